@@ -1,0 +1,82 @@
+"""Local metres and WGS84 degrees."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyproj import Geod
+
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+
+STEADY = settings(derandomize=True, deadline=None)
+GEOD = Geod(ellps="WGS84")
+
+latitudes = st.floats(-90, 90)
+longitudes = st.floats(-180, 180)
+metres = st.floats(-100_000, 100_000)
+
+
+@STEADY
+@given(latitudes, longitudes, metres, metres)
+def test_there_and_back_is_the_same_place(latitude, longitude, east, north):
+    frame = LocalFrame(latitude, longitude)
+    there = frame.to_geodetic([east, north])
+    back = frame.to_local(*there)
+    assert back == pytest.approx([east, north], abs=1e-5)
+    assert -180 <= there[1] < 180
+    assert -90 <= there[0] <= 90
+
+
+@STEADY
+@given(st.floats(-89, 89), longitudes, st.floats(0.1, 100_000), st.floats(0, 2 * np.pi))
+def test_distance_and_azimuth_from_the_origin_are_geodesic(latitude, longitude, distance, azimuth):
+    east, north = distance * np.sin(azimuth), distance * np.cos(azimuth)
+    lat, lon = LocalFrame(latitude, longitude).to_geodetic([east, north])
+    forward, _, length = GEOD.inv(longitude, latitude, lon, lat)
+    assert length == pytest.approx(distance, abs=1e-5)
+    turn = (np.radians(forward) - azimuth + np.pi) % (2 * np.pi) - np.pi
+    assert abs(turn) * distance < 1e-4
+
+
+def test_one_metre_at_the_equator_and_at_45_degrees():
+    # Radii of curvature of WGS84: a and b²/a at the equator; textbook values at 45 degrees.
+    lat, lon = LocalFrame(0.0, 0.0).to_geodetic([[1.0, 0.0], [0.0, 1.0]])
+    assert lon[0] == pytest.approx(1 / 111_319.4908, rel=1e-9)
+    assert lat[1] == pytest.approx(1 / 110_574.2758, rel=1e-9)
+    lat, lon = LocalFrame(45.0, 10.0).to_geodetic([[1.0, 0.0], [0.0, 1.0]])
+    assert lon[0] - 10 == pytest.approx(1 / 78_846.8351, rel=1e-7)
+    assert lat[1] - 45 == pytest.approx(1 / 111_131.7774, rel=1e-7)
+
+
+def test_shapes_follow_the_input():
+    frame = LocalFrame(47.4, 8.5)
+    lat, lon = frame.to_geodetic(np.zeros((3, 4, 2)))
+    assert lat.shape == lon.shape == (3, 4)
+    assert frame.to_local(lat, lon).shape == (3, 4, 2)
+    assert frame.to_local(47.4, [8.5, 8.6]).shape == (2, 2)
+    lat, lon = frame.to_geodetic([0.0, 0.0])
+    assert lat.shape == lon.shape == ()
+    assert (float(lat), float(lon)) == pytest.approx((47.4, 8.5), abs=1e-12)
+
+
+@pytest.mark.parametrize("longitude", [180.0, -180.0, 179.9999])
+def test_the_antimeridian_is_no_edge(longitude):
+    frame = LocalFrame(-17.0, longitude)
+    _, lon = frame.to_geodetic([[-500.0, 0.0], [500.0, 0.0]])
+    assert lon[0] > 179
+    assert lon[1] < -179
+    assert frame.to_local(-17.0, lon)[:, 0] == pytest.approx([-500, 500], abs=0.01)
+
+
+@pytest.mark.parametrize("pole", [90.0, -90.0])
+def test_at_the_poles_distances_still_hold(pole):
+    lat, lon = LocalFrame(pole, 0.0).to_geodetic([[0.0, 0.0], [300.0, 400.0]])
+    assert lat[0] == pole
+    assert GEOD.inv(0.0, pole, lon[1], lat[1])[2] == pytest.approx(500.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("origin", [(90.1, 0.0), (np.nan, 0.0), (0.0, np.inf)])
+def test_an_origin_off_the_earth_is_refused(origin):
+    with pytest.raises(InputError, match="expected a latitude from -90 to 90"):
+        LocalFrame(*origin)
