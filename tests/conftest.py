@@ -1,0 +1,62 @@
+"""What all tests share."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, settings
+
+from faao_mav.plan import Plan, parse_plan
+
+settings.register_profile(
+    "deterministic",
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
+settings.load_profile("deterministic")
+
+MISSIONS = Path(__file__).parent.parent / "missions"
+
+SMALL = """
+site: {origin: {latitude: -35.363262, longitude: 149.165237, elevation: 584.0}}
+vehicle: {max_speed: 20, max_acceleration: 5}
+flight:
+  start: [0, 50]
+  end: [50, 0]
+  altitude: 40
+  duration: 10
+  time_step: 0.5
+radio:
+  base_station: {position: [0, 0], power_dbm: 10}
+  relay: {power_dbm: 10, noise_dbm: -80}
+  ground_user: {position: [60, 60], noise_dbm: -80}
+"""
+"""Twenty slots in the active region: solved in a second."""
+
+MakePlan = Callable[..., Plan]
+
+
+def edited(text: str, changes: dict[str, Any]) -> str:
+    """Return the YAML `text` with the values at the dotted keys of `changes` replaced."""
+    data = yaml.safe_load(text)
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        section = data
+        for key in parents:
+            section = section.setdefault(key, {})
+        section[last] = value
+    return yaml.safe_dump(data)
+
+
+@pytest.fixture(scope="session")
+def small_plan() -> MakePlan:
+    """Make the small plan with some keys replaced: `small_plan({"radio.seed": 1})`."""
+
+    def make(changes: dict[str, Any] | None = None) -> Plan:
+        return parse_plan(edited(SMALL, changes or {}))
+
+    return make

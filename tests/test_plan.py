@@ -1,0 +1,313 @@
+"""`plan.yaml`: what is read, and what bad input gets."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from conftest import MISSIONS, SMALL, edited
+from hypothesis import given
+from hypothesis import strategies as st
+
+from faao_mav.errors import PlanError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.plan import Plan, parse_plan, read_plan
+
+NAN, INF = float("nan"), float("inf")
+
+
+def refused(changes: dict[str, Any]) -> str:
+    with pytest.raises(PlanError) as caught:
+        parse_plan(edited(SMALL, changes), "small.yaml")
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["paper", "paper_active", "copter_relay"])
+def test_sample_plans_are_valid(name: str) -> None:
+    plan = read_plan(MISSIONS / f"{name}.yaml")
+    assert plan.text == (MISSIONS / f"{name}.yaml").read_text()
+
+
+def test_the_paper_plan_is_section_iv() -> None:
+    plan = read_plan(MISSIONS / "paper.yaml")
+    flight, radio, vehicle = plan.flight, plan.radio, plan.vehicle
+    assert (flight.start, flight.end, flight.altitude) == ((0, 350), (350, 0), 100)
+    assert (flight.duration, flight.time_step, flight.slots) == (50, 0.2, 250)
+    assert flight.start_velocity is None
+    assert flight.end_velocity is None
+    assert not flight.bound_first_acceleration
+    assert (vehicle.max_speed, vehicle.max_acceleration) == (100, 5)
+    assert radio.base_station.position == (0, 0)
+    assert radio.ground_user.position == (300, 300)
+    for station in (radio.base_station, radio.relay, radio.ground_user):
+        assert station.antennas == 2
+    assert radio.base_station.power == radio.relay.power == pytest.approx(0.1)
+    assert radio.relay.noise == radio.ground_user.noise == pytest.approx(1e-15)
+    assert radio.reference_gain == pytest.approx(1e-5)
+    assert radio.rician_factor == 3
+    assert radio.modulation == "bpsk"
+
+
+def test_defaults_and_units() -> None:
+    plan = parse_plan(
+        """
+        site: {origin: {latitude: 47.4, longitude: 8.5, elevation: 400}}
+        vehicle: {max_speed: 8, max_acceleration: 1.5}
+        flight: {start: [0, 1], end: [2, 3], altitude: 50, duration: 30}
+        radio: {base_station: {position: [0, 0]}, ground_user: {position: [5, 5]}}
+        """
+    )
+    assert plan.flight.slots == 150
+    assert plan.flight.start_velocity == plan.flight.end_velocity == (0, 0)
+    assert plan.flight.bound_first_acceleration
+    assert plan.radio.base_station.power == pytest.approx(0.1)
+    assert plan.radio.ground_user.noise == pytest.approx(1e-11)
+    assert plan.radio.line_of_sight == "ula"
+    assert (plan.optimizer.tolerance, plan.optimizer.max_iterations) == (1e-4, 50)
+    assert (plan.mission.on_finish, plan.mission.path_tolerance) == ("rtl", 2.0)
+    assert plan.vehicle.autopilot == "ardupilot"
+
+
+def test_degrees_become_local_metres() -> None:
+    frame = LocalFrame(-35.363262, 149.165237)
+    latitude, longitude = frame.to_geodetic([30.0, 40.0])
+    where = {"latitude": float(latitude), "longitude": float(longitude)}
+    plan = parse_plan(edited(SMALL, {"flight.start": where}))
+    assert plan.flight.start == pytest.approx((30, 40), abs=1e-6)
+
+
+@pytest.mark.parametrize("written", ["1e-4", "1.0e-4", "0.0001", "1E-4"])
+def test_exponents_are_numbers(written: str) -> None:
+    plan = parse_plan(SMALL + f"optimizer: {{tolerance: {written}}}\n")
+    assert plan.optimizer.tolerance == 1e-4
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({"flight.duration": 10.2}, ["flight.duration", "10.2 s", "whole number", "10 or 10.5"]),
+        ({"flight.duration": NAN}, ["flight.duration", "nan", "finite", "seconds"]),
+        ({"flight.duration": INF}, ["flight.duration", "inf", "finite"]),
+        ({"flight.duration": -3}, ["flight.duration", "-3", "above 0"]),
+        ({"flight.duration": "10 s"}, ["flight.duration", "'10 s'", "seconds"]),
+        ({"flight.duration": 1.0}, ["flight.duration", "2 step", "at least 3"]),
+        ({"flight.time_step": 1e-7}, ["flight.duration", "100,000,000 steps", "100,000"]),
+        ({"flight.altitude": 0}, ["flight.altitude", "above 0", "no bound"]),
+        ({"flight.altitude": -40}, ["flight.altitude", "-40", "above 0"]),
+        ({"radio.relay.antennas": 0}, ["radio.relay.antennas", "0", "1 to 64"]),
+        ({"radio.relay.antennas": True}, ["radio.relay.antennas", "True"]),
+        ({"radio.base_station.antennas": 2.5}, ["radio.base_station.antennas", "2.5"]),
+        ({"radio.modulation": "QPSK"}, ["radio.modulation", "'QPSK'", "qpsk"]),
+        ({"radio.modulaton": "qpsk"}, ["radio.modulaton", "did you mean modulation?"]),
+        ({"fligth": {}}, ["fligth", "did you mean flight?"]),
+        ({"altitude": 40}, ["altitude", "belongs at flight.altitude"]),
+        ({"flight.start": [1]}, ["flight.start", "[1]", "[east, north]"]),
+        ({"flight.start": [NAN, 0]}, ["flight.start", "nan", "finite"]),
+        ({"flight.end": [5e5, 0]}, ["flight.end", "100 km"]),
+        (
+            {"flight.start": {"latitude": 149.165, "longitude": -35.363}},
+            ["flight.start", "149.165", "look swapped"],
+        ),
+        (
+            {"site.origin": {"latitude": 149.165, "longitude": -35.363}},
+            ["site.origin", "149.165", "look swapped"],
+        ),
+        (
+            {"flight.start": {"latitude": 35.363, "longitude": 149.165}},
+            ["flight.start", "km from site.origin", "south and west are negative"],
+        ),
+        (
+            {"flight.start": {"latitude": 10.0, "longitude": 20.0}},
+            ["flight.start", "km from site.origin", "100 km"],
+        ),
+        ({"flight.start": {"latitude": 10.0}}, ["flight.start", "latitude: degrees"]),
+        ({"flight.start_velocity": [30, 0]}, ["flight.start_velocity", "30 m/s", "20 m/s"]),
+        ({"flight.end_velocity": "slow"}, ["flight.end_velocity", "'slow'", "hover, free"]),
+        ({"vehicle.parameters": {"WPNAV_JERK": "x"}}, ["vehicle.parameters.WPNAV_JERK", "number"]),
+        ({"radio.base_station.power_dbm": 1e6}, ["radio.base_station.power_dbm", "100 dBm"]),
+        ({"optimizer.tolerance": 0}, ["optimizer.tolerance", "above 0"]),
+        ({"radio.seed": -1}, ["radio.seed", "-1", "whole number"]),
+        ({"flight": None}, ["flight", "null", "start, end"]),
+        ({"fence.exclusion": [{"center": [0, 0], "radius": -1}]}, ["fence.exclusion[0].radius"]),
+        ({"fence.inclusion": [[0, 0], [1, 1]]}, ["fence.inclusion", "three corners"]),
+    ],
+)
+def test_message_names_key_value_and_what_is_accepted(
+    changes: dict[str, Any], parts: list[str]
+) -> None:
+    message = refused(changes)
+    assert message.startswith("small.yaml: ")
+    assert [part for part in parts if part not in message] == []
+    assert message.count("\n") == 0
+
+
+def test_positions_with_swapped_degrees_in_range_are_recognised() -> None:
+    origin = {"latitude": 47.4, "longitude": 8.5, "elevation": 400.0}
+    message = refused({"site.origin": origin, "flight.start": {"latitude": 8.5, "longitude": 47.4}})
+    assert "look swapped" in message
+
+
+@pytest.mark.parametrize("key", ["site.origin", "flight.start", "flight.end", "flight.duration",
+                                 "flight.altitude", "vehicle.max_speed",
+                                 "vehicle.max_acceleration", "radio.base_station.position",
+                                 "radio.ground_user.position"])  # fmt: skip
+def test_required_keys(key: str) -> None:
+    data = yaml.safe_load(SMALL)
+    *parents, last = key.split(".")
+    section = data
+    for parent in parents:
+        section = section[parent]
+    del section[last]
+    with pytest.raises(PlanError, match=rf"{key}: missing; give "):
+        parse_plan(yaml.safe_dump(data))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("optimizer.method", "direct"),
+        ("radio.fading", "ergodic"),
+        ("radio.causal", True),
+        ("vehicle.min_speed", 3.0),
+        ("vehicle.type", "plane"),
+        ("mission.parameters", "recommend"),
+        ("fence", {"inclusion": [[0, 0], [9, 0], [9, 9]]}),
+    ],
+)
+def test_what_does_not_work_yet_says_so(key: str, value: object) -> None:
+    assert f"{key}: " in (message := refused({key: value}))
+    assert "does not work yet" in message
+
+
+def test_too_short_a_duration_says_how_long_it_takes() -> None:
+    message = refused({"flight.end": [300, 50]})
+    assert "300 m, which takes at least 19.5 s at 20 m/s and 5 m/s^2" in message
+    plan = parse_plan(edited(SMALL, {"flight.end": [300, 50], "flight.duration": 19.5}))
+    assert plan.flight.duration == 19.5
+
+
+@pytest.mark.parametrize(
+    ("velocity", "bounded", "needed"),
+    [("free", True, 15.5), ("hover", False, 18.0), ([20, 0], True, 17.5)],
+)
+def test_shortest_duration_depends_on_the_ends(
+    velocity: object, bounded: bool, needed: float
+) -> None:
+    # 300 m at 20 m/s take 15 s and a step at w_F; each ramp of 4 s costs 2 s more, a jump none
+    changes = {
+        "flight.end": [300, 50],
+        "flight.start_velocity": velocity,
+        "flight.end_velocity": "free" if velocity == "free" else "hover",
+        "flight.bound_first_acceleration": bounded,
+        "flight.duration": 5,
+    }
+    assert f"at least {needed:g} s" in refused(changes)
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("", "not nothing"),
+        ("- 1\n", "not list"),
+        ("flight: [1\n", "line 2"),
+        ("a: 1\nb: 2\na: 3\n", "line 3, column 1: not valid YAML: the key 'a' stands twice"),
+        ("a: &x 1\nb: *x\n", "line 2: aliases"),
+        ("{" * 1000, "nested more than 20 deep"),
+        ("? [a]\n: 1\n", "a key has to be a word"),
+        ("a: !!python/object:os.system 1\n", "line 1"),
+        ("a: " + "9" * 5000, "thousands of digits"),
+        ("a\x00b", "not valid YAML"),
+        ("a: 1\n---\nb: 2\n", "line 2"),
+        ("x" * 1_000_001, "at most 1,000,000"),
+    ],
+)
+def test_text_that_is_no_plan(text: str, part: str) -> None:
+    with pytest.raises(PlanError, match=r"^p\.yaml: ") as caught:
+        parse_plan(text, "p.yaml")
+    assert part in str(caught.value)
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    with pytest.raises(PlanError, match=r"absent\.yaml: cannot be read: No such file"):
+        read_plan(tmp_path / "absent.yaml")
+    with pytest.raises(PlanError, match="cannot be read"):
+        read_plan(tmp_path)
+    (tmp_path / "latin.yaml").write_bytes(b"name: \xff\n")
+    with pytest.raises(PlanError, match="not UTF-8"):
+        read_plan(tmp_path / "latin.yaml")
+
+
+def test_byte_order_mark_and_crlf_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "plan.yaml"
+    path.write_bytes(b"\xef\xbb\xbf" + SMALL.replace("\n", "\r\n").encode())
+    assert read_plan(path).flight.slots == 20
+
+
+def test_method_replaces_the_plans() -> None:
+    with pytest.raises(PlanError, match=r"optimizer\.method: 'magic' is not accepted"):
+        parse_plan(SMALL, method="magic")
+    plan = parse_plan(SMALL + "optimizer: {method: direct}\n", method="algorithm1")
+    assert plan.optimizer.method == "algorithm1"
+    assert parse_plan(plan.text).optimizer == plan.optimizer
+
+
+LEAVES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(10**20), 10**20),
+    st.floats(),
+    st.text(max_size=8),
+    st.sampled_from(["hover", "free", "qpsk", "ula", "realization", "rtl"]),
+    st.lists(st.floats(), max_size=3),
+    st.dictionaries(st.sampled_from(["latitude", "longitude", "x"]), st.floats(), max_size=3),
+)
+
+
+@st.composite
+def mutated_plans(draw: st.DrawFn) -> str:
+    """The small plan with a few keys removed, added, or given another value."""
+    data = yaml.safe_load(SMALL)
+    for _ in range(draw(st.integers(1, 3))):
+        section = data
+        while True:
+            key = draw(st.sampled_from([*sorted(section, key=str), "extra"]))
+            inner = section.get(key)
+            if not isinstance(inner, dict) or not inner or draw(st.booleans()):
+                break
+            section = inner
+        if draw(st.integers(0, 3)) == 0:
+            section.pop(key, None)
+            if not section:
+                break
+        else:
+            section[key] = draw(LEAVES)
+    return yaml.safe_dump(data)
+
+
+@given(mutated_plans())
+def test_any_mutation_gives_a_plan_or_one_error(text: str) -> None:
+    try:
+        plan = parse_plan(text)
+    except PlanError as error:
+        assert str(error).startswith("plan: ")
+        assert len(str(error)) < 5000
+    else:
+        assert isinstance(plan, Plan)
+        assert 3 <= plan.flight.slots <= 100_000
+        assert math.isfinite(plan.radio.relay.noise)
+        assert plan.radio.relay.noise > 0
+
+
+@given(st.text(max_size=300) | st.binary(max_size=300).map(lambda b: b.decode("latin-1")))
+def test_any_text_gives_a_plan_or_one_error(text: str) -> None:
+    with pytest.raises(PlanError):
+        parse_plan(text)
+
+
+@given(st.integers(0, len(SMALL)), st.integers(0, 20), st.text(max_size=10))
+def test_any_cut_or_insertion_gives_a_plan_or_one_error(at: int, cut: int, new: str) -> None:
+    try:
+        parse_plan(SMALL[:at] + new + SMALL[at + cut :])
+    except PlanError as error:
+        assert str(error).startswith("plan: ")
