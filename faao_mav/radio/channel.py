@@ -1,0 +1,112 @@
+"""The channel of each hop, (1) and (2): path gain, line of sight, fading."""
+
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InputError
+
+
+def path_gain(w: Real, p: Real, altitude: float, rho_0: float) -> Real:
+    """Return the power gain rho_0 d^-2 of (1) and (2), d² = ||w - p||² + H².
+
+    Args:
+        w: (..., 2) horizontal positions of the UAV, m.
+        p: (..., 2) position of the station on the ground, m.
+        altitude: H, m above the station.
+        rho_0: gain at 1 m, linear.
+
+    Returns:
+        (...) linear gains.
+
+    >>> path_gain(np.array([30.0, 0.0]), np.array([0.0, 0.0]), 40.0, 1e-5)
+    np.float64(4e-09)
+    """
+    away = np.asarray(w, dtype=np.float64) - np.asarray(p, dtype=np.float64)
+    return np.asarray(rho_0 / (np.sum(away**2, axis=-1) + altitude**2))[()]
+
+
+def displacement(w: Real, p: Real, altitude: float) -> Real:
+    """Return the vector from a ground station to the UAV, (..., 3) m east, north, up.
+
+    It points along the wave on the BS-UAV link; on the UAV-GU link the wave goes the other way,
+    along its negative.
+
+    >>> displacement(np.array([30.0, 0.0]), np.array([10.0, 5.0]), 40.0)
+    array([20., -5., 40.])
+    """
+    away = np.asarray(w, dtype=np.float64) - np.asarray(p, dtype=np.float64)
+    return np.concatenate([away, np.full((*away.shape[:-1], 1), float(altitude))], axis=-1)
+
+
+def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
+    """Return H^LoS of uniform linear arrays half a wavelength apart, both lying along east.
+
+    Entry (l, m) is exp(-jπ (l - m) u): moving the receiving element east along the wave lengthens
+    its way, moving the transmitting one shortens it. u is the east component of the unit vector
+    along the wave. The phase common to all entries, 2π d/λ, changes no rate and is left out.
+
+    Args:
+        path: (..., 3) vector from transmitter to receiver in any unit, far longer than the arrays:
+            ``displacement`` for BS to UAV, its negative for UAV to GU.
+        receive: number of receiving antennas.
+        transmit: number of transmitting antennas.
+
+    Returns:
+        (..., receive, transmit), unit modulus, rank one.
+
+    Raises:
+        InputError: a path has no length.
+
+    >>> np.round(line_of_sight_ula(np.array([1.0, 0.0, 0.0]), 2, 2), 12).real
+    array([[ 1., -1.],
+           [-1.,  1.]])
+    """
+    path = np.asarray(path, dtype=np.float64)
+    length = np.linalg.norm(path, axis=-1)
+    if not np.all(length > 0.0):
+        raise InputError("transmitter and receiver are in the same place: no direction between")
+    u = np.asarray(path[..., 0] / length)
+    steps = np.arange(receive)[:, None] - np.arange(transmit)
+    entries: Complex = np.exp(-1j * np.pi * steps * u[..., None, None])
+    return entries
+
+
+def line_of_sight_all_ones(receive: int, transmit: int) -> Complex:
+    """Return an H^LoS of ones, (receive, transmit): every pair of elements in phase.
+
+    >>> line_of_sight_all_ones(1, 2).real
+    array([[1., 1.]])
+    """
+    return np.ones((receive, transmit), dtype=np.complex128)
+
+
+def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) -> Complex:
+    """Draw H^NLoS for each slot: independent CN(0, 1) entries, (slots, receive, transmit).
+
+    >>> rayleigh(np.random.default_rng(1), 3, 2, 4).shape
+    (3, 2, 4)
+    """
+    parts = rng.standard_normal((2, slots, receive, transmit))
+    drawn: Complex = (parts[0] + 1j * parts[1]) * np.sqrt(0.5)
+    return drawn
+
+
+def rician(los: Complex, nlos: Complex, K: float) -> Complex:
+    """Combine √(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS, the bracket of (1) and (2).
+
+    Args:
+        los: (..., N_r, N_t) line-of-sight part.
+        nlos: (..., N_r, N_t) scattered part; the leading axes broadcast.
+        K: Rician factor, linear, at least 0; infinity gives the line of sight alone.
+
+    Raises:
+        InputError: K is negative or not a number.
+
+    >>> float(rician(np.ones((1, 1)), np.zeros((1, 1)), 3.0)[0, 0]) ** 2
+    0.7499999999999999
+    """
+    if not K >= 0.0:
+        raise InputError(f"the Rician factor K must be at least 0, got {K}")
+    scattered = 1.0 / (1.0 + K)
+    combined: Complex = np.sqrt(1.0 - scattered) * los + np.sqrt(scattered) * nlos
+    return combined

@@ -1,0 +1,180 @@
+"""Finite alphabets, and the differences between their vectors merged into classes.
+
+Each alphabet is kept unscaled on an integer grid (on the unit circle for 8-PSK), where sums,
+differences and products of symbols are exact, and is scaled to unit energy only when handed out.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InputError
+
+MODULATIONS: tuple[str, ...] = ("bpsk", "qpsk", "8psk", "16qam", "64qam")
+
+# 8-PSK alone has irrational coordinates; far below their spacing, far above rounding.
+_DECIMALS = 9
+
+
+def _square_qam(side: int) -> Complex:
+    levels = np.arange(1.0 - side, side, 2.0)
+    return (levels[:, None] + 1j * levels).ravel()
+
+
+def _8psk() -> Complex:
+    r = np.sqrt(0.5)
+    return np.array([1, r + 1j * r, 1j, -r + 1j * r, -1, -r - 1j * r, -1j, r - 1j * r])
+
+
+_GRIDS: dict[str, Callable[[], Complex]] = {
+    "bpsk": lambda: np.array([1.0 + 0j, -1.0]),
+    "qpsk": lambda: _square_qam(2),
+    "8psk": _8psk,
+    "16qam": lambda: _square_qam(4),
+    "64qam": lambda: _square_qam(8),
+}
+
+
+@lru_cache
+def _grid(modulation: str) -> tuple[Complex, float]:
+    """Return the unscaled alphabet and the factor that gives it unit mean energy."""
+    if modulation not in _GRIDS:
+        raise InputError(f"unknown modulation {modulation!r}; known are {', '.join(MODULATIONS)}")
+    grid = _GRIDS[modulation]()
+    return grid, float(1.0 / np.sqrt(np.mean(np.abs(grid) ** 2)))
+
+
+def _check_antennas(antennas: int) -> None:
+    if antennas < 1:
+        raise InputError(f"a transmitter needs at least one antenna, got {antennas}")
+
+
+def _product(values: Complex, antennas: int) -> Complex:
+    """Return all vectors with entries from ``values``, the last entry running fastest."""
+    index = np.indices((len(values),) * antennas).reshape(antennas, -1)
+    return np.ascontiguousarray(values[index].T)
+
+
+@lru_cache
+def constellation(modulation: str) -> Complex:
+    """Return the symbols of an alphabet, (rho,) complex, mean energy 1; read-only.
+
+    BPSK is ±1, QPSK (±1 ± j)/√2, 8-PSK the eighth roots of 1, 16- and 64-QAM square.
+
+    Raises:
+        InputError: the modulation is not one of ``MODULATIONS``.
+
+    >>> constellation("bpsk").real
+    array([ 1., -1.])
+    """
+    grid, scale = _grid(modulation)
+    symbols: Complex = grid * scale
+    symbols.setflags(write=False)
+    return symbols
+
+
+@lru_cache(maxsize=16)
+def symbol_vectors(modulation: str, antennas: int) -> Complex:
+    """Return all input vectors x of (3), (rho**N, N) complex with E[x x^H] = I; read-only.
+
+    Raises:
+        InputError: unknown modulation, or fewer than one antenna.
+
+    >>> symbol_vectors("bpsk", 2).real.tolist()
+    [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]
+    """
+    _check_antennas(antennas)
+    vectors = _product(constellation(modulation), antennas)
+    vectors.setflags(write=False)
+    return vectors
+
+
+@dataclass(frozen=True, eq=False)
+class DifferenceClasses:
+    """The non-zero differences u_mk = x_m - x_k of (7), merged up to a common unit phase.
+
+    ||H P u|| is the same for u and e^{jφ} u whatever H and P are, so a sum over all rho^{2N} pairs
+    (m, k) is a sum over these classes weighted by ``multiplicity``, plus ``symbols`` pairs m = k.
+
+    Attributes:
+        vectors: (k, N) complex, one representative u of each class.
+        multiplicity: (k,) how many ordered pairs (m, k) lie in each class.
+        symbols: rho**N, the number of input vectors; also the size of the zero class.
+        bits: N log2(rho), what one channel use carries at most.
+    """
+
+    vectors: Complex
+    multiplicity: Real
+    symbols: int
+    bits: float
+
+    @property
+    def weight(self) -> Real:
+        """The probability of each class when m and k are drawn at random, (k,)."""
+        return self.multiplicity / float(self.symbols) ** 2
+
+
+def _scalar_differences(grid: Complex) -> tuple[Complex, Real]:
+    """Return the distinct differences of two symbols, zero too, and how many pairs give each."""
+    pairs = np.round((grid[:, None] - grid).ravel(), _DECIMALS) + 0.0  # + 0.0 turns -0 into 0
+    _, first, counts = np.unique(pairs, return_index=True, return_counts=True)
+    return (grid[:, None] - grid).ravel()[first], counts.astype(np.float64)
+
+
+@lru_cache
+def difference_vector_count(modulation: str, antennas: int) -> int:
+    """Return how many distinct difference vectors ``difference_classes`` has to go through.
+
+    Its time and memory are proportional to this number, which is known without allocating.
+
+    Raises:
+        InputError: unknown modulation, or fewer than one antenna.
+
+    >>> difference_vector_count("64qam", 2), difference_vector_count("64qam", 4)
+    (50625, 2562890625)
+    """
+    _check_antennas(antennas)
+    grid, _ = _grid(modulation)
+    return int(len(_scalar_differences(grid)[0]) ** antennas)
+
+
+@lru_cache(maxsize=16)
+def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
+    """Merge the differences of all pairs of input vectors into classes.
+
+    Two vectors differ by a unit phase exactly if u u^H is the same, so the entries of u u^H,
+    exact on the integer grids and rounded for 8-PSK, identify a class. Pairs are never enumerated:
+    the distinct differences of single symbols are counted and combined over the antennas.
+
+    Raises:
+        InputError: unknown modulation, or fewer than one antenna.
+
+    >>> classes = difference_classes("bpsk", 2)
+    >>> classes.multiplicity.tolist(), classes.symbols, classes.bits
+    ([4.0, 4.0, 2.0, 2.0], 4, 2.0)
+    """
+    _check_antennas(antennas)
+    grid, scale = _grid(modulation)
+    values, counts = _scalar_differences(grid)
+    u = _product(values, antennas)
+    pairs = _product(counts.astype(np.complex128), antennas).real.prod(axis=1)
+
+    outer = [u[:, i] * u[:, j].conj() for i, j in combinations_with_replacement(range(antennas), 2)]
+    keys = np.round(np.column_stack([part for o in outer for part in (o.real, o.imag)]), _DECIMALS)
+    _, first, label = np.unique(keys + 0.0, axis=0, return_index=True, return_inverse=True)
+    multiplicity: Real = np.bincount(label.ravel(), weights=pairs).astype(np.float64)
+    vectors = u[first] * scale
+
+    # Nearest first: the classes that decide the rate at high SNR come together at the front.
+    energy = np.round(np.sum(np.abs(vectors) ** 2, axis=1), _DECIMALS)
+    order = np.argsort(energy, kind="stable")[1:]  # without the zero vector, alone at energy 0
+    vectors, multiplicity = vectors[order], multiplicity[order]
+    vectors.setflags(write=False)
+    multiplicity.setflags(write=False)
+    return DifferenceClasses(
+        vectors, multiplicity, len(grid) ** antennas, antennas * float(np.log2(len(grid)))
+    )

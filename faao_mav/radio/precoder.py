@@ -1,0 +1,237 @@
+"""Linear precoders, all of power W: tr(P^H P) = W.
+
+The classical schemes are written for as many receiving as transmitting antennas. P stays N_t x N_t
+in every case:
+
+- N_r < N_t: columns of zeros are appended; the streams beyond N_r have nothing to be sent on.
+- N_r > N_t: H is replaced by (H^H H)^{1/2}, its right polar factor. They differ by a rotation of
+  what is received, which no rate notices, and no stream is lost.
+
+Where H is zero there is no direction to prefer, and P is the scaled identity.
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TypeAlias
+
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InputError
+
+Scheme: TypeAlias = Callable[[Complex, float, float], Complex]
+
+# Singular values below this fraction of the largest are rounding, not channel.
+_RANK = 1e-10
+
+
+def _check_positive(name: str, value: float) -> None:
+    if not value > 0.0:
+        raise InputError(f"the {name} must be above 0, got {value}")
+
+
+def _with_power(P: Complex, power: float) -> Complex:
+    """Scale each (N_t, N_t) matrix to tr(P^H P) = power, zero matrices becoming the identity."""
+    _check_positive("transmit power", power)
+    largest = np.max(np.abs(P), axis=(-2, -1), keepdims=True)
+    # Divided by its largest entry first, no P is too small or too large to be squared.
+    P = np.where(largest > 0.0, P / np.where(largest > 0.0, largest, 1.0), np.eye(P.shape[-1]))
+    energy = np.sum(P.real**2 + P.imag**2, axis=(-2, -1), keepdims=True)
+    return np.asarray(P * np.sqrt(power / energy), dtype=np.complex128)
+
+
+def _svd(H: Complex) -> tuple[Complex, Real, Complex]:
+    """U, s, V^H with U replaced by V where N_r > N_t: the right polar factor is V s V^H."""
+    receive, transmit = np.shape(H)[-2:]
+    U, s, Vh = np.linalg.svd(np.asarray(H, dtype=np.complex128), full_matrices=False)
+    if receive > transmit:
+        U = np.conj(np.swapaxes(Vh, -1, -2))
+    return U, s, Vh
+
+
+def _from_gains(U: Complex, gains: Real, Vh: Complex, power: float) -> Complex:
+    """V diag(gains) U^H, widened to N_t columns and scaled to the power."""
+    V = np.conj(np.swapaxes(Vh, -1, -2))
+    P = (V * gains[..., None, :]) @ np.conj(np.swapaxes(U, -1, -2))
+    missing = P.shape[-2] - P.shape[-1]
+    return _with_power(np.pad(P, [(0, 0)] * (P.ndim - 1) + [(0, missing)]), power)
+
+
+def mrt(H: Complex, power: float) -> Complex:
+    """Return maximum-ratio transmission, P ∝ H^H.
+
+    Args:
+        H: (..., N_r, N_t) channels.
+        power: W, W.
+
+    Returns:
+        (..., N_t, N_t), tr(P^H P) = W; for N_r ≠ N_t see the module.
+
+    Raises:
+        InputError: the power is not above 0.
+
+    >>> mrt(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0).real.round(12)
+    array([[3., 0.],
+           [0., 4.]])
+    """
+    U, s, Vh = _svd(H)
+    return _from_gains(U, s, Vh, power)
+
+
+def zf(H: Complex, power: float) -> Complex:
+    """Return zero forcing, P ∝ H^+, the pseudo-inverse: H P is diagonal.
+
+    Directions in which H is zero to within rounding are left out.
+
+    Args:
+        H: (..., N_r, N_t) channels.
+        power: W, W.
+
+    Returns:
+        (..., N_t, N_t), tr(P^H P) = W; for N_r ≠ N_t see the module.
+
+    Raises:
+        InputError: the power is not above 0.
+
+    >>> zf(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0).real.round(12)
+    array([[4., 0.],
+           [0., 3.]])
+    """
+    U, s, Vh = _svd(H)
+    kept = s > _RANK * s[..., :1]
+    gains = np.where(kept, s[..., :1] / np.where(kept, s, 1.0), 0.0)
+    return _from_gains(U, gains, Vh, power)
+
+
+def mmse(H: Complex, power: float, noise: float) -> Complex:
+    """Return the regularised inverse, P ∝ H^H (H H^H + (N_r σ²/W) I)^-1.
+
+    It tends to zero forcing as the noise vanishes and to maximum ratio as it takes over. Source:
+    Peel, Hochwald and Swindlehurst, "A vector-perturbation technique for near-capacity
+    multiantenna multiuser communication, part I", IEEE Trans. Commun. 53 (2005).
+
+    Args:
+        H: (..., N_r, N_t) channels.
+        power: W, W.
+        noise: σ², W.
+
+    Returns:
+        (..., N_t, N_t), tr(P^H P) = W; for N_r ≠ N_t see the module (N_r is then min(N_r, N_t)).
+
+    Raises:
+        InputError: the power or the noise is not above 0.
+
+    >>> mmse(np.array([[1.0, 0.0], [0.0, 3.0]]), 2.0, 3.0).real.round(12)
+    array([[1., 0.],
+           [0., 1.]])
+    """
+    _check_positive("transmit power", power)
+    _check_positive("noise power", noise)
+    U, s, Vh = _svd(H)
+    return _from_gains(U, s / (s**2 + s.shape[-1] * noise / power), Vh, power)
+
+
+def waterfilling(H: Complex, power: float, noise: float) -> Complex:
+    """Return the optimum for Gaussian inputs, P = V diag(√p) with H = U S V^H.
+
+    p_i = max(0, μ - σ²/s_i²), the water level μ such that Σ p_i = W.
+
+    Args:
+        H: (..., N_r, N_t) channels.
+        power: W, W.
+        noise: σ², W.
+
+    Returns:
+        (..., N_t, N_t), tr(P^H P) = W.
+
+    Raises:
+        InputError: the power or the noise is not above 0.
+
+    >>> waterfilling(np.diag([1.0, 0.5]), 5.0, 1.0).real.round(12) ** 2
+    array([[4., 0.],
+           [0., 1.]])
+    """
+    _check_positive("transmit power", power)
+    _check_positive("noise power", noise)
+    _, s, Vh = np.linalg.svd(np.asarray(H, dtype=np.complex128), full_matrices=True)
+    # Floors come lowest first. With the first r in use the level is (W + their sum) / r, and the
+    # right r is the last whose highest floor lies below its level. The floor of a dead mode is
+    # infinite.
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        floor = noise / s**2
+        level = (power + np.cumsum(floor, axis=-1)) / np.arange(1, s.shape[-1] + 1)
+        active = np.isfinite(floor) & (floor < level)
+        r = np.maximum(1, np.sum(active, axis=-1, keepdims=True))
+        p = np.where(active, np.take_along_axis(level, r - 1, axis=-1) - floor, 0.0)
+    p = np.pad(p, [(0, 0)] * (p.ndim - 1) + [(0, Vh.shape[-1] - p.shape[-1])])
+    V = np.conj(np.swapaxes(Vh, -1, -2))
+    return _with_power(V * np.sqrt(p)[..., None, :], power)
+
+
+def _check_two(H: Complex) -> None:
+    if np.shape(H)[-1] != 2:
+        raise InputError(f"this optimum is for two transmitting antennas, not {np.shape(H)[-1]}")
+
+
+def bpsk_two_antennas(H: Complex, power: float) -> Complex:
+    """Return the precoder of highest cutoff rate for BPSK on two antennas.
+
+    P = √(W/2) v_1 [1, j]: both streams in quadrature on v_1, the dominant right singular vector
+    of H. Derived for this project and never beaten by numerical search.
+
+    Args:
+        H: (..., N_r, 2) channels.
+        power: W, W.
+
+    Returns:
+        (..., 2, 2), tr(P^H P) = W.
+
+    Raises:
+        InputError: N_t is not 2, or the power is not above 0.
+
+    >>> np.abs(bpsk_two_antennas(np.diag([1.0, 2.0]), 2.0)).round(12)
+    array([[0., 0.],
+           [1., 1.]])
+    """
+    _check_two(H)
+    _, _, Vh = np.linalg.svd(np.asarray(H, dtype=np.complex128), full_matrices=False)
+    v = np.conj(Vh[..., 0, :])
+    return _with_power(v[..., :, None] * np.array([1.0, 1j]), power)
+
+
+def bpsk_two_antennas_rate(H: Complex, power: float, noise: float) -> Real:
+    """Return the cutoff rate that ``bpsk_two_antennas`` reaches, bit/s/Hz.
+
+    R_0 = 2 (1 - log2(1 + e^-x)), x = W λ_1² / (2 σ²), λ_1 the largest singular value of H.
+
+    Args:
+        H: (..., N_r, 2) channels.
+        power: W, W.
+        noise: σ², W.
+
+    Returns:
+        (...) between 0 and 2.
+
+    Raises:
+        InputError: N_t is not 2, or the noise is not above 0.
+
+    >>> float(bpsk_two_antennas_rate(np.eye(2), 2.0, 1.0).round(6))
+    1.096118
+    """
+    _check_two(H)
+    _check_positive("noise power", noise)
+    largest = np.linalg.svd(np.asarray(H, dtype=np.complex128), compute_uv=False)[..., 0]
+    x = power * largest**2 / (2.0 * noise)
+    # 1 + e^-x = 2 (1 + (e^-x - 1) / 2): as accurate where the rate is next to nothing.
+    return np.asarray(-2.0 * np.log1p(0.5 * np.expm1(-x)) / np.log(2.0))[()]
+
+
+SCHEMES: Mapping[str, Scheme] = MappingProxyType(
+    {
+        "mmse": mmse,
+        "mrt": lambda H, power, noise: mrt(H, power),  # noqa: ARG005
+        "zf": lambda H, power, noise: zf(H, power),  # noqa: ARG005
+        "waterfilling": waterfilling,
+    }
+)
+"""The classical schemes by name, each called with (H, power, noise)."""

@@ -1,0 +1,105 @@
+"""The cutoff rate, (7) and (8): a lower bound on the mutual information, in closed form."""
+
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InputError
+from faao_mav.radio.constellation import DifferenceClasses
+
+# Complex numbers held at once: 32 MB.
+_CHUNK = 2_000_000
+
+
+def _received(H: Complex, P: Complex, noise: float) -> Complex:
+    """H P / (2 σ), so that exponents are plain squared norms; (..., N_r, N_t)."""
+    if not noise > 0.0:
+        raise InputError(f"the noise power must be above 0, got {noise}")
+    return np.asarray(np.asarray(H) @ np.asarray(P) / (2.0 * np.sqrt(noise)), dtype=np.complex128)
+
+
+def _squared_norms(A: Complex, u: Complex) -> Real:
+    received = A @ u.T
+    norms: Real = np.sum(received.real**2 + received.imag**2, axis=-2)
+    return norms
+
+
+def exponents(H: Complex, P: Complex, u: Complex, noise: float) -> Real:
+    """Return the exponents D = ||H P u||² / (4 σ²) of (7) and (8).
+
+    Args:
+        H: (..., N_r, N_t) channels.
+        P: (..., N_t, N_t) precoders; the leading axes of H and P broadcast.
+        u: (k, N_t) differences of input vectors, ``DifferenceClasses.vectors``.
+        noise: σ², W.
+
+    Returns:
+        (..., k), never negative.
+
+    Raises:
+        InputError: the noise is not above 0.
+
+    >>> exponents(np.eye(1), np.eye(1), np.array([[2.0 + 0j]]), 0.5)
+    array([2.])
+    """
+    return _squared_norms(_received(H, P, noise), u)
+
+
+def cutoff_rate(H: Complex, P: Complex, classes: DifferenceClasses, noise: float) -> Real:
+    """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz.
+
+    R_0 = 2 N log2(rho) - log2 Σ_m Σ_k exp(-||H P u_mk||² / (4 σ²)), the double sum taken over the
+    classes. In terms of the class probabilities it is -log2(1 + Σ weight (e^-D - 1)), exact where
+    the rate is small, and N log2(rho) - log2(1 + Σ multiplicity e^-D / rho^N), exact where it is
+    nearly N log2(rho); each is used on its side.
+
+    Args:
+        H: (..., N_r, N_t) channels.
+        P: (..., N_t, N_t) precoders; the leading axes of H and P broadcast.
+        classes: the differences of the alphabet on N_t antennas.
+        noise: σ², W.
+
+    Returns:
+        (...) between 0 and ``classes.bits``.
+
+    Raises:
+        InputError: the noise is not above 0.
+
+    >>> from faao_mav.radio.constellation import difference_classes
+    >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))
+    0.548059
+    """
+    A = _received(H, P, noise)
+    shape, flat = A.shape[:-2], A.reshape(-1, *A.shape[-2:])
+    rate = np.empty(len(flat))
+    step = max(1, _CHUNK // (len(classes.vectors) * A.shape[-2]))
+    for start in range(0, len(flat), step):
+        part = slice(start, start + step)
+        D = _squared_norms(flat[part], classes.vectors)
+        remaining = np.exp(-D) @ classes.weight
+        value = classes.bits - np.log1p(classes.symbols * remaining) / np.log(2.0)
+        low = remaining + 1.0 / classes.symbols > 0.5
+        value[low] = -np.log1p(np.expm1(-D[low]) @ classes.weight) / np.log(2.0)
+        rate[part] = value
+    return np.clip(rate, 0.0, classes.bits).reshape(shape)[()]
+
+
+def log_nonzero_sum(D: Real, classes: DifferenceClasses) -> Real:
+    """Return ln of what keeps the cutoff rate below its ceiling, Σ multiplicity e^-D / rho^N.
+
+    N log2(rho) - R_0 = log2(1 + e^s) with s the value returned. It is finite at any SNR, even
+    where the sum itself underflows and R_0 no longer tells two precoders apart.
+
+    Args:
+        D: (..., k) exponents of the classes, from ``exponents``.
+        classes: the differences of the alphabet.
+
+    Returns:
+        (...) natural logarithms.
+
+    >>> from faao_mav.radio.constellation import difference_classes
+    >>> float(log_nonzero_sum(np.array([1e4]), difference_classes("bpsk", 1)))
+    -10000.0
+    """
+    nearest = np.min(D, axis=-1)
+    total = np.exp(nearest[..., None] - D) @ (classes.multiplicity / classes.symbols)
+    return np.asarray(np.log(total) - nearest)[()]

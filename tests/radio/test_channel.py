@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.errors import InputError
+from faao_mav.radio.channel import (
+    displacement,
+    line_of_sight_all_ones,
+    line_of_sight_ula,
+    path_gain,
+    rayleigh,
+    rician,
+)
+
+ANGLES = st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1.0)
+
+
+def test_path_gain_is_the_inverse_square() -> None:
+    w = np.array([[0.0, 0.0], [300.0, 400.0]])
+    np.testing.assert_allclose(
+        path_gain(w, np.zeros(2), 100.0, 1e-5), [1e-9, 1e-5 / (500.0**2 + 100.0**2)]
+    )
+
+
+@settings(deadline=None, derandomize=True)
+@given(ANGLES, ANGLES, st.integers(1, 4), st.integers(1, 4))
+def test_ula_is_rank_one_with_unit_entries(x: float, y: float, receive: int, transmit: int) -> None:
+    H = line_of_sight_ula(np.array([x, y, 100.0]), receive, transmit)
+    assert H.shape == (receive, transmit)
+    np.testing.assert_allclose(np.abs(H), 1.0, rtol=1e-12)
+    assert np.linalg.matrix_rank(H) == 1
+
+
+@settings(deadline=None, derandomize=True)
+@given(ANGLES, ANGLES)
+def test_ula_links_are_reciprocal(x: float, y: float) -> None:
+    up = displacement(np.array([x, y]), np.zeros(2), 100.0)
+    np.testing.assert_allclose(
+        line_of_sight_ula(-up, 2, 3), line_of_sight_ula(up, 3, 2).T, rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("horizontal", [(120.0, -40.0), (-70.0, 200.0)])
+def test_ula_agrees_with_the_positions_of_the_elements(
+    sign: float, horizontal: tuple[float, float]
+) -> None:
+    wavelength = 1e-4
+    path = sign * displacement(np.array(horizontal), np.zeros(2), 100.0)
+    east = np.array([0.5 * wavelength, 0.0, 0.0])
+    transmitters = np.arange(2)[:, None] * east
+    receivers = path + np.arange(3)[:, None] * east
+    way = np.linalg.norm(receivers[:, None] - transmitters, axis=-1)
+    expected = np.exp(-2j * np.pi * (way - way[0, 0]) / wavelength)
+    H = line_of_sight_ula(path, 3, 2)
+    np.testing.assert_allclose(H, expected, atol=1e-4)
+    assert np.abs(H - expected.conj()).max() > 0.5  # the other sign would not pass
+
+
+def test_ula_is_vectorised_and_needs_a_direction() -> None:
+    paths = np.array([[[1.0, 2.0, 3.0], [0.0, 5.0, 1.0]]])
+    H = line_of_sight_ula(paths, 2, 2)
+    assert H.shape == (1, 2, 2, 2)
+    np.testing.assert_allclose(H[0, 1], line_of_sight_all_ones(2, 2))
+    with pytest.raises(InputError, match="same place"):
+        line_of_sight_ula(np.zeros(3), 2, 2)
+
+
+def test_rayleigh_has_unit_power_and_repeats() -> None:
+    H = rayleigh(np.random.default_rng(3), 5000, 2, 3)
+    assert H.shape == (5000, 2, 3)
+    assert np.mean(np.abs(H) ** 2) == pytest.approx(1.0, abs=0.02)
+    assert abs(np.mean(H**2)) < 0.02  # circular
+    np.testing.assert_array_equal(H, rayleigh(np.random.default_rng(3), 5000, 2, 3))
+
+
+@pytest.mark.parametrize("K", [0.0, 1.0, 10.0, np.inf])
+def test_rician_keeps_unit_mean_power(K: float) -> None:
+    nlos = rayleigh(np.random.default_rng(5), 5000, 2, 2)
+    H = rician(line_of_sight_all_ones(2, 2), nlos, K)
+    assert np.mean(np.abs(H) ** 2) == pytest.approx(1.0, abs=0.03)
+
+
+def test_rician_limits() -> None:
+    nlos = rayleigh(np.random.default_rng(5), 4, 2, 2)
+    los = line_of_sight_all_ones(2, 2)
+    np.testing.assert_array_equal(rician(los, nlos, np.inf), np.broadcast_to(los, nlos.shape))
+    np.testing.assert_array_equal(rician(los, nlos, 0.0), nlos)
+    for wrong in (-1.0, np.nan):
+        with pytest.raises(InputError, match="Rician"):
+            rician(los, nlos, wrong)

@@ -1,0 +1,152 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.arrays import Complex
+from faao_mav.errors import InputError
+from faao_mav.radio.constellation import difference_classes
+from faao_mav.radio.precoder import (
+    SCHEMES,
+    bpsk_two_antennas,
+    bpsk_two_antennas_rate,
+    mmse,
+    mrt,
+    waterfilling,
+    zf,
+)
+from faao_mav.radio.rate import cutoff_rate
+
+SHAPES = [(1, 1), (2, 2), (3, 3), (1, 2), (2, 3), (2, 1), (4, 2), (3, 2)]
+
+
+def channel(seed: int, *shape: int) -> Complex:
+    parts = np.random.default_rng(seed).standard_normal((2, *shape))
+    return (parts[0] + 1j * parts[1]) * np.sqrt(0.5)
+
+
+def power_of(P: Complex) -> np.ndarray:
+    return np.sum(np.abs(P) ** 2, axis=(-2, -1))
+
+
+def parallel(A: Complex, B: Complex) -> None:
+    """A and B are equal up to a positive factor."""
+    np.testing.assert_allclose(A / np.linalg.norm(A), B / np.linalg.norm(B), atol=1e-9)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(("receive", "transmit"), SHAPES)
+@pytest.mark.parametrize("scale", [1e-8, 1.0, 1e5])
+def test_shape_power_and_batches(scheme: str, receive: int, transmit: int, scale: float) -> None:
+    H = scale * channel(1, 3, 4, receive, transmit)
+    P = SCHEMES[scheme](H, 0.1, 1e-3)
+    assert P.shape == (3, 4, transmit, transmit)
+    assert P.dtype == np.complex128
+    np.testing.assert_allclose(power_of(P), 0.1, rtol=1e-12)
+    np.testing.assert_allclose(SCHEMES[scheme](H[1, 2], 0.1, 1e-3), P[1, 2], atol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_singular_and_zero_channels(scheme: str) -> None:
+    H = np.array([[[1.0, 1.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]]])
+    P = SCHEMES[scheme](H, 2.0, 1.0)
+    assert np.all(np.isfinite(P))
+    np.testing.assert_allclose(power_of(P), 2.0, rtol=1e-12)
+    # nothing goes where the channel leads nowhere
+    np.testing.assert_allclose(H[0] @ P[0] @ (H[0] @ P[0]).conj().T, 4.0 * np.ones((2, 2)))
+    np.testing.assert_allclose(np.abs(P[2]), np.eye(2), atol=1e-12)
+
+
+def test_zero_forcing_makes_the_link_diagonal() -> None:
+    for receive, transmit in SHAPES:
+        if receive <= transmit:
+            H = channel(2, receive, transmit)
+            link = H @ zf(H, 3.0)
+            expected = np.zeros((receive, transmit))
+            np.fill_diagonal(expected, link[0, 0].real)
+            np.testing.assert_allclose(link, expected, atol=1e-10)
+            assert link[0, 0].real > 0.0
+    # With more receiving antennas, the link is orthogonal: no stream disturbs another.
+    link = (H := channel(3, 4, 2)) @ zf(H, 3.0)
+    parallel(link.conj().T @ link, np.eye(2))
+
+
+def test_maximum_ratio_is_matched_to_the_channel() -> None:
+    H = channel(4, 3, 3)
+    parallel(mrt(H, 2.0), H.conj().T)
+    H = channel(4, 2, 3)
+    parallel(mrt(H, 2.0), np.hstack([H.conj().T, np.zeros((3, 1))]))
+    H = channel(4, 4, 2)
+    P = mrt(H, 2.0)
+    parallel(P @ P, H.conj().T @ H)
+    parallel(P, P.conj().T)
+
+
+@pytest.mark.parametrize(("receive", "transmit"), SHAPES)
+def test_mmse_lies_between_maximum_ratio_and_zero_forcing(receive: int, transmit: int) -> None:
+    H = channel(5, receive, transmit)
+    np.testing.assert_allclose(mmse(H, 2.0, 1e-12), zf(H, 2.0), atol=1e-8)
+    np.testing.assert_allclose(mmse(H, 2.0, 1e12), mrt(H, 2.0), atol=1e-8)
+    if receive == transmit:
+        inverse = np.linalg.inv(H @ H.conj().T + receive * 0.7 / 2.0 * np.eye(receive))
+        parallel(mmse(H, 2.0, 0.7), H.conj().T @ inverse)
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.integers(0, 10_000), st.sampled_from(SHAPES), st.floats(-3.0, 4.0))
+def test_waterfilling_meets_the_optimality_conditions(
+    seed: int, shape: tuple[int, int], exponent: float
+) -> None:
+    H, power, noise = channel(seed, *shape), 2.0, 10.0**-exponent
+    P = waterfilling(H, power, noise)
+    _, s, Vh = np.linalg.svd(H)
+    modes = Vh @ P
+    p = np.sum(np.abs(modes) ** 2, axis=1)
+    np.testing.assert_allclose(np.abs(modes), np.diag(np.sqrt(p)), atol=1e-9)
+    assert p.sum() == pytest.approx(power)
+    floor = noise / s**2
+    used = p[: len(s)] > 1e-12
+    level = (p[: len(s)] + floor)[used]
+    np.testing.assert_allclose(level, level[0], rtol=1e-9)
+    assert np.all(floor[~used] >= level[0] * (1 - 1e-9))
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.integers(0, 10_000), st.sampled_from([1, 2, 3]), st.floats(-3.0, 2.5))
+def test_closed_form_is_never_beaten(seed: int, receive: int, exponent: float) -> None:
+    H, noise = channel(seed, receive, 2), 10.0**-exponent
+    classes = difference_classes("bpsk", 2)
+    best = cutoff_rate(H, bpsk_two_antennas(H, 2.0), classes, noise)
+    assert bpsk_two_antennas_rate(H, 2.0, noise) == pytest.approx(best, rel=1e-9)
+    others = channel(seed + 1, 200, 2, 2)
+    others *= np.sqrt(2.0 / power_of(others))[:, None, None]
+    assert np.max(cutoff_rate(H, others, classes, noise)) <= best * (1 + 1e-12)
+    # nor by small changes of it
+    near = bpsk_two_antennas(H, 2.0) + 0.05 * channel(seed + 2, 200, 2, 2)
+    near *= np.sqrt(2.0 / power_of(near))[:, None, None]
+    assert np.max(cutoff_rate(H, near, classes, noise)) <= best * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("noise", [1e-15, 1e-9, 1e3, 1e12, 1e15])
+def test_closed_form_rate_at_the_extremes(noise: float) -> None:
+    H = np.diag([1.0, 2.0])
+    rate = bpsk_two_antennas_rate(H, 1.0, noise)
+    if noise < 1.0:
+        assert rate == pytest.approx(2.0, abs=1e-15)
+    else:
+        x = 2.0 / noise
+        assert rate == pytest.approx((x - x**2 / 4) / np.log(2.0), rel=1e-8)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_power_must_be_positive(scheme: str) -> None:
+    with pytest.raises(InputError, match="power"):
+        SCHEMES[scheme](np.eye(2), 0.0, 1.0)
+
+
+def test_what_else_is_refused() -> None:
+    for scheme in (mmse, waterfilling):
+        with pytest.raises(InputError, match="noise"):
+            scheme(np.eye(2), 1.0, 0.0)
+    with pytest.raises(InputError, match="two transmitting antennas, not 3"):
+        bpsk_two_antennas(np.eye(3), 1.0)

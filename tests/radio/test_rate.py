@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.arrays import Complex
+from faao_mav.errors import InputError
+from faao_mav.radio import rate
+from faao_mav.radio.constellation import MODULATIONS, difference_classes, symbol_vectors
+from faao_mav.radio.precoder import bpsk_two_antennas
+from faao_mav.radio.rate import cutoff_rate, exponents, log_nonzero_sum
+
+SMALL = [("bpsk", 1), ("bpsk", 2), ("bpsk", 3), ("qpsk", 2), ("8psk", 2), ("16qam", 2)]
+
+
+def channel(seed: int, *shape: int) -> Complex:
+    parts = np.random.default_rng(seed).standard_normal((2, *shape))
+    return (parts[0] + 1j * parts[1]) * np.sqrt(0.5)
+
+
+@pytest.mark.parametrize(
+    ("modulation", "decibels", "expected"),
+    [("bpsk", 0, 0.548059), ("bpsk", 5, 0.940189), ("qpsk", 0, 0.632103), ("qpsk", 5, 1.460161)],
+)
+def test_single_antenna_oracle(modulation: str, decibels: float, expected: float) -> None:
+    one = np.ones((1, 1))
+    classes = difference_classes(modulation, 1)
+    assert cutoff_rate(one, one, classes, 10 ** (-decibels / 10)) == pytest.approx(
+        expected, abs=5e-7
+    )
+
+
+# The table's SNR is per stream with H divided by √2: unit noise, H = [2 1; 1 1] √(snr/2), and
+# P = I, so tr(P^H P) = W = 2. The closed form is scaled to the same W = 2.
+@pytest.mark.parametrize(
+    ("modulation", "closed_form", "decibels", "expected"),
+    [
+        ("bpsk", False, -5, 0.5813),
+        ("bpsk", False, 0, 1.1894),
+        ("bpsk", False, 5, 1.8039),
+        ("qpsk", False, 0, 1.5944),
+        ("qpsk", False, 5, 2.9244),
+        ("qpsk", False, 10, 3.8653),
+        ("bpsk", True, -5, 1.1591),
+        ("bpsk", True, 0, 1.9078),
+        ("bpsk", True, 5, 1.9999),
+    ],
+)
+def test_two_antenna_oracle(
+    modulation: str, closed_form: bool, decibels: float, expected: float
+) -> None:
+    H = np.array([[2.0, 1.0], [1.0, 1.0]]) * np.sqrt(10 ** (decibels / 10) / 2)
+    P = bpsk_two_antennas(H, 2.0) if closed_form else np.eye(2)
+    classes = difference_classes(modulation, 2)
+    assert cutoff_rate(H, P, classes, 1.0) == pytest.approx(expected, abs=5.1e-5)
+
+
+def test_exponents_are_those_of_the_paper() -> None:
+    H, P = channel(1, 3, 2, 2), channel(2, 3, 2, 2)
+    u = difference_classes("qpsk", 2).vectors
+    D = exponents(H, P, u, 0.3)
+    assert D.shape == (3, 20)
+    for n in range(3):
+        for k in range(20):
+            assert D[n, k] == pytest.approx(np.linalg.norm(H[n] @ P[n] @ u[k]) ** 2 / (4 * 0.3))
+
+
+@pytest.mark.parametrize(("modulation", "antennas"), SMALL)
+def test_equation_7_as_printed(modulation: str, antennas: int) -> None:
+    H, P = channel(3, 2, antennas), channel(4, antennas, antennas)
+    x = symbol_vectors(modulation, antennas)
+    y = x @ (H @ P).T
+    total = sum(np.exp(-np.sum(np.abs(s - y) ** 2, axis=1) / (4 * 0.2)).sum() for s in y)
+    classes = difference_classes(modulation, antennas)
+    expected = 2 * classes.bits - np.log2(total)
+    assert cutoff_rate(H, P, classes, 0.2) == pytest.approx(expected, abs=1e-12)
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.integers(0, 10_000), st.sampled_from(SMALL), st.floats(-13, 8), st.floats(1.0, 10.0))
+def test_bounds_and_monotonicity(
+    seed: int, case: tuple[str, int], exponent: float, more: float
+) -> None:
+    modulation, antennas = case
+    classes = difference_classes(modulation, antennas)
+    H, P = channel(seed, 5, 2, antennas), channel(seed + 1, 5, antennas, antennas)
+    low = cutoff_rate(H, P, classes, 10**-exponent)
+    high = cutoff_rate(H, np.sqrt(more) * P, classes, 10**-exponent)
+    assert np.all(low > 0.0)
+    assert np.all(high <= classes.bits)
+    assert np.all(high >= low - 1e-14 * classes.bits)
+
+
+@pytest.mark.parametrize(("modulation", "antennas"), SMALL)
+@pytest.mark.parametrize("snr", [1e-12, 1e-9, 1e-6])
+def test_relative_accuracy_where_there_is_next_to_no_signal(
+    modulation: str, antennas: int, snr: float
+) -> None:
+    H, P = channel(7, 2, antennas), channel(8, antennas, antennas)
+    classes = difference_classes(modulation, antennas)
+    D = exponents(H, P, classes.vectors, 1.0 / snr)
+    # R0 = (m1 - m2/2 + m1²/2 + O(D³)) / ln 2 with m the moments of D; E uu^H = 2 I gives m1.
+    m1 = 0.5 * snr * np.linalg.norm(H @ P) ** 2
+    m2 = classes.weight @ D**2
+    expected = (m1 - m2 / 2 + m1**2 / 2) / np.log(2)
+    tolerance = max(2e-14, 20 * D.max() ** 2)
+    assert cutoff_rate(H, P, classes, 1.0 / snr) == pytest.approx(expected, rel=tolerance)
+
+
+@pytest.mark.parametrize(("modulation", "antennas"), SMALL)
+@pytest.mark.parametrize("snr", [1e-3, 1.0, 30.0, 100.0])
+def test_extended_precision_reference(modulation: str, antennas: int, snr: float) -> None:
+    classes = difference_classes(modulation, antennas)
+    H, P = channel(9, 2, antennas), np.eye(antennas)
+    D = exponents(H, P, classes.vectors, 1.0 / snr).astype(np.longdouble)
+    total = np.sum(classes.multiplicity * np.exp(-D)) / np.longdouble(classes.symbols)
+    expected = float(np.log2(np.longdouble(classes.symbols)) - np.log1p(total) / np.log(2.0))
+    assert cutoff_rate(H, P, classes, 1.0 / snr) == pytest.approx(expected, abs=1e-13)
+
+
+@pytest.mark.parametrize("modulation", MODULATIONS)
+def test_log_sum_stays_finite_and_gives_the_gap(modulation: str) -> None:
+    classes = difference_classes(modulation, 2)
+    H, P = channel(10, 2, 2), np.eye(2)
+    for snr in (1e-12, 1.0, 1e6, 1e12):
+        logs = log_nonzero_sum(exponents(H, P, classes.vectors, 1.0 / snr), classes)
+        assert np.isfinite(logs)
+        gap = np.log1p(np.exp(logs)) / np.log(2.0)
+        rate_ = cutoff_rate(H, P, classes, 1.0 / snr)
+        assert classes.bits - rate_ == pytest.approx(gap, abs=1e-13 * classes.bits)
+    assert logs < -1e6
+    assert rate_ == classes.bits
+
+
+def test_chunks_do_not_change_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    classes = difference_classes("qpsk", 2)
+    H, P = channel(11, 4, 7, 2, 2), channel(12, 7, 2, 2)
+    whole = cutoff_rate(H, P, classes, 0.5)
+    monkeypatch.setattr(rate, "_CHUNK", 200)
+    np.testing.assert_allclose(cutoff_rate(H, P, classes, 0.5), whole, rtol=1e-14)
+    assert whole.shape == (4, 7)
+
+
+def test_noise_must_be_positive() -> None:
+    for noise in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="noise"):
+            exponents(np.eye(1), np.eye(1), np.ones((1, 1)), noise)
