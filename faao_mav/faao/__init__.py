@@ -1,0 +1,1 @@
+"""The optimiser: trajectory and precoders together."""

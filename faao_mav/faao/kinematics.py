@@ -1,0 +1,105 @@
+"""The flights that an aircraft can make: (11), (12), (13d)-(13f) and the ends of `flight:`.
+
+Beyond the paper, which leaves v(N+1) unlimited, every sample of the speed is bounded by v_max:
+the last one is flown too. a(N+1) moves nothing and is zero.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.plan import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Positions w (m), velocities v (m/s) and accelerations a (m/s²), each (N + 2, 2)."""
+
+    w: Real
+    v: Real
+    a: Real
+
+
+@dataclass(frozen=True, slots=True)
+class Kinematics:
+    """The feasible set: w_I, w_F (2,), N + 2 = `slots`, delta_t, v_max, a_max, end velocities.
+
+    An end velocity of None is free. `bound_first_acceleration` extends (13f) to n = 0.
+    """
+
+    start: Real
+    end: Real
+    slots: int
+    time_step: float
+    max_speed: float
+    max_acceleration: float
+    start_velocity: Real | None
+    end_velocity: Real | None
+    bound_first_acceleration: bool
+
+    @property
+    def first_bounded_acceleration(self) -> int:
+        """The least n for which (13f) holds."""
+        return 0 if self.bound_first_acceleration else 1
+
+    def residuals(self, trajectory: Trajectory) -> dict[str, float]:
+        """Return the largest violation of each constraint, in its own unit; 0 where it holds."""
+        w, v, a, dt = trajectory.w, trajectory.v, trajectory.a, self.time_step
+        speed, acceleration = np.linalg.norm(v, axis=1), np.linalg.norm(a, axis=1)
+        bounded = acceleration[self.first_bounded_acceleration :]
+        found = {
+            "(11) position": _largest(w[1:] - w[:-1] - v[:-1] * dt - a[:-1] * dt**2 / 2),
+            "(12) velocity": _largest(v[1:] - v[:-1] - a[:-1] * dt),
+            "(13d) ends": max(_largest(w[0] - self.start), _largest(w[-1] - self.end)),
+            "(13e) speed": float(max(0.0, speed.max() - self.max_speed)),
+            "(13f) acceleration": float(max(0.0, bounded.max() - self.max_acceleration)),
+        }
+        if self.start_velocity is not None:
+            found["start velocity"] = _largest(v[0] - self.start_velocity)
+        if self.end_velocity is not None:
+            found["end velocity"] = _largest(v[-1] - self.end_velocity)
+        return found
+
+    def integrate(self, start_velocity: Real, acceleration: Real) -> Trajectory:
+        """Follow (11) and (12) exactly from w_I with v(0) (2,) and a(n) (N + 2, 2).
+
+        The accelerations are first changed by the least-squares correction that meets w_F and a
+        given end velocity, so that a solver's tolerance does not add up along the flight.
+        """
+        dt, steps = self.time_step, self.slots - 1
+        a = acceleration[:-1].copy()
+        to_position = dt**2 * (steps - np.arange(steps) - 0.5)
+        rows, missing = [to_position], [self.end - self.start - steps * dt * start_velocity]
+        if self.end_velocity is not None:
+            rows.append(np.full(steps, dt))
+            missing.append(self.end_velocity - start_velocity)
+        effect = np.array(rows)
+        a += np.linalg.pinv(effect) @ (np.array(missing) - effect @ a)
+        v = start_velocity + dt * np.vstack([np.zeros(2), np.cumsum(a, axis=0)])
+        w = self.start + dt * np.vstack([np.zeros(2), np.cumsum((v[:-1] + v[1:]) / 2, axis=0)])
+        return Trajectory(w, v, np.vstack([a, np.zeros(2)]))
+
+
+def kinematics(plan: Plan) -> Kinematics:
+    """Return the feasible set of `plan`."""
+    flight, vehicle = plan.flight, plan.vehicle
+
+    def vector(value: tuple[float, float] | None) -> Real | None:
+        return None if value is None else np.array(value, dtype=float)
+
+    return Kinematics(
+        start=np.array(flight.start, dtype=float),
+        end=np.array(flight.end, dtype=float),
+        slots=flight.slots,
+        time_step=flight.time_step,
+        max_speed=vehicle.max_speed,
+        max_acceleration=vehicle.max_acceleration,
+        start_velocity=vector(flight.start_velocity),
+        end_velocity=vector(flight.end_velocity),
+        bound_first_acceleration=flight.bound_first_acceleration,
+    )
+
+
+def _largest(values: Real) -> float:
+    return float(np.abs(values).max())

@@ -1,0 +1,86 @@
+"""A first flight to start from."""
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InfeasibleError
+from faao_mav.faao.kinematics import Kinematics, Trajectory
+
+_BISECTIONS = 100
+
+
+def straight_flight(kin: Kinematics) -> Trajectory:
+    """Return a feasible flight: along the line from w_I to w_F at the most even speed.
+
+    End velocities that do not lie on that line bend it; then it is the flight of least
+    sum ||a||². Raises `InfeasibleError` when there is none.
+    """
+    line = kin.end - kin.start
+    distance = float(np.linalg.norm(line))
+    ends = [v for v in (kin.start_velocity, kin.end_velocity) if v is not None]
+    if distance:
+        direction = line / distance
+    else:
+        direction = next((v / np.linalg.norm(v) for v in ends if v.any()), np.array([1.0, 0.0]))
+    across = np.array([-direction[1], direction[0]])
+    if all(abs(v @ across) <= 1e-12 * kin.max_speed for v in ends):
+        speed = _even_speed(kin, direction, distance)
+        if speed is not None:
+            v = speed[:, None] * direction
+            a = np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)])
+            return kin.integrate(v[0], a)
+    return _gentlest_flight(kin)
+
+
+def _even_speed(kin: Kinematics, direction: Real, distance: float) -> Real | None:
+    """Speeds (N + 2,) along the line that sum to `distance`, as near to one value as allowed."""
+    n = np.arange(kin.slots, dtype=float)
+    gain = kin.max_acceleration * kin.time_step
+    upper = np.full(kin.slots, kin.max_speed)
+    lower = -upper
+    if kin.start_velocity is not None:
+        first = float(kin.start_velocity @ direction)
+        steps = n + (0.0 if kin.bound_first_acceleration else np.where(n > 0, np.inf, 0.0))
+        upper, lower = (
+            np.minimum(upper, first + gain * steps),
+            np.maximum(lower, first - gain * steps),
+        )
+    if kin.end_velocity is not None:
+        last, steps = float(kin.end_velocity @ direction), n[::-1]
+        upper, lower = (
+            np.minimum(upper, last + gain * steps),
+            np.maximum(lower, last - gain * steps),
+        )
+
+    def flown(speed: Real) -> float:
+        return float(kin.time_step * (speed[:-1] + speed[1:]).sum() / 2)
+
+    slack = 1e-9 * max(1.0, distance)
+    if (lower > upper + 1e-12).any() or not flown(lower) - slack <= distance <= flown(
+        upper
+    ) + slack:
+        return None
+    slow, fast = -kin.max_speed, kin.max_speed
+    for _ in range(_BISECTIONS):
+        middle = (slow + fast) / 2
+        if flown(np.clip(middle, lower, upper)) < distance:
+            slow = middle
+        else:
+            fast = middle
+    return np.asarray(np.clip(fast, lower, upper))
+
+
+def _gentlest_flight(kin: Kinematics) -> Trajectory:
+    import cvxpy as cp
+
+    from faao_mav.faao.scaled import flight_variables, solve
+
+    flight = flight_variables(kin)
+    problem = cp.Problem(cp.Minimize(cp.sum_squares(flight.a)), flight.constraints)
+    if solve(problem) == cp.INFEASIBLE:
+        raise InfeasibleError(
+            "no flight from start to end meets the end velocities within the duration, "
+            f"{kin.max_speed:g} m/s and {kin.max_acceleration:g} m/s^2; "
+            "give more time or gentler end velocities"
+        )
+    return flight.trajectory()
