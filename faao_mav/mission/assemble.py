@@ -1,0 +1,87 @@
+"""From a route to mission items: take-off, the way to w_I, the route, the end."""
+
+from typing import TYPE_CHECKING
+
+from faao_mav.errors import InfeasibleError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.route import Route
+
+if TYPE_CHECKING:
+    from faao_mav.plan import Plan
+
+SETTLING_HOLD = 6.0
+"""The least hold at w_I, s.
+
+ArduCopter leaves late by up to 0.75 s after a hold of 1 s: it is still drifting.
+"""
+
+_DECIMALS = 9  # of a degree: 0.1 mm
+
+
+def assemble(route: Route, plan: "Plan") -> Mission:
+    """Return the mission that flies `route` at `plan.flight.altitude` above the origin.
+
+    Home is the plan's origin. The items: TAKEOFF there, if the plan asks for it; the way to w_I
+    at the vehicle's greatest speed, with a hold for the route's first hold or `SETTLING_HOLD`,
+    whichever is longer; for each leg a DO_CHANGE_SPEED, then its waypoint; and what
+    `plan.mission.on_finish` says. Unused parameters are 0: ArduPilot refuses NaN.
+
+    Raises `InfeasibleError` if home and items are more than `plan.mission.max_items`.
+    """
+    origin, altitude = plan.origin, plan.flight.altitude
+    latitudes, longitudes = LocalFrame(origin.latitude, origin.longitude).to_geodetic(
+        route.positions
+    )
+    places = [
+        (round(float(x), _DECIMALS), round(float(y), _DECIMALS))
+        for x, y in zip(latitudes, longitudes, strict=True)
+    ]
+
+    items = []
+    if plan.mission.takeoff:
+        # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
+        here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
+        items.append(_at(Command.NAV_TAKEOFF, here, altitude))
+    items.append(_change_speed(plan.vehicle.max_speed))
+    items.append(_waypoint(places[0], altitude, max(float(route.holds[0]), SETTLING_HOLD)))
+    for place, speed, hold in zip(places[1:], route.speeds, route.holds[1:], strict=True):
+        items.append(_change_speed(float(speed)))
+        items.append(_waypoint(place, altitude, float(hold)))
+    items.append(_finish(plan, places[-1]))
+
+    rows = len(items) + 1
+    if rows > plan.mission.max_items:
+        raise InfeasibleError(
+            f"the mission needs {rows} items with home, mission.max_items is "
+            f"{plan.mission.max_items}; raise mission.max_items (if the autopilot stores as many) "
+            f"or mission.path_tolerance (now {plan.mission.path_tolerance:g} m)"
+        )
+    return Mission(tuple(items), Home(origin.latitude, origin.longitude, origin.elevation))
+
+
+def _finish(plan: "Plan", place: tuple[float, float]) -> MissionItem:
+    match plan.mission.on_finish:
+        case "rtl":
+            return MissionItem(Command.NAV_RETURN_TO_LAUNCH, Frame.MISSION)
+        case "land":
+            return _at(Command.NAV_LAND, place, 0.0)
+        case "hover":
+            return _at(Command.NAV_LOITER_UNLIM, place, plan.flight.altitude)
+
+
+def _waypoint(place: tuple[float, float], altitude: float, hold: float) -> MissionItem:
+    return _at(Command.NAV_WAYPOINT, place, altitude, hold)
+
+
+def _at(
+    command: Command, place: tuple[float, float], altitude: float, param1: float = 0.0
+) -> MissionItem:
+    frame = Frame.GLOBAL_RELATIVE_ALT
+    return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), *place, float(altitude))
+
+
+def _change_speed(speed: float) -> MissionItem:
+    # Type 1 is ground speed; throttle -1 leaves it alone.
+    return MissionItem(Command.DO_CHANGE_SPEED, Frame.MISSION, (1.0, float(speed), -1.0, 0.0))

@@ -1,0 +1,105 @@
+"""What ArduCopter and PX4 do with the legs between waypoints: the limits that shape them.
+
+Models and defaults as measured on ArduCopter 4.7 and PX4 1.16 in simulation.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import PlanError
+
+if TYPE_CHECKING:
+    from faao_mav.plan import Plan
+
+Name: TypeAlias = tuple[str, float]
+"""A parameter's name and the factor that makes its value SI."""
+
+# Newer names first: a vehicle has one generation, a parameter file may carry both.
+_ARDUPILOT_ACCELERATION: tuple[Name, ...] = (("WP_ACC", 1.0), ("WPNAV_ACCEL", 0.01))
+_ARDUPILOT_JERK: tuple[Name, ...] = (("WP_JERK", 1.0), ("WPNAV_JERK", 1.0))
+_PX4_ACCELERATION: tuple[Name, ...] = (("MPC_ACC_HOR", 1.0),)
+_PX4_JERK: tuple[Name, ...] = (("MPC_JERK_AUTO", 1.0),)
+
+_JERK_LAG = 0.30
+"""ArduCopter's t_j: what a ramp takes beyond the ideal jerk-limited one, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArduCopterLegs:
+    """How ArduCopter flies a leg between plain waypoints: A in m/s², J in m/s³."""
+
+    acceleration: float = 2.5
+    jerk: float = 1.0
+
+    def ramp_duration(self, change: Real) -> Real:
+        """Return the time in which the speed changes by `change` m/s >= 0, s; same shape.
+
+        D = dv/A + A/J + t_j; when dv is too small to reach A, D = 2 (a/J + t_j) with the peak
+        acceleration a from a²/J + a t_j = dv.
+        """
+        a, j, lag = self.acceleration, self.jerk, _JERK_LAG
+        peak = j * (np.sqrt(lag**2 + 4 * change / j) - lag) / 2
+        return np.where(peak >= a, change / a + a / j + lag, 2 * (peak / j + lag))
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg that reaches `speed`, m; same shape.
+
+        Two ramps of v/2 D each: every leg is planned as if it began and ended at rest.
+        """
+        return speed * self.ramp_duration(speed)
+
+
+@dataclass(frozen=True, slots=True)
+class Px4Legs:
+    """How PX4 flies a leg between plain waypoints: a in m/s², j in m/s³."""
+
+    acceleration: float = 3.0
+    jerk: float = 4.0
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg that is flown at `speed`, m; same shape.
+
+        It must be able to stop at the next waypoint, d metres ahead, so its speed is
+        v = (-b + sqrt(b² + 8 a d)) / 2 with b = 4 a² / j; this is that, solved for d.
+        """
+        b = 4 * self.acceleration**2 / self.jerk
+        return speed * (speed + b) / (2 * self.acceleration)
+
+
+Legs: TypeAlias = ArduCopterLegs | Px4Legs
+
+
+def legs_of(plan: "Plan") -> Legs:
+    """Return how the plan's vehicle flies legs, by its autopilot and `vehicle.parameters`.
+
+    Parameters of either generation of names are known: WP_ACC and WP_JERK in metres,
+    WPNAV_ACCEL in centimetres and WPNAV_JERK in metres; MPC_ACC_HOR and MPC_JERK_AUTO for PX4.
+    Raises `PlanError` if the one that counts is not a positive number.
+    """
+    if plan.vehicle.autopilot == "px4":
+        px4 = Px4Legs()
+        return Px4Legs(
+            acceleration=_value(plan, _PX4_ACCELERATION, px4.acceleration),
+            jerk=_value(plan, _PX4_JERK, px4.jerk),
+        )
+    copter = ArduCopterLegs()
+    return ArduCopterLegs(
+        acceleration=_value(plan, _ARDUPILOT_ACCELERATION, copter.acceleration),
+        jerk=_value(plan, _ARDUPILOT_JERK, copter.jerk),
+    )
+
+
+def _value(plan: "Plan", names: tuple[Name, ...], default: float) -> float:
+    for name, unit in names:
+        if name in plan.vehicle.parameters:
+            value = plan.vehicle.parameters[name]
+            if not (math.isfinite(value) and value > 0):
+                raise PlanError(
+                    f"{plan.source}: vehicle.parameters.{name}: {value:g}; give a number above 0"
+                )
+            return value * unit
+    return default

@@ -1,0 +1,73 @@
+"""A mission as data: items, home."""
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from faao_mav.errors import InputError
+
+Params: TypeAlias = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Where relative altitudes count from: WGS84 degrees, metres above mean sea level.
+
+    Raises `InputError` for coordinates that are no place on Earth.
+    """
+
+    latitude: float
+    longitude: float
+    altitude: float
+
+    def __post_init__(self) -> None:
+        if not (
+            abs(self.latitude) <= 90 and abs(self.longitude) <= 180 and math.isfinite(self.altitude)
+        ):
+            raise InputError(
+                f"home {self.latitude}, {self.longitude}, {self.altitude}: expected a latitude "
+                "within 90 degrees, a longitude within 180 and a finite altitude"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """One MAVLink mission item.
+
+    `command` is a MAV_CMD (0 to 65535), `frame` a MAV_FRAME (0 to 255), `params` are param1 to
+    param4. `x` and `y` are latitude and longitude in degrees and `z` metres, except in
+    `Frame.MISSION`, where they are param5 to param7. A param4 (yaw) of NaN means "not set".
+
+    Raises `InputError` for integers out of range, other than four parameters, values not finite.
+    """
+
+    command: int
+    frame: int
+    params: Params = (0.0, 0.0, 0.0, 0.0)
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    autocontinue: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.command <= 65_535:
+            raise InputError(f"mission item: command {self.command}; expected 0 to 65535")
+        if not 0 <= self.frame <= 255:
+            raise InputError(f"mission item: frame {self.frame}; expected 0 to 255")
+        if len(self.params) != 4:
+            raise InputError(f"mission item: {len(self.params)} parameters; expected 4")
+        if not all(map(math.isfinite, (*self.params[:3], self.x, self.y, self.z))):
+            raise InputError(
+                f"mission item: params {self.params}, x {self.x}, y {self.y}, z {self.z}; "
+                "expected finite numbers (param4 may be NaN)"
+            )
+        if math.isinf(self.params[3]):
+            raise InputError(f"mission item: param4 {self.params[3]}; expected a number or NaN")
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """What an autopilot is given: the items in order, without the home row, and the home."""
+
+    items: tuple[MissionItem, ...]
+    home: Home | None = None

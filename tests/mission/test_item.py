@@ -1,0 +1,45 @@
+"""Items and the numbers of commands and frames."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from faao_mav.errors import InputError
+from faao_mav.mission import Command, Frame, Home, MissionItem
+
+
+@pytest.mark.parametrize("command", Command)
+def test_commands_have_mavlinks_numbers(command):
+    assert mavlink.enums["MAV_CMD"][int(command)].name == f"MAV_CMD_{command.name}"
+
+
+@pytest.mark.parametrize("frame", Frame)
+def test_frames_have_mavlinks_numbers(frame):
+    assert mavlink.enums["MAV_FRAME"][int(frame)].name == f"MAV_FRAME_{frame.name}"
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"command": 65_536}, "command 65536; expected 0 to 65535"),
+        ({"frame": -1}, "frame -1; expected 0 to 255"),
+        ({"params": (0.0, 0.0, 0.0)}, "3 parameters; expected 4"),
+        ({"params": (math.nan, 0.0, 0.0, 0.0)}, "expected finite"),
+        ({"params": (0.0, 0.0, 0.0, math.inf)}, "param4 inf"),
+        ({"z": math.nan}, "expected finite"),
+    ],
+)
+def test_an_impossible_item_is_refused(fields, message):
+    with pytest.raises(InputError, match=message):
+        MissionItem(**({"command": 16, "frame": 3} | fields))
+
+
+def test_yaw_may_be_not_set():
+    assert math.isnan(MissionItem(16, 3, (0.0, 0.0, 0.0, math.nan)).params[3])
+
+
+@pytest.mark.parametrize("home", [(91.0, 0.0, 0.0), (0.0, 180.1, 0.0), (0.0, 0.0, math.nan)])
+def test_an_impossible_home_is_refused(home):
+    with pytest.raises(InputError, match="home"):
+        Home(*home)

@@ -1,0 +1,229 @@
+"""QGC WPL 110, against itself, pymavlink and damaged files."""
+
+import dataclasses
+import math
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.mavwp import MAVWPLoader
+from relay_flights import STEADY, dash_hover_dash, mission_of, plan_with
+
+from faao_mav.errors import MissionFileError
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.formats import MISSION_SUFFIXES, read_mission, render_mission
+from faao_mav.mission.formats.wpl import read_wpl, write_wpl
+
+
+@pytest.fixture(scope="module")
+def mission():
+    return mission_of(*dash_hover_dash(), plan_with(on_finish="land"))
+
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+latitudes, longitudes = st.floats(-90, 90), st.floats(-180, 180)
+
+
+@st.composite
+def items(draw):
+    frame = draw(st.integers(0, 255))
+    x, y = (numbers, numbers) if frame == 2 else (latitudes, longitudes)
+    yaw = st.one_of(numbers, st.just(math.nan))
+    params = draw(st.tuples(numbers, numbers, numbers, yaw))
+    command = draw(st.integers(0, 65_535))
+    return MissionItem(command, frame, params, draw(x), draw(y), draw(numbers), draw(st.booleans()))
+
+
+homes = st.builds(Home, latitudes, longitudes, numbers).filter(
+    lambda home: any(dataclasses.astuple(home))
+)
+missions = st.builds(Mission, st.lists(items(), max_size=6).map(tuple), st.none() | homes)
+
+
+@STEADY
+@given(missions)
+def test_what_is_written_is_read_back_bit_for_bit(mission):
+    # repr tells NaN and the sign of zero, which == does not.
+    assert repr(read_wpl(write_wpl(mission), "x")) == repr(mission)
+
+
+@STEADY
+@given(missions)
+def test_the_form_that_every_reader_accepts(mission):
+    text = write_wpl(mission)
+    assert text.endswith(("1\n", "0\n"))
+    assert "\r" not in text
+    header, *rows = text.splitlines()
+    assert header == "QGC WPL 110"
+    fields = [row.split("\t") for row in rows]
+    assert all(len(f) == 12 for f in fields)
+    assert [int(f[0]) for f in fields] == list(range(len(mission.items) + 1))
+    assert [int(f[1]) for f in fields] == [1] + [0] * len(mission.items)
+    assert fields[0][2:4] == ["0", "16"]
+    for value in (v for f in fields for v in f[4:11]):
+        assert value == "nan" or len(value.split(".")[1]) >= 8
+
+
+@pytest.mark.parametrize("home", [Home(-35.363262, 149.165237, 584.0), None])
+def test_pymavlink_reads_the_same(mission, home, tmp_path):
+    path = tmp_path / "x.waypoints"
+    path.write_text(write_wpl(dataclasses.replace(mission, home=home)))
+    loader = MAVWPLoader()
+    assert loader.load(str(path)) == len(mission.items) + 1
+    row = loader.wp(0)
+    assert (row.command, row.frame, row.current) == (16, 0, 1)
+    assert (row.x, row.y, row.z) == (dataclasses.astuple(home) if home else (0, 0, 0))
+    for index, item in enumerate(mission.items, start=1):
+        row = loader.wp(index)
+        assert (row.seq, row.current, row.command, row.frame) == (
+            *(index, 0),
+            *(item.command, item.frame),
+        )
+        assert (row.param1, row.param2, row.param3, row.param4) == item.params
+        # It keeps doubles in memory: its precision is the file's.
+        assert (row.x, row.y, row.z) == (item.x, item.y, item.z)
+
+
+HOME = "0\t1\t0\t16\t0\t0\t0\t0\t47.4\t8.5\t400\t1"
+ITEM = "1\t0\t3\t16\t0\t0\t0\t0\t47.5\t8.6\t50\t1"
+GOOD = f"QGC WPL 110\n{HOME}\n{ITEM}\n"
+READ = Mission((MissionItem(16, 3, x=47.5, y=8.6, z=50.0),), Home(47.4, 8.5, 400.0))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD,
+        GOOD.replace("\n", "\r\n"),
+        GOOD.replace("\n", "\r"),
+        "\ufeff" + GOOD,
+        GOOD.removesuffix("\n"),
+        GOOD.replace("\t", "   "),
+        GOOD.replace("\n", "  \n\n"),
+        f"# by hand\nQGC WPL 110\n# home\n{HOME}\n  # first\n{ITEM}\n",
+        GOOD.replace("QGC WPL 110", "QGC\tWPL  110 "),
+        GOOD.replace("\t1\t0\t16", "\t0\t0\t16", 1),  # no current item
+        GOOD.replace("47.5", "+4.75e1").replace("8.6", "8.60"),
+    ],
+)
+def test_harmless_oddities_are_read(text):
+    assert read_wpl(text, "x") == READ
+
+
+def with_field(index, value, row=ITEM):
+    fields = row.split("\t")
+    fields[index] = value
+    return GOOD.replace(row, "\t".join(fields))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "x: nothing in it; expected 'QGC WPL 110'"),
+        ("\n\n", "nothing in it"),
+        ("QGC WPL 110\n", "a header but no items"),
+        (f"{HOME}\n{ITEM}\n", "line 1: '0"),
+        ("QGC WPL 120\n" + HOME, "line 1: 'QGC WPL 120'; expected 'QGC WPL 110'"),
+        ("QGC WPL 100\n" + HOME, "line 1: QGC WPL 100 has other fields"),
+        ("\x00\x01\x02", r"line 1: '\x00\x01\x02'; expected"),
+        (GOOD.replace("\t50\t1", "\t50"), "line 3: 11 fields; expected 12"),
+        (GOOD.replace("\t50\t1", "\t50\t1\t0"), "line 3: 13 fields; expected 12"),
+        (with_field(0, "2"), "line 3, field index: '2'; expected 1: rows count up"),
+        (with_field(0, "-1"), "field index: '-1'; expected a whole number from 0 to 65535"),
+        (with_field(0, "1.0"), "field index: '1.0'; expected a whole number"),
+        (with_field(1, "1"), "field current: '1'; expected 0: line 2 is already current"),
+        (with_field(1, "2"), "field current: '2'; expected a whole number from 0 to 1"),
+        (with_field(2, "256"), "field frame: '256'; expected a whole number from 0 to 255"),
+        (with_field(3, "16.0"), "field command: '16.0'; expected a whole number"),
+        (with_field(3, "65536"), "field command: '65536'"),
+        (with_field(3, "١٦"), "field command: '١٦'"),
+        (with_field(4, "nan"), "field param1: 'nan'; expected a finite number"),
+        (with_field(4, "1_0"), "field param1: '1_0'"),
+        (with_field(4, "0x10"), "field param1: '0x10'"),
+        (with_field(7, "inf"), "field param4: 'inf'; expected a finite number or nan"),
+        (with_field(8, "nan"), "field latitude: 'nan'; expected a finite number from -90 to 90"),
+        (with_field(8, "90.01"), "field latitude: '90.01'"),
+        (with_field(8, "47,5"), "field latitude: '47,5'"),
+        (with_field(9, "-180.1"), "field longitude: '-180.1'"),
+        (with_field(10, "1e999"), "field altitude: '1e999'; expected a finite number"),
+        (with_field(10, "nan"), "field altitude: 'nan'"),
+        (with_field(10, "9" * 500), "field altitude: '9999999"),
+        (with_field(11, "true"), "field autocontinue: 'true'; expected a whole number from 0"),
+        (with_field(3, "22", HOME), "line 2, field command: '22'; expected 16: row 0 is the home"),
+        (with_field(2, "3", HOME), "line 2, field frame: '3'; expected 0: row 0 is the home"),
+    ],
+)
+def test_damage_is_named(text, message):
+    with pytest.raises(MissionFileError, match=re.escape(message)) as caught:
+        read_wpl(text, "x")
+    assert str(caught.value).startswith("x: ")
+    assert len(str(caught.value)) < 250
+
+
+def test_coordinates_of_the_mission_frame_are_plain_parameters():
+    text = with_field(2, "2").replace("47.5", "1000")
+    assert read_wpl(text, "x").items[0].x == 1000
+
+
+def reads_or_complains(text):
+    try:
+        mission = read_wpl(text, "x")
+    except MissionFileError:
+        return
+    assert repr(read_wpl(write_wpl(mission), "x")) == repr(mission)
+
+
+@STEADY
+@given(st.text())
+def test_any_text_is_read_or_refused(text):
+    reads_or_complains(text)
+    reads_or_complains("QGC WPL 110\n" + text)
+
+
+@STEADY
+@given(st.data())
+def test_a_mutated_file_is_read_or_refused(data):
+    text = GOOD
+    for _ in range(data.draw(st.integers(1, 4))):
+        begin = data.draw(st.integers(0, len(text)))
+        end = min(len(text), begin + data.draw(st.integers(0, 6)))
+        patch = data.draw(st.text("0123456789.-+eEnaif\t\n\r #\x00", max_size=6))
+        text = text[:begin] + patch + text[end:]
+    reads_or_complains(text)
+
+
+@pytest.mark.parametrize("suffix", [*MISSION_SUFFIXES, ".WAYPOINTS"])
+def test_a_file_is_read_by_its_ending(mission, tmp_path, suffix):
+    path = tmp_path / f"flight{suffix}"
+    path.write_text(render_mission(mission, path), newline="")
+    assert read_mission(path) == read_mission(str(path)) == mission
+
+
+@pytest.mark.parametrize("name", ["flight.plan", "flight.kml", "flight", ".waypoints"])
+def test_an_unknown_ending_is_refused(mission, tmp_path, name):
+    path = tmp_path / name
+    with pytest.raises(MissionFileError, match=r"ends in \.waypoints or \.txt .*not written yet"):
+        read_mission(path)
+    with pytest.raises(MissionFileError, match=re.escape(str(path))):
+        render_mission(mission, path)
+
+
+def test_a_file_that_cannot_be_opened_is_named(tmp_path):
+    with pytest.raises(MissionFileError, match=r"none\.waypoints: cannot be read: No such file"):
+        read_mission(tmp_path / "none.waypoints")
+    (tmp_path / "folder.txt").mkdir()
+    with pytest.raises(MissionFileError, match="cannot be read: Is a directory"):
+        read_mission(tmp_path / "folder.txt")
+    with pytest.raises(MissionFileError, match="cannot be read: embedded null"):
+        read_mission("a\0.txt")
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "x.waypoints"
+    path.write_bytes(b"QGC WPL 110\n\xff\xfe")
+    with pytest.raises(MissionFileError, match=r"x\.waypoints: line 2: byte 0xff is not UTF-8"):
+        read_mission(path)
+    path.write_bytes(b"#" * 16_000_001)
+    with pytest.raises(MissionFileError, match="more than 16 MB"):
+        read_mission(path)
