@@ -1,0 +1,90 @@
+"""The result of the main job, for people and for programs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from faao_mav.faao.pricing import MutualInformation, Saturation
+from faao_mav.faao.solution import Solution
+from faao_mav.mission import Mission, Route
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """Everything that the main job found out."""
+
+    solution: Solution
+    information: MutualInformation
+    saturation: Saturation
+    mission: Mission
+    route: Route
+    seconds_optimize: float
+    seconds_total: float
+    written: tuple[Path, ...]
+
+
+def as_dict(result: Result) -> dict[str, Any]:
+    """Return the JSON object of `--json`: bit/s/Hz, seconds, metres, dB."""
+    solution, rates = result.solution, result.solution.rates
+    information = result.information
+    return {
+        "name": solution.plan.name,
+        "average_rate": rates.R_avg,
+        "rate_bs_uav": rates.R_U,
+        "rate_uav_user": rates.R_G,
+        "mutual_information": information.average,
+        "mutual_information_bs_uav": information.bs_uav,
+        "mutual_information_uav_user": information.uav_user,
+        "mutual_information_error": information.error,
+        "upper_bound": None,
+        "iterations": solution.iterations,
+        "converged": solution.converged,
+        "ending": solution.ending,
+        "history": solution.history.tolist(),
+        "residuals": solution.residuals(),
+        "seconds": {"optimize": result.seconds_optimize, "total": result.seconds_total},
+        "saturated": result.saturation.saturated,
+        "spare_db": result.saturation.spare_db,
+        "mission": {
+            "items": len(result.mission.items),
+            "duration": result.route.duration,
+            "distance": result.route.distance,
+        },
+        "predicted": None,
+    }
+
+
+def as_text(result: Result) -> str:
+    """Return the summary for people."""
+    solution, rates = result.solution, result.solution.rates
+    information, limit = result.information, result.saturation
+    flight = solution.plan.flight
+    title = [solution.plan.name] if solution.plan.name else []
+    lines = [
+        *title,
+        f"rate         {rates.R_avg:.4f} bit/s/Hz of at most {limit.ceiling:g} "
+        f"(base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f})",
+        f"             {solution.history[0]:.4f} on the straight start; mutual information "
+        f"{information.average:.3f} +- {information.error:.1g}",
+    ]
+    if limit.saturated:
+        lines.append(
+            "saturated    the alphabet is used up and the route hardly matters: "
+            f"{limit.spare_db:.1f} dB less power at both stations would do"
+        )
+    state = "converged" if solution.converged else "NOT CONVERGED"
+    lines += [
+        f"optimiser    {state} after {_count(solution.iterations, 'iteration')}, "
+        f"{result.seconds_optimize:.1f} s: {solution.ending}",
+        f"mission      {_count(len(result.mission.items), 'item')}; relay route of "
+        f"{result.route.duration:.1f} s (planned: {flight.duration - flight.time_step:g} s) and "
+        f"{result.route.distance:.0f} m",
+    ]
+    lines += [f"written      {path}" for path in result.written]
+    if not result.written:
+        lines.append("written      nothing: give --out MISSION.waypoints")
+    return "\n".join(lines)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -1,0 +1,202 @@
+"""The command line, from plan to mission file."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from conftest import SMALL, edited
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.mission.formats import read_mission
+
+
+def run(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "plan.yaml"
+    path.write_text(SMALL)
+    return path
+
+
+def test_the_main_job(plan: Path, tmp_path: Path) -> None:
+    out, save = tmp_path / "m.waypoints", tmp_path / "r.npz"
+    result = run(plan, "--out", out, "--save", save)
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    assert "bit/s/Hz of at most 2" in result.stdout
+    assert "converged after" in result.stdout
+    assert str(out) in result.stdout
+    mission = read_mission(out)
+    assert mission.home is not None
+    assert [item.command for item in mission.items][:3] == [22, 178, 16]
+    assert mission.items[-1].command == 20
+    with np.load(save) as archive:
+        assert archive["w"].shape == (20, 2)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.waypoints", "plan.yaml", "r.npz"]
+
+
+def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -> None:
+    result = run(plan, "--out", tmp_path / "m.txt", "--json")
+    assert result.exit_code == 0
+    assert result.stdout.count("\n") == 1
+    data = json.loads(result.stdout)
+    assert data["average_rate"] == min(data["rate_bs_uav"], data["rate_uav_user"])
+    assert data["average_rate"] < data["mutual_information"] < 2
+    assert data["upper_bound"] is None
+    assert data["iterations"] == len(data["history"]) - 1
+    assert 0 < data["seconds"]["optimize"] <= data["seconds"]["total"]
+    assert data["saturated"] is False
+    assert data["mission"]["items"] == len(read_mission(tmp_path / "m.txt").items)
+    assert data["mission"]["duration"] == pytest.approx(9.5, abs=1)
+    assert data["mission"]["distance"] > 70
+    assert max(data["residuals"].values()) < 1e-6
+
+
+def test_same_plan_same_bytes(plan: Path, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        assert run(plan, "--out", tmp_path / f"{name}.txt", "--save", tmp_path / f"{name}.npz",
+                   "--quiet").output == ""  # fmt: skip
+    for suffix in ("txt", "npz"):
+        first, second = (tmp_path / f"{name}.{suffix}" for name in "ab")
+        assert first.read_bytes() == second.read_bytes()
+
+
+def test_saturation_is_said_with_the_power_to_save(plan: Path) -> None:
+    plan.write_text(
+        edited(SMALL, {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40})
+    )
+    result = run(plan)
+    assert result.exit_code == 0
+    assert "saturated" in result.stdout
+    assert "dB less power at both stations would do" in result.stdout
+    assert "written      nothing: give --out" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (["--out", "x.plan"], "x.plan: '.plan'; expected a name that ends in .waypoints or .txt"),
+        (["--out", "x"], "no ending"),
+        (["--out", "absent/x.txt"], "there is no directory absent"),
+        (["--save", "x.yaml"], "--save x.yaml: give a name that ends in .npz"),
+        (["--method", "magic"], "optimizer.method: 'magic' is not accepted; give direct or"),
+        (["--method", "direct"], "optimizer.method: direct does not work yet"),
+        (["--nonsense"], "No such option"),
+        (["second.yaml"], "unexpected extra argument"),
+    ],
+)
+def test_bad_arguments(
+    plan: Path, options: list[str], part: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(plan, *options)
+    assert result.exit_code == 2
+    assert part in result.stderr
+    assert result.stdout == ""
+    assert [p.name for p in tmp_path.iterdir()] == ["plan.yaml"]
+
+
+def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
+    plan: Path, tmp_path: Path
+) -> None:
+    out, save = tmp_path / "m.txt", tmp_path / "r.npz"
+    plan.write_text(SMALL.replace("altitude: 40", "altitude: -1"))
+    result = run(plan, "--out", out)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"faao-mission: {plan}: flight.altitude: -1")
+    plan.write_text(edited(SMALL, {"vehicle.parameters": {"WPNAV_JERK": 0}}))
+    result = run(plan, "--out", out, "--save", save)
+    assert result.exit_code == 2
+    assert "vehicle.parameters.WPNAV_JERK: 0" in result.stderr
+    assert not save.exists()
+    plan.write_text(edited(SMALL, {"mission.max_items": 4}))
+    result = run(plan, "--out", out, "--save", save)
+    assert result.exit_code == 1
+    assert "mission.max_items" in result.stderr
+    assert save.exists()
+    assert not out.exists()
+
+
+def test_a_failed_run_keeps_the_old_mission(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "m.txt"
+    out.write_text("precious")
+    plan.write_text(edited(SMALL, {"mission.max_items": 4}))
+    assert run(plan, "--out", out).exit_code == 1
+    assert out.read_text() == "precious"
+
+
+def test_help_and_no_arguments() -> None:
+    assert "--out" in run("--help").stdout
+    assert run("--version").stdout.startswith("faao-mission ")
+    assert run().exit_code == 2
+
+
+def test_as_a_program(plan: Path, tmp_path: Path) -> None:
+    """The installed script: progress off a terminal stays silent, errors are one line."""
+    script = Path(sys.executable).with_name("faao-mission")
+    good = subprocess.run([script, plan, "--json"], capture_output=True, text=True, check=False)
+    assert (good.returncode, good.stderr) == (0, "")
+    json.loads(good.stdout)
+    bad = subprocess.run(
+        [script, tmp_path / "no.yaml"], capture_output=True, text=True, check=False
+    )
+    assert bad.returncode == 2
+    where = tmp_path / "no.yaml"
+    assert bad.stderr == f"faao-mission: {where}: cannot be read: No such file or directory\n"
+
+
+TINY = edited(SMALL, {"flight.duration": 3, "flight.end": [5, 45], "optimizer.max_iterations": 1})
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-3, 300),
+    st.floats(-500, 500) | st.sampled_from([float("nan"), float("inf")]),
+    st.sampled_from(["hover", "free", "qpsk", "none", "all_ones", "mrt", "land", ""]),
+    st.lists(st.floats(-20, 20), min_size=2, max_size=2),
+)
+
+
+@st.composite
+def mutations(draw: st.DrawFn) -> dict[str, Any]:
+    paths = [
+        f"{section}.{key}"
+        for section, keys in yaml.safe_load(TINY).items()
+        for key in [*keys, "extra"]
+    ]
+    paths += ["radio.relay.power_dbm", "radio.relay.antennas", "radio.modulation", "radio.fading",
+              "radio.seed", "optimizer.precoder", "mission.on_finish", "mission.path_tolerance",
+              "flight.start_velocity", "mission.max_items", "vehicle.parameters"]  # fmt: skip
+    return draw(st.dictionaries(st.sampled_from(paths), VALUES, min_size=1, max_size=3))
+
+
+@settings(max_examples=60)
+@given(mutations())
+def test_no_mutation_gives_a_traceback_or_a_partial_file(
+    tmp_path_factory: pytest.TempPathFactory, changes: dict[str, Any]
+) -> None:
+    folder = tmp_path_factory.mktemp("fuzz")
+    plan, out = folder / "plan.yaml", folder / "m.waypoints"
+    plan.write_text(edited(TINY, changes))
+    result = run(plan, "--out", out, "--json")
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    assert result.exit_code in (0, 1, 2)
+    assert "Traceback" not in result.output
+    if result.exit_code == 0:
+        json.loads(result.stdout)
+        assert read_mission(out).items
+        assert sorted(p.name for p in folder.iterdir()) == ["m.waypoints", "plan.yaml"]
+    else:
+        assert result.stdout == ""
+        assert result.stderr
+        assert [p.name for p in folder.iterdir()] == ["plan.yaml"]
