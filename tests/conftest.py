@@ -60,3 +60,14 @@ def small_plan() -> MakePlan:
         return parse_plan(edited(SMALL, changes or {}))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def paper_plan(small_plan: MakePlan) -> MakePlan:
+    """Make the small plan for Algorithm 1 and a known draw, with some keys replaced."""
+
+    def make(changes: dict[str, Any] | None = None) -> Plan:
+        paper = {"optimizer.method": "algorithm1", "radio.fading": "realization"}
+        return small_plan(paper | (changes or {}))
+
+    return make

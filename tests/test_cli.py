@@ -91,7 +91,7 @@ def test_saturation_is_said_with_the_power_to_save(plan: Path) -> None:
         (["--out", "absent/x.txt"], "there is no directory absent"),
         (["--save", "x.yaml"], "--save x.yaml: give a name that ends in .npz"),
         (["--method", "magic"], "optimizer.method: 'magic' is not accepted; give direct or"),
-        (["--method", "direct"], "optimizer.method: direct does not work yet"),
+        (["--method", "algorithm1"], "radio.fading: ergodic is not for algorithm1"),
         (["--nonsense"], "No such option"),
         (["second.yaml"], "unexpected extra argument"),
     ],

@@ -42,8 +42,11 @@ def plan(
     ] = None,
     method: Annotated[
         str | None,
-        typer.Option(metavar="M", help="Replace optimizer.method of the plan: algorithm1."),
+        typer.Option(metavar="M", help="Replace optimizer.method: direct or algorithm1."),
     ] = None,
+    bound: Annotated[
+        bool, typer.Option("--bound", help="Also compute what no route can exceed.")
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object instead of the summary.")
     ] = False,
@@ -57,7 +60,7 @@ def plan(
     Exit status: 0 done; 1 there is no such flight or mission; 2 unusable arguments or input.
     """
     try:
-        _run(plan_file, out, save, method, as_json, quiet)
+        _run(plan_file, out, save, method, bound, as_json, quiet)
     except InputError as error:
         _fail(error, 2)
     except FaaoError as error:
@@ -74,13 +77,16 @@ def _run(
     out: Path | None,
     save: Path | None,
     method: str | None,
+    bound: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
     from faao_mav.cli.progress import progress
     from faao_mav.cli.summary import Result, as_dict, as_text
+    from faao_mav.faao.bound import upper_bound
     from faao_mav.faao.optimize import optimize
-    from faao_mav.faao.pricing import price, saturation
+    from faao_mav.faao.pricing import fresh_rates, price, saturation
+    from faao_mav.faao.problem import build_problem
     from faao_mav.faao.solution import save_solution
     from faao_mav.mission import assemble, plan_route
     from faao_mav.mission.autopilot import legs_of
@@ -107,11 +113,15 @@ def _run(
         mission = assemble(route, read)
         if out is not None:
             write_whole(out, render_mission(mission, out).encode())
-        information, limit = price(solution), saturation(solution)
+        information, fresh = price(solution), fresh_rates(solution)
+        limit = saturation(solution)
+        ceiling = upper_bound(build_problem(read), solution.rates.R_avg) if bound else None
     result = Result(
         solution=solution,
         information=information,
+        fresh=fresh,
         saturation=limit,
+        bound=ceiling,
         mission=mission,
         route=route,
         seconds_optimize=optimized,

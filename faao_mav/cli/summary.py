@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from faao_mav.faao.pricing import MutualInformation, Saturation
+from faao_mav.faao.bound import Bound
+from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.faao.solution import Solution
 from faao_mav.mission import Mission, Route
 
@@ -15,7 +16,9 @@ class Result:
 
     solution: Solution
     information: MutualInformation
+    fresh: FreshRates | None
     saturation: Saturation
+    bound: Bound | None
     mission: Mission
     route: Route
     seconds_optimize: float
@@ -36,7 +39,11 @@ def as_dict(result: Result) -> dict[str, Any]:
         "mutual_information_bs_uav": information.bs_uav,
         "mutual_information_uav_user": information.uav_user,
         "mutual_information_error": information.error,
-        "upper_bound": None,
+        "fresh_rate": result.fresh.average if result.fresh else None,
+        "fresh_rate_error": result.fresh.error if result.fresh else None,
+        "upper_bound": result.bound.value if result.bound else None,
+        "upper_bound_exact": result.bound.exact if result.bound else None,
+        "starts": dict(solution.starts),
         "iterations": solution.iterations,
         "converged": solution.converged,
         "ending": solution.ending,
@@ -67,6 +74,17 @@ def as_text(result: Result) -> str:
         f"             {solution.history[0]:.4f} on the straight start; mutual information "
         f"{information.average:.3f} +- {information.error:.1g}",
     ]
+    if result.fresh is not None:
+        lines.append(
+            f"             {result.fresh.average:.4f} +- {result.fresh.error:.1g} on fading that "
+            "was not planned on"
+        )
+    if result.bound is not None:
+        short = 100 * (1 - rates.R_avg / result.bound.value) if result.bound.value else 0.0
+        lines.append(
+            f"bound        within {short:.2g} % of the best that any route can do: at most "
+            f"{result.bound.value:.4f} bit/s/Hz{'' if result.bound.exact else ' (numerical)'}"
+        )
     if limit.saturated:
         lines.append(
             "saturated    the alphabet is used up and the route hardly matters: "

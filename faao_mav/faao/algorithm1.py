@@ -15,6 +15,7 @@ from faao_mav.errors import PlanError, SolverError
 from faao_mav.faao.kinematics import Trajectory
 from faao_mav.faao.precoder_step import optimize_precoders
 from faao_mav.faao.problem import Problem
+from faao_mav.faao.progress import Observer, Progress
 from faao_mav.faao.solution import Solution, make_solution
 from faao_mav.faao.start import straight_flight
 from faao_mav.faao.trajectory_step import link_sum, optimize_trajectory
@@ -22,19 +23,6 @@ from faao_mav.radio.precoder import SCHEMES
 
 MAX_CONES = 300_000
 """Exponential cones that a convex problem may have: slots times classes, both links."""
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Where the optimiser stands: R_avg of the best iterate so far, and what runs now."""
-
-    iteration: int
-    max_iterations: int
-    stage: str
-    best_rate: float
-
-
-Observer = Callable[[Progress], None]
 
 
 Pair = tuple[Complex, Complex]
@@ -55,7 +43,7 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
     the paper's comparison. Raises `PlanError` when the alphabet makes the convex problems too
     large, and `InfeasibleError` when there is no flight at all.
     """
-    _check_size(problem)
+    _check_plan(problem)
     options = problem.plan.optimizer
     best = current = _start(problem)
     history = [_rate(problem, current)]
@@ -147,8 +135,18 @@ def _rate(problem: Problem, iterate: _Iterate) -> float:
     )
 
 
-def _check_size(problem: Problem) -> None:
+def _check_plan(problem: Problem) -> None:
     plan = problem.plan
+    if plan.radio.fading == "ergodic":
+        raise PlanError(
+            f"{plan.source}: radio.fading: ergodic is not for algorithm1, which plans for one "
+            "known draw; use realization or none, or optimizer.method: direct"
+        )
+    if plan.optimizer.inputs == "gaussian":
+        raise PlanError(
+            f"{plan.source}: optimizer.inputs: gaussian is not for algorithm1, whose sums are "
+            "those of an alphabet; use optimizer.method: direct"
+        )
     cones = problem.kinematics.slots * sum(len(k.classes.multiplicity) for k in problem.links)
     if cones > MAX_CONES:
         raise PlanError(

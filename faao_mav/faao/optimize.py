@@ -1,7 +1,7 @@
 """Plan -> Solution, by the method that the plan asks for."""
 
-from faao_mav.faao.algorithm1 import Observer, algorithm1
 from faao_mav.faao.problem import build_problem
+from faao_mav.faao.progress import Observer
 from faao_mav.faao.solution import Solution
 from faao_mav.plan import Plan
 
@@ -12,4 +12,11 @@ def optimize(plan: Plan, *, observe: Observer | None = None) -> Solution:
     `observe` is told the progress. Raises `PlanError` when the plan asks for more than the
     method can handle, `InfeasibleError` when no flight satisfies it.
     """
-    return algorithm1(build_problem(plan), observe=observe)
+    problem = build_problem(plan)
+    if plan.optimizer.method == "algorithm1":
+        from faao_mav.faao.algorithm1 import algorithm1  # with CVXPY, half a second to import
+
+        return algorithm1(problem, observe=observe)
+    from faao_mav.faao.direct import direct
+
+    return direct(problem, observe=observe)

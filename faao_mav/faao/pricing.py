@@ -1,15 +1,22 @@
 """What a solution is worth beyond its objective: mutual information, and power to spare."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from faao_mav.arrays import Complex
+from faao_mav.faao.design import design
 from faao_mav.faao.problem import build_problem
 from faao_mav.faao.solution import Solution
+from faao_mav.radio.channel import rayleigh
 from faao_mav.radio.mutual_information import mean_mutual_information
+from faao_mav.radio.rate import cutoff_rate
 
 SATURATED = 0.999
 """Share of N log2(rho) from which a link counts as saturated."""
+
+_FRESH_DRAWS = 64
+_FRESH_SEARCHES = 128
 
 _MAX_SPARE_DB = 300.0
 _BISECTIONS = 60
@@ -40,8 +47,7 @@ def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
     problem, rng = build_problem(solution.plan), np.random.default_rng(solution.plan.radio.seed)
     (bs_uav, first), (uav_user, second) = (
         mean_mutual_information(
-            link.channel(solution.w, H_r),
-            P,
+            *_per_slot(link.channel(solution.w, H_r), P),
             link.modulation,
             link.noise,
             rng=rng,
@@ -55,6 +61,61 @@ def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
         )
     )
     return MutualInformation(bs_uav, uav_user, max(first, second))
+
+
+@dataclass(frozen=True, slots=True)
+class FreshRates:
+    """R_U and R_G of (10) on fading that was not planned on, with standard errors, bit/s/Hz."""
+
+    bs_uav: float
+    uav_user: float
+    bs_uav_error: float
+    uav_user_error: float
+
+    @property
+    def average(self) -> float:
+        """The smaller of both, as in (9)."""
+        return min(self.bs_uav, self.uav_user)
+
+    @property
+    def error(self) -> float:
+        """The standard error of the smaller of both."""
+        return self.bs_uav_error if self.bs_uav <= self.uav_user else self.uav_user_error
+
+
+def fresh_rates(solution: Solution) -> FreshRates | None:
+    """Return what `solution` carries on new draws of the fading; None unless it was averaged over.
+
+    Every slot has draws of its own. Precoders that know the draw are made anew for each, on a
+    regular sample of the slots.
+    """
+    problem, wanted = build_problem(solution.plan), design(solution.plan)
+    if not wanted.averaged:
+        return None
+    rng = np.random.default_rng([solution.plan.radio.seed, 1])
+    slots = len(solution.w)
+    step = 1 if wanted.blind else -(-slots // _FRESH_SEARCHES)
+    chosen = np.arange(step // 2, slots, step)
+    w, draws = solution.w[chosen], _FRESH_DRAWS if wanted.blind else 1
+    found = []
+    for link, P in zip(problem.links, (solution.P_B, solution.P_U), strict=True):
+        nlos = rayleigh(rng, draws * len(w), link.receive, link.transmit)
+        fresh = replace(link, nlos=nlos.reshape(draws, len(w), link.receive, link.transmit))
+        H = link.channel(w, fresh.small_scale(w))
+        known = P[chosen] if wanted.blind else wanted.precoders(link, H)
+        rates = cutoff_rate(H, known, link.classes, link.noise)
+        # The slots' own means differ: within a slot it is the draws that err. One draw per slot
+        # leaves only the spread over all, an upper estimate.
+        spread = rates.var(axis=0, ddof=1).mean() if draws > 1 else rates.var(ddof=1)
+        found.append((float(rates.mean()), float(np.sqrt(spread / rates.size))))
+    (bs_uav, first), (uav_user, second) = found
+    return FreshRates(bs_uav, uav_user, first, second)
+
+
+def _per_slot(H: Complex, P: Complex) -> tuple[Complex, Complex]:
+    """Lay draws and slots in one row: (m, N_r, N_t) and (m, N_t, N_t)."""
+    wide = np.broadcast_to(P, (*H.shape[:-2], *P.shape[-2:]))
+    return H.reshape(-1, *H.shape[-2:]), wide.reshape(-1, *P.shape[-2:])
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Everything that (13) needs, as arrays."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,6 @@ from faao_mav.errors import PlanError
 from faao_mav.faao.kinematics import Kinematics, kinematics
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
-    displacement,
     line_of_sight_all_ones,
     line_of_sight_ula,
     path_gain,
@@ -32,8 +32,9 @@ class Link:
     """One hop: (1) or (2) with its share of (13).
 
     `station` is p_B or p_U (2,), `altitude` H, `power` W_B or W_U (W), `noise` sigma² (W);
-    `receive` and `transmit` are the antenna counts, and `nlos` (N + 2, N_r, N_t) the Rayleigh
-    draw, or None for the line of sight alone.
+    `receive` and `transmit` are the antenna counts. `nlos` is the Rayleigh part: a known draw per
+    slot (N + 2, N_r, N_t), draws to be averaged over (S, 1, N_r, N_t), or None for the line of
+    sight alone.
     """
 
     name: str
@@ -60,21 +61,46 @@ class Link:
         """Whether H_r changes with w."""
         return self.line_of_sight == "ula"
 
+    @property
+    def los_share(self) -> float:
+        """The factor of H^LoS in H_r."""
+        return (
+            1.0 if self.nlos is None else math.sqrt(self.rician_factor / (1 + self.rician_factor))
+        )
+
     def gain(self, w: Real) -> Real:
         """Return rho_0 d^-2 (N + 2,) at the positions w (N + 2, 2)."""
         return path_gain(w, self.station, self.altitude, self.reference_gain)
 
     def small_scale(self, w: Real) -> Complex:
-        """Return H_r (N + 2, N_r, N_t), the bracket of (1) or (2), at the positions w."""
-        if self.follows_position:
-            outward = displacement(w, self.station, self.altitude)
-            wave = outward if self.to_relay else -outward
-            los = line_of_sight_ula(wave, self.receive, self.transmit)
-        else:
+        """Return H_r, the bracket of (1) or (2), at the positions w (N + 2, 2).
+
+        (N + 2, N_r, N_t); with fading that is averaged over, a leading axis of draws.
+        """
+        away = w - self.station
+        d = np.sqrt(np.sum(away**2, axis=1) + self.altitude**2)
+        return self.fade(self.line_of_sight_at(away[:, 0] / d))
+
+    def line_of_sight_at(self, cosine: Real) -> Complex:
+        """Return H^LoS (n, N_r, N_t) at direction cosines u = (x - x_j) / d (n,)."""
+        if not self.follows_position:
             ones = line_of_sight_all_ones(self.receive, self.transmit)
-            los = np.broadcast_to(ones, (len(w), *ones.shape))
+            return np.broadcast_to(ones, (len(cosine), *ones.shape))
+        across = np.sqrt(np.maximum(0.0, 1 - cosine**2))
+        outward = np.column_stack([cosine, across, np.zeros_like(cosine)])
+        wave = outward if self.to_relay else -outward
+        return line_of_sight_ula(wave, self.receive, self.transmit)
+
+    def fade(self, los: Complex) -> Complex:
+        """Return H_r for line-of-sight parts `los` (N + 2, N_r, N_t).
+
+        Draws that are averaged over turn with the line of sight. Their distribution does not
+        change by that, and their mean rate depends on the distance alone.
+        """
         if self.nlos is None:
             return los
+        if self.nlos.ndim == 4:
+            return los * rician(np.ones_like(self.nlos), self.nlos, self.rician_factor)
         return rician(los, self.nlos, self.rician_factor)
 
     def channel(self, w: Real, H_r: Complex) -> Complex:
@@ -82,8 +108,9 @@ class Link:
         return np.sqrt(self.gain(w))[:, None, None] * H_r
 
     def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
-        """Return (7) or (8) for every slot, bits (N + 2,)."""
-        return cutoff_rate(self.channel(w, H_r), P, self.classes, self.noise)
+        """Return (7) or (8) for every slot, bits (N + 2,), its mean where H_r has draws."""
+        rates = cutoff_rate(self.channel(w, H_r), P, self.classes, self.noise)
+        return np.asarray(rates.mean(axis=0)) if rates.ndim == 2 else rates
 
 
 @dataclass(frozen=True)
@@ -113,14 +140,26 @@ def build_problem(plan: Plan) -> Problem:
     rng = np.random.default_rng(radio.seed)
 
     def link(
-        name: str, position: Vector, receive: int, transmit: int, power: float, noise: float
+        name: str,
+        to_relay: bool,
+        position: Vector,
+        receive: int,
+        transmit: int,
+        power: float,
+        noise: float,
     ) -> Link:
-        drawn = radio.fading == "realization"
+        match radio.fading:
+            case "realization":
+                nlos: Complex | None = rayleigh(rng, slots, receive, transmit)
+            case "ergodic":
+                nlos = rayleigh(rng, radio.fading_samples, receive, transmit)[:, None]
+            case "none":
+                nlos = None
         return Link(
             name=name,
             station=np.array(position),
             altitude=plan.flight.altitude,
-            to_relay=position is base.position,
+            to_relay=to_relay,
             power=power,
             noise=noise,
             receive=receive,
@@ -129,7 +168,7 @@ def build_problem(plan: Plan) -> Problem:
             reference_gain=radio.reference_gain,
             rician_factor=radio.rician_factor,
             line_of_sight=radio.line_of_sight,
-            nlos=rayleigh(rng, slots, receive, transmit) if drawn else None,
+            nlos=nlos,
         )
 
     return Problem(
@@ -137,6 +176,7 @@ def build_problem(plan: Plan) -> Problem:
         kinematics=kinematics(plan),
         bs_uav=link(
             "base station to UAV",
+            True,
             base.position,
             relay.antennas,
             base.antennas,
@@ -145,6 +185,7 @@ def build_problem(plan: Plan) -> Problem:
         ),
         uav_user=link(
             "UAV to ground user",
+            False,
             user.position,
             user.antennas,
             relay.antennas,

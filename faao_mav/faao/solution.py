@@ -1,8 +1,10 @@
 """What an optimiser returns: trajectory, precoders, rates, and the means to check them."""
 
 import io
+import json
 import zipfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +38,9 @@ class Solution:
     `t` (n,) s; `w`, `v`, `a` (n, 2); `P_B` (n, N_t, N_t) and `P_U` (n, N_u, N_u) in sqrt(W);
     the fading `H_rB` (n, N_u, N_t) and `H_rU` (n, N_r, N_u) without path gain; `I_U`, `I_G`
     (n,) of (7), (8) in bits; `history` R_avg of the start and after each iteration.
+    Fading that is averaged over has a leading axis of draws, and so have precoders that know it.
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
-    what did.
+    what did; `starts` what each start of the direct method led to, bit/s/Hz.
     """
 
     plan: Plan
@@ -54,6 +57,7 @@ class Solution:
     history: Real
     converged: bool
     ending: str
+    starts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def rates(self) -> Rates:
@@ -111,6 +115,7 @@ def make_solution(
     *,
     converged: bool,
     ending: str,
+    starts: Mapping[str, float] | None = None,
 ) -> Solution:
     """Put an iterate together with its rates."""
     I_U, I_G = (
@@ -132,6 +137,7 @@ def make_solution(
         history=np.array(history),
         converged=converged,
         ending=ending,
+        starts=starts or {},
     )
 
 
@@ -141,13 +147,14 @@ _ARRAYS = ("t", "w", "v", "a", "P_B", "P_U", "H_rB", "H_rU", "I_U", "I_G", "hist
 def save_solution(solution: Solution, path: str | Path) -> None:
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
-    Keys: the arrays of `Solution` by name, `R_avg`, `R_U`, `R_G`, `converged`, `ending` and
-    `plan`, the YAML text. The same solution gives the same bytes.
+    Keys: the arrays of `Solution` by name, `R_avg`, `R_U`, `R_G`, `converged`, `ending`,
+    `starts` (JSON text) and `plan`, the YAML text. The same solution gives the same bytes.
     """
     rates = solution.rates
     values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}
     values |= {"R_avg": rates.R_avg, "R_U": rates.R_U, "R_G": rates.R_G}
     values |= {"converged": solution.converged, "ending": solution.ending}
+    values["starts"] = json.dumps(dict(solution.starts))
     values["plan"] = solution.plan.text
     buffer = io.BytesIO()
     np.savez(buffer, **values)
@@ -161,9 +168,10 @@ def load_solution(path: str | Path) -> Solution:
             arrays = {name: archive[name] for name in _ARRAYS}
             text, ending = str(archive["plan"]), str(archive["ending"])
             converged = bool(archive["converged"])
+            starts = json.loads(str(archive["starts"]))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: not a result of faao-mission --save: {error}") from None
     plan = parse_plan(text, f"{path} (plan)")
-    return Solution(plan=plan, converged=converged, ending=ending, **arrays)
+    return Solution(plan=plan, converged=converged, ending=ending, starts=starts, **arrays)

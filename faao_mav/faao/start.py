@@ -24,7 +24,7 @@ def straight_flight(kin: Kinematics) -> Trajectory:
         direction = next((v / np.linalg.norm(v) for v in ends if v.any()), np.array([1.0, 0.0]))
     across = np.array([-direction[1], direction[0]])
     if all(abs(v @ across) <= 1e-12 * kin.max_speed for v in ends):
-        speed = _even_speed(kin, direction, distance)
+        speed = even_speed(kin, direction, distance)
         if speed is not None:
             v = speed[:, None] * direction
             a = np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)])
@@ -32,8 +32,35 @@ def straight_flight(kin: Kinematics) -> Trajectory:
     return _gentlest_flight(kin)
 
 
-def _even_speed(kin: Kinematics, direction: Real, distance: float) -> Real | None:
-    """Speeds (N + 2,) along the line that sum to `distance`, as near to one value as allowed."""
+def even_speed(kin: Kinematics, direction: Real, distance: float) -> Real | None:
+    """Return speeds (N + 2,) along `direction` (2,) as near to one value as the limits allow.
+
+    The flight is `distance` metres long. None where that is not possible.
+    """
+    lower, upper = _speed_limits(kin, direction)
+    slack = 1e-9 * max(1.0, distance)
+    if (lower > upper + 1e-12).any():
+        return None
+    if not _flown(kin, lower) - slack <= distance <= _flown(kin, upper) + slack:
+        return None
+    slow, fast = -kin.max_speed, kin.max_speed
+    for _ in range(_BISECTIONS):
+        middle = (slow + fast) / 2
+        if _flown(kin, np.clip(middle, lower, upper)) < distance:
+            slow = middle
+        else:
+            fast = middle
+    return np.asarray(np.clip(fast, lower, upper))
+
+
+def farthest(kin: Kinematics, direction: Real) -> float:
+    """Return how far along `direction` a straight flight gets, m; minus infinity for none."""
+    lower, upper = _speed_limits(kin, direction)
+    return -np.inf if (lower > upper + 1e-12).any() else _flown(kin, upper)
+
+
+def _speed_limits(kin: Kinematics, direction: Real) -> tuple[Real, Real]:
+    """The least and the greatest speed (N + 2,) that the ends and the limits allow."""
     n = np.arange(kin.slots, dtype=float)
     gain = kin.max_acceleration * kin.time_step
     upper = np.full(kin.slots, kin.max_speed)
@@ -41,33 +68,17 @@ def _even_speed(kin: Kinematics, direction: Real, distance: float) -> Real | Non
     if kin.start_velocity is not None:
         first = float(kin.start_velocity @ direction)
         steps = n + (0.0 if kin.bound_first_acceleration else np.where(n > 0, np.inf, 0.0))
-        upper, lower = (
-            np.minimum(upper, first + gain * steps),
-            np.maximum(lower, first - gain * steps),
-        )
+        upper = np.minimum(upper, first + gain * steps)
+        lower = np.maximum(lower, first - gain * steps)
     if kin.end_velocity is not None:
         last, steps = float(kin.end_velocity @ direction), n[::-1]
-        upper, lower = (
-            np.minimum(upper, last + gain * steps),
-            np.maximum(lower, last - gain * steps),
-        )
+        upper = np.minimum(upper, last + gain * steps)
+        lower = np.maximum(lower, last - gain * steps)
+    return lower, upper
 
-    def flown(speed: Real) -> float:
-        return float(kin.time_step * (speed[:-1] + speed[1:]).sum() / 2)
 
-    slack = 1e-9 * max(1.0, distance)
-    if (lower > upper + 1e-12).any() or not flown(lower) - slack <= distance <= flown(
-        upper
-    ) + slack:
-        return None
-    slow, fast = -kin.max_speed, kin.max_speed
-    for _ in range(_BISECTIONS):
-        middle = (slow + fast) / 2
-        if flown(np.clip(middle, lower, upper)) < distance:
-            slow = middle
-        else:
-            fast = middle
-    return np.asarray(np.clip(fast, lower, upper))
+def _flown(kin: Kinematics, speed: Real) -> float:
+    return float(kin.time_step * (speed[:-1] + speed[1:]).sum() / 2)
 
 
 def _gentlest_flight(kin: Kinematics) -> Trajectory:

@@ -19,6 +19,8 @@ Fading: TypeAlias = Literal["ergodic", "realization", "none"]
 ChannelKnowledge: TypeAlias = Literal["statistical", "instantaneous"]
 Method: TypeAlias = Literal["direct", "algorithm1"]
 PrecoderScheme: TypeAlias = Literal["faao", "mmse", "mrt", "zf", "waterfilling"]
+Inputs: TypeAlias = Literal["alphabet", "gaussian"]
+Start: TypeAlias = Literal["straight", "bs", "user", "bs-user", "user-bs"]
 OnFinish: TypeAlias = Literal["rtl", "land", "hover"]
 MissionParameters: TypeAlias = Literal["recommend", "keep"]
 
@@ -113,10 +115,16 @@ class Radio:
 
 @dataclass(frozen=True, slots=True)
 class Optimizer:
-    """How the plan is optimised; `tolerance` is tol on R_avg, bit/s/Hz."""
+    """How the plan is optimised; `tolerance` is tol on R_avg, bit/s/Hz.
+
+    `inputs` are those that route and precoders are made for; what is reported is always the rate
+    of the alphabet. `starts` are the routes that the direct method starts from.
+    """
 
     method: Method
     precoder: PrecoderScheme
+    inputs: Inputs
+    starts: tuple[Start, ...]
     tolerance: float
     max_iterations: int
 

@@ -99,7 +99,9 @@ class _Reader:
             vehicle=vehicle,
             flight=flight,
             radio=self.radio(),
-            optimizer=model.Optimizer(**dict(tree.optimizer)),
+            optimizer=model.Optimizer(
+                **dict(tree.optimizer) | {"starts": tuple(tree.optimizer.starts)}
+            ),
             mission=model.MissionOptions(**dict(tree.mission)),
             name=tree.name,
             text=self.text,

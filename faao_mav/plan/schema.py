@@ -13,12 +13,14 @@ from faao_mav.plan.model import (
     Autopilot,
     ChannelKnowledge,
     Fading,
+    Inputs,
     LineOfSight,
     Method,
     MissionParameters,
     Modulation,
     OnFinish,
     PrecoderScheme,
+    Start,
     Vector,
     VehicleType,
 )
@@ -204,7 +206,7 @@ class RadioSection(Section):
         3.0, ge=0, le=1e6, description="the Rician factor K, linear, 0 to 1e6"
     )
     line_of_sight: LineOfSight = Field("ula", description="ula or all_ones")
-    fading: Fading = Field("realization", description="ergodic, realization or none")
+    fading: Fading = Field("ergodic", description="ergodic, realization or none")
     fading_samples: int = Field(32, ge=1, le=100_000, description="a whole number, 1 to 100000")
     csi: ChannelKnowledge = Field("statistical", description="statistical or instantaneous")
     seed: int = Field(0, ge=0, lt=2**63, description="a whole number from 0")
@@ -214,8 +216,14 @@ class RadioSection(Section):
 class OptimizerSection(Section):
     """`optimizer`."""
 
-    method: Method = Field("algorithm1", description="direct or algorithm1")
+    method: Method = Field("direct", description="direct or algorithm1")
     precoder: PrecoderScheme = Field("faao", description="faao, mmse, mrt, zf or waterfilling")
+    inputs: Inputs = Field("alphabet", description="alphabet or gaussian")
+    starts: list[Start] = Field(
+        ["straight", "bs", "user", "bs-user", "user-bs"],
+        min_length=1,
+        description="a list of straight, bs, user, bs-user and user-bs",
+    )
     tolerance: float = Field(
         1e-4, gt=0, le=10, description="a number of bit/s/Hz above 0, at most 10"
     )
@@ -284,8 +292,6 @@ class PlanSection(Section):
 
 
 NOT_YET: tuple[tuple[str, object, str], ...] = (
-    ("optimizer.method", "direct", "use algorithm1"),
-    ("radio.fading", "ergodic", "use realization or none"),
     ("radio.causal", True, "leave it false"),
     ("vehicle.type", "plane", "use copter"),
     ("mission.parameters", "recommend", "use keep"),

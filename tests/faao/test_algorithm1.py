@@ -9,16 +9,16 @@ from conftest import MISSIONS, MakePlan
 
 from faao_mav.errors import InfeasibleError, PlanError, SolverError
 from faao_mav.faao import algorithm1 as module
-from faao_mav.faao.algorithm1 import Progress
 from faao_mav.faao.optimize import optimize
+from faao_mav.faao.progress import Progress
 from faao_mav.plan import read_plan
 from faao_mav.radio.precoder import SCHEMES
 
 
 @pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
 @pytest.mark.parametrize("fading", ["realization", "none"])
-def test_a_solution_proves_itself(small_plan: MakePlan, line_of_sight: str, fading: str) -> None:
-    plan = small_plan({"radio.line_of_sight": line_of_sight, "radio.fading": fading})
+def test_a_solution_proves_itself(paper_plan: MakePlan, line_of_sight: str, fading: str) -> None:
+    plan = paper_plan({"radio.line_of_sight": line_of_sight, "radio.fading": fading})
     solution = optimize(plan)
     assert solution.converged
     assert "less than 0.0001" in solution.ending
@@ -30,8 +30,8 @@ def test_a_solution_proves_itself(small_plan: MakePlan, line_of_sight: str, fadi
     assert solution.iterations == len(solution.history) - 1
 
 
-def test_rates_are_7_to_10_by_brute_force(small_plan: MakePlan) -> None:
-    solution = optimize(small_plan())
+def test_rates_are_7_to_10_by_brute_force(paper_plan: MakePlan) -> None:
+    solution = optimize(paper_plan())
     radio, altitude = solution.plan.radio, solution.plan.flight.altitude
     x = np.array([[a, b] for a in (1, -1) for b in (1, -1)])
     rates = []
@@ -67,16 +67,16 @@ def test_the_paper_plan_is_saturated_and_flies_straight() -> None:
     assert solution.w @ np.array([1.0, 1.0]) == pytest.approx(350)
 
 
-def test_same_seed_same_bytes_and_other_seed_other_draw(small_plan: MakePlan) -> None:
-    first, again = optimize(small_plan()), optimize(small_plan())
+def test_same_seed_same_bytes_and_other_seed_other_draw(paper_plan: MakePlan) -> None:
+    first, again = optimize(paper_plan()), optimize(paper_plan())
     for name in ("w", "v", "a", "P_B", "P_U", "H_rB", "I_U", "history"):
         assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
-    other = optimize(small_plan({"radio.seed": 1}))
+    other = optimize(paper_plan({"radio.seed": 1}))
     assert not np.allclose(first.H_rB, other.H_rB)
 
 
-def test_ula_fading_belongs_to_the_final_positions(small_plan: MakePlan) -> None:
-    solution = optimize(small_plan({"radio.line_of_sight": "ula", "radio.fading": "none"}))
+def test_ula_fading_belongs_to_the_final_positions(paper_plan: MakePlan) -> None:
+    solution = optimize(paper_plan({"radio.line_of_sight": "ula", "radio.fading": "none"}))
     d = np.column_stack([solution.w, np.full(20, 40.0)])
     u = d[:, 0] / np.linalg.norm(d, axis=1)
     assert solution.H_rB[:, 1, 0] == pytest.approx(np.exp(-1j * np.pi * u))
@@ -84,8 +84,8 @@ def test_ula_fading_belongs_to_the_final_positions(small_plan: MakePlan) -> None
 
 
 @pytest.mark.parametrize("scheme", sorted(SCHEMES))
-def test_schemes_keep_their_precoder_and_fly_for_it(small_plan: MakePlan, scheme: str) -> None:
-    solution = optimize(small_plan({"optimizer.precoder": scheme}))
+def test_schemes_keep_their_precoder_and_fly_for_it(paper_plan: MakePlan, scheme: str) -> None:
+    solution = optimize(paper_plan({"optimizer.precoder": scheme}))
     assert max(solution.residuals().values()) < 1e-6
     radio = solution.plan.radio
     gain = radio.reference_gain / (np.sum(solution.w**2, axis=1) + 40.0**2)
@@ -95,10 +95,10 @@ def test_schemes_keep_their_precoder_and_fly_for_it(small_plan: MakePlan, scheme
     assert solution.rates.R_avg > solution.history[0]
 
 
-def test_faao_beats_every_scheme(small_plan: MakePlan) -> None:
-    best = optimize(small_plan()).rates.R_avg
+def test_faao_beats_every_scheme(paper_plan: MakePlan) -> None:
+    best = optimize(paper_plan()).rates.R_avg
     for scheme in SCHEMES:
-        assert optimize(small_plan({"optimizer.precoder": scheme})).rates.R_avg < best + 1e-3
+        assert optimize(paper_plan({"optimizer.precoder": scheme})).rates.R_avg < best + 1e-3
 
 
 @pytest.mark.parametrize(
@@ -118,22 +118,22 @@ def test_faao_beats_every_scheme(small_plan: MakePlan) -> None:
         {"flight.duration": 1.5, "flight.end": [0.5, 49.5]},
     ],
 )
-def test_unusual_plans_are_solved(small_plan: MakePlan, changes: dict[str, Any]) -> None:
-    solution = optimize(small_plan(changes))
+def test_unusual_plans_are_solved(paper_plan: MakePlan, changes: dict[str, Any]) -> None:
+    solution = optimize(paper_plan(changes))
     assert max(solution.residuals().values()) < 1e-6
     assert np.isfinite(solution.history).all()
     assert solution.rates.R_avg >= solution.history[0]
 
 
-def test_the_iteration_limit_is_kept_and_said(small_plan: MakePlan) -> None:
-    solution = optimize(small_plan({"optimizer.max_iterations": 1, "optimizer.tolerance": 1e-9}))
+def test_the_iteration_limit_is_kept_and_said(paper_plan: MakePlan) -> None:
+    solution = optimize(paper_plan({"optimizer.max_iterations": 1, "optimizer.tolerance": 1e-9}))
     assert not solution.converged
     assert solution.iterations == 1
     assert solution.ending == "max_iterations (1) reached"
 
 
 def test_a_solver_failure_keeps_the_best_so_far(
-    small_plan: MakePlan, monkeypatch: pytest.MonkeyPatch
+    paper_plan: MakePlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = []
     original = module.optimize_precoders
@@ -145,7 +145,7 @@ def test_a_solver_failure_keeps_the_best_so_far(
         return original(*arguments, **options)
 
     monkeypatch.setattr(module, "optimize_precoders", failing)
-    solution = optimize(small_plan())
+    solution = optimize(paper_plan())
     assert not solution.converged
     assert solution.ending == "stopped in iteration 2, the best so far is kept: no progress"
     assert solution.iterations == 1
@@ -153,24 +153,24 @@ def test_a_solver_failure_keeps_the_best_so_far(
     assert max(solution.residuals().values()) < 1e-6
 
 
-def test_progress_is_told(small_plan: MakePlan) -> None:
+def test_progress_is_told(paper_plan: MakePlan) -> None:
     told: list[Progress] = []
-    solution = optimize(small_plan(), observe=told.append)
+    solution = optimize(paper_plan(), observe=told.append)
     assert {p.iteration for p in told} == set(range(1, solution.iterations + 1))
     assert {p.stage for p in told} == {"trajectory (27)", "precoders (35)"}
     assert [p.best_rate for p in told] == sorted(p.best_rate for p in told)
     assert told[0].best_rate == solution.history[0]
 
 
-def test_what_is_too_large_is_refused_before_it_is_tried(small_plan: MakePlan) -> None:
+def test_what_is_too_large_is_refused_before_it_is_tried(paper_plan: MakePlan) -> None:
     with pytest.raises(PlanError, match=r"optimizer\.method: algorithm1 would need .* cones"):
-        optimize(small_plan({"radio.modulation": "64qam"}))
+        optimize(paper_plan({"radio.modulation": "64qam"}))
     with pytest.raises(PlanError, match=r"radio\.relay\.antennas: 64 antennas with bpsk"):
-        optimize(small_plan({"radio.relay.antennas": 64}))
+        optimize(paper_plan({"radio.relay.antennas": 64}))
 
 
-def test_no_flight_is_infeasible(small_plan: MakePlan) -> None:
-    plan = small_plan()
+def test_no_flight_is_infeasible(paper_plan: MakePlan) -> None:
+    plan = paper_plan()
     flight = replace(plan.flight, start_velocity=(20.0, 0.0), duration=2.0, end=(0.0, 50.0))
     with pytest.raises(InfeasibleError):
         optimize(replace(plan, flight=flight))

@@ -14,8 +14,8 @@ from faao_mav.faao.solution import Solution, load_solution, save_solution
 
 
 @pytest.fixture(scope="module")
-def solution(small_plan: MakePlan) -> Solution:
-    return optimize(small_plan({"optimizer.max_iterations": 2}))
+def solution(paper_plan: MakePlan) -> Solution:
+    return optimize(paper_plan({"optimizer.max_iterations": 2}))
 
 
 def test_saved_keys_and_shapes(solution: Solution, tmp_path: Path) -> None:
@@ -73,9 +73,9 @@ def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None
     assert price(solution) == information
 
 
-def test_spare_power_is_what_could_be_saved(small_plan: MakePlan) -> None:
+def test_spare_power_is_what_could_be_saved(paper_plan: MakePlan) -> None:
     powers = {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40}
-    found = optimize(small_plan(powers))
+    found = optimize(paper_plan(powers))
     limit = saturation(found)
     assert limit.saturated
     assert limit.ceiling == 2

@@ -29,8 +29,8 @@ def sums_of(problem: Problem) -> tuple[SumOfExponentials, ...]:
     )
 
 
-def test_xi_is_that_of_16(small_plan: MakePlan) -> None:
-    problem = build_problem(small_plan())
+def test_xi_is_that_of_16(paper_plan: MakePlan) -> None:
+    problem = build_problem(paper_plan())
     w = straight_flight(problem.kinematics).w
     found = xi(sums_of(problem), w)
     xis = []
@@ -46,10 +46,10 @@ def test_xi_is_that_of_16(small_plan: MakePlan) -> None:
 @pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
 @pytest.mark.parametrize("power", [-10, 10, 20])
 def test_xi_never_increases_and_the_flight_stays_feasible(
-    small_plan: MakePlan, modulation: str, power: float
+    paper_plan: MakePlan, modulation: str, power: float
 ) -> None:
     problem = build_problem(
-        small_plan(
+        paper_plan(
             {
                 "radio.modulation": modulation,
                 "radio.base_station.power_dbm": power,
@@ -67,9 +67,9 @@ def test_xi_never_increases_and_the_flight_stays_feasible(
     assert max(problem.kinematics.residuals(flight).values()) < 1e-6
 
 
-def test_27_reaches_a_stationary_point(small_plan: MakePlan) -> None:
+def test_27_reaches_a_stationary_point(paper_plan: MakePlan) -> None:
     """No feasible move of the whole flight lowers xi: checked without the solver."""
-    problem = build_problem(small_plan())
+    problem = build_problem(paper_plan())
     kin, sums = problem.kinematics, sums_of(problem)
     flight = optimize_trajectory(problem, sums, straight_flight(kin))
     best = xi(sums, flight.w)
@@ -87,9 +87,9 @@ def test_27_reaches_a_stationary_point(small_plan: MakePlan) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_35_reaches_the_closed_form_for_bpsk_and_two_antennas(
-    small_plan: MakePlan, seed: int
+    paper_plan: MakePlan, seed: int
 ) -> None:
-    problem = build_problem(small_plan({"radio.seed": seed, "flight.duration": 20}))
+    problem = build_problem(paper_plan({"radio.seed": seed, "flight.duration": 20}))
     w = straight_flight(problem.kinematics).w
     for link in problem.links:
         H_r = link.small_scale(w)

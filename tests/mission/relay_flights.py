@@ -51,7 +51,7 @@ def plan_with(
             GroundUser((300.0, 300.0), 2, 1e-11),
             *("bpsk", 1e-5, 3.0, "ula", "none", 1, "statistical", 0, False),
         ),
-        optimizer=Optimizer("direct", "faao", 1e-4, 50),
+        optimizer=Optimizer("direct", "faao", "alphabet", ("straight",), 1e-4, 50),
         mission=MissionOptions(takeoff, on_finish, path_tolerance, max_items, "keep"),
     )
 
