@@ -54,6 +54,9 @@ def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -
     assert data["average_rate"] == min(data["rate_bs_uav"], data["rate_uav_user"])
     assert data["average_rate"] < data["mutual_information"] < 2
     assert data["upper_bound"] is None
+    assert data["fresh_rate"] == pytest.approx(data["average_rate"], abs=0.1)
+    assert 0 < data["fresh_rate_error"] < 0.05
+    assert data["starts"]["straight"] <= data["average_rate"] + 1e-3
     assert data["iterations"] == len(data["history"]) - 1
     assert 0 < data["seconds"]["optimize"] <= data["seconds"]["total"]
     assert data["saturated"] is False
@@ -61,6 +64,21 @@ def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -
     assert data["mission"]["duration"] == pytest.approx(9.5, abs=1)
     assert data["mission"]["distance"] > 70
     assert max(data["residuals"].values()) < 1e-6
+
+
+def test_the_bound_is_computed_when_asked_for(plan: Path) -> None:
+    data = json.loads(run(plan, "--bound", "--json").stdout)
+    assert data["average_rate"] <= data["upper_bound"] <= 2
+    assert data["upper_bound_exact"] is False
+    assert "of the best that any route can do: at most" in run(plan, "--bound").stdout
+
+
+def test_algorithm_1_by_option(plan: Path) -> None:
+    plan.write_text(edited(SMALL, {"radio.fading": "realization"}))
+    data = json.loads(run(plan, "--method", "algorithm1", "--json").stdout)
+    assert data["fresh_rate"] is None
+    assert data["starts"] == {}
+    assert "less than 0.0001" in data["ending"]
 
 
 def test_same_plan_same_bytes(plan: Path, tmp_path: Path) -> None:

@@ -83,7 +83,6 @@ def _run(
 ) -> None:
     from faao_mav.cli.progress import progress
     from faao_mav.cli.summary import Result, as_dict, as_text
-    from faao_mav.faao.bound import upper_bound
     from faao_mav.faao.optimize import optimize
     from faao_mav.faao.pricing import fresh_rates, price, saturation
     from faao_mav.faao.problem import build_problem
@@ -115,7 +114,11 @@ def _run(
             write_whole(out, render_mission(mission, out).encode())
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
-        ceiling = upper_bound(build_problem(read), solution.rates.R_avg) if bound else None
+        ceiling = None
+        if bound:
+            from faao_mav.faao.bound import upper_bound
+
+            ceiling = upper_bound(build_problem(read), solution.rates.R_avg)
     result = Result(
         solution=solution,
         information=information,

@@ -25,11 +25,11 @@ from faao_mav.faao.problem import Link, Problem
 from faao_mav.faao.rate_model import best_curve
 from faao_mav.radio.best_precoder import best_precoders
 
-_LINES = 48
+_LINES = 64
 _DISTANCES = 600
 _SEARCHED = 25
 _DIRECTIONS = 257
-_WEIGHTS = (0.25, 0.5, 0.75)
+_WEIGHTS = (0.3, 0.4, 0.45, 0.5, 0.55, 0.6, 0.7)
 _BISECTIONS = 11
 _BLOCKS = 150
 _PASSES = 2
@@ -247,7 +247,8 @@ def majorant_lines(r: Real, rates: Real) -> tuple[Real, Real]:
     """
     step = r[:, 1:2] - r[:, :1]
     moving = np.where(step > 0, step, 1.0)
-    between = np.abs(np.diff(rates, 2, axis=1)).max(axis=1, keepdims=True) / 8
+    # h² |R''| / 8 is what a curve may rise above its chord; twice that, as R'' is seen on the grid.
+    between = np.abs(np.diff(rates, 2, axis=1)).max(axis=1, keepdims=True) / 4
     tangent = np.minimum(0.0, np.diff(rates, axis=1) / moving)
     whole = np.minimum(0.0, (rates[:, -1:] - rates[:, :1]) / (moving * (r.shape[1] - 1)))
     picks = np.linspace(0, tangent.shape[1] - 1, _LINES).astype(np.intp)

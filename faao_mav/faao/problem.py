@@ -11,6 +11,7 @@ from faao_mav.errors import PlanError
 from faao_mav.faao.kinematics import Kinematics, kinematics
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
+    balanced_rayleigh,
     line_of_sight_all_ones,
     line_of_sight_ula,
     path_gain,
@@ -152,7 +153,7 @@ def build_problem(plan: Plan) -> Problem:
             case "realization":
                 nlos: Complex | None = rayleigh(rng, slots, receive, transmit)
             case "ergodic":
-                nlos = rayleigh(rng, radio.fading_samples, receive, transmit)[:, None]
+                nlos = balanced_rayleigh(rng, radio.fading_samples, receive, transmit)[:, None]
             case "none":
                 nlos = None
         return Link(

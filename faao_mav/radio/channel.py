@@ -91,6 +91,25 @@ def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) 
     return drawn
 
 
+def balanced_rayleigh(
+    rng: np.random.Generator, draws: int, receive: int, transmit: int
+) -> Complex:
+    """Draw a few H^NLoS that stand for all of them, (draws, receive, transmit).
+
+    Every draw comes with its turns by j, -1 and -j, and all are scaled to unit mean power: mean
+    and mean square are exact, where a few independent draws would have some of their own. (Fewer
+    than four draws are only scaled.)
+
+    >>> G = balanced_rayleigh(np.random.default_rng(1), 8, 2, 2)
+    >>> bool(np.abs(G.mean(axis=0)).max() < 1e-15), float(np.mean(np.abs(G) ** 2).round(12))
+    (True, 1.0)
+    """
+    turns = 4 if draws >= 4 else 1
+    base = rayleigh(rng, -(-draws // turns), receive, transmit)
+    drawn = np.concatenate([base * 1j**k for k in range(turns)])[:draws]
+    return np.asarray(drawn / np.sqrt(np.mean(np.abs(drawn) ** 2)))
+
+
 def rician(los: Complex, nlos: Complex, K: float) -> Complex:
     """Combine √(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS, the bracket of (1) and (2).
 
