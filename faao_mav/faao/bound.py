@@ -111,7 +111,7 @@ def _without_excursions(problem: Problem, ranges: Ranges, known: float) -> tuple
         rate, other = tables[own][0], tables[1 - own][0]
         # A grid point stands for what follows it: rates fall, so its own is an upper bound there.
         least = np.maximum(0.0, np.abs(s - apart) - s[1])
-        seen = other[:, (least / s[1]).astype(np.intp)]
+        seen = other[:, np.minimum(least / s[1], len(s) - 1).astype(np.intp)]
         limit = farthest
         for weight in _WEIGHTS:
             share = weight * rate + (1 - weight) * seen
