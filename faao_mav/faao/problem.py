@@ -26,6 +26,8 @@ from faao_mav.radio.constellation import (
 from faao_mav.radio.rate import cutoff_rate
 
 MAX_DIFFERENCE_VECTORS = 5_000_000
+MAX_CHANNELS = 5_000_000
+"""Channels that are held for each link: draws times slots."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,12 @@ def build_problem(plan: Plan) -> Problem:
     base, relay, user = radio.base_station, radio.relay, radio.ground_user
     for key, antennas in (("base_station", base.antennas), ("relay", relay.antennas)):
         _check_size(plan, f"radio.{key}.antennas", antennas)
+    if radio.fading == "ergodic" and radio.fading_samples * slots > MAX_CHANNELS:
+        raise PlanError(
+            f"{plan.source}: radio.fading_samples: {radio.fading_samples:,} draws in {slots:,} "
+            f"slots are {radio.fading_samples * slots:,} channels, at most {MAX_CHANNELS:,} are "
+            "accepted; use fewer draws or a longer flight.time_step"
+        )
     rng = np.random.default_rng(radio.seed)
 
     def link(

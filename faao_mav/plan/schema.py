@@ -207,7 +207,7 @@ class RadioSection(Section):
     )
     line_of_sight: LineOfSight = Field("ula", description="ula or all_ones")
     fading: Fading = Field("ergodic", description="ergodic, realization or none")
-    fading_samples: int = Field(32, ge=1, le=100_000, description="a whole number, 1 to 100000")
+    fading_samples: int = Field(32, ge=1, le=10_000, description="a whole number, 1 to 10000")
     csi: ChannelKnowledge = Field("statistical", description="statistical or instantaneous")
     seed: int = Field(0, ge=0, lt=2**63, description="a whole number from 0")
     causal: bool = Field(False, description="true or false")

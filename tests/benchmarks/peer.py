@@ -1,0 +1,165 @@
+"""The peer: CasADi + IPOPT (MUMPS, exact Hessian) on the problem of the direct method.
+
+maximise t, t <= mean of each link's rates, under (11), (12), (13d)-(13f) as `Kinematics` has them.
+Lengths in 100 m. The precoders enter through numbers c of every slot alone: with H = sqrt(g) H_r
+every exponent of (7), (8) is D_k = g(w) c_k, so that one model with c as its parameter serves all
+starts and all precoders.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.faao.kinematics import Kinematics, Trajectory
+from faao_mav.faao.problem import Link
+
+LENGTH = 100.0
+TOLERANCE = 1e-7
+ROUNDS, GAIN = 6, 1e-5
+"""Alternation of IPOPT and best precoders: at most so many rounds, the least gain of R_avg."""
+
+
+@dataclass(frozen=True)
+class ClassRate:
+    """offset - factor log2(base + sum_k multiplicity_k e^(-g c_k)), one column of c per slot.
+
+    (7), (8) with every class of differences, or the closed form of BPSK on two antennas, which is
+    the rate at the best precoders: 2 - 2 log2(1 + e^-x).
+    """
+
+    link: Link
+    offset: float
+    factor: float
+    base: float
+    multiplicity: Real
+    c: Real
+
+    @property
+    def gain(self) -> float:
+        """g at the foot of the station: c times it is of the order of one to a hundred."""
+        return self.link.reference_gain / self.link.altitude**2
+
+
+def at_precoders(link: Link, w: Real, P: Complex) -> ClassRate:
+    """The rate at fixed precoders P that are best, or were chosen, at the positions w.
+
+    Where the line of sight turns with the UAV the precoders' phases turn with it (without
+    scattering the rate at P then depends on the distance alone): better for the peer than
+    precoders that point where the UAV was.
+    """
+    assert not link.follows_position or link.nlos is None
+    classes = link.classes
+    z = link.small_scale(w) @ P @ classes.vectors.T / (2 * np.sqrt(link.noise))
+    c = np.sum(np.abs(z) ** 2, axis=1).T
+    return ClassRate(link, 2 * classes.bits, 1.0, classes.symbols, classes.multiplicity, c)
+
+
+def at_best(link: Link, w: Real) -> ClassRate:
+    """The rate at the best precoders in closed form: BPSK, two antennas."""
+    assert not link.follows_position or link.nlos is None
+    strongest = np.linalg.svd(link.small_scale(w), compute_uv=False)[:, 0]
+    x = link.power * strongest**2 / (2 * link.noise)
+    return ClassRate(link, 2.0, 2.0, 1.0, np.ones(1), x[None, :])
+
+
+def _rate(rate: ClassRate, w: Any, c: Any) -> Any:
+    """The rate (1, n) at scaled positions w (2, n), c (k, n) in units of 1 / `gain`."""
+    p, H = rate.link.station / LENGTH, rate.link.altitude / LENGTH
+    away = (ca.DM(w) if isinstance(w, np.ndarray) else w) - p
+    g = H**2 / (ca.sum1(away**2) + H**2)
+    D = ca.repmat(g, c.shape[0], 1) * c
+    total = rate.base + ca.mtimes(ca.DM(rate.multiplicity).T, ca.exp(-D))
+    return rate.offset - rate.factor * ca.log(total) / np.log(2.0)
+
+
+class Model:
+    """The nonlinear program for given kinematics and kinds of rates, built once."""
+
+    def __init__(self, kin: Kinematics, rates: list[ClassRate], max_seconds: float) -> None:
+        self.kin, n = kin, kin.slots
+        dt, speed = kin.time_step, kin.max_speed
+        # v in v_max, a in a_max, w in LENGTH
+        step = dt * speed / LENGTH
+        bend = dt**2 * kin.max_acceleration / LENGTH
+        turn = dt * kin.max_acceleration / speed
+        cls = ca.SX
+        w, v, a = cls.sym("w", 2, n), cls.sym("v", 2, n), cls.sym("a", 2, n - 1)
+        t = cls.sym("t")
+        position = w[:, 1:] - w[:, :-1] - step * v[:, :-1] - bend / 2 * a
+        velocity = v[:, 1:] - v[:, :-1] - turn * a
+        speeds = ca.sum1(v**2)
+        bounded = ca.sum1(a[:, kin.first_bounded_acceleration :] ** 2)
+        parameters, below = [], []
+        for number, rate in enumerate(rates):
+            c = cls.sym(f"c{number}", *rate.c.shape)
+            parameters.append(ca.vec(c))
+            below.append(t - ca.sum2(_rate(rate, w, c)) / n)
+        g = [ca.vec(position), ca.vec(velocity), ca.vec(speeds), ca.vec(bounded), *below]
+        sizes = [int(part.numel()) for part in g]
+        self.lower_g = np.concatenate(
+            [np.zeros(sizes[0] + sizes[1]), np.full(sum(sizes[2:]), -np.inf)]
+        )
+        self.upper_g = np.concatenate(
+            [np.zeros(sizes[0] + sizes[1]), np.ones(sizes[2] + sizes[3]), np.zeros(len(below))]
+        )
+        lower_w, upper_w = np.full((n, 2), -np.inf), np.full((n, 2), np.inf)
+        lower_v, upper_v = lower_w.copy(), upper_w.copy()
+        for lower, upper, at, value in (
+            (lower_w, upper_w, 0, kin.start / LENGTH),
+            (lower_w, upper_w, -1, kin.end / LENGTH),
+            (lower_v, upper_v, 0, kin.start_velocity),
+            (lower_v, upper_v, -1, kin.end_velocity),
+        ):
+            if value is not None:
+                lower[at] = upper[at] = value if lower is lower_w else value / speed
+        free = np.full(2 * (n - 1) + 1, np.inf)
+        self.lower = np.concatenate([lower_w.ravel(), lower_v.ravel(), -free])
+        self.upper = np.concatenate([upper_w.ravel(), upper_v.ravel(), free])
+        options = {
+            "print_time": False,
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "tol": TOLERANCE,
+                "max_iter": 1000,
+                "max_wall_time": max_seconds,
+                "linear_solver": "mumps",
+            },
+        }
+        x = ca.vertcat(ca.vec(w), ca.vec(v), ca.vec(a), t)
+        program = {"x": x, "p": ca.vertcat(*parameters), "f": -t, "g": ca.vertcat(*g)}
+        self.solver: Any = ca.nlpsol("peer", "ipopt", program, options)
+
+    def solve(self, rates: list[ClassRate], start: Trajectory) -> Trajectory:
+        """Return where IPOPT ends from `start`."""
+        kin, n = self.kin, self.kin.slots
+        least = min(
+            float(np.mean(ca.DM(_rate(r, start.w.T / LENGTH, r.c * r.gain)).full())) for r in rates
+        )
+        x0 = np.concatenate(
+            [
+                (start.w / LENGTH).ravel(),
+                (start.v / kin.max_speed).ravel(),
+                (start.a[:-1] / kin.max_acceleration).ravel(),
+                [least],
+            ]
+        )
+        found = self.solver(
+            x0=x0,
+            p=np.concatenate([r.c.ravel(order="F") * r.gain for r in rates]),
+            lbx=self.lower,
+            ubx=self.upper,
+            lbg=self.lower_g,
+            ubg=self.upper_g,
+        )
+        x = np.asarray(found["x"]).ravel()
+        w, v = (part.reshape(n, 2) for part in np.split(x[: 4 * n], 2))
+        a = x[4 * n : -1].reshape(n - 1, 2)
+        return Trajectory(
+            w * LENGTH,
+            v * kin.max_speed,
+            np.vstack([a * kin.max_acceleration, np.zeros(2)]),
+        )
