@@ -91,9 +91,7 @@ def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) 
     return drawn
 
 
-def balanced_rayleigh(
-    rng: np.random.Generator, draws: int, receive: int, transmit: int
-) -> Complex:
+def balanced_rayleigh(rng: np.random.Generator, draws: int, receive: int, transmit: int) -> Complex:
     """Draw a few H^NLoS that stand for all of them, (draws, receive, transmit).
 
     Every draw comes with its turns by j, -1 and -j, and all are scaled to unit mean power: mean
