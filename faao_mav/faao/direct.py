@@ -59,7 +59,6 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     wanted = design(problem.plan)
-    field = rate_field(problem, wanted)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
 
@@ -67,6 +66,8 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         if observe is not None:
             observe(Progress(number, len(routes) + 1, stage, best))
 
+    tell(0, "rates over the map", 0.0)
+    field = rate_field(problem, wanted)
     history: list[float] = []
     spread: dict[str, float] = {}
     best: Optimum | None = None

@@ -250,8 +250,8 @@ def test_same_seed_same_bytes(faint_plan: MakePlan) -> None:
 def test_progress_is_told(faint_plan: MakePlan) -> None:
     told: list[Progress] = []
     solution = optimize(faint_plan(), observe=told.append)
-    assert [p.iteration for p in told] == list(range(1, len(solution.starts) + 2))
-    assert told[0].stage == "start straight"
+    assert [p.iteration for p in told] == list(range(len(solution.starts) + 2))
+    assert [p.stage for p in told[:2]] == ["rates over the map", "start straight"]
 
 
 def test_more_draws_than_can_be_held_are_refused(small_plan: MakePlan) -> None:
