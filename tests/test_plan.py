@@ -167,7 +167,6 @@ def test_required_keys(key: str) -> None:
     ("key", "value"),
     [
         ("radio.causal", True),
-        ("vehicle.min_speed", 3.0),
         ("vehicle.type", "plane"),
         ("mission.parameters", "recommend"),
         ("fence", {"inclusion": [[0, 0], [9, 0], [9, 9]]}),

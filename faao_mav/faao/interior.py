@@ -2,7 +2,8 @@
 
     maximise  min_j F_j(w),  F_j(w) = (1 / n) sum_n f_jn(w_n)  under (11), (12), (13d)-(13f)
 
-f may be non-concave: the method finds a local optimum near its start. The limits on ||v_n|| and
+f may be non-concave: the method finds a local optimum near its start. A least speed is kept by
+the half-planes of `slow`, which turn with every step. The limits on ||v_n|| and
 ||a_n|| are second-order cones with Nesterov-Todd scaling, a predictor and a corrector. t <= F_j
 is the barrier -mu c sum_j log(F_j - t), t at its optimum at every point. A start on the limits
 is widened by a margin that is driven to zero. A Newton step is one banded LU (`newton`). Where the
@@ -23,6 +24,7 @@ from faao_mav.faao import cones
 from faao_mav.faao.kinematics import Kinematics, Trajectory
 from faao_mav.faao.newton import FlightScale, Newton, Point, Step, best_floor
 from faao_mav.faao.rewards import LENGTH, ScaledRewards, Stage, StageValues
+from faao_mav.faao.slow import Slow
 
 __all__ = ["Optimum", "Stage", "StageValues", "maximize"]
 
@@ -113,6 +115,9 @@ class _Search:
             s=s,
             z=self.mu * cones.inverse(s),
             margin=widened - 1,
+            slow=Slow.begin(
+                v, self.kin.min_speed / self.kin.max_speed, self.scale.matrix.moves_v[:, 0], self.mu
+            ),
             weights=weights / weights.sum(),
             total=total,
             floor=best_floor(total, self.share * self.mu),
@@ -149,11 +154,15 @@ class _Search:
         point, matrix = self.point, self.scale.matrix
         force_w, force_v = matrix.pull(point.y)
         force_w -= np.tensordot(point.weights, point.gradient, 1)
-        force_v -= self.scale.spread(point.z[1:])
-        size = (np.abs(point.z).sum() + np.abs(point.y).sum()) / (8 * point.w.shape[0])
+        force_v -= self.scale.spread(point.z[1:]) + point.slow.forces()
+        size = (np.abs(point.z).sum() + point.slow.z.sum() + np.abs(point.y).sum()) / (
+            8 * point.w.shape[0]
+        )
         slope = max(np.abs(force_w).max(), np.abs(force_v).max()) / max(1.0, size / 10)
-        broken = max(point.margin.max(), np.abs(matrix.dynamics(point.w, point.v)).max())
-        gap = (point.s * point.z).sum() + point.weights @ (point.total - point.floor)
+        margin = max(point.margin.max(), point.slow.margin.max())
+        broken = max(margin, np.abs(matrix.dynamics(point.w, point.v)).max())
+        gap = (point.s * point.z).sum() + (point.slow.s * point.slow.z).sum()
+        gap += point.weights @ (point.total - point.floor)
         worth = float(point.total.min())
         if broken < self.tolerance / 10 and (self.best is None or worth > self.best[0]):
             self.best = worth, point
@@ -175,10 +184,12 @@ class _Search:
                 self.point,
                 s=self.point.s + length * ahead.ds,
                 z=self.point.z + length * ahead.dz,
+                slow=self.point.slow.linear(length, *ahead.slow),
             ).gap()
             keep = max((left / now) ** 3, 0.01 if slope < 1 else 0.1)
             self.mu = max(min(self.mu, keep * now), self.tolerance / 20 * self.steep)
-            step = newton.step(self.mu, newton.scaling.second_order(ahead.ds, ahead.dz) * length**2)
+            second = newton.scaling.second_order(ahead.ds, ahead.dz) * length**2
+            step = newton.step(self.mu, second, ahead.slow[0] * ahead.slow[1] * length**2)
             length = min(1.0, _BOUNDARY * step.reach(self.point))
             for _ in range(2):
                 if self._accept(newton, step, length):
@@ -228,6 +239,7 @@ class _Search:
             s=np.vstack([1 + margin, self.scale.limited(v)]),
             z=point.z + length * step.dz,
             margin=margin,
+            slow=point.slow.moved(v, length, point.slow.z + length * step.slow[1]),
             weights=weights / weights.sum(),
             total=total,
             floor=best_floor(total, self.share * self.mu),
@@ -269,6 +281,9 @@ def _settle(
 def _excess(kin: Kinematics, flight: Trajectory) -> float:
     """Return the largest violation of a limit, relative to it."""
     found = kin.residuals(flight)
+    slow = found.get("minimum speed", 0.0)
     return max(
-        found["(13e) speed"] / kin.max_speed, found["(13f) acceleration"] / kin.max_acceleration
+        found["(13e) speed"] / kin.max_speed,
+        found["(13f) acceleration"] / kin.max_acceleration,
+        slow / kin.min_speed if slow else 0.0,
     )

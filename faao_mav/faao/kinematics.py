@@ -25,7 +25,8 @@ class Trajectory:
 class Kinematics:
     """The feasible set: w_I, w_F (2,), N + 2 = `slots`, delta_t, v_max, a_max, end velocities.
 
-    An end velocity of None is free. `bound_first_acceleration` extends (13f) to n = 0.
+    An end velocity of None is free. `bound_first_acceleration` extends (13f) to n = 0. Beyond the
+    paper, every sample of the speed is at least `min_speed`, m/s: fixed wings do not hover.
     """
 
     start: Real
@@ -37,6 +38,7 @@ class Kinematics:
     start_velocity: Real | None
     end_velocity: Real | None
     bound_first_acceleration: bool
+    min_speed: float = 0.0
 
     @property
     def first_bounded_acceleration(self) -> int:
@@ -59,6 +61,8 @@ class Kinematics:
             found["start velocity"] = _largest(v[0] - self.start_velocity)
         if self.end_velocity is not None:
             found["end velocity"] = _largest(v[-1] - self.end_velocity)
+        if self.min_speed > 0:
+            found["minimum speed"] = float(max(0.0, self.min_speed - speed.min()))
         return found
 
     def integrate(self, start_velocity: Real, acceleration: Real) -> Trajectory:
@@ -98,6 +102,7 @@ def kinematics(plan: Plan) -> Kinematics:
         start_velocity=vector(flight.start_velocity),
         end_velocity=vector(flight.end_velocity),
         bound_first_acceleration=flight.bound_first_acceleration,
+        min_speed=vehicle.min_speed,
     )
 
 

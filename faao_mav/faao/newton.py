@@ -9,7 +9,8 @@ From (w, v, t), slacks (s, F - t) and multipliers (z, weights, y) the step solve
 
 with + for new multipliers, H = -sum_j weights_j Hessian(F_j), G the gradients of the F_j, W the
 scaling of `cones`, c the share of the barrier that keeps t below the F_j, and
-D v = (v, k (v_{n+1} - v_n)) what the limits bound.
+D v = (v, k (v_{n+1} - v_n)) what the limits bound. A least speed adds to D the half-planes of
+`slow`, whose own curvature is left out.
 """
 
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from faao_mav.faao import cones
 from faao_mav.faao.banded import SIZE, Factors, FlightMatrix, Q, V, W, Y
 from faao_mav.faao.kinematics import Kinematics
 from faao_mav.faao.rewards import LENGTH
+from faao_mav.faao.slow import Slow
 
 _UNBOUNDED = 1e20
 
@@ -78,6 +80,7 @@ class Point:
     s: Real
     z: Real
     margin: Real
+    slow: Slow
     weights: Real
     total: Real
     floor: float
@@ -86,22 +89,33 @@ class Point:
 
     def gap(self) -> float:
         """Return the mean of s^T z over the cones."""
-        return float((self.s * self.z).sum() / self.s.shape[1])
+        slow = self.slow
+        both = (self.s * self.z).sum() + (slow.s * slow.z).sum()
+        return float(both / (self.s.shape[1] + slow.on.sum()))
 
     def centred(self, mu: float, share: float) -> "Point":
         """Return the same flight with z = mu s^-1."""
-        return replace(self, z=mu * cones.inverse(self.s), floor=best_floor(self.total, share * mu))
+        return replace(
+            self,
+            z=mu * cones.inverse(self.s),
+            slow=self.slow.centred(mu),
+            floor=best_floor(self.total, share * mu),
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A direction; dtotal (J,) is the first-order change of the F_j, rise that of t."""
+    """A direction; dtotal (J,) is the first-order change of the F_j, rise that of t.
+
+    `slow` has the changes of s and z of `Slow`.
+    """
 
     dw: Real
     dv: Real
     dy: Real
     ds: Real
     dz: Real
+    slow: tuple[Real, Real]
     dweights: Real
     dtotal: Real
     rise: float
@@ -112,6 +126,7 @@ class Step:
         return min(
             cones.reach(point.s, self.ds),
             cones.reach(point.z, self.dz),
+            point.slow.reach(*self.slow),
             1 / falls if falls > 0 else np.inf,
         )
 
@@ -130,6 +145,7 @@ class Newton:
     scaling: cones.Scaling
     curvature: Real
     give: Real
+    at_v: Real
     factors: Factors
     columns: Real
     border: Real
@@ -157,7 +173,8 @@ class Newton:
             curvature = _convex(curvature)
         curvature[:, [0, 2]] += proximal
         n, links = scale.matrix.slots, point.total.shape[0]
-        factors = scale.matrix.factor(curvature, scaling.curvature[:n], give)
+        at_v = point.slow.stiffness()
+        factors = scale.matrix.factor(curvature, scaling.curvature[:n] + at_v, give)
         if factors is None:
             return None
         right = np.zeros((links + 2, n, SIZE))
@@ -165,11 +182,14 @@ class Newton:
         _load(right[links], scale, give, scaling.lean * point.margin)
         right[links, :-1, Y] = -scale.matrix.dynamics(point.w, point.v)
         _load(right[-1], scale, give, cones.inverse(point.s)[1:])
+        slow, none = point.slow, np.zeros(n)
+        right[links, :, V] += slow.u * slow.raised(-slow.margin, 0.0, none)[:, None]
+        right[-1, :, V] += slow.u * (slow.on / slow.s)[:, None]
         columns = factors.solve(right)
         flat = point.gradient.reshape(links, -1)
         border = flat @ columns[:links, :, W].reshape(links, -1).T
         border[np.diag_indices(links)] += (point.total - point.floor) / point.weights
-        newton = cls(scale, point, share, scaling, curvature, give, factors, columns, border)
+        newton = cls(scale, point, share, scaling, curvature, give, at_v, factors, columns, border)
         return newton if not exact or newton.convex() else None
 
     def convex(self) -> bool:
@@ -182,15 +202,16 @@ class Newton:
         size = float((step.dw * step.dw).sum() + (step.dv * step.dv).sum())
         return self.decrease(step) > 1e-8 * size
 
-    def step(self, mu: float, correction: Real | None = None) -> Step:
-        """Solve for the barrier `mu`, less the second-order `correction` (3, m) of the cones."""
-        point, scaling, scale = self.point, self.scaling, self.scale
+    def step(self, mu: float, correction: Real | None = None, of_slow: Real | float = 0.0) -> Step:
+        """Solve for `mu`, less the second-order `correction` (3, m), `of_slow` (n,)."""
+        point, scaling, scale, slow = self.point, self.scaling, self.scale, self.point.slow
         n, links = scale.matrix.slots, point.total.shape[0]
         alone = self.columns[links] + mu * self.columns[-1]
         target = mu * cones.inverse(point.s)
         if correction is not None:
             right = np.zeros((1, n, SIZE))
             _load(right[0], scale, self.give, -correction[1:])
+            right[0, :, V] -= slow.u * np.asarray(of_slow / slow.s)[:, None]
             alone += self.factors.solve(right)[0]
             target -= correction
         ds_0 = -point.margin
@@ -207,10 +228,13 @@ class Newton:
 
         dw, dv, y = found[:, W], found[:, V], found[:-1, Y]
         ds = np.vstack([ds_0, scale.limited(dv)])
+        slope = slow.slope(dv)
+        raised = slow.raised(slope, mu, of_slow * np.ones(n))
         z = np.zeros_like(point.z)
         z[1:, n:] = (-found[:-1, Q] / scale.gain * scale.bounded).T
         # the multipliers of the speeds from stationarity, not from W^-2 ds: that keeps its digits
-        z[1:, :n] = (scale.matrix.pull(y)[1] - scale.spread(z[1:])).T
+        pushed = slow.u * raised[:, None]
+        z[1:, :n] = (scale.matrix.pull(y)[1] - scale.spread(z[1:]) - pushed).T
         z[0] = scaling.radial(target, ds_0, z[1:])
         return Step(
             dw=dw,
@@ -218,6 +242,7 @@ class Newton:
             dy=y - point.y,
             ds=ds,
             dz=z - point.z,
+            slow=(slope, raised - slow.z),
             dweights=weights - point.weights,
             dtotal=flat @ dw.ravel(),
             rise=rise,
@@ -232,6 +257,7 @@ class Newton:
         x, point = step.ds[1:].T, self.point
         stiff = float((x * _times(self.scaling.curvature, x)).sum())
         kink = point.weights / (point.total - point.floor) * (step.dtotal - step.rise) ** 2
+        stiff += float((step.dv * _times(self.at_v, step.dv)).sum())
         return self.bend(step) + stiff + float(kink.sum())
 
 

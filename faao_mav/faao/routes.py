@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.faao.cruise import cruise_by
 from faao_mav.faao.kinematics import Kinematics, Trajectory
 from faao_mav.faao.start import even_speed, farthest, straight_flight
 
@@ -20,15 +21,17 @@ def starts(
     """Return the flights named: `straight`, or stations in the order of the visit, `bs-user`.
 
     A flight by way of stations goes as far towards them as the time allows, and spends what is
-    left hovering there. Flights that cannot be had (no time at all, or end velocities across the
-    way) are left out; if nothing is left, the straight one is returned.
+    left hovering there; with a least speed it goes all the way and circles there. Flights that
+    cannot be had (no time at all, or end velocities across the way) are left out; if nothing is
+    left, the straight one is returned.
     """
     found = {}
     for name in names:
         if name == "straight":
             found[name] = straight_flight(kin)
             continue
-        flight = _by_way_of(kin, [stations[key] for key in name.split("-")])
+        stops = [stations[key] for key in name.split("-")]
+        flight = cruise_by(kin, stops) if kin.min_speed > 0 else _by_way_of(kin, stops)
         if flight is not None:
             found[name] = flight
     return found or {"straight": straight_flight(kin)}

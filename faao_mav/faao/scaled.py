@@ -11,11 +11,14 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 
+from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
 from faao_mav.faao.kinematics import Kinematics, Trajectory
 
 LENGTH = 100.0
 """Unit of length inside the solver, m."""
+
+_INSIDE = 1e-7  # by which the least speed is raised, for what the solver leaves open
 
 # The variables are scaled here already: Clarabel's own equilibration of the many exponential
 # cones more often stalls it than helps. Where it does stall, shorter steps mostly get through.
@@ -52,8 +55,13 @@ class FlightVariables:
         return kin.integrate(start, np.asarray(self.a.value) * kin.max_acceleration)
 
 
-def flight_variables(kin: Kinematics) -> FlightVariables:
-    """Return new variables under (11), (12), (13d)-(13f)."""
+def flight_variables(kin: Kinematics, about: Real | None = None) -> FlightVariables:
+    """Return new variables under (11), (12), (13d)-(13f).
+
+    `about`, feasible velocities (N + 2, 2) in m/s, adds the least speed: v(n) about v_i(n) on the
+    far side of the half-plane v(n)^T v_i(n) >= v_min ||v_i(n)||, which is inside the true set.
+    Without it the least speed is left out.
+    """
     n, dt = kin.slots, kin.time_step
     w, v, a = (cp.Variable((n, 2)) for _ in range(3))
     advance = kin.max_speed * dt / LENGTH
@@ -72,6 +80,15 @@ def flight_variables(kin: Kinematics) -> FlightVariables:
         constraints.append(v[0] == kin.start_velocity / kin.max_speed)
     if kin.end_velocity is not None:
         constraints.append(v[-1] == kin.end_velocity / kin.max_speed)
+    if about is not None and kin.min_speed > 0:
+        ahead = about / np.linalg.norm(about, axis=1, keepdims=True)
+        free = slice(
+            0 if kin.start_velocity is None else 1,
+            kin.slots if kin.end_velocity is None else kin.slots - 1,
+        )
+        # given end velocities keep it already: twice said, they would leave no interior
+        least = kin.min_speed / kin.max_speed * (1 + _INSIDE)
+        constraints.append(cp.sum(cp.multiply(ahead, v), axis=1)[free] >= least)
     return FlightVariables(kin, w, v, a, constraints)
 
 

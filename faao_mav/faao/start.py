@@ -13,7 +13,8 @@ def straight_flight(kin: Kinematics) -> Trajectory:
     """Return a feasible flight: along the line from w_I to w_F at the most even speed.
 
     End velocities that do not lie on that line bend it; then it is the flight of least
-    sum ||a||². Raises `InfeasibleError` when there is none.
+    sum ||a||², and where the line is too slow for the least speed, one with detours. Raises
+    `InfeasibleError` when there is none.
     """
     line = kin.end - kin.start
     distance = float(np.linalg.norm(line))
@@ -29,6 +30,10 @@ def straight_flight(kin: Kinematics) -> Trajectory:
             v = speed[:, None] * direction
             a = np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)])
             return kin.integrate(v[0], a)
+    if kin.min_speed > 0:
+        from faao_mav.faao.cruise import cruise
+
+        return cruise(kin)
     return _gentlest_flight(kin)
 
 
@@ -64,7 +69,7 @@ def _speed_limits(kin: Kinematics, direction: Real) -> tuple[Real, Real]:
     n = np.arange(kin.slots, dtype=float)
     gain = kin.max_acceleration * kin.time_step
     upper = np.full(kin.slots, kin.max_speed)
-    lower = -upper
+    lower = np.full(kin.slots, kin.min_speed) if kin.min_speed > 0 else -upper
     if kin.start_velocity is not None:
         first = float(kin.start_velocity @ direction)
         steps = n + (0.0 if kin.bound_first_acceleration else np.where(n > 0, np.inf, 0.0))

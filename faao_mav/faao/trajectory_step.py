@@ -75,7 +75,7 @@ def optimize_trajectory(
         gap = current - floor
         if gap <= NEGLIGIBLE * scale:
             break
-        candidate = _solve_27(problem, sums, flight.w, floor, gap)
+        candidate = _solve_27(problem, sums, flight, floor, gap)
         reached = xi(sums, candidate.w)
         if reached < current:
             flight, current, decrease = candidate, reached, current - reached
@@ -89,14 +89,18 @@ def optimize_trajectory(
 
 
 def _solve_27(
-    problem: Problem, sums: tuple[SumOfExponentials, ...], w_i: Real, floor: float, gap: float
+    problem: Problem,
+    sums: tuple[SumOfExponentials, ...],
+    last: Trajectory,
+    floor: float,
+    gap: float,
 ) -> Trajectory:
-    """Solve (27) about `w_i`, with (xi - floor) / gap as the objective."""
-    flight = flight_variables(problem.kinematics)
+    """Solve (27) about the flight `last`, with (xi - floor) / gap as the objective."""
+    flight = flight_variables(problem.kinematics, last.v)
     objective = cp.Variable()
     constraints: list[Any] = list(flight.constraints)
     for s in sums:
-        sum_lb, more = _surrogate(s, w_i, flight.w, gap)
+        sum_lb, more = _surrogate(s, last.w, flight.w, gap)
         constraints += [*more, sum_lb - (s.offset + floor) / gap <= objective]
     if solve(cp.Problem(cp.Minimize(objective), constraints)) == cp.INFEASIBLE:
         raise SolverError("Clarabel calls (27) infeasible, although a feasible flight is known")

@@ -58,10 +58,6 @@ def _check_available(tree: schema.PlanSection, source: str) -> None:
         if found == value:
             shown = str(value).lower()
             raise PlanError(f"{source}: {path}: {shown} does not work yet; {advice}")
-    if tree.vehicle.min_speed > 0:
-        raise PlanError(
-            f"{source}: vehicle.min_speed: {tree.vehicle.min_speed} does not work yet; leave it 0"
-        )
     if tree.fence is not None:
         raise PlanError(f"{source}: fence: does not work yet; leave it out")
 
@@ -194,6 +190,11 @@ class _Reader:
         )
 
     def check_speeds(self, flight: model.Flight, vehicle: model.Vehicle) -> None:
+        if vehicle.min_speed > vehicle.max_speed:
+            raise self.fail(
+                "vehicle.min_speed",
+                f"{vehicle.min_speed:g} m/s is above vehicle.max_speed ({vehicle.max_speed:g} m/s)",
+            )
         velocities: Mapping[str, model.Vector | None] = {
             "flight.start_velocity": flight.start_velocity,
             "flight.end_velocity": flight.end_velocity,
@@ -204,6 +205,13 @@ class _Reader:
                     key,
                     f"{quote(list(velocity))} is {math.hypot(*velocity):.6g} m/s; "
                     f"vehicle.max_speed allows {vehicle.max_speed:g} m/s",
+                )
+            if velocity is not None and math.hypot(*velocity) < vehicle.min_speed:
+                given = quote(list(velocity)) if any(velocity) else "hover"
+                raise self.fail(
+                    key,
+                    f"{given} is {math.hypot(*velocity):.6g} m/s; vehicle.min_speed asks for at "
+                    f"least {vehicle.min_speed:g} m/s: give free or a velocity",
                 )
 
     def check_steps(self, flight: model.Flight) -> None:

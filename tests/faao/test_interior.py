@@ -18,6 +18,7 @@ from faao_mav.faao.interior import Stage, StageValues, maximize
 from faao_mav.faao.kinematics import Kinematics, Trajectory
 from faao_mav.faao.newton import FlightScale, Newton, Point, best_floor
 from faao_mav.faao.scaled import LENGTH, flight_variables
+from faao_mav.faao.slow import Slow
 from faao_mav.faao.start import straight_flight
 from faao_mav.faao.stationarity import kkt_residual
 
@@ -472,10 +473,10 @@ def test_the_scaling_of_the_cones(seed: int) -> None:
         assert (s + 0.999 * longest * ds)[0].min() > 0
 
 
-@given(st.integers(0, 2**32 - 1), st.booleans(), st.booleans())
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.booleans(), st.sampled_from([0.0, 0.005, 0.1]))
 @settings(max_examples=25)
 def test_a_newton_step_solves_the_linearised_conditions(
-    seed: int, hover: bool, exact: bool
+    seed: int, hover: bool, exact: bool, least: float
 ) -> None:
     rng = np.random.default_rng(seed)
     kin = copter(1.4) if hover else plane(1.4)
@@ -487,6 +488,7 @@ def test_a_newton_step_solves_the_linearised_conditions(
     concave = -symmetric(rng, 2 * n)[0].reshape(2, n, 3)
     margin = rng.uniform(0, 0.1, m)
     z = inside(rng, m)
+    slow = Slow.begin(v, least, scale.matrix.moves_v[:, 0], 0.2)
     # a limit on what cannot move is there in name only, and pulls at nothing
     real = np.vstack([np.ones(m), x != 0])
     point = Point(
@@ -496,6 +498,7 @@ def test_a_newton_step_solves_the_linearised_conditions(
         s=np.vstack([np.hypot(*x) + 0.1 + margin, x]),
         z=z * real,
         margin=margin,
+        slow=slow,
         weights=np.array([0.3, 0.7]),
         total=total,
         floor=best_floor(total, share * mu),
@@ -507,7 +510,8 @@ def test_a_newton_step_solves_the_linearised_conditions(
     newton = Newton.at(scale, point, scaling, share=share, proximal=0.01, exact=exact)
     assert newton is not None
     correction = 0.01 * rng.standard_normal((3, m)) * real
-    step = newton.step(mu, correction)
+    of_slow = 0.01 * rng.standard_normal(n) * slow.on
+    step = newton.step(mu, correction, of_slow)
 
     curvature = -np.tensordot(point.weights, concave, 1) + 0.01 * np.array([1, 0, 1])
     xx, xy, yy = curvature.T
@@ -518,7 +522,13 @@ def test_a_newton_step_solves_the_linearised_conditions(
     on_w, on_v = scale.matrix.pull(point.y + step.dy)
     force = bent * scale.matrix.moves_w + on_w - np.tensordot(weights, point.gradient, 1)
     assert force == pytest.approx(np.zeros((n, 2)), abs=1e-7)
-    assert on_v == pytest.approx(scale.spread(z[1:]), abs=1e-7)
+    raised = slow.z + step.slow[1]
+    assert slow.s * raised + slow.z * step.slow[0] == pytest.approx(
+        mu * slow.on - of_slow, abs=1e-7
+    )
+    assert step.slow[0] == pytest.approx((slow.u * step.dv).sum(axis=1) - slow.margin)
+    pulled = scale.spread(z[1:]) + slow.u * raised[:, None]
+    assert on_v == pytest.approx(pulled, abs=1e-7 * (1 + np.abs(pulled).max()))
     assert scale.matrix.dynamics(point.w + step.dw, point.v + step.dv) == pytest.approx(
         np.zeros((n - 1, 2)), abs=1e-9
     )
