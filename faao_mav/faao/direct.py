@@ -19,8 +19,11 @@ from faao_mav.faao.problem import Link, Problem
 from faao_mav.faao.progress import Observer, Progress
 from faao_mav.faao.rate_model import CurveRate, rate_model
 from faao_mav.faao.routes import starts
-from faao_mav.faao.slot_rate import BestRate
+from faao_mav.faao.slot_rate import BestRate, FixedRate
 from faao_mav.faao.solution import Solution, make_solution
+
+_POLISH = 12
+"""Steps at most at exact rates, after those in a table."""
 
 _ROUGH = 1e-3
 """Tolerance with which starts are compared, in shares of the best rate."""
@@ -90,7 +93,30 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         tolerance=options.tolerance,
         max_iterations=options.max_iterations,
     )
+    final = _polished(problem, wanted, field, final)
     return _solution(problem, wanted, field, final, history, spread)
+
+
+def _polished(problem: Problem, wanted: Design, field: RateField, found: Optimum) -> Optimum:
+    """Take `found` a little further at exact rates where it was found in a table of searches.
+
+    With the precoders held, the rates are exact, and whatever they gain the best ones gain too.
+    """
+    if not any(isinstance(rate, ModeRate) and not rate.table.exact for rate in field.rates):
+        return found
+    w = found.trajectory.w
+    held = []
+    for link, rate in zip(field.links, field.rates, strict=True):
+        H = link.channel(w, link.small_scale(w))
+        held.append(FixedRate(link, _precoders(link, rate, wanted, w, H)))
+    polished = maximize(
+        problem.kinematics,
+        RateField(field.links, tuple(held)),
+        found.trajectory,
+        tolerance=problem.plan.optimizer.tolerance,
+        max_iterations=_POLISH,
+    )
+    return replace(found, trajectory=polished.trajectory, value=polished.value)
 
 
 def _counted(field: RateField, wanted: Design, w: Real) -> float:

@@ -30,13 +30,15 @@ class Table:
     """The best rate over a = ln(W lambda_1² gain / sigma²) and kappa = lambda_2 / lambda_1.
 
     `gains` (m,) and `ratios` (c,) are the grid, `Q` (m, c, N_t, N_t) the best precoders there for
-    unit power, in the basis of the right singular vectors.
+    unit power, in the basis of the right singular vectors; `exact` says that they are known in
+    closed form, so that only the spline errs.
     """
 
     spline: Any
     gains: Real
     ratios: Real
     Q: Complex
+    exact: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,15 +120,15 @@ def _table(modulation: str, antennas: int, modes: int, low: int, high: int) -> T
     H[..., 0, 0] = np.exp(gains / 2)[:, None]
     if modes == 2:
         H[..., 1, 1] = np.exp(gains / 2)[:, None] * ratios
-    rate, Q = _search(modulation, H)
-    return Table(RectBivariateSpline(gains, ratios, rate), gains, ratios, Q)
+    rate, Q, exact = _search(modulation, H)
+    return Table(RectBivariateSpline(gains, ratios, rate), gains, ratios, Q, exact)
 
 
-def _search(modulation: str, H: Complex) -> tuple[Real, Complex]:
+def _search(modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
     exact = best_precoders(H[:1, :1], 1.0, modulation, 1.0).exact
     if exact:
         found = best_precoders(H, 1.0, modulation, 1.0)
-        return found.rate, found.P
+        return found.rate, found.P, True
     every_a, every_k = _SEARCH_EVERY
     coarse = best_precoders(H[::every_a, ::every_k], 1.0, modulation, 1.0).P
     i, j = np.arange(H.shape[0]) // every_a, np.arange(H.shape[1]) // every_k
@@ -139,7 +141,7 @@ def _search(modulation: str, H: Complex) -> tuple[Real, Complex]:
             better = found.rate > rate
             rate = np.where(better, found.rate, rate)
             Q = np.where(better[..., None, None], found.P, Q)
-    return rate, Q
+    return rate, Q, False
 
 
 def _modes(link: Link, cosine: Real) -> tuple[Real, Real]:
