@@ -90,6 +90,12 @@ def as_text(result: Result) -> str:
             "saturated    the alphabet is used up and the route hardly matters: "
             f"{limit.spare_db:.1f} dB less power at both stations would do"
         )
+    if len(solution.starts) > 1:
+        ranked = sorted(solution.starts.items(), key=lambda start: start[1])
+        (worst, low), (best, high) = ranked[0], ranked[-1]
+        lines.append(
+            f"starts       {len(ranked)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
+        )
     state = "converged" if solution.converged else "NOT CONVERGED"
     lines += [
         f"optimiser    {state} after {_count(solution.iterations, 'iteration')}, "

@@ -1,0 +1,62 @@
+"""The summary for people."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import MakePlan
+
+from faao_mav.cli.summary import Result, as_dict, as_text
+from faao_mav.faao.bound import Bound
+from faao_mav.faao.optimize import optimize
+from faao_mav.faao.pricing import MutualInformation, saturation
+from faao_mav.mission import assemble, plan_route
+
+
+@pytest.fixture(scope="module")
+def result(small_plan: MakePlan) -> Result:
+    plan = small_plan({"radio.fading": "none", "name": "over the hill"})
+    solution = optimize(plan)
+    route = plan_route(solution.t, solution.w, plan)
+    return Result(
+        solution=replace(solution, starts={"straight": 1.25, "bs-user": 1.5, "user": 1.0}),
+        information=MutualInformation(1.9, 1.8, 0.001),
+        fresh=None,
+        saturation=saturation(solution),
+        bound=Bound(2 * solution.rates.R_avg, exact=False),
+        mission=assemble(route, plan),
+        route=route,
+        seconds_optimize=1.0,
+        seconds_total=2.0,
+        written=(),
+    )
+
+
+def test_it_says_what_was_found(result: Result) -> None:
+    lines = as_text(result).splitlines()
+    assert lines[0] == "over the hill"
+    assert f"{result.solution.rates.R_avg:.4f} bit/s/Hz of at most 2" in lines[1]
+    text = "\n".join(lines)
+    assert "mutual information 1.800 +- 0.001" in text
+    assert "3, from 1.0000 (user) to 1.5000 (bs-user) bit/s/Hz" in text
+    assert "within 50 % of the best that any route can do" in text
+    assert "(numerical)" in text
+    assert "converged after" in text
+    assert "nothing: give --out" in text
+
+
+def test_a_run_that_did_not_converge_says_so(result: Result) -> None:
+    stopped = replace(result.solution, converged=False, ending="stopped after 3 steps")
+    text = as_text(replace(result, solution=stopped))
+    assert "NOT CONVERGED" in text
+    assert "stopped after 3 steps" in text
+
+
+def test_numbers_for_programs_are_the_solutions(result: Result) -> None:
+    data = as_dict(result)
+    assert data["average_rate"] == result.solution.rates.R_avg
+    assert data["upper_bound"] == 2 * result.solution.rates.R_avg
+    assert data["mission"]["distance"] == pytest.approx(
+        np.linalg.norm(np.diff(result.route.positions, axis=0), axis=1).sum()
+    )
+    assert data["seconds"] == {"optimize": 1.0, "total": 2.0}
