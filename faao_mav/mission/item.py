@@ -1,10 +1,11 @@
-"""A mission as data: items, home."""
+"""A mission as data: items, home, fence, rally points."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from faao_mav.errors import InputError
+from faao_mav.mission.fence import Fence, RallyPoint
 
 Params: TypeAlias = tuple[float, float, float, float]
 
@@ -36,9 +37,10 @@ class MissionItem:
 
     `command` is a MAV_CMD (0 to 65535), `frame` a MAV_FRAME (0 to 255), `params` are param1 to
     param4. `x` and `y` are latitude and longitude in degrees and `z` metres, except in
-    `Frame.MISSION`, where they are param5 to param7. A param4 (yaw) of NaN means "not set".
+    `Frame.MISSION`, where they are param5 to param7. NaN means "not set": files of ground stations
+    have it in any place, and what an autopilot makes of it depends on the place.
 
-    Raises `InputError` for integers out of range, other than four parameters, values not finite.
+    Raises `InputError` for integers out of range, other than four parameters, infinities.
     """
 
     command: int
@@ -56,18 +58,21 @@ class MissionItem:
             raise InputError(f"mission item: frame {self.frame}; expected 0 to 255")
         if len(self.params) != 4:
             raise InputError(f"mission item: {len(self.params)} parameters; expected 4")
-        if not all(map(math.isfinite, (*self.params[:3], self.x, self.y, self.z))):
+        if any(map(math.isinf, (*self.params, self.x, self.y, self.z))):
             raise InputError(
                 f"mission item: params {self.params}, x {self.x}, y {self.y}, z {self.z}; "
-                "expected finite numbers (param4 may be NaN)"
+                "expected finite numbers, or NaN for what is not set"
             )
-        if math.isinf(self.params[3]):
-            raise InputError(f"mission item: param4 {self.params[3]}; expected a number or NaN")
 
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """What an autopilot is given: the items in order, without the home row, and the home."""
+    """What an autopilot is given: the items in order, without the home row, and the home.
+
+    A fence and rally points travel beside it: only some formats hold them.
+    """
 
     items: tuple[MissionItem, ...]
     home: Home | None = None
+    fence: Fence = field(default_factory=Fence)
+    rally: tuple[RallyPoint, ...] = ()

@@ -1,0 +1,85 @@
+"""Geofences and rally points: what travels beside a mission."""
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from faao_mav.errors import InputError
+
+Place: TypeAlias = tuple[float, float]
+"""WGS84 latitude and longitude, degrees."""
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """All places within `radius` metres of `center`; to stay in (`inclusion`) or out of.
+
+    Raises `InputError` for a center that is no place on Earth or a radius that is not above 0.
+    """
+
+    center: Place
+    radius: float
+    inclusion: bool
+
+    def __post_init__(self) -> None:
+        _check(self.center, "fence circle")
+        if not (math.isfinite(self.radius) and self.radius > 0):
+            raise InputError(f"fence circle: radius {self.radius}; expected metres above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Polygon:
+    """The inside of `vertices`, at least three; to stay in (`inclusion`) or out of.
+
+    Raises `InputError` for fewer vertices or one that is no place on Earth.
+    """
+
+    vertices: tuple[Place, ...]
+    inclusion: bool
+
+    def __post_init__(self) -> None:
+        if len(self.vertices) < 3:
+            raise InputError(f"fence polygon: {len(self.vertices)} vertices; expected at least 3")
+        for vertex in self.vertices:
+            _check(vertex, "fence polygon")
+
+
+@dataclass(frozen=True, slots=True)
+class RallyPoint:
+    """A place to return to instead of home: degrees, metres above home.
+
+    Raises `InputError` for coordinates that are no place on Earth.
+    """
+
+    latitude: float
+    longitude: float
+    altitude: float
+
+    def __post_init__(self) -> None:
+        _check((self.latitude, self.longitude), "rally point")
+        if not math.isfinite(self.altitude):
+            raise InputError(f"rally point: altitude {self.altitude}; expected finite metres")
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """Where the aircraft may be: inside every inclusion, outside every exclusion.
+
+    `breach_return` is where ArduPilot flies after a breach, or None.
+    """
+
+    polygons: tuple[Polygon, ...] = ()
+    circles: tuple[Circle, ...] = ()
+    breach_return: RallyPoint | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.polygons or self.circles)
+
+
+def _check(place: Place, what: str) -> None:
+    latitude, longitude = place
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
+        raise InputError(
+            f"{what}: {latitude}, {longitude}; expected a latitude within 90 degrees and a "
+            "longitude within 180"
+        )

@@ -1,0 +1,6 @@
+"""How a vehicle will fly a mission."""
+
+from faao_mav.mission.flight.path import FlightModel, FlightPath, Flown
+from faao_mav.mission.flight.track import Track
+
+__all__ = ["FlightModel", "FlightPath", "Flown", "Track"]

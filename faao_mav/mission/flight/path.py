@@ -1,0 +1,51 @@
+"""What a flight model is asked, and what it answers."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faao_mav.arrays import Real
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlightPath:
+    """Legs flown one after the other, from rest at the first point and to rest at the last.
+
+    `points` (m, 3) are east, north, up in metres, m >= 1. `speeds` (m - 1,), m/s, are the ground
+    speeds commanded for the leg that ends at point k + 1, in force from that leg's start. `holds`
+    (m,), s, say how long the aircraft is told to wait at each point, as commanded: what the
+    autopilot makes of fractions is the model's business. `splines` (m,) marks points that are
+    spline waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own.
+    """
+
+    points: Real
+    speeds: Real
+    holds: Real
+    splines: NDArray[np.bool_]
+    radii: Real
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flown:
+    """How a `FlightPath` is flown: time counts from the start at the first point.
+
+    `arrivals` and `departures` (m,), s, are when the autopilot takes each point as reached, and
+    when it leaves for the next; `departures[-1]` is the end. `t` (k,), s, is uniform from 0 to at
+    least the end; `position` and `velocity` (k, 3) are east, north, up, metres and m/s.
+    """
+
+    arrivals: Real
+    departures: Real
+    t: Real
+    position: Real
+    velocity: Real
+
+
+class FlightModel(Protocol):
+    """How one kind of vehicle flies legs."""
+
+    def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
+        """Return the predicted flight along `path`, sampled every `step` seconds."""
+        ...
