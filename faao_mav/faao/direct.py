@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.faao.coarse import rejected
 from faao_mav.faao.design import Design, design
 from faao_mav.faao.interior import Optimum, StageValues, maximize
 from faao_mav.faao.mode_rate import ModeRate
@@ -57,24 +58,35 @@ class RateField:
 def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """Optimise trajectory and precoders of `problem` together.
 
-    Every start of `optimizer.starts` is improved roughly, the best one to the end. The result is
-    never worse than the best start. Raises `InfeasibleError` when there is no flight at all.
+    The starts of `optimizer.starts` that `coarse` does not reject are improved roughly, the best
+    one to the end. The result is never worse than any of those. Raises `InfeasibleError` when
+    there is no flight at all.
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     wanted = design(problem.plan)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
-    routes = starts(kin, options.starts, stations)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
-            observe(Progress(number, len(routes) + 1, stage, best))
+            observe(Progress(number, len(options.starts) + 1, stage, best))
 
     tell(0, "rates over the map", 0.0)
     field = rate_field(problem, wanted)
+    spread = rejected(
+        kin,
+        field,
+        options.starts,
+        stations,
+        tolerance=_ROUGH,
+        max_iterations=options.max_iterations,
+    )
+    hopeful = [name for name in options.starts if name not in spread]
+    if wanted.gaussian:  # coarse values are not priced with the alphabet
+        spread = {}
+    routes = starts(kin, hopeful, stations)
     history: list[float] = []
-    spread: dict[str, float] = {}
     best: Optimum | None = None
-    for number, (name, flight) in enumerate(routes.items(), start=1):
+    for number, (name, flight) in enumerate(routes.items(), start=len(spread) + 1):
         history = history or [_counted(field, wanted, flight.w)]
         tell(number, f"start {name}", max(history))
         found = maximize(
@@ -85,7 +97,11 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             best = found
         history.append(_counted(field, wanted, best.trajectory.w))
     assert best is not None
-    tell(len(routes) + 1, "the best start", max(history))
+    # in the plan's order; a coarse copy may promise a little too much
+    most = max(spread[name] for name in routes)
+    order = dict.fromkeys((*options.starts, *routes))
+    spread = {name: min(spread[name], most) for name in order if name in spread}
+    tell(len(spread) + 1, "the best start", max(history))
     final = maximize(
         kin,
         field,
