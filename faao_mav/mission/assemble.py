@@ -25,8 +25,9 @@ def assemble(route: Route, plan: "Plan") -> Mission:
 
     Home is the plan's origin. The items: TAKEOFF there, if the plan asks for it; the way to w_I
     at the vehicle's greatest speed, with a hold for the route's first hold or `SETTLING_HOLD`,
-    whichever is longer; for each leg a DO_CHANGE_SPEED, then its waypoint; and what
-    `plan.mission.on_finish` says. Unused parameters are 0: ArduPilot refuses NaN.
+    whichever is longer; for each leg its waypoint, before it a DO_CHANGE_SPEED where the speed
+    is another, after it a NAV_DELAY where the wait has a fraction that the autopilot would not
+    keep; and what `plan.mission.on_finish` says. Unused parameters are 0: ArduPilot refuses NaN.
 
     Raises `InfeasibleError` if home and items are more than `plan.mission.max_items`.
     """
@@ -45,10 +46,20 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
         items.append(_at(Command.NAV_TAKEOFF, here, altitude))
     items.append(_change_speed(plan.vehicle.max_speed))
-    items.append(_waypoint(places[0], altitude, max(float(route.holds[0]), SETTLING_HOLD)))
-    for place, speed, hold in zip(places[1:], route.speeds, route.holds[1:], strict=True):
-        items.append(_change_speed(float(speed)))
-        items.append(_waypoint(place, altitude, float(hold)))
+    commanded = plan.vehicle.max_speed
+    for k, place in enumerate(places):
+        speed = float(route.speeds[k - 1]) if k else commanded
+        if speed != commanded:
+            items.append(_change_speed(speed))
+            commanded = speed
+        hold, delay = float(route.holds[k]), float(route.delays[k])
+        if k == 0:
+            hold = max(hold, SETTLING_HOLD)
+        if plan.vehicle.autopilot == "px4":  # keeps fractions
+            hold, delay = hold + delay, 0.0
+        items.append(_waypoint(place, altitude, hold, float(route.radii[k])))
+        if delay > 0:
+            items.append(MissionItem(Command.NAV_DELAY, Frame.MISSION, (delay, -1.0, -1.0, -1.0)))
     items.append(_finish(plan, places[-1]))
 
     rows = len(items) + 1
@@ -71,15 +82,17 @@ def _finish(plan: "Plan", place: tuple[float, float]) -> MissionItem:
             return _at(Command.NAV_LOITER_UNLIM, place, plan.flight.altitude)
 
 
-def _waypoint(place: tuple[float, float], altitude: float, hold: float) -> MissionItem:
-    return _at(Command.NAV_WAYPOINT, place, altitude, hold)
-
-
-def _at(
-    command: Command, place: tuple[float, float], altitude: float, param1: float = 0.0
+def _waypoint(
+    place: tuple[float, float], altitude: float, hold: float, radius: float
 ) -> MissionItem:
     frame = Frame.GLOBAL_RELATIVE_ALT
-    return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), *place, float(altitude))
+    params = (hold, radius, 0.0, 0.0)
+    return MissionItem(Command.NAV_WAYPOINT, frame, params, *place, float(altitude))
+
+
+def _at(command: Command, place: tuple[float, float], altitude: float) -> MissionItem:
+    frame = Frame.GLOBAL_RELATIVE_ALT
+    return MissionItem(command, frame, (0.0, 0.0, 0.0, 0.0), *place, float(altitude))
 
 
 def _change_speed(speed: float) -> MissionItem:

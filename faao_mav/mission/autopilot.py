@@ -5,15 +5,13 @@ Models and defaults as measured on ArduCopter 4.7 and PX4 1.16 in simulation.
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.errors import PlanError
-
-if TYPE_CHECKING:
-    from faao_mav.plan import Plan
+from faao_mav.errors import InputError
+from faao_mav.mission.vehicle import Vehicle
 
 Name: TypeAlias = tuple[str, float]
 """A parameter's name and the factor that makes its value SI."""
@@ -23,6 +21,8 @@ _ARDUPILOT_ACCELERATION: tuple[Name, ...] = (("WP_ACC", 1.0), ("WPNAV_ACCEL", 0.
 _ARDUPILOT_JERK: tuple[Name, ...] = (("WP_JERK", 1.0), ("WPNAV_JERK", 1.0))
 _PX4_ACCELERATION: tuple[Name, ...] = (("MPC_ACC_HOR", 1.0),)
 _PX4_JERK: tuple[Name, ...] = (("MPC_JERK_AUTO", 1.0),)
+
+_WIDEST_RADIUS, _RADIUS_SHARE = 4.0, 0.35
 
 _JERK_LAG = 0.30
 """ArduCopter's t_j: what a ramp takes beyond the ideal jerk-limited one, s."""
@@ -52,6 +52,10 @@ class ArduCopterLegs:
         """
         return speed * self.ramp_duration(speed)
 
+    def radii(self, room: Real) -> Real:
+        """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `room`."""
+        return np.zeros_like(room)
+
 
 @dataclass(frozen=True, slots=True)
 class Px4Legs:
@@ -69,37 +73,42 @@ class Px4Legs:
         b = 4 * self.acceleration**2 / self.jerk
         return speed * (speed + b) / (2 * self.acceleration)
 
+    def radii(self, room: Real) -> Real:
+        """Return acceptance radii, m, for waypoints whose shorter leg is `room` (n,), m.
+
+        A wider one costs less speed in a corner; one as long as its leg would count at once.
+        """
+        return np.minimum(_WIDEST_RADIUS, _RADIUS_SHARE * room)
+
 
 Legs: TypeAlias = ArduCopterLegs | Px4Legs
 
 
-def legs_of(plan: "Plan") -> Legs:
-    """Return how the plan's vehicle flies legs, by its autopilot and `vehicle.parameters`.
+def legs_of(vehicle: Vehicle) -> Legs:
+    """Return how `vehicle` flies legs, by its autopilot and its parameters.
 
     Parameters of either generation of names are known: WP_ACC and WP_JERK in metres,
     WPNAV_ACCEL in centimetres and WPNAV_JERK in metres; MPC_ACC_HOR and MPC_JERK_AUTO for PX4.
-    Raises `PlanError` if the one that counts is not a positive number.
+    Raises `InputError` if the one that counts is not a positive number.
     """
-    if plan.vehicle.autopilot == "px4":
+    if vehicle.autopilot == "px4":
         px4 = Px4Legs()
         return Px4Legs(
-            acceleration=_value(plan, _PX4_ACCELERATION, px4.acceleration),
-            jerk=_value(plan, _PX4_JERK, px4.jerk),
+            acceleration=_value(vehicle, _PX4_ACCELERATION, px4.acceleration),
+            jerk=_value(vehicle, _PX4_JERK, px4.jerk),
         )
     copter = ArduCopterLegs()
     return ArduCopterLegs(
-        acceleration=_value(plan, _ARDUPILOT_ACCELERATION, copter.acceleration),
-        jerk=_value(plan, _ARDUPILOT_JERK, copter.jerk),
+        acceleration=_value(vehicle, _ARDUPILOT_ACCELERATION, copter.acceleration),
+        jerk=_value(vehicle, _ARDUPILOT_JERK, copter.jerk),
     )
 
 
-def _value(plan: "Plan", names: tuple[Name, ...], default: float) -> float:
+def _value(vehicle: Vehicle, names: tuple[Name, ...], default: float) -> float:
     for name, unit in names:
-        if name in plan.vehicle.parameters:
-            value = plan.vehicle.parameters[name]
+        if name in vehicle.parameters:
+            value = vehicle.parameters[name]
             if not (math.isfinite(value) and value > 0):
-                raise PlanError(
-                    f"{plan.source}: vehicle.parameters.{name}: {value:g}; give a number above 0"
-                )
+                raise InputError(f"{vehicle.source}.{name}: {value:g}; give a number above 0")
             return value * unit
     return default

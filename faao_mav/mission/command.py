@@ -11,6 +11,7 @@ class Command(IntEnum):
     NAV_RETURN_TO_LAUNCH = 20
     NAV_LAND = 21
     NAV_TAKEOFF = 22
+    NAV_DELAY = 93
     DO_CHANGE_SPEED = 178
 
 

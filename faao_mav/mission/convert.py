@@ -1,150 +1,69 @@
-"""From a trajectory to a mission: hovers become holds, the rest few legs with speeds."""
+"""From a trajectory to the mission whose predicted flight keeps it, in space and time."""
 
-import math
-from itertools import pairwise
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from faao_mav.arrays import Real
-from faao_mav.errors import InputError
 from faao_mav.mission.assemble import assemble
 from faao_mav.mission.autopilot import legs_of
-from faao_mav.mission.hover import SLOWEST, Stop, find_hovers
+from faao_mav.mission import flight
 from faao_mav.mission.item import Mission
-from faao_mav.mission.route import Route
-from faao_mav.mission.simplify import simplify
-from faao_mav.mission.vector import lengths
+from faao_mav.mission.outline import plan_route
+from faao_mav.mission.recommend import candidates
+from faao_mav.mission.run_in import with_run_in
+from faao_mav.mission.schedule import Schedule, schedule
+from faao_mav.mission.vehicle import Vehicle, vehicle_of
 
 if TYPE_CHECKING:
     from faao_mav.faao.solution import Solution
-    from faao_mav.plan import Plan
 
-# Shares of the path tolerance, chosen so that together they never exceed it: hovers stay within
-# 2 * 0.45, legs within 0.9 of ends that lie on samples or in hovers, merged stops within 0.05.
-_LEG_SHARE = 0.9
-_HOVER_SHARE = 0.45
-_MERGE_SHARE = 0.05
+_PER_WAYPOINT = 0.02
+"""Metres of rms error that one waypoint less is worth."""
 
-_HOVER_RADIUS = 1.0
-"""A hover's radius at most, m, however lax the path tolerance."""
+_ASTRAY = 10.0
+"""Metres of rms error that one metre beyond the path tolerance weighs."""
 
-_SAME_POINT = 1e-3
-"""Ends closer than this are one waypoint, m."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conversion:
+    """A mission, the schedule it flies by, and the vehicle it was timed for.
+
+    `parameters` are those that the vehicle has to be given first, none for `keep`.
+    """
+
+    mission: Mission
+    schedule: Schedule
+    vehicle: Vehicle
+    parameters: Mapping[str, float]
+
+
+def convert(solution: "Solution") -> Conversion:
+    """Return the mission for `solution`, with the parameters that make it fly best.
+
+    Each set of parameters that `recommend` proposes is given a route and a schedule of its own;
+    the least rms error at equal times wins, with some regard to the number of waypoints.
+    Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
+    """
+    plan, tried = solution.plan, []
+    limit = plan.mission.path_tolerance
+    for parameters in candidates(plan):
+        given = vehicle_of(plan)
+        vehicle = Vehicle(
+            given.autopilot, given.kind, {**given.parameters, **parameters}, given.source
+        )
+        legs, speed = legs_of(vehicle), plan.vehicle.max_speed
+        route = plan_route(solution.t, solution.w, plan, legs)
+        route = with_run_in(route, solution.t, solution.w, legs, speed)
+        timed = schedule(route, solution.t, solution.w, flight.flight_model(vehicle), legs, speed)
+        found = timed.deviation
+        cost = found.rms + _PER_WAYPOINT * len(timed.route.positions)
+        tried.append(
+            (cost + _ASTRAY * max(0.0, found.path - limit), len(tried), timed, vehicle, parameters)
+        )
+    _, _, timed, vehicle, parameters = min(tried)
+    return Conversion(assemble(timed.route, plan), timed, vehicle, parameters)
 
 
 def to_mission(solution: "Solution") -> Mission:
-    """Return the mission that flies `solution`: `plan_route`, then `assemble`.
-
-    Raises what they raise: `InputError`, `PlanError`, `InfeasibleError`.
-    """
-    return assemble(plan_route(solution.t, solution.w, solution.plan), solution.plan)
-
-
-def plan_route(t: ArrayLike, w: ArrayLike, plan: "Plan") -> Route:
-    """Return waypoints, holds and speeds that follow the trajectory.
-
-    The polyline through the waypoints passes every sample of `w` within
-    `plan.mission.path_tolerance`. Hovers are one waypoint with a hold of whole seconds; what
-    rounding leaves over is carried to the next hold. Between hovers `simplify` chooses the
-    waypoints; each leg's speed is its length over its planned duration, to 0.001 m/s, at most
-    `plan.vehicle.max_speed`. Ramps are not allowed for: an aircraft flies this somewhat late.
-
-    `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
-    positions at those times, metres. Raises `InputError` if they are not; `PlanError` if
-    `plan.vehicle.parameters` has an unusable value for a limit that is needed.
-    """
-    times, positions = _checked(t, w)
-    tolerance, legs = plan.mission.path_tolerance, legs_of(plan)
-    stops = _stops(times, positions, tolerance)
-    waypoints = [stops[0]]
-    for start, stop in pairwise(stops):
-        stretch = slice(start.last, stop.first + 1)
-        path = positions[stretch].copy()
-        path[0], path[-1] = start.position, stop.position
-        inner = simplify(times[stretch], path, legs, plan.vehicle.max_speed, _LEG_SHARE * tolerance)
-        waypoints += [Stop(start.last + k, start.last + k, path[k]) for k in inner]
-        waypoints.append(stop)
-    return _timed(times, waypoints, plan.vehicle.max_speed)
-
-
-def _checked(t: ArrayLike, w: ArrayLike) -> tuple[Real, Real]:
-    times, positions = np.asarray(t, dtype=float), np.asarray(w, dtype=float)
-    if times.ndim != 1 or len(times) < 2 or positions.shape != (len(times), 2):
-        raise InputError(
-            f"trajectory: t {times.shape} and w {positions.shape}; expected (n,) and (n, 2), n >= 2"
-        )
-    if not (np.isfinite(times).all() and np.isfinite(positions).all()):
-        raise InputError("trajectory: t and w must be finite")
-    if not (np.diff(times) > 0).all():
-        raise InputError("trajectory: t must increase")
-    return times, positions
-
-
-def _stops(t: Real, w: Real, tolerance: float) -> list[Stop]:
-    """Return the hovers, with the trajectory's ends as first and last, at w_I and w_F exactly."""
-    end = len(t) - 1
-    closed = math.dist(w[0], w[end]) <= _SAME_POINT
-    stops = find_hovers(t, w, min(_HOVER_RADIUS, _HOVER_SHARE * tolerance))
-    if stops and stops[0].first == 0:
-        last = stops[0].last
-        if last == end and not closed:
-            last -= 1  # two ends in one hover: leave a leg between them
-        stops[0] = Stop(0, last, w[0])
-    else:
-        stops.insert(0, Stop(0, 0, w[0]))
-    if stops[-1].last == end:
-        stops[-1] = Stop(stops[-1].first, end, w[end])
-    else:
-        stops.append(Stop(end, end, w[end]))
-    return _merged(stops, w, tolerance)
-
-
-def _merged(stops: list[Stop], w: Real, tolerance: float) -> list[Stop]:
-    """Return `stops` without neighbours in one place between which nothing of note happens."""
-    result = [stops[0]]
-    for stop in stops[1:]:
-        before = result[-1]
-        ends_at_w_f = stop.last == len(w) - 1
-        near = _SAME_POINT if before.first == 0 and ends_at_w_f else _MERGE_SHARE * tolerance
-        position = stop.position if ends_at_w_f else before.position
-        samples = w[before.first : stop.last + 1]
-        if (
-            math.dist(before.position, stop.position) <= near
-            and lengths(samples - position).max() <= tolerance
-        ):
-            result[-1] = Stop(before.first, stop.last, position)
-        else:
-            result.append(stop)
-    return result
-
-
-def _timed(t: Real, waypoints: list[Stop], max_speed: float) -> Route:
-    """Return the route with speeds and holds that keep the planned times nominally."""
-    positions = np.array([stop.position for stop in waypoints])
-    arrivals = t[[stop.first for stop in waypoints]]
-    departures = t[[stop.last for stop in waypoints]]
-    length = lengths(np.diff(positions, axis=0))
-    planned = arrivals[1:] - departures[:-1]
-    speeds = np.array(
-        [_speed(s / d, max_speed) for s, d in zip(length, planned, strict=True)], dtype=float
-    )
-    # Where the plan hovers, or creeps slower than is flown, there is time to wait.
-    waits = departures > arrivals
-    waits[1:] |= length < SLOWEST * planned
-    holds = np.zeros(len(waypoints))
-    clock = arrivals[0]
-    for k in range(len(waypoints)):
-        if waits[k]:
-            holds[k] = max(0, round(departures[k] - clock))
-        clock += holds[k]
-        if k < len(length):
-            clock += length[k] / speeds[k]
-    return Route(positions, arrivals, departures, speeds, holds)
-
-
-def _speed(speed: float, max_speed: float) -> float:
-    """Return the speed to command, m/s: rounded, never above `max_speed`, never 0."""
-    rounded = round(max(speed, SLOWEST), 3)
-    return rounded if rounded <= max_speed else math.floor(max_speed * 1000) / 1000 or max_speed
+    """Return the mission for `solution`: that of `convert`."""
+    return convert(solution).mission

@@ -1,4 +1,4 @@
-"""The relay route: what is flown between w_I and w_F, before it becomes mission items."""
+"""The relay route, before it becomes mission items."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,16 @@ from faao_mav.mission.vector import lengths
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """Waypoints from w_I to w_F with their planned times, and what is commanded for them.
+    """Waypoints with their planned times, and what is commanded for them.
 
     `positions` (m, 2) are local east-north metres, m >= 1. `arrivals` and `departures` (m,), s,
     say when the plan reaches and leaves each waypoint; they differ at hovers. `speeds` (m - 1,),
     m/s, are commanded, one for each leg; `holds` (m,), whole seconds, how long the aircraft waits
-    at each waypoint.
+    at each waypoint, and `delays` (m,), s, how much longer, less than one; `radii` (m,), m, the
+    acceptance radii, 0 for the autopilot's own.
+
+    The relay route goes from waypoint `first`, w_I, to waypoint `last`, w_F: one before it is
+    flown to be at speed there, one after it to be still at speed there.
     """
 
     positions: Real
@@ -23,6 +27,10 @@ class Route:
     departures: Real
     speeds: Real
     holds: Real
+    delays: Real
+    radii: Real
+    first: int
+    last: int
 
     @property
     def leg_lengths(self) -> Real:
@@ -31,13 +39,5 @@ class Route:
 
     @property
     def distance(self) -> float:
-        """Length of the route, m: without the way to w_I and from w_F."""
-        return float(self.leg_lengths.sum())
-
-    @property
-    def duration(self) -> float:
-        """Nominal duration of the route, s: legs at the commanded speeds, plus the holds.
-
-        How the aircraft speeds up and slows down is not in it.
-        """
-        return float((self.leg_lengths / self.speeds).sum() + self.holds.sum())
+        """Length of the relay route, m: without the way to w_I and from w_F."""
+        return float(self.leg_lengths[self.first : self.last].sum())

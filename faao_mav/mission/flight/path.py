@@ -16,13 +16,15 @@ class FlightPath:
     `points` (m, 3) are east, north, up in metres, m >= 1. `speeds` (m - 1,), m/s, are the ground
     speeds commanded for the leg that ends at point k + 1, in force from that leg's start. `holds`
     (m,), s, say how long the aircraft is told to wait at each point, as commanded: what the
-    autopilot makes of fractions is the model's business. `splines` (m,) marks points that are
-    spline waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own.
+    autopilot makes of fractions is the model's business. `delays` (m,), s, come on top: NAV_DELAY
+    items after the point, which keep fractions. `splines` (m,) marks points that are spline
+    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own.
     """
 
     points: Real
     speeds: Real
     holds: Real
+    delays: Real
     splines: NDArray[np.bool_]
     radii: Real
 

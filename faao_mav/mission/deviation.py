@@ -1,0 +1,53 @@
+"""How far a flight is from the plan: at equal times, and from the path."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.mission.vector import lengths
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """Metres between flown and planned.
+
+    `rms` and `max` compare positions at equal times, `path` is the farthest that either path
+    strays from the other.
+    """
+
+    rms: float
+    max: float
+    path: float
+
+
+def deviation(planned: Real, flown: Real, path: Real) -> Deviation:
+    """Compare positions `planned` and `flown` (n, 2) at the same n instants.
+
+    `path` (m, 2) is the flown path in between, as finely sampled as it curves.
+    """
+    apart = lengths(flown - planned)
+    return Deviation(
+        rms=float(np.sqrt(np.mean(apart**2))),
+        max=float(apart.max()),
+        path=float(max(astray(path, planned).max(), astray(planned, path).max())),
+    )
+
+
+def astray(points: Real, path: Real) -> Real:
+    """Return the distance of each of `points` (n, 2) from the polyline `path` (m, 2), (n,)."""
+    if len(path) == 1:
+        return lengths(points - path[0])
+    begin, chord = path[:-1], np.diff(path, axis=0)
+    square = np.sum(chord**2, axis=1)
+    result = np.empty(len(points))
+    rows = max(1, _CELLS // len(begin))
+    for first in range(0, len(points), rows):
+        away = points[first : first + rows, None] - begin
+        along = np.sum(away * chord, axis=2) / np.where(square > 0, square, 1.0)
+        away -= np.clip(along, 0, 1)[..., None] * chord
+        result[first : first + rows] = np.sqrt(np.sum(away**2, axis=2).min(axis=1))
+    return result
+
+
+_CELLS = 500_000  # pairs of point and leg held at once

@@ -1,0 +1,71 @@
+"""Which autopilot parameters a mission is timed for.
+
+An autopilot whose ramps take longer than the plan's falls behind at every one; one that turns
+corners at a crawl does so in every curve. Few parameters decide that: the limits of acceleration
+and jerk, and for PX4 how far it may fall behind before it slows down and how well it has to meet
+a waypoint's altitude.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from faao_mav.errors import PlanError
+
+if TYPE_CHECKING:
+    from faao_mav.plan import Plan
+
+_STRAIGHT = 1.35
+"""Of a_max: makes up for the time that a jerk-limited ramp loses."""
+
+_CURVED = {"ardupilot": 4.0, "px4": 5.0}
+"""m/s²: corners and short legs at speed."""
+
+_RANGE = {"ardupilot": (0.5, 5.0), "px4": (2.0, 15.0)}
+"""m/s²: what the autopilots accept."""
+
+_JERK = {"ardupilot": 10.0, "px4": 20.0}
+
+
+def candidates(plan: "Plan") -> tuple[Mapping[str, float], ...]:
+    """Return sets of parameters to try, the gentlest first; one empty set for `keep`.
+
+    ArduPilot's have the names of both generations: a vehicle takes those that it knows.
+    """
+    if plan.mission.parameters == "keep":
+        return ({},)
+    autopilot, limit = plan.vehicle.autopilot, plan.vehicle.max_acceleration
+    low, high = _RANGE[autopilot]
+    straight = round(min(max(_STRAIGHT * limit, low), high), 2)
+    tried = dict.fromkeys((straight, max(straight, _CURVED[autopilot])))
+    named = _ardupilot if autopilot == "ardupilot" else _px4
+    return tuple(named(plan, acceleration) for acceleration in tried)
+
+
+def _ardupilot(plan: "Plan", acceleration: float) -> dict[str, float]:
+    speed, jerk = plan.vehicle.max_speed, _JERK["ardupilot"]
+    return {
+        "WPNAV_SPEED": round(100 * speed),
+        "WPNAV_ACCEL": round(100 * acceleration),
+        "WPNAV_JERK": jerk,
+        "WP_SPD": speed,
+        "WP_ACC": acceleration,
+        "WP_JERK": jerk,
+    }
+
+
+def _px4(plan: "Plan", acceleration: float) -> dict[str, float]:
+    return {
+        "MPC_XY_CRUISE": plan.vehicle.max_speed,
+        "MPC_ACC_HOR": acceleration,
+        "MPC_JERK_AUTO": _JERK["px4"],
+        "MPC_XY_ERR_MAX": 10.0,
+        "NAV_MC_ALT_RAD": 3.0,
+    }
+
+
+def check(plan: "Plan") -> None:
+    """Raise `PlanError` for a plan whose aircraft has no parameters to recommend."""
+    if plan.vehicle.type == "plane" and plan.mission.parameters == "recommend":
+        raise PlanError(
+            f"{plan.source}: mission.parameters: recommend is for multicopters; use keep"
+        )

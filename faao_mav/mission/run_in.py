@@ -1,0 +1,67 @@
+"""Legs before w_I and after w_F for plans that begin or end at speed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.mission.autopilot import Legs
+from faao_mav.mission.route import Route
+from faao_mav.mission.vector import lengths
+
+MOVING = 0.5
+"""Slower ends than this, m/s, are taken as hovers."""
+
+_MARGIN = 1.2
+
+
+def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) -> Route:
+    """Return `route` with a leg that is long enough to be at the plan's first speed at w_I.
+
+    Likewise one after w_F, so that the aircraft does not brake before it. Ends at which the plan
+    waits, or is slower than `MOVING`, get none. `t` (n,) s, `w` (n, 2) m.
+    """
+    if len(route.positions) < 2:
+        return route
+    into = (w[1] - w[0]) / (t[1] - t[0])
+    out = (w[-1] - w[-2]) / (t[-1] - t[-2])
+    if _speed(into) > MOVING and route.departures[0] == route.arrivals[0]:
+        lead, lasting = _lead(into, legs, max_speed)
+        route = replace(
+            _with(route, 0, route.positions[0] - lead, route.arrivals[0] - lasting, _speed(into)),
+            first=1,
+            last=route.last + 1,
+        )
+        route.holds[1] = 0.0
+    if _speed(out) > MOVING and route.departures[-1] == route.arrivals[-1]:
+        lead, lasting = _lead(out, legs, max_speed)
+        end = len(route.positions)
+        route = _with(
+            route, end, route.positions[-1] + lead, route.departures[-1] + lasting, _speed(out)
+        )
+    return route
+
+
+def _speed(velocity: Real) -> float:
+    return float(lengths(velocity))
+
+
+def _lead(velocity: Real, legs: Legs, max_speed: float) -> tuple[Real, float]:
+    """Return the way, (2,) m, on which `velocity` can be reached, and its nominal duration, s."""
+    speed = min(_speed(velocity), max_speed)
+    length = _MARGIN * float(legs.shortest_leg(np.array([speed]))[0])
+    return velocity / _speed(velocity) * length, length / speed
+
+
+def _with(route: Route, at: int, position: Real, time: float, speed: float) -> Route:
+    """Return `route` with a waypoint more at its beginning (`at` 0) or its end."""
+    return replace(
+        route,
+        positions=np.insert(route.positions, at, position, axis=0),
+        arrivals=np.insert(route.arrivals, at, time),
+        departures=np.insert(route.departures, at, time),
+        speeds=np.insert(route.speeds, max(at - 1, 0) if at else 0, speed),
+        holds=np.insert(route.holds, at, 0.0),
+        delays=np.insert(route.delays, at, 0.0),
+        radii=np.insert(route.radii, at, 0.0),
+    )

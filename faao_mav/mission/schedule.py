@@ -1,0 +1,218 @@
+"""A route whose predicted flight keeps the plan's time, with as few legs as that takes.
+
+`plan_route` gives the first legs. Their speeds and holds are fitted (`timing`); legs on which the
+predicted flight is still too far from the plan at equal times are split there, and all is fitted
+anew. In the end legs whose speeds hardly differ share one, and values are rounded to what is sent.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faao_mav.arrays import Real
+from faao_mav.mission.autopilot import Legs
+from faao_mav.mission.deviation import Deviation, deviation
+from faao_mav.mission.flight import FlightModel, FlightPath, Flown
+from faao_mav.mission.hover import SLOWEST
+from faao_mav.mission.route import Route
+from faao_mav.mission.timing import SHORTEST_HOLD, Clock, fit
+from faao_mav.mission.vector import lengths
+
+ALLOWED = 0.8
+"""Metres that a leg may be off at equal times before it is split."""
+
+WAYPOINTS = 24
+"""Waypoints at most, unless the path itself takes more."""
+
+_ROUNDS = 5
+_WORTHWHILE = 0.95
+"""A round of splits has to bring the rms error below this share of what it was."""
+
+_ALIKE = 0.02
+"""Speeds of neighbouring legs that differ by less, relatively, are tried as one."""
+
+_DEARER = 1.05
+_SPEED_DIGITS, _HOLD_DIGITS = 2, 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Schedule:
+    """A route with its predicted flight: `clock` ties the flight's time to the plan's."""
+
+    route: Route
+    path: FlightPath
+    flown: Flown
+    clock: Clock
+
+    def positions(self, t: Real) -> Real:
+        """Return where the aircraft is predicted to be at the plan's times `t` (k,), (k, 2)."""
+        return self.clock.positions(self.flown, t)
+
+    @property
+    def deviation(self) -> Deviation:
+        """How far that is from the plan."""
+        t, w = self.clock.t, self.clock.w
+        start = self.clock.start(self.flown)
+        within = (self.flown.t >= start) & (self.flown.t <= start + t[-1])
+        return deviation(w, self.positions(t), self.flown.position[within, :2])
+
+
+def schedule(
+    route: Route, t: Real, w: Real, model: FlightModel, legs: Legs, max_speed: float
+) -> Schedule:
+    """Return `route` refined and timed so that `model` predicts a flight close to the plan.
+
+    `t` (n,) s and `w` (n, 2) m are the plan; `legs` says how short a leg may be for its speed,
+    and how wide its acceptance radius; no speed is above `max_speed`, m/s.
+    """
+    timing = _Timing(t, w, model, legs, max_speed)
+    best = timing.fitted(route)
+    for _ in range(_ROUNDS):
+        splits = timing.splits(best)
+        if not splits:
+            break
+        finer = timing.fitted(_split(best.route, splits, t, w))
+        if finer.deviation.rms > _WORTHWHILE * best.deviation.rms:
+            break
+        best = finer
+    return timing.rounded(timing.shared(best))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Timing:
+    """The plan and the vehicle that all trials have in common."""
+
+    t: Real
+    w: Real
+    model: FlightModel
+    legs: Legs
+    max_speed: float
+
+    def flight(self, route: Route) -> Schedule:
+        """Return the predicted flight of `route`."""
+        stops = route.holds + route.delays > 0
+        stops[[0, -1]] = True
+        reach = np.concatenate([[np.inf], route.leg_lengths, [np.inf]])
+        radii = self.legs.radii(np.minimum(reach[:-1], reach[1:]))
+        route = replace(route, radii=np.where(stops, 0.0, np.round(radii, 1)))
+        path = FlightPath(
+            points=np.column_stack([route.positions, np.zeros(len(route.positions))]),
+            speeds=route.speeds,
+            holds=route.holds,
+            delays=route.delays,
+            splines=np.zeros(len(route.positions), dtype=bool),
+            radii=route.radii,
+        )
+        leaving = route.first == 0
+        at = route.departures if leaving else route.arrivals
+        clock = Clock(self.t - self.t[0], self.w, route.first, at[route.first] - self.t[0], leaving)
+        return Schedule(route, path, self.model.fly(path), clock)
+
+    def fitted(self, route: Route, groups: NDArray[np.int_] | None = None) -> Schedule:
+        """Return `route` with the speeds and holds that fit best."""
+        first = self.flight(route)
+        free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
+        free[-1] = False
+        path = fit(
+            self.model,
+            first.path,
+            first.clock,
+            groups=np.arange(len(route.speeds)) if groups is None else groups,
+            free=free,
+            min_speed=SLOWEST,
+            max_speed=self.max_speed,
+        )
+        return self.flight(
+            replace(route, speeds=path.speeds, holds=path.holds, delays=path.delays)
+        )
+
+    def splits(self, found: Schedule) -> list[float]:
+        """Return the plan's times at which legs that are off by too much are best split."""
+        route = found.route
+        off = lengths(found.positions(self.t - self.t[0]) - self.w)
+        room = WAYPOINTS - len(route.positions)
+        worst = []
+        for k in range(route.first, route.last):
+            inside = np.flatnonzero(
+                (self.t > route.departures[k]) & (self.t < route.arrivals[k + 1])
+            )
+            usable = inside[self._usable(route, k, inside)]
+            if len(inside) and len(usable) and off[inside].max() > ALLOWED:
+                at = usable[np.argmax(off[usable])]
+                worst.append((float(off[inside].max()), float(self.t[at])))
+        worst.sort(reverse=True)
+        return sorted(time for _, time in worst[: max(room, 0)])
+
+    def _usable(self, route: Route, k: int, inside: NDArray[np.int_]) -> NDArray[np.bool_]:
+        """Tell for each sample `inside` leg k whether both parts would be legs of some use."""
+        result = np.ones(len(inside), dtype=bool)
+        ends = (
+            (route.positions[k], self.t[inside] - route.departures[k]),
+            (route.positions[k + 1], route.arrivals[k + 1] - self.t[inside]),
+        )
+        for end, lasting in ends:
+            length = lengths(self.w[inside] - end)
+            result &= length >= self.legs.shortest_leg(length / lasting)
+        return result
+
+    def shared(self, found: Schedule) -> Schedule:
+        """Return `found` with one speed for neighbouring legs wherever that hardly costs."""
+        for alike in (8 * _ALIKE, 4 * _ALIKE, 2 * _ALIKE, _ALIKE):
+            groups = _groups(found.route.speeds, alike)
+            if groups[-1:] == len(groups) - 1:
+                continue
+            tried = self.fitted(found.route, groups)
+            if tried.deviation.rms <= max(_DEARER * found.deviation.rms, ALLOWED / 2):
+                return tried
+        return found
+
+    def rounded(self, found: Schedule) -> Schedule:
+        """Return `found` with the values that are sent."""
+        route = found.route
+        top = np.floor(self.max_speed * 10**_SPEED_DIGITS) / 10**_SPEED_DIGITS or self.max_speed
+        waits = np.round(route.holds + route.delays, _HOLD_DIGITS)
+        holds = np.floor(waits)
+        sent = self.flight(
+            replace(
+                route,
+                speeds=np.minimum(np.round(route.speeds, _SPEED_DIGITS), top),
+                holds=holds,
+                delays=np.round(waits - holds, _HOLD_DIGITS),
+            )
+        )
+        if route.last < len(holds) - 1:
+            return sent
+        # the relay is needed to the end of the plan's last slot
+        lasting = self.t[-1] - self.t[0] + self.t[-1] - self.t[-2]
+        early = lasting + sent.clock.start(sent.flown) - sent.flown.arrivals[-1]
+        holds[-1] = max(SHORTEST_HOLD, np.ceil(early))
+        return self.flight(replace(sent.route, holds=holds))
+
+
+def _groups(speeds: Real, alike: float) -> NDArray[np.int_]:
+    """Number the runs of legs whose speeds stay within a factor 1 + `alike` of their first."""
+    groups, leader = np.zeros(len(speeds), dtype=int), 0
+    for k in range(1, len(speeds)):
+        same = abs(speeds[k] - speeds[leader]) <= alike * speeds[leader]
+        groups[k] = groups[k - 1] + (not same)
+        leader = leader if same else k
+    return groups
+
+
+def _split(route: Route, times: list[float], t: Real, w: Real) -> Route:
+    """Return `route` with waypoints where the plan is at `times` (s, sorted)."""
+    at = np.searchsorted(route.arrivals, times)
+    positions = np.column_stack([np.interp(times, t, x) for x in w.T])
+    still = np.zeros(len(times))
+    return replace(
+        route,
+        positions=np.insert(route.positions, at, positions, axis=0),
+        arrivals=np.insert(route.arrivals, at, times),
+        departures=np.insert(route.departures, at, times),
+        speeds=np.insert(route.speeds, at, route.speeds[at - 1]),
+        holds=np.insert(route.holds, at, still),
+        delays=np.insert(route.delays, at, still),
+        radii=np.insert(route.radii, at, still),
+        last=route.last + len(times),
+    )
