@@ -7,3 +7,4 @@ from numpy.typing import NDArray
 
 Real: TypeAlias = NDArray[np.float64]
 Complex: TypeAlias = NDArray[np.complex128]
+Integers: TypeAlias = NDArray[np.int_]

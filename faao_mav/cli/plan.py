@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from faao_mav.cli.outcome import exit_status
-from faao_mav.errors import InputError
+from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_whole
 
 
@@ -24,6 +24,10 @@ def plan(
     save: Annotated[
         Path | None,
         typer.Option(metavar="RESULT.npz", help="Write trajectory, precoders and rates."),
+    ] = None,
+    precoders: Annotated[
+        Path | None,
+        typer.Option(metavar="TABLE.csv", help="Write the precoders by time and position."),
     ] = None,
     method: Annotated[
         str | None,
@@ -42,13 +46,14 @@ def plan(
     Exit status: 0 done; 1 there is no such flight or mission; 2 unusable arguments or input.
     """
     with exit_status():
-        _run(plan_file, out, save, method, bound, as_json, quiet)
+        _run(plan_file, out, save, precoders, method, bound, as_json, quiet)
 
 
 def _run(
     plan_file: Path,
     out: Path | None,
     save: Path | None,
+    precoders: Path | None,
     method: str | None,
     bound: bool,
     as_json: bool,
@@ -60,31 +65,46 @@ def _run(
     from faao_mav.faao.pricing import fresh_rates, price, saturation
     from faao_mav.faao.problem import build_problem
     from faao_mav.faao.solution import save_solution
-    from faao_mav.mission import assemble, plan_route
-    from faao_mav.mission.autopilot import legs_of
+    from faao_mav.mission.convert import convert
     from faao_mav.mission.formats import check_suffix, render_mission
+    from faao_mav.mission.parameter_file import parameter_path, render_parameters
+    from faao_mav.mission.precoder_table import precoder_table
+    from faao_mav.mission.prediction import predict_delivery
+    from faao_mav.mission.recommend import candidates
     from faao_mav.plan import read_plan
 
     started = time.perf_counter()
+    read = read_plan(plan_file, method=method)
+    vehicles = candidates(read)  # a useless parameter is refused before the work, not after it
+    tuned = None
     if out is not None:
         check_suffix(out)
-        check_writable(out)
-    if save is not None:
-        if save.suffix != ".npz":
-            raise InputError(f"--save {save}: give a name that ends in .npz")
-        check_writable(save)
-    read = read_plan(plan_file, method=method)
-    legs_of(read)  # a useless vehicle parameter is refused before the work, not after it
+        tuned = parameter_path(out, read.vehicle.autopilot) if any(vehicles) else None
+    if save is not None and save.suffix != ".npz":
+        raise InputError(f"--save {save}: give a name that ends in .npz")
+    targets = [path for path in (out, tuned, save, precoders) if path is not None]
+    for path in targets:
+        check_writable(path)
     with progress(shown=sys.stderr.isatty() and not quiet) as observe:
         optimizing = time.perf_counter()
         solution = optimize(read, observe=observe)
         optimized = time.perf_counter() - optimizing
+        try:
+            conversion = convert(solution)
+        except FaaoError:
+            if save is not None:  # what was found is not lost with the mission
+                save_solution(solution, save)
+            raise
+        prediction = predict_delivery(solution, conversion)
         if save is not None:
-            save_solution(solution, save)
-        route = plan_route(solution.t, solution.w, read)
-        mission = assemble(route, read)
+            save_solution(solution, save, conversion.schedule.track())
+        if precoders is not None:
+            write_whole(precoders, precoder_table(solution).encode())
+        if tuned is not None:
+            text = render_parameters(conversion.parameters, read.vehicle.autopilot)
+            write_whole(tuned, text.encode())
         if out is not None:
-            write_whole(out, render_mission(mission, out).encode())
+            write_whole(out, render_mission(conversion.mission, out).encode())
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None
@@ -98,11 +118,11 @@ def _run(
         fresh=fresh,
         saturation=limit,
         bound=ceiling,
-        mission=mission,
-        route=route,
+        conversion=conversion,
+        prediction=prediction,
         seconds_optimize=optimized,
         seconds_total=time.perf_counter() - started,
-        written=tuple(path for path in (out, save) if path is not None),
+        written=tuple(targets),
     )
     if as_json:
         typer.echo(json.dumps(as_dict(result), allow_nan=False))

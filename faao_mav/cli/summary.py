@@ -7,7 +7,8 @@ from typing import Any
 from faao_mav.faao.bound import Bound
 from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.faao.solution import Solution
-from faao_mav.mission import Mission, Route
+from faao_mav.mission.convert import Conversion
+from faao_mav.mission.prediction import Prediction
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,8 +20,8 @@ class Result:
     fresh: FreshRates | None
     saturation: Saturation
     bound: Bound | None
-    mission: Mission
-    route: Route
+    conversion: Conversion
+    prediction: Prediction
     seconds_optimize: float
     seconds_total: float
     written: tuple[Path, ...]
@@ -53,11 +54,21 @@ def as_dict(result: Result) -> dict[str, Any]:
         "saturated": result.saturation.saturated,
         "spare_db": result.saturation.spare_db,
         "mission": {
-            "items": len(result.mission.items),
-            "duration": result.route.duration,
-            "distance": result.route.distance,
+            "items": len(result.conversion.mission.items),
+            "duration": result.prediction.duration,
+            "distance": result.conversion.schedule.route.distance,
+            "parameters": dict(result.conversion.parameters),
         },
-        "predicted": None,
+        "predicted": {
+            "average_rate": result.prediction.rates.R_avg,
+            "rate_bs_uav": result.prediction.rates.R_U,
+            "rate_uav_user": result.prediction.rates.R_G,
+            "average_rate_by_position": result.prediction.by_position.R_avg,
+            "duration": result.prediction.duration,
+            "max_path_error": result.prediction.max_path_error,
+            "max_position_error": result.prediction.max_position_error,
+            "rms_position_error": result.prediction.rms_position_error,
+        },
     }
 
 
@@ -65,7 +76,8 @@ def as_text(result: Result) -> str:
     """Return the summary for people."""
     solution, rates = result.solution, result.solution.rates
     information, limit = result.information, result.saturation
-    flight = solution.plan.flight
+    flight, flown = solution.plan.flight, result.prediction
+    share = 100 * flown.rates.R_avg / rates.R_avg if rates.R_avg else 100.0
     title = [solution.plan.name] if solution.plan.name else []
     lines = [
         *title,
@@ -100,10 +112,16 @@ def as_text(result: Result) -> str:
     lines += [
         f"optimiser    {state} after {_count(solution.iterations, 'iteration')}, "
         f"{result.seconds_optimize:.1f} s: {solution.ending}",
-        f"mission      {_count(len(result.mission.items), 'item')}; relay route of "
-        f"{result.route.duration:.1f} s (planned: {flight.duration - flight.time_step:g} s) and "
-        f"{result.route.distance:.0f} m",
+        f"mission      {_count(len(result.conversion.mission.items), 'item')}; relay route of "
+        f"{result.conversion.schedule.route.distance:.0f} m",
+        f"predicted    {flown.rates.R_avg:.4f} bit/s/Hz, {share:.2f} % of the plan, in "
+        f"{flown.duration:.1f} s (planned: {flight.duration:g} s)",
+        f"             {flown.rms_position_error:.1f} m rms from the plan at equal times, "
+        f"{flown.max_position_error:.1f} m at most; {flown.max_path_error:.1f} m from its path",
     ]
+    if result.conversion.parameters:
+        wanted = ", ".join(f"{name} {v:g}" for name, v in result.conversion.parameters.items())
+        lines.append(f"parameters   the mission is timed for {wanted}: load them first")
     lines += [f"written      {path}" for path in result.written]
     if not result.written:
         lines.append("written      nothing: give --out MISSION.waypoints")

@@ -144,11 +144,14 @@ def make_solution(
 _ARRAYS = ("t", "w", "v", "a", "P_B", "P_U", "H_rB", "H_rU", "I_U", "I_G", "history")
 
 
-def save_solution(solution: Solution, path: str | Path) -> None:
+def save_solution(
+    solution: Solution, path: str | Path, extra: Mapping[str, Real] | None = None
+) -> None:
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
     Keys: the arrays of `Solution` by name, `R_avg`, `R_U`, `R_G`, `converged`, `ending`,
-    `starts` (JSON text) and `plan`, the YAML text. The same solution gives the same bytes.
+    `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`, which
+    `load_solution` leaves alone. The same solution gives the same bytes.
     """
     rates = solution.rates
     values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}
@@ -156,6 +159,7 @@ def save_solution(solution: Solution, path: str | Path) -> None:
     values |= {"converged": solution.converged, "ending": solution.ending}
     values["starts"] = json.dumps(dict(solution.starts))
     values["plan"] = solution.plan.text
+    values |= extra or {}
     buffer = io.BytesIO()
     np.savez(buffer, **values)
     write_whole(path, buffer.getvalue())

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from faao_mav.mission import flight
 from faao_mav.mission.assemble import assemble
 from faao_mav.mission.autopilot import legs_of
-from faao_mav.mission import flight
 from faao_mav.mission.item import Mission
 from faao_mav.mission.outline import plan_route
 from faao_mav.mission.recommend import candidates

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Integers, Real
 from faao_mav.errors import InputError
 from faao_mav.faao.problem import build_problem
-from faao_mav.faao.solution import Rates, Solution
+from faao_mav.faao.solution import Solution
 from faao_mav.mission.vector import lengths
 
 
-def delivered(solution: Solution, w: Real, slots: "np.ndarray | None" = None) -> tuple[Real, Real]:
+def delivered(solution: Solution, w: Real, slots: Integers | None = None) -> tuple[Real, Real]:
     """Return (7) and (8), bits, each (n,), where the aircraft is at `w` (n, 2) in slot n.
 
     Each slot keeps its fading; the line of sight and the path gain are those at `w`. The
@@ -27,12 +27,6 @@ def delivered(solution: Solution, w: Real, slots: "np.ndarray | None" = None) ->
     return I_U, I_G
 
 
-def delivered_rates(solution: Solution, w: Real) -> Rates:
-    """Return R_U and R_G of (10) along positions `w` (n, 2), one per slot, bit/s/Hz."""
-    I_U, I_G = delivered(solution, w)
-    return Rates(float(I_U.mean()), float(I_G.mean()))
-
-
-def nearest_slots(solution: Solution, w: Real) -> "np.ndarray":
+def nearest_slots(solution: Solution, w: Real) -> Integers:
     """Return for each of `w` (n, 2) the slot (n,) that is planned nearest to it."""
     return np.array([int(np.argmin(lengths(solution.w - place))) for place in w], dtype=int)

@@ -49,6 +49,17 @@ class Schedule:
         """Return where the aircraft is predicted to be at the plan's times `t` (k,), (k, 2)."""
         return self.clock.positions(self.flown, t)
 
+    def track(self) -> dict[str, Real]:
+        """Return the predicted relay flight on the plan's clock, as `--save` keeps it.
+
+        `predicted_t` (k,), s; `predicted_w` and `predicted_v` (k, 2), east and north, m and m/s.
+        """
+        return {
+            "predicted_t": self.flown.t - self.clock.start(self.flown),
+            "predicted_w": self.flown.position[:, :2],
+            "predicted_v": self.flown.velocity[:, :2],
+        }
+
     @property
     def deviation(self) -> Deviation:
         """How far that is from the plan."""
@@ -123,9 +134,7 @@ class _Timing:
             min_speed=SLOWEST,
             max_speed=self.max_speed,
         )
-        return self.flight(
-            replace(route, speeds=path.speeds, holds=path.holds, delays=path.delays)
-        )
+        return self.flight(replace(route, speeds=path.speeds, holds=path.holds, delays=path.delays))
 
     def splits(self, found: Schedule) -> list[float]:
         """Return the plan's times at which legs that are off by too much are best split."""
