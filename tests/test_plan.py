@@ -168,7 +168,6 @@ def test_required_keys(key: str) -> None:
     [
         ("radio.causal", True),
         ("vehicle.type", "plane"),
-        ("mission.parameters", "recommend"),
         ("fence", {"inclusion": [[0, 0], [9, 0], [9, 9]]}),
     ],
 )

@@ -52,7 +52,7 @@ def convert(solution: "Solution") -> Conversion:
             given.autopilot, given.kind, {**given.parameters, **parameters}, given.source
         )
         legs, speed = legs_of(vehicle), plan.vehicle.max_speed
-        route = plan_route(solution.t, solution.w, plan, legs)
+        route = plan_route(solution.t, solution.w, plan)
         route = with_run_in(route, solution.t, solution.w, legs, speed)
         timed = schedule(route, solution.t, solution.w, flight.flight_model(vehicle), legs, speed)
         found = timed.deviation

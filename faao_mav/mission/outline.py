@@ -9,12 +9,10 @@ from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.mission.autopilot import Legs, legs_of
 from faao_mav.mission.hover import SLOWEST, Stop, find_hovers
 from faao_mav.mission.route import Route
 from faao_mav.mission.simplify import simplify
 from faao_mav.mission.vector import lengths
-from faao_mav.mission.vehicle import vehicle_of
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
@@ -32,7 +30,7 @@ _SAME_POINT = 1e-3
 """Ends closer than this are one waypoint, m."""
 
 
-def plan_route(t: ArrayLike, w: ArrayLike, plan: "Plan", legs: Legs | None = None) -> Route:
+def plan_route(t: ArrayLike, w: ArrayLike, plan: "Plan") -> Route:
     """Return waypoints, holds and speeds that follow the trajectory.
 
     The polyline through the waypoints passes every sample of `w` within
@@ -42,19 +40,17 @@ def plan_route(t: ArrayLike, w: ArrayLike, plan: "Plan", legs: Legs | None = Non
     `plan.vehicle.max_speed`. Ramps are not allowed for yet: `schedule` does that.
 
     `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
-    positions at those times, metres; `legs` is how the vehicle flies a leg, by default by
-    `plan.vehicle.parameters`. Raises `InputError` if they are not; `PlanError` if a parameter has
-    an unusable value.
+    positions at those times, metres. Raises `InputError` if they are not.
     """
     times, positions = _checked(t, w)
-    tolerance, legs = plan.mission.path_tolerance, legs or legs_of(vehicle_of(plan))
+    tolerance = plan.mission.path_tolerance
     stops = _stops(times, positions, tolerance)
     waypoints = [stops[0]]
     for start, stop in pairwise(stops):
         stretch = slice(start.last, stop.first + 1)
         path = positions[stretch].copy()
         path[0], path[-1] = start.position, stop.position
-        inner = simplify(times[stretch], path, legs, plan.vehicle.max_speed, _LEG_SHARE * tolerance)
+        inner = simplify(path, _LEG_SHARE * tolerance)
         waypoints += [Stop(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
     return _timed(times, waypoints, plan.vehicle.max_speed)

@@ -275,7 +275,7 @@ class MissionSection(Section):
         2.0, ge=0.1, le=1000, description="a number of metres, 0.1 to 1000"
     )
     max_items: int = Field(600, ge=2, le=65_535, description="a whole number, 2 to 65535")
-    parameters: MissionParameters = Field("keep", description="recommend or keep")
+    parameters: MissionParameters = Field("recommend", description="recommend or keep")
 
 
 class PlanSection(Section):
@@ -294,6 +294,5 @@ class PlanSection(Section):
 NOT_YET: tuple[tuple[str, object, str], ...] = (
     ("radio.causal", True, "leave it false"),
     ("vehicle.type", "plane", "use copter"),
-    ("mission.parameters", "recommend", "use keep"),
 )
 """Values that the schema knows and the program does not, with what to write instead."""
