@@ -5,7 +5,7 @@ Models and defaults as measured on ArduCopter 4.7 and PX4 1.16 in simulation.
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,9 @@ _JERK_LAG = 0.30
 @dataclass(frozen=True, slots=True)
 class ArduCopterLegs:
     """How ArduCopter flies a leg between plain waypoints: A in m/s², J in m/s³."""
+
+    whole_seconds: ClassVar[bool] = True
+    """Whether holds lose their fractions."""
 
     acceleration: float = 2.5
     jerk: float = 1.0
@@ -60,6 +63,8 @@ class ArduCopterLegs:
 @dataclass(frozen=True, slots=True)
 class Px4Legs:
     """How PX4 flies a leg between plain waypoints: a in m/s², j in m/s³."""
+
+    whole_seconds: ClassVar[bool] = False
 
     acceleration: float = 3.0
     jerk: float = 4.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Integers, Real
 from faao_mav.mission.autopilot import Legs
 from faao_mav.mission.deviation import Deviation, deviation
 from faao_mav.mission.flight import FlightModel, FlightPath, Flown
@@ -126,12 +126,12 @@ class _Timing:
         clock = Clock(self.t - self.t[0], self.w, route.first, at[route.first] - self.t[0], leaving)
         return Schedule(route, path, self.model.fly(path), clock)
 
-    def fitted(self, route: Route, groups: NDArray[np.int_] | None = None) -> Schedule:
+    def fitted(self, route: Route, groups: Integers | None = None) -> Schedule:
         """Return `route` with the speeds and holds that fit best."""
         first = self.flight(route)
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
-        path = fit(
+        speeds, waits = fit(
             self.model,
             first.path,
             first.clock,
@@ -140,7 +140,12 @@ class _Timing:
             min_speed=SLOWEST,
             max_speed=self.max_speed,
         )
-        return self.flight(replace(route, speeds=path.speeds, holds=path.holds, delays=path.delays))
+        return self.flight(self._waiting(replace(route, speeds=speeds), waits))
+
+    def _waiting(self, route: Route, waits: Real) -> Route:
+        """Return `route` with `waits` (m,), s, as holds, and as delays what holds cannot say."""
+        holds = np.floor(waits) if self.legs.whole_seconds else waits
+        return replace(route, holds=holds, delays=np.round(waits - holds, 9))
 
     def splits(self, found: Schedule) -> list[float]:
         """Return the plan's times at which legs that are off by too much are best split."""
@@ -159,7 +164,7 @@ class _Timing:
         worst.sort(reverse=True)
         return sorted(time for _, time in worst[: max(room, 0)])
 
-    def _usable(self, route: Route, k: int, inside: NDArray[np.int_]) -> NDArray[np.bool_]:
+    def _usable(self, route: Route, k: int, inside: Integers) -> NDArray[np.bool_]:
         """Tell for each sample `inside` leg k whether both parts would be legs of some use."""
         result = np.ones(len(inside), dtype=bool)
         ends = (
@@ -187,25 +192,18 @@ class _Timing:
         route = found.route
         top = np.floor(self.max_speed * 10**_SPEED_DIGITS) / 10**_SPEED_DIGITS or self.max_speed
         waits = np.round(route.holds + route.delays, _HOLD_DIGITS)
-        holds = np.floor(waits)
-        sent = self.flight(
-            replace(
-                route,
-                speeds=np.minimum(np.round(route.speeds, _SPEED_DIGITS), top),
-                holds=holds,
-                delays=np.round(waits - holds, _HOLD_DIGITS),
-            )
-        )
-        if route.last < len(holds) - 1:
+        speeds = np.minimum(np.round(route.speeds, _SPEED_DIGITS), top)
+        sent = self.flight(self._waiting(replace(route, speeds=speeds), waits))
+        if route.last < len(waits) - 1:
             return sent
         # the relay is needed to the end of the plan's last slot
         lasting = self.t[-1] - self.t[0] + self.t[-1] - self.t[-2]
         early = lasting + sent.clock.start(sent.flown) - sent.flown.arrivals[-1]
-        holds[-1] = max(SHORTEST_HOLD, np.ceil(early))
-        return self.flight(replace(sent.route, holds=holds))
+        waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
+        return self.flight(self._waiting(sent.route, waits))
 
 
-def _groups(speeds: Real, alike: float) -> NDArray[np.int_]:
+def _groups(speeds: Real, alike: float) -> Integers:
     """Number the runs of legs whose speeds stay within a factor 1 + `alike` of their first."""
     groups, leader = np.zeros(len(speeds), dtype=int), 0
     for k in range(1, len(speeds)):

@@ -1,28 +1,32 @@
 """Speeds and holds with which the predicted flight keeps the plan's time.
 
 minimise sum_i |p(t_i) - w(t_i)|² over the speeds commanded for the legs and the holds at the
-hovers, p being the predicted flight. A Levenberg-Marquardt method with bounds (SciPy's) on finite
-differences: the prediction has no gradients, but it is smooth and quick. An error early in the
-flight shows in everything that follows, so later legs and holds make up for earlier ones.
+hovers, p being the predicted flight. A Levenberg-Marquardt method with bounds on finite
+differences: the prediction has no gradients, but it is smooth, and many variants of one flight
+cost little more than one. So all differences are flown at once, and then all dampings. An error
+early in the flight shows in everything that follows: later legs and holds make up for earlier ones.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Integers, Real
 from faao_mav.mission.flight import FlightModel, FlightPath, Flown
 
 SPEED_STEP, HOLD_STEP = 0.02, 0.05
 """Finite differences, m/s and s: above the predictions' noise, below what the physics bends."""
 
-_SAMPLES = 400
-_ATTEMPTS = 30
-_INSIDE = 1e-6  # the method starts within its bounds
-
 SHORTEST_HOLD = 1.0
 """A hold at least, s: an autopilot that is not told to wait flies through."""
+
+_STEP = 0.25  # of the predicted flight, s
+_SAMPLES = 400
+_ITERATIONS = 12
+_DAMPINGS = 10.0 ** np.arange(-4, 4)
+_ENOUGH = 0.01
+"""Share by which an iteration has to lessen the sum of squares."""
 
 _LEASH = 0.05
 """Metres that a speed's departure from the plan's mean by 1 m/s weighs: keeps idle speeds put."""
@@ -58,53 +62,67 @@ def fit(
     path: FlightPath,
     clock: Clock,
     *,
-    groups: NDArray[np.int_],
+    groups: Integers,
     free: NDArray[np.bool_],
     min_speed: float,
     max_speed: float,
-) -> FlightPath:
-    """Return `path` with the speeds, and the holds at the points `free` (m,), that fit best.
+) -> tuple[Real, Real]:
+    """Return the speeds (m - 1,) and the waits at the points (m,) that fit best.
 
     Legs with the same number in `groups` (m - 1,), counted from 0, share a speed. Speeds stay
-    within `min_speed` and `max_speed` (m/s), the free holds, which are whole seconds with the rest
-    as a delay, at or above `SHORTEST_HOLD`.
+    within `min_speed` and `max_speed` (m/s), the waits at the points `free` (m,) at or above
+    `SHORTEST_HOLD`; the others stay as they are.
     """
-    from scipy.optimize import least_squares
-
+    waits = path.holds + path.delays
     if len(path.speeds) == 0:
-        return path
+        return path.speeds, waits
     chosen = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
     t, w = clock.t[chosen], clock.w[chosen]
     count = int(groups.max()) + 1
-    means = np.bincount(groups, path.speeds) / np.bincount(groups)
     low = np.concatenate([np.full(count, min_speed), np.full(free.sum(), SHORTEST_HOLD)])
     high = np.concatenate([np.full(count, max_speed), np.full(free.sum(), np.inf)])
-    begin = np.concatenate([means, (path.holds + path.delays)[free]])
-    begin = np.clip(begin, low + _INSIDE, high - _INSIDE)
+    steps = np.concatenate([np.full(count, SPEED_STEP), np.full(free.sum(), HOLD_STEP)])
+    means = np.bincount(groups, path.speeds) / np.bincount(groups)
+    begin = np.clip(np.concatenate([means, waits[free]]), low, high)
 
-    def with_values(x: Real) -> FlightPath:
-        holds, delays = path.holds.copy(), path.delays.copy()
-        holds[free] = np.floor(x[count:])
-        delays[free] = x[count:] - holds[free]
-        return replace(path, speeds=x[:count][groups], holds=holds, delays=delays)
+    def flown(x: Real) -> tuple[Real, Real]:
+        held = np.tile(waits, (len(x), 1))
+        held[:, free] = x[:, count:]
+        return x[:, :count][:, groups], held
 
-    def error(x: Real) -> Real:
-        apart = clock.positions(model.fly(with_values(x)), t) - w
-        leash = _LEASH * (x[:count] - begin[:count])
-        return np.concatenate([apart.ravel() / np.sqrt(len(t)), leash / np.sqrt(count)])
+    def errors(x: Real) -> Real:
+        """Return the residuals (B, r) of the variants x (B, k)."""
+        many = model.fly_many(path, *flown(x), _STEP)
+        apart = np.stack([clock.positions(one, t) - w for one in many]).reshape(len(x), -1)
+        leash = _LEASH * (x[:, :count] - begin[:count])
+        return np.hstack([apart / np.sqrt(len(t)), leash / np.sqrt(count)])
 
-    def slope(x: Real) -> Real:
-        now, columns = error(x), []
-        for k in range(len(x)):
-            step = SPEED_STEP if k < count else HOLD_STEP
-            if x[k] + step > high[k]:
-                step = -step
-            moved = x.copy()
-            moved[k] += step
-            columns.append((error(moved) - now) / step)
-        return np.column_stack(columns)
+    x = begin
+    for _ in range(_ITERATIONS):
+        signed = np.where(x + steps > high, -steps, steps)
+        tried = errors(np.vstack([x, x + np.diag(signed)]))
+        now, slope = tried[0], ((tried[1:] - tried[0]) / signed[:, None]).T
+        ahead = _steps(x, slope, now, low, high)
+        squares = np.sum(errors(ahead) ** 2, axis=1)
+        best = int(np.argmin(squares))
+        before = float(now @ now)
+        if squares[best] < before:
+            x = ahead[best]
+        if squares[best] > (1 - _ENOUGH) * before:
+            break
+    speeds, held = flown(x[None])
+    return speeds[0], held[0]
 
-    found = least_squares(
-        error, begin, jac=slope, bounds=(low, high), xtol=1e-4, ftol=1e-3, max_nfev=_ATTEMPTS
-    )
-    return with_values(found.x)
+
+def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real) -> Real:
+    """Return where the damped Gauss-Newton steps lead, (dampings, k), within the bounds."""
+    gradient = slope.T @ error
+    stuck = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
+    slope = np.where(stuck, 0.0, slope)
+    square = slope.T @ slope
+    diagonal = np.diag(square) + 1e-12
+    steps = [
+        np.linalg.solve(square + np.diag(damping * diagonal + 1e-9), -slope.T @ error)
+        for damping in _DAMPINGS
+    ]
+    return np.clip(x + np.array(steps), low, high)

@@ -1,5 +1,6 @@
 """What a flight model is asked, and what it answers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -50,4 +51,13 @@ class FlightModel(Protocol):
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds."""
+        ...
+
+    def fly_many(
+        self, path: FlightPath, speeds: Real, waits: Real, step: float = 0.1
+    ) -> Sequence[Flown]:
+        """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s.
+
+        Waits are exact, however holds and delays make them up.
+        """
         ...
