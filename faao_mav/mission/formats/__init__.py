@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from faao_mav.errors import MissionFileError
+from faao_mav.files import read_text
 from faao_mav.mission.formats.kml import write_kml
 from faao_mav.mission.formats.losses import losses
 from faao_mav.mission.formats.mission_file import MissionFile
@@ -53,7 +54,7 @@ def read_mission_file(path: str | Path) -> MissionFile:
     """
     path = Path(path)
     check_readable(path)
-    text = _text(path)
+    text = read_text(path, MAX_BYTES, "a mission", MissionFileError)
     if _format(path) == "plan":
         return read_qgc_plan(text, str(path))
     return MissionFile(read_wpl(text, str(path)))
@@ -108,22 +109,3 @@ def check_readable(path: Path) -> None:
 
 def _format(path: Path) -> Format:
     return _FORMATS[path.suffix.lower()]
-
-
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = getattr(error, "strerror", None) or error
-        raise MissionFileError(f"{path}: cannot be read: {reason}") from error
-    if len(content) > MAX_BYTES:
-        raise MissionFileError(f"{path}: more than {MAX_BYTES // 1_000_000} MB; expected a mission")
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise MissionFileError(
-            f"{path}: line {line}: byte 0x{content[error.start]:02x} is not UTF-8; "
-            "expected a text file"
-        ) from error
