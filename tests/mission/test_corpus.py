@@ -1,5 +1,6 @@
 """Mission files as the field has them: which are read, and what the others are told."""
 
+import math
 import re
 from pathlib import Path
 
@@ -80,7 +81,7 @@ REFUSED = {
 def outline(mission: Mission) -> list[tuple[int, tuple[float, ...], float]]:
     # NaN, a yaw that is not set, is in some of the files and 0 in the others.
     return [
-        (item.command, tuple(0 if p != p else p for p in item.params), item.z)
+        (item.command, tuple(0 if math.isnan(p) else p for p in item.params), item.z)
         for item in mission.items
     ]
 
