@@ -18,7 +18,8 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="MISSION", help="Write the mission: .waypoints or .txt (QGC WPL 110)."
+            metavar="MISSION",
+            help="Write the mission: .waypoints, .txt, .plan or .kml.",
         ),
     ] = None,
     save: Annotated[
@@ -101,10 +102,13 @@ def _run(
         if precoders is not None:
             write_whole(precoders, precoder_table(solution).encode())
         if tuned is not None:
-            text = render_parameters(conversion.parameters, read.vehicle.autopilot)
+            text = render_parameters(
+                conversion.parameters, read.vehicle.autopilot, header=f"for {out}"
+            )
             write_whole(tuned, text.encode())
         if out is not None:
-            write_whole(out, render_mission(conversion.mission, out).encode())
+            rendered = render_mission(conversion.mission, out, conversion.vehicle)
+            write_whole(out, rendered.encode())
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None
