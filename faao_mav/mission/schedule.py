@@ -32,7 +32,7 @@ _ROUNDS = 5
 _WORTHWHILE = 0.95
 """A round of splits has to bring the rms error below this share of what it was."""
 
-_ALIKE = 0.02
+_ALIKE = (0.1, 0.03)
 """Speeds of neighbouring legs that differ by less, relatively, are tried as one."""
 
 _DEARER = 1.05
@@ -64,6 +64,11 @@ class Schedule:
         }
 
     @property
+    def rms(self) -> float:
+        """How far that is from the plan, m rms."""
+        return float(np.sqrt(np.mean(lengths(self.positions(self.clock.t) - self.clock.w) ** 2)))
+
+    @property
     def deviation(self) -> Deviation:
         """How far that is from the plan."""
         t, w = self.clock.t, self.clock.w
@@ -72,33 +77,14 @@ class Schedule:
         return deviation(w, self.positions(t), self.flown.position[within, :2])
 
 
-def schedule(
-    route: Route, t: Real, w: Real, model: FlightModel, legs: Legs, max_speed: float
-) -> Schedule:
-    """Return `route` refined and timed so that `model` predicts a flight close to the plan.
+@dataclass(frozen=True, slots=True, eq=False)
+class Scheduler:
+    """The plan and the vehicle that all trials of a conversion have in common.
 
     `t` (n,) s and `w` (n, 2) m are the plan; `legs` says how short a leg may be for its speed,
-    and how wide its acceptance radius; no speed is above `max_speed`, m/s.
+    and how wide its acceptance radius; no speed is above `max_speed`, m/s, unless the aircraft
+    would not keep up: then by at most a tenth.
     """
-    timing = _Timing(t, w, model, legs, max_speed)
-    best = timing.fitted(route)
-    if best.deviation.rms > ALLOWED:  # corners cost time that only speed makes up for
-        timing = replace(timing, max_speed=_FASTER * max_speed)
-        best = timing.fitted(best.route)
-    for _ in range(_ROUNDS):
-        splits = timing.splits(best)
-        if not splits:
-            break
-        finer = timing.fitted(_split(best.route, splits, t, w))
-        if finer.deviation.rms > _WORTHWHILE * best.deviation.rms:
-            break
-        best = finer
-    return timing.rounded(timing.shared(best))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Timing:
-    """The plan and the vehicle that all trials have in common."""
 
     t: Real
     w: Real
@@ -106,7 +92,27 @@ class _Timing:
     legs: Legs
     max_speed: float
 
-    def flight(self, route: Route) -> Schedule:
+    def first(self, route: Route) -> Schedule:
+        """Return `route` with the speeds and holds that fit best."""
+        return self._fitted(route, self.max_speed)
+
+    def refined(self, first: Schedule) -> Schedule:
+        """Return `first` with more legs where it is off, and values as they are sent."""
+        best, top = first, self.max_speed
+        if best.rms > ALLOWED:  # corners cost time that only speed makes up for
+            top *= _FASTER
+            best = self._fitted(best.route, top)
+        for _ in range(_ROUNDS):
+            splits = self._splits(best)
+            if not splits:
+                break
+            finer = self._fitted(_split(best.route, splits, self.t, self.w), top)
+            if finer.rms > _WORTHWHILE * best.rms:
+                break
+            best = finer
+        return self._rounded(self._shared(best, top), top)
+
+    def _flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`."""
         stops = route.holds + route.delays > 0
         stops[[0, -1]] = True
@@ -126,9 +132,8 @@ class _Timing:
         clock = Clock(self.t - self.t[0], self.w, route.first, at[route.first] - self.t[0], leaving)
         return Schedule(route, path, self.model.fly(path), clock)
 
-    def fitted(self, route: Route, groups: Integers | None = None) -> Schedule:
-        """Return `route` with the speeds and holds that fit best."""
-        first = self.flight(route)
+    def _fitted(self, route: Route, top: float, groups: Integers | None = None) -> Schedule:
+        first = self._flight(route)
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
         speeds, waits = fit(
@@ -138,16 +143,16 @@ class _Timing:
             groups=np.arange(len(route.speeds)) if groups is None else groups,
             free=free,
             min_speed=SLOWEST,
-            max_speed=self.max_speed,
+            max_speed=top,
         )
-        return self.flight(self._waiting(replace(route, speeds=speeds), waits))
+        return self._flight(self._waiting(replace(route, speeds=speeds), waits))
 
     def _waiting(self, route: Route, waits: Real) -> Route:
         """Return `route` with `waits` (m,), s, as holds, and as delays what holds cannot say."""
         holds = np.floor(waits) if self.legs.whole_seconds else waits
         return replace(route, holds=holds, delays=np.round(waits - holds, 9))
 
-    def splits(self, found: Schedule) -> list[float]:
+    def _splits(self, found: Schedule) -> list[float]:
         """Return the plan's times at which legs that are off by too much are best split."""
         route = found.route
         off = lengths(found.positions(self.t - self.t[0]) - self.w)
@@ -176,31 +181,31 @@ class _Timing:
             result &= length >= self.legs.shortest_leg(length / lasting)
         return result
 
-    def shared(self, found: Schedule) -> Schedule:
+    def _shared(self, found: Schedule, top: float) -> Schedule:
         """Return `found` with one speed for neighbouring legs wherever that hardly costs."""
-        for alike in (8 * _ALIKE, 4 * _ALIKE, 2 * _ALIKE, _ALIKE):
+        for alike in _ALIKE:
             groups = _groups(found.route.speeds, alike)
             if groups[-1:] == len(groups) - 1:
                 continue
-            tried = self.fitted(found.route, groups)
-            if tried.deviation.rms <= max(_DEARER * found.deviation.rms, ALLOWED / 2):
+            tried = self._fitted(found.route, top, groups)
+            if tried.rms <= max(_DEARER * found.rms, ALLOWED / 2):
                 return tried
         return found
 
-    def rounded(self, found: Schedule) -> Schedule:
+    def _rounded(self, found: Schedule, top: float) -> Schedule:
         """Return `found` with the values that are sent."""
         route = found.route
-        top = np.floor(self.max_speed * 10**_SPEED_DIGITS) / 10**_SPEED_DIGITS or self.max_speed
+        top = np.floor(top * 10**_SPEED_DIGITS) / 10**_SPEED_DIGITS or top
         waits = np.round(route.holds + route.delays, _HOLD_DIGITS)
         speeds = np.minimum(np.round(route.speeds, _SPEED_DIGITS), top)
-        sent = self.flight(self._waiting(replace(route, speeds=speeds), waits))
+        sent = self._flight(self._waiting(replace(route, speeds=speeds), waits))
         if route.last < len(waits) - 1:
             return sent
         # the relay is needed to the end of the plan's last slot
         lasting = self.t[-1] - self.t[0] + self.t[-1] - self.t[-2]
         early = lasting + sent.clock.start(sent.flown) - sent.flown.arrivals[-1]
         waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
-        return self.flight(self._waiting(sent.route, waits))
+        return self._flight(self._waiting(sent.route, waits))
 
 
 def _groups(speeds: Real, alike: float) -> Integers:

@@ -1,5 +1,6 @@
 """What a flight model is asked, and what it answers."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -19,7 +20,8 @@ class FlightPath:
     (m,), s, say how long the aircraft is told to wait at each point, as commanded: what the
     autopilot makes of fractions is the model's business. `delays` (m,), s, come on top: NAV_DELAY
     items after the point, which keep fractions. `splines` (m,) marks points that are spline
-    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own.
+    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own. `before`, m/s, is
+    the speed in force on arriving at the first point, NaN for the autopilot's own.
     """
 
     points: Real
@@ -28,6 +30,7 @@ class FlightPath:
     delays: Real
     splines: NDArray[np.bool_]
     radii: Real
+    before: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

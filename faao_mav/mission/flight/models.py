@@ -1,0 +1,14 @@
+"""Which model predicts the flight of a vehicle."""
+
+from faao_mav.mission.flight.arducopter import ArduCopter
+from faao_mav.mission.flight.path import FlightModel
+from faao_mav.mission.vehicle import Vehicle
+
+
+def flight_model(vehicle: Vehicle) -> FlightModel:
+    """Return the model of `vehicle` with its parameters; raises `InputError` for useless ones."""
+    if vehicle.autopilot == "px4":
+        from faao_mav.mission.flight.px4 import Px4
+
+        return Px4.from_vehicle(vehicle)
+    return ArduCopter.from_vehicle(vehicle)
