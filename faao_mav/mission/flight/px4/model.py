@@ -1,36 +1,32 @@
 """A PX4 multicopter as a flight model."""
 
-import math
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError
+from faao_mav.mission.flight.parameters import Parameter, limits_of
 from faao_mav.mission.flight.path import FlightPath, Flown
 from faao_mav.mission.flight.px4.guidance import Limits
 from faao_mav.mission.flight.px4.sampling import grid, sampled
 from faao_mav.mission.flight.px4.simulation import SWITCH_DELAY, Variants, simulate
 from faao_mav.mission.vehicle import Vehicle
 
-_Parameter: TypeAlias = tuple[tuple[str, ...], float]
-"""A parameter's names, newest first, and the least value that makes sense."""
-
-_PARAMETERS: dict[str, _Parameter] = {
-    "cruise_speed": (("MPC_XY_CRUISE",), 0.1),
-    "max_speed": (("MPC_XY_VEL_MAX",), 0.1),
-    "acceleration": (("MPC_ACC_HOR",), 0.1),
-    "jerk": (("MPC_JERK_AUTO",), 0.1),
-    "corner_gain": (("MPC_XY_TRAJ_P",), 0.01),
-    "error_limit": (("MPC_XY_ERR_MAX",), 0.1),
-    "acceptance_radius": (("NAV_ACC_RAD",), 0.05),
-    "height_radius": (("NAV_MC_ALT_RAD",), 0.05),
-    "climb_speed": (("MPC_Z_V_AUTO_UP", "MPC_Z_VEL_MAX_UP"), 0.1),
-    "descent_speed": (("MPC_Z_V_AUTO_DN", "MPC_Z_VEL_MAX_DN"), 0.1),
-    "climb_acceleration": (("MPC_ACC_UP_MAX",), 0.1),
-    "descent_acceleration": (("MPC_ACC_DOWN_MAX",), 0.1),
+_PARAMETERS = {
+    "cruise_speed": Parameter({"MPC_XY_CRUISE": 1.0}, 0.1),
+    "max_speed": Parameter({"MPC_XY_VEL_MAX": 1.0}, 0.1),
+    "acceleration": Parameter({"MPC_ACC_HOR": 1.0}, 0.1),
+    "jerk": Parameter({"MPC_JERK_AUTO": 1.0}, 0.1),
+    "corner_gain": Parameter({"MPC_XY_TRAJ_P": 1.0}, 0.01),
+    "error_limit": Parameter({"MPC_XY_ERR_MAX": 1.0}, 0.1),
+    "acceptance_radius": Parameter({"NAV_ACC_RAD": 1.0}, 0.05),
+    "height_radius": Parameter({"NAV_MC_ALT_RAD": 1.0}, 0.05),
+    "climb_speed": Parameter({"MPC_Z_V_AUTO_UP": 1.0, "MPC_Z_VEL_MAX_UP": 1.0}, 0.1),
+    "descent_speed": Parameter({"MPC_Z_V_AUTO_DN": 1.0, "MPC_Z_VEL_MAX_DN": 1.0}, 0.1),
+    "climb_acceleration": Parameter({"MPC_ACC_UP_MAX": 1.0}, 0.1),
+    "descent_acceleration": Parameter({"MPC_ACC_DOWN_MAX": 1.0}, 0.1),
 }
 
 
@@ -67,12 +63,7 @@ class Px4:
 
         Raises `InputError` for a value that is too small to fly with or not finite.
         """
-        limits = {}
-        for limit, (names, least) in _PARAMETERS.items():
-            name = next((name for name in names if name in vehicle.parameters), None)
-            if name is not None:
-                limits[limit] = _checked(vehicle, name, least)
-        return cls(**limits)
+        return cls(**limits_of(vehicle, _PARAMETERS))
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -119,13 +110,6 @@ class Px4:
             self.descent_speed,
             self.height_radius,
         )
-
-
-def _checked(vehicle: Vehicle, name: str, least: float) -> float:
-    value = vehicle.parameters[name]
-    if not (math.isfinite(value) and value >= least):
-        raise InputError(f"{vehicle.source}: {name}: {value:g}; give a number of {least:g} or more")
-    return value
 
 
 def _standing(point: Real, holds: Real, step: float) -> Flown:

@@ -12,10 +12,10 @@ POSITION_GAIN = 0.95
 VELOCITY_GAINS = (1.8, 0.4, 0.2)
 """MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC."""
 
-ATTITUDE_LAG = 0.156
+ATTITUDE_LAG = 0.25
 """Time constant from the acceleration asked for to the thrust's, s. Fitted."""
 
-DRAG = 0.073
+DRAG = 0.1
 """Air drag over mass, 1/s. Fitted."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)

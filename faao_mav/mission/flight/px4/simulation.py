@@ -19,7 +19,7 @@ SWITCH_DELAY = 0.1
 START_LAG = 0.12
 """From the first leg becoming current to the trajectory moving, s. Fitted."""
 
-WANDER = 0.089
+WANDER = 0.08
 """How far the position estimate strays from the trajectory all the time, m. Fitted."""
 
 _SETTLED = 2e-3
