@@ -17,8 +17,8 @@ from faao_mav.mission.vehicle import Vehicle, vehicle_of
 if TYPE_CHECKING:
     from faao_mav.faao.solution import Solution
 
-_WORTH_IT = 0.8
-"""A less gentle set of parameters has to bring the rms error below this share."""
+_GOOD = 1.2
+"""Metres of rms error at equal times that no better parameters are sought for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,24 +38,29 @@ def convert(solution: "Solution") -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
     The sets of parameters that `recommend` proposes are compared by the rms error at equal times
-    on the first legs; the gentlest that does well is refined.
+    on the first legs, and refined in that order until one is good.
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     plan, t, w = solution.plan, solution.t, solution.w
     top = plan.vehicle.max_speed
     given, outline = vehicle_of(plan), plan_route(t, w, plan)
-    best: tuple[float, Schedule, Scheduler, Vehicle, Mapping[str, float]] | None = None
+    tried = []
     for parameters in candidates(plan):
         vehicle = replace(given, parameters={**given.parameters, **parameters})
         legs = legs_of(vehicle)
         scheduler = Scheduler(t, w, flight_model(vehicle), legs, top)
         first = scheduler.first(with_run_in(outline, t, w, legs, top))
-        if best is None or first.rms < _WORTH_IT * best[0]:
-            best = first.rms, first, scheduler, vehicle, parameters
+        tried.append((first, scheduler, vehicle, parameters))
+    tried.sort(key=lambda trial: trial[0].rms)
+    best: Conversion | None = None
+    for first, scheduler, vehicle, parameters in tried:
+        schedule = scheduler.refined(first)
+        if best is None or schedule.rms < best.schedule.rms:
+            best = Conversion(assemble(schedule.route, plan), schedule, vehicle, parameters)
+        if best.schedule.rms <= _GOOD:
+            break
     assert best is not None
-    _, first, scheduler, vehicle, parameters = best
-    schedule = scheduler.refined(first)
-    return Conversion(assemble(schedule.route, plan), schedule, vehicle, parameters)
+    return best
 
 
 def to_mission(solution: "Solution") -> Mission:

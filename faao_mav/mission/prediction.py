@@ -8,6 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.faao.solution import Rates, Solution
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.delivery import delivered, nearest_slots
+from faao_mav.mission.vector import lengths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,8 +18,8 @@ class Prediction:
     `w` (n, 2), m, is where the aircraft is in each of the plan's slots. `I_U` and `I_G` (n,) of
     (7), (8), bits, are what it gets there with the slot's precoders; `by_position` are R_U and
     R_G if the radio takes the precoders of the slot planned nearest to where it is instead.
-    `duration`, s, is from w_I to the end of the slot that begins with the arrival at w_F: T, if
-    the aircraft keeps the plan. Errors are metres, at equal times and of the path.
+    `duration`, s, is T plus by how much later than planned the aircraft comes to w_F, within
+    the path tolerance and for good. Errors are metres, at equal times and of the path.
     """
 
     w: Real
@@ -43,15 +44,29 @@ def predict_delivery(solution: Solution, conversion: Conversion) -> Prediction:
     I_U, I_G = delivered(solution, w)
     near_U, near_G = delivered(solution, w, nearest_slots(solution, w))
     apart = schedule.deviation
-    arrival = float(schedule.flown.arrivals[schedule.route.last])
-    slot = solution.plan.flight.time_step
+    near = solution.plan.mission.path_tolerance
+    t, end = schedule.flown.t - schedule.clock.start(schedule.flown), solution.w[-1]
+    late = _settled(t, schedule.flown.position[:, :2], end, near)
+    late -= _settled(solution.t, solution.w, end, near)
     return Prediction(
         w=w,
         I_U=I_U,
         I_G=I_G,
         by_position=Rates(float(np.mean(near_U)), float(np.mean(near_G))),
-        duration=arrival - schedule.clock.start(schedule.flown) + slot,
+        duration=solution.plan.flight.duration + late,
         max_path_error=apart.path,
         max_position_error=apart.max,
         rms_position_error=apart.rms,
     )
+
+
+def _settled(t: Real, w: Real, end: Real, near: float) -> float:
+    """Return the time from which the aircraft stays within `near` of `end` until it leaves it."""
+    apart = lengths(w - end)
+    arrived = int(np.argmin(apart))  # a flight that goes on comes closest once
+    outside = np.flatnonzero(apart[:arrived] > near)
+    if len(outside) == 0:
+        return float(t[0])
+    k = int(outside[-1])
+    share = (apart[k] - near) / (apart[k] - apart[k + 1])
+    return float(t[k] + max(0.0, min(1.0, share)) * (t[k + 1] - t[k]))

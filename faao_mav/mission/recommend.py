@@ -14,8 +14,8 @@ from faao_mav.errors import PlanError
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
 
-_STRAIGHT = 1.35
-"""Of a_max: makes up for the time that a jerk-limited ramp loses."""
+_GENTLE = (1.35, 2.0)
+"""Of a_max: the first makes up for the time that a jerk-limited ramp loses."""
 
 _CURVED = {"ardupilot": 4.0, "px4": 5.0}
 """m/s²: corners and short legs at speed."""
@@ -35,10 +35,12 @@ def candidates(plan: "Plan") -> tuple[Mapping[str, float], ...]:
         return ({},)
     autopilot, limit = plan.vehicle.autopilot, plan.vehicle.max_acceleration
     low, high = _RANGE[autopilot]
-    straight = round(min(max(_STRAIGHT * limit, low), high), 2)
-    tried = dict.fromkeys((straight, max(straight, _CURVED[autopilot])))
+    tried = dict.fromkeys(
+        round(min(max(acceleration, low), high), 2)
+        for acceleration in (*(share * limit for share in _GENTLE), _CURVED[autopilot])
+    )
     named = _ardupilot if autopilot == "ardupilot" else _px4
-    return tuple(named(plan, acceleration) for acceleration in tried)
+    return tuple(named(plan, acceleration) for acceleration in sorted(tried))
 
 
 def _ardupilot(plan: "Plan", acceleration: float) -> dict[str, float]:

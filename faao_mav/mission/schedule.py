@@ -28,6 +28,9 @@ WAYPOINTS = 24
 _FASTER = 1.1
 """Of the greatest speed: commanded at most, where the aircraft would not keep up otherwise."""
 
+_SETTLING = 3.0
+"""A hold at w_F at least while speeds are fitted, s: the aircraft comes to rest there."""
+
 _ROUNDS = 5
 _WORTHWHILE = 0.95
 """A round of splits has to bring the rms error below this share of what it was."""
@@ -94,6 +97,10 @@ class Scheduler:
 
     def first(self, route: Route) -> Schedule:
         """Return `route` with the speeds and holds that fit best."""
+        if route.last == len(route.holds) - 1:  # it ends at rest
+            waits = route.holds + route.delays
+            waits[-1] = max(waits[-1], _SETTLING)
+            route = self._waiting(route, waits)
         return self._fitted(route, self.max_speed)
 
     def refined(self, first: Schedule) -> Schedule:
@@ -103,11 +110,8 @@ class Scheduler:
             top *= _FASTER
             best = self._fitted(best.route, top)
         for _ in range(_ROUNDS):
-            splits = self._splits(best)
-            if not splits:
-                break
-            finer = self._fitted(_split(best.route, splits, self.t, self.w), top)
-            if finer.rms > _WORTHWHILE * best.rms:
+            finer = self._finer(best, top)
+            if finer is None:
                 break
             best = finer
         return self._rounded(self._shared(best, top), top)
@@ -152,8 +156,25 @@ class Scheduler:
         holds = np.floor(waits) if self.legs.whole_seconds else waits
         return replace(route, holds=holds, delays=np.round(waits - holds, 9))
 
+    def _finer(self, found: Schedule, top: float) -> Schedule | None:
+        """Return `found` with the legs split that are off by too much, or None if that is no use.
+
+        A leg may become too short for its speed: then fewer splits can be better than all.
+        """
+        times = self._splits(found)
+        for count in dict.fromkeys((len(times), len(times) // 2, 1)):
+            if 0 < count <= len(times):
+                split = _split(found.route, sorted(times[:count]), self.t, self.w)
+                finer = self._fitted(split, top)
+                if finer.rms <= _WORTHWHILE * found.rms:
+                    return finer
+        return None
+
     def _splits(self, found: Schedule) -> list[float]:
-        """Return the plan's times at which legs that are off by too much are best split."""
+        """Return the plan's times at which legs that are off by too much are best split.
+
+        The worst leg comes first.
+        """
         route = found.route
         off = lengths(found.positions(self.t - self.t[0]) - self.w)
         room = WAYPOINTS - len(route.positions)
@@ -167,7 +188,7 @@ class Scheduler:
                 at = usable[np.argmax(off[usable])]
                 worst.append((float(off[inside].max()), float(self.t[at])))
         worst.sort(reverse=True)
-        return sorted(time for _, time in worst[: max(room, 0)])
+        return [time for _, time in worst[: max(room, 0)]]
 
     def _usable(self, route: Route, k: int, inside: Integers) -> NDArray[np.bool_]:
         """Tell for each sample `inside` leg k whether both parts would be legs of some use."""

@@ -25,8 +25,11 @@ _STEP = 0.25  # of the predicted flight, s
 _SAMPLES = 400
 _ITERATIONS = 12
 _DAMPINGS = 10.0 ** np.arange(-4, 4)
-_ENOUGH = 0.01
+_ENOUGH = 0.05
 """Share by which an iteration has to lessen the sum of squares."""
+
+_LAST, _LAST_WEIGHT = 4.0, 3.5
+"""The last seconds of the flight weigh more: they decide when it is over."""
 
 _LEASH = 0.05
 """Metres that a speed's departure from the plan's mean by 1 m/s weighs: keeps idle speeds put."""
@@ -90,12 +93,14 @@ def fit(
         held[:, free] = x[:, count:]
         return x[:, :count][:, groups], held
 
+    weights = np.where(t > t[-1] - _LAST, _LAST_WEIGHT, 1.0)[:, None] / np.sqrt(len(t))
+
     def errors(x: Real) -> Real:
         """Return the residuals (B, r) of the variants x (B, k)."""
         many = model.fly_many(path, *flown(x), _STEP)
-        apart = np.stack([clock.positions(one, t) - w for one in many]).reshape(len(x), -1)
+        apart = [((clock.positions(one, t) - w) * weights).ravel() for one in many]
         leash = _LEASH * (x[:, :count] - begin[:count])
-        return np.hstack([apart / np.sqrt(len(t)), leash / np.sqrt(count)])
+        return np.hstack([np.stack(apart), leash / np.sqrt(count)])
 
     x = begin
     for _ in range(_ITERATIONS):

@@ -27,9 +27,9 @@ class FlightPath:
     points: Real
     speeds: Real
     holds: Real
-    delays: Real
     splines: NDArray[np.bool_]
     radii: Real
+    delays: Real | float = 0.0
     before: float = math.nan
 
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError
 from faao_mav.mission.flight.arducopter.leg import Leg, changed_leg, plain_leg
 from faao_mav.mission.flight.arducopter.ramp import Ramp, top_speed
+from faao_mav.mission.flight.parameters import Parameter, limits_of
 from faao_mav.mission.flight.path import FlightPath, Flown
 from faao_mav.mission.vehicle import Vehicle
 
@@ -30,15 +30,14 @@ REVERSAL, OVERLOAD = 1.0, 1.4
 LEAN_ACCELERATION = 9.81 * math.tan(math.radians(30))
 """At the default lean limit, m/s²."""
 
-# Newer names first: a vehicle has one generation, a file of parameters may carry both.
-_NAMES: dict[str, tuple[tuple[str, float], ...]] = {
-    "speed": (("WP_SPD", 1.0), ("WPNAV_SPEED", 0.01)),
-    "climb_speed": (("WP_SPD_UP", 1.0), ("WPNAV_SPEED_UP", 0.01)),
-    "descent_speed": (("WP_SPD_DN", 1.0), ("WPNAV_SPEED_DN", 0.01)),
-    "acceleration": (("WP_ACC", 1.0), ("WPNAV_ACCEL", 0.01)),
-    "climb_acceleration": (("WP_ACC_Z", 1.0), ("WPNAV_ACCEL_Z", 0.01)),
-    "jerk": (("WP_JERK", 1.0), ("WPNAV_JERK", 1.0)),
-    "radius": (("WP_RADIUS_M", 1.0), ("WPNAV_RADIUS", 0.01)),
+_PARAMETERS = {
+    "speed": Parameter({"WP_SPD": 1.0, "WPNAV_SPEED": 0.01}, 0.1),
+    "climb_speed": Parameter({"WP_SPD_UP": 1.0, "WPNAV_SPEED_UP": 0.01}, 0.1),
+    "descent_speed": Parameter({"WP_SPD_DN": 1.0, "WPNAV_SPEED_DN": 0.01}, 0.1),
+    "acceleration": Parameter({"WP_ACC": 1.0, "WPNAV_ACCEL": 0.01}, 0.1),
+    "climb_acceleration": Parameter({"WP_ACC_Z": 1.0, "WPNAV_ACCEL_Z": 0.01}, 0.1),
+    "jerk": Parameter({"WP_JERK": 1.0, "WPNAV_JERK": 1.0}, 0.1),
+    "radius": Parameter({"WP_RADIUS_M": 1.0, "WPNAV_RADIUS": 0.01}, 0.05),
 }
 
 
@@ -68,20 +67,9 @@ class ArduCopter:
     def from_vehicle(cls, vehicle: Vehicle) -> "ArduCopter":
         """Return the model with the limits that `vehicle.parameters` set, of either generation.
 
-        Raises `InputError` for a value that is not a positive number.
+        Raises `InputError` for a value that is too small to fly with or not finite.
         """
-        limits = {}
-        for limit, names in _NAMES.items():
-            for name, unit in names:
-                if name in vehicle.parameters:
-                    value = vehicle.parameters[name]
-                    if not (math.isfinite(value) and value > 0):
-                        raise InputError(
-                            f"{vehicle.source}.{name}: {value:g}; give a number above 0"
-                        )
-                    limits[limit] = value * unit
-                    break
-        return cls(**limits)
+        return cls(**limits_of(vehicle, _PARAMETERS))
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.

@@ -1,5 +1,6 @@
 """A PX4 multicopter as a flight model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -73,12 +74,19 @@ class Px4:
         refuses, are flown as plain ones. The end is when the last waypoint is done: the aircraft
         is then within its radius and may still be braking.
         """
-        many = self.fly_many(path, path.speeds[None], path.holds[None], step)
-        return Flown(
-            many.arrivals[0], many.departures[0], many.t, many.position[0], many.velocity[0]
-        )
+        return self.fly_many(path, path.speeds[None], (path.holds + path.delays)[None], step)[0]
 
     def fly_many(
+        self, path: FlightPath, speeds: ArrayLike, waits: ArrayLike, step: float = 0.1
+    ) -> Sequence[Flown]:
+        """Return the flights of `fly_batch` one by one."""
+        many = self.fly_batch(path, speeds, waits, step)
+        return [
+            Flown(many.arrivals[k], many.departures[k], many.t, many.position[k], many.velocity[k])
+            for k in range(len(many.arrivals))
+        ]
+
+    def fly_batch(
         self, path: FlightPath, speeds: ArrayLike, holds: ArrayLike, step: float = 0.1
     ) -> Flown:
         """Fly variants of `path` with other `speeds` (B, m - 1), m/s, and `holds` (B, m), s.
