@@ -31,7 +31,8 @@ def simplify(w: Real, tolerance: float) -> list[int]:
 
 def _longest(w: Real, tolerance: float) -> list[int]:
     """Return where legs end that each go as far as they can."""
-    kept, first, last = [], 0, len(w) - 1
+    kept: list[int] = []
+    first, last = 0, len(w) - 1
     while True:
         step = 1
         while first + step < last and _fits(w, first, min(first + 2 * step, last), tolerance):

@@ -85,7 +85,7 @@ class ArduCopter:
         """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s."""
         flight = _Flight.along(self, path, speeds, waits)
         ends = flight.departures[:, -1]
-        t = step * np.arange(int(np.ceil(ends.max() / step)) + 2)
+        t = step * np.arange(int(np.ceil(ends.max() / step)) + 2, dtype=np.float64)
         position, velocity = flight.sampled(t)
         return [
             Flown(flight.arrivals[k], flight.departures[k], t, position[k], velocity[k])
@@ -107,7 +107,7 @@ class _Flight:
     def along(cls, model: ArduCopter, path: FlightPath, speeds: Real, waits: Real) -> "_Flight":
         ways = np.diff(path.points, axis=0)
         lengths = np.sqrt(np.sum(ways**2, axis=1))
-        stops = (waits > 0).any(axis=0)
+        stops = np.any(waits > 0, axis=0)
         stops[[0, -1]] = True
         limits = [_along(model, way, length) for way, length in zip(ways, lengths, strict=True)]
         lag = HOLD_LAG + HOLD_LAG_PER_RISE * model.acceleration / model.jerk

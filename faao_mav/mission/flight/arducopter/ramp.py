@@ -30,7 +30,7 @@ class Ramp:
     duration: Real
 
     @classmethod
-    def between(cls, v0: Real, v1: Real, acceleration: Real, jerk: float) -> "Ramp":
+    def between(cls, v0: Real, v1: Real, acceleration: float, jerk: float) -> "Ramp":
         """Return the quickest ramp; all arguments broadcast."""
         change = np.abs(v1 - v0)
         peak = jerk * (np.sqrt(JERK_LAG**2 + 4 * change / jerk) - JERK_LAG) / 2
@@ -70,7 +70,7 @@ class Ramp:
         return np.minimum(np.where(rising <= r, rising, flat), self.duration / 2)
 
 
-def top_speed(length: Real, speed: Real, acceleration: Real, jerk: float) -> Real:
+def top_speed(length: Real, speed: Real, acceleration: float, jerk: float) -> Real:
     """Return the speed, at most `speed`, that a leg of `length` (m) reaches from rest to rest.
 
     The leg has to hold both ramps: v D(v) <= length.
