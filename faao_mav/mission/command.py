@@ -8,10 +8,43 @@ class Command(IntEnum):
 
     NAV_WAYPOINT = 16
     NAV_LOITER_UNLIM = 17
+    NAV_LOITER_TURNS = 18
+    NAV_LOITER_TIME = 19
     NAV_RETURN_TO_LAUNCH = 20
     NAV_LAND = 21
     NAV_TAKEOFF = 22
+    NAV_LOITER_TO_ALT = 31
+    NAV_SPLINE_WAYPOINT = 82
+    NAV_VTOL_TAKEOFF = 84
+    NAV_VTOL_LAND = 85
+    NAV_DELAY = 93
+    CONDITION_DELAY = 112
+    CONDITION_DISTANCE = 114
+    CONDITION_YAW = 115
+    DO_JUMP = 177
     DO_CHANGE_SPEED = 178
+    DO_SET_HOME = 179
+    DO_LAND_START = 189
+    DO_SET_ROI_LOCATION = 195
+    DO_SET_ROI_NONE = 197
+    DO_SET_ROI = 201
+
+
+FLOWN_TO = frozenset(
+    {
+        Command.NAV_WAYPOINT,
+        Command.NAV_LOITER_UNLIM,
+        Command.NAV_LOITER_TURNS,
+        Command.NAV_LOITER_TIME,
+        Command.NAV_LAND,
+        Command.NAV_TAKEOFF,
+        Command.NAV_LOITER_TO_ALT,
+        Command.NAV_SPLINE_WAYPOINT,
+        Command.NAV_VTOL_TAKEOFF,
+        Command.NAV_VTOL_LAND,
+    }
+)
+"""Commands that fly to the place x, y, z of their item."""
 
 
 class Frame(IntEnum):
@@ -23,3 +56,17 @@ class Frame(IntEnum):
     GLOBAL = 0
     MISSION = 2
     GLOBAL_RELATIVE_ALT = 3
+    GLOBAL_INT = 5
+    GLOBAL_RELATIVE_ALT_INT = 6
+    GLOBAL_TERRAIN_ALT = 10
+    GLOBAL_TERRAIN_ALT_INT = 11
+
+
+ABOVE_SEA = frozenset({Frame.GLOBAL, Frame.GLOBAL_INT})
+"""Frames whose z counts from mean sea level."""
+
+ABOVE_HOME = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT})
+"""Frames whose z counts from home."""
+
+ABOVE_TERRAIN = frozenset({Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT})
+"""Frames whose z counts from the ground below."""
