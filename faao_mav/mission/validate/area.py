@@ -3,9 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
@@ -70,13 +71,16 @@ def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | 
     return _polygonal(joined)
 
 
-def lines(starts: Real, ends: Real) -> Any:
+def lines(starts: Real, ends: Real) -> NDArray[np.object_]:
     """Return the straights from `starts` to `ends`, each (n, 2), as an array of n geometries."""
     import shapely
 
-    straight = shapely.linestrings(np.stack([starts, ends], axis=1))
+    paths: NDArray[np.object_] = np.asarray(
+        shapely.linestrings(np.stack([starts, ends], axis=1)), dtype=object
+    )
     still = (starts == ends).all(axis=1)
-    return np.where(still, shapely.points(starts), straight)
+    paths[still] = shapely.points(starts[still])
+    return paths
 
 
 def _polygonal(shape: "BaseGeometry") -> "BaseGeometry":

@@ -1,6 +1,7 @@
 """Items that ArduPilot accepts and then flies in a way that nobody expects."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from faao_mav.mission.command import Command
 from faao_mav.mission.validate import parameters
@@ -28,7 +29,7 @@ _LEAN = ((30.0, 10.3), (45.0, 15.2))
 )
 def _spline_delay(case: Case) -> Iterator[Issue]:
     flying = [(k, item) for k, item in enumerate(case.items) if item.command <= NAV_LAST]
-    for (before, first), (index, second) in zip(flying, flying[1:], strict=False):
+    for (before, first), (index, second) in pairwise(flying):
         if (first.command, second.command) == (Command.NAV_SPLINE_WAYPOINT, Command.NAV_DELAY):
             yield Issue(
                 index,

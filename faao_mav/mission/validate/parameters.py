@@ -102,7 +102,7 @@ def acceptance_radius(vehicle: Vehicle) -> Parameter:
 
 
 def fence_type(vehicle: Vehicle) -> Parameter:
-    """Return which fences ArduPilot keeps: bits 1 ceiling, 2 circle about home, 4 areas, 8 floor."""
+    """Return the fences that ArduPilot keeps: bits 1 ceiling, 2 circle, 4 areas, 8 floor."""
     return _FENCE_TYPE_COPTER if vehicle.kind == "copter" else _FENCE_TYPE_PLANE
 
 
