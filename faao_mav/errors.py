@@ -17,6 +17,10 @@ class MissionFileError(InputError):
     """A mission file cannot be read or written."""
 
 
+class ParameterFileError(InputError):
+    """A file of autopilot parameters cannot be read or written."""
+
+
 class InfeasibleError(FaaoError):
     """The input is sound, but nothing satisfies it: no trajectory, no mission within the limits."""
 

@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Text files read; files written whole or not at all."""
 
 import contextlib
 import os
@@ -6,6 +6,30 @@ import tempfile
 from pathlib import Path
 
 from faao_mav.errors import InputError
+
+
+def read_text(path: str | Path, most: int, what: str, error: type[InputError]) -> str:
+    """Return the UTF-8 text in the file `path`.
+
+    Raises `error` if it cannot be opened, is larger than `most` bytes (`what` says what was
+    expected instead) or is not UTF-8.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(most + 1)
+    except (OSError, ValueError) as failure:  # ValueError: a NUL in the name
+        reason = getattr(failure, "strerror", None) or failure
+        raise error(f"{path}: cannot be read: {reason}") from failure
+    if len(content) > most:
+        raise error(f"{path}: more than {most // 1_000_000} MB; expected {what}")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as failure:
+        line = content.count(b"\n", 0, failure.start) + 1
+        raise error(
+            f"{path}: line {line}: byte 0x{content[failure.start]:02x} is not UTF-8; "
+            "expected a text file"
+        ) from failure
 
 
 def check_writable(path: str | Path) -> None:

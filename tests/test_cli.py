@@ -104,7 +104,7 @@ def test_saturation_is_said_with_the_power_to_save(plan: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "part"),
     [
-        (["--out", "x.plan"], "x.plan: '.plan'; expected a name that ends in .waypoints or .txt"),
+        (["--out", "x.gpx"], "x.gpx: '.gpx'; expected a name that ends in .waypoints or .txt"),
         (["--out", "x"], "no ending"),
         (["--out", "absent/x.txt"], "there is no directory absent"),
         (["--save", "x.yaml"], "--save x.yaml: give a name that ends in .npz"),

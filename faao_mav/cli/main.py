@@ -1,22 +1,50 @@
-"""`faao-mission PLAN.yaml --out MISSION`: from a plan to a mission file."""
+"""`faao-mission`: which command an argument list is for."""
 
-import json
-import sys
-import time
+import difflib
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import check_writable, write_whole
+from faao_mav.cli.convert import convert
+from faao_mav.cli.plan import plan
+
+DEFAULT = "plan"
+"""The command of an argument list that names none."""
+
+
+class _CommandOrPlan(TyperGroup):
+    """A first argument that names no command is a plan, or an option of the command that plans."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        own = {name for parameter in self.get_params(ctx) for name in parameter.opts}
+        if args and args[0] not in self.commands and args[0] not in own:
+            self._check_is_plan(ctx, args[0])
+            args = [DEFAULT, *args]
+        return super().parse_args(ctx, args)
+
+    def _check_is_plan(self, ctx: Any, argument: str) -> None:
+        """Take a bare word that is no file for a mistyped command."""
+        path = Path(argument)
+        if argument.startswith("-") or path.suffix or path.name != argument or path.exists():
+            return
+        near = difflib.get_close_matches(argument, self.commands, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(self.commands)}"
+        ctx.fail(f"{argument}: no command and no file of this name; {hint}")
+
 
 app = typer.Typer(
+    cls=_CommandOrPlan,
+    subcommand_metavar="PLAN.yaml | COMMAND ...",
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command(DEFAULT)(plan)
+app.command("convert")(convert)
 
 
 def _version(asked: bool) -> None:
@@ -27,114 +55,21 @@ def _version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.command(context_settings={"help_option_names": ["-h", "--help"]})
-def plan(
-    plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MISSION", help="Write the mission: .waypoints or .txt (QGC WPL 110)."
-        ),
-    ] = None,
-    save: Annotated[
-        Path | None,
-        typer.Option(metavar="RESULT.npz", help="Write trajectory, precoders and rates."),
-    ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(metavar="M", help="Replace optimizer.method: direct or algorithm1."),
-    ] = None,
-    bound: Annotated[
-        bool, typer.Option("--bound", help="Also compute what no route can exceed.")
-    ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object instead of the summary.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
-    version: Annotated[  # noqa: ARG001
+@app.callback()
+def main(
+    version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Optimise a radio-relay flight and write it as a MAVLink mission.
+    """Plan radio-relay flights of UAVs, as MAVLink missions for ArduPilot and PX4.
 
-    Exit status: 0 done; 1 there is no such flight or mission; 2 unusable arguments or input.
+    To plan, name a plan file, and the mission to write:
+
+        faao-mission PLAN.yaml --out MISSION
+
+    A first argument that names none of the commands is taken for a plan. Each command
+    tells its options with --help.
     """
-    try:
-        _run(plan_file, out, save, method, bound, as_json, quiet)
-    except InputError as error:
-        _fail(error, 2)
-    except FaaoError as error:
-        _fail(error, 1)
-
-
-def _fail(error: FaaoError, status: int) -> None:
-    typer.echo(f"faao-mission: {error}", err=True)
-    raise typer.Exit(status)
-
-
-def _run(
-    plan_file: Path,
-    out: Path | None,
-    save: Path | None,
-    method: str | None,
-    bound: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    from faao_mav.cli.progress import progress
-    from faao_mav.cli.summary import Result, as_dict, as_text
-    from faao_mav.faao.optimize import optimize
-    from faao_mav.faao.pricing import fresh_rates, price, saturation
-    from faao_mav.faao.problem import build_problem
-    from faao_mav.faao.solution import save_solution
-    from faao_mav.mission import assemble, plan_route
-    from faao_mav.mission.autopilot import legs_of
-    from faao_mav.mission.formats import check_suffix, render_mission
-    from faao_mav.plan import read_plan
-
-    started = time.perf_counter()
-    if out is not None:
-        check_suffix(out)
-        check_writable(out)
-    if save is not None:
-        if save.suffix != ".npz":
-            raise InputError(f"--save {save}: give a name that ends in .npz")
-        check_writable(save)
-    read = read_plan(plan_file, method=method)
-    legs_of(read)  # a useless vehicle parameter is refused before the work, not after it
-    with progress(shown=sys.stderr.isatty() and not quiet) as observe:
-        optimizing = time.perf_counter()
-        solution = optimize(read, observe=observe)
-        optimized = time.perf_counter() - optimizing
-        if save is not None:
-            save_solution(solution, save)
-        route = plan_route(solution.t, solution.w, read)
-        mission = assemble(route, read)
-        if out is not None:
-            write_whole(out, render_mission(mission, out).encode())
-        information, fresh = price(solution), fresh_rates(solution)
-        limit = saturation(solution)
-        ceiling = None
-        if bound:
-            from faao_mav.faao.bound import upper_bound
-
-            ceiling = upper_bound(build_problem(read), solution.rates.R_avg)
-    result = Result(
-        solution=solution,
-        information=information,
-        fresh=fresh,
-        saturation=limit,
-        bound=ceiling,
-        mission=mission,
-        route=route,
-        seconds_optimize=optimized,
-        seconds_total=time.perf_counter() - started,
-        written=tuple(path for path in (out, save) if path is not None),
-    )
-    if as_json:
-        typer.echo(json.dumps(as_dict(result), allow_nan=False))
-    elif not quiet:
-        typer.echo(as_text(result))
 
 
 def run() -> None:

@@ -69,6 +69,7 @@ class MissionItem:
 class Mission:
     """What an autopilot is given: the items in order, without the home row, and the home.
 
+    The target of a DO_JUMP (param1) counts the items from 1, as every file format does: home is 0.
     A fence and rally points travel beside it: only some formats hold them.
     """
 

@@ -12,7 +12,7 @@ from relay_flights import STEADY, dash_hover_dash, mission_of, plan_with
 
 from faao_mav.errors import MissionFileError
 from faao_mav.mission import Home, Mission, MissionItem
-from faao_mav.mission.formats import MISSION_SUFFIXES, read_mission, render_mission
+from faao_mav.mission.formats import losses_in, read_mission, render_mission
 from faao_mav.mission.formats.wpl import read_wpl, write_wpl
 
 
@@ -29,8 +29,7 @@ latitudes, longitudes = st.floats(-90, 90), st.floats(-180, 180)
 def items(draw):
     frame = draw(st.integers(0, 255))
     x, y = (numbers, numbers) if frame == 2 else (latitudes, longitudes)
-    yaw = st.one_of(numbers, st.just(math.nan))
-    params = draw(st.tuples(numbers, numbers, numbers, yaw))
+    params = draw(st.tuples(numbers, numbers, numbers, numbers))
     command = draw(st.integers(0, 65_535))
     return MissionItem(command, frame, params, draw(x), draw(y), draw(numbers), draw(st.booleans()))
 
@@ -44,7 +43,7 @@ missions = st.builds(Mission, st.lists(items(), max_size=6).map(tuple), st.none(
 @STEADY
 @given(missions)
 def test_what_is_written_is_read_back_bit_for_bit(mission):
-    # repr tells NaN and the sign of zero, which == does not.
+    # repr tells the sign of zero, which == does not.
     assert repr(read_wpl(write_wpl(mission), "x")) == repr(mission)
 
 
@@ -62,7 +61,18 @@ def test_the_form_that_every_reader_accepts(mission):
     assert [int(f[1]) for f in fields] == [1] + [0] * len(mission.items)
     assert fields[0][2:4] == ["0", "16"]
     for value in (v for f in fields for v in f[4:11]):
-        assert value == "nan" or len(value.split(".")[1]) >= 8
+        assert len(value.split(".")[1]) >= 8
+
+
+def test_what_is_not_set_is_written_as_0_and_told():
+    nan = math.nan
+    item = MissionItem(16, 3, (1.0, nan, 2.0, nan), nan, 8.5, nan)
+    mission = Mission((READ.items[0], item), READ.home)
+    (_, read) = read_wpl(write_wpl(mission), "x").items
+    assert read == MissionItem(16, 3, (1.0, 0.0, 2.0, 0.0), 0.0, 8.5, 0.0)
+    assert losses_in(mission, "x.txt") == [
+        "not set (NaN) becomes 0: item 2 param2, item 2 param4, item 2 latitude, item 2 altitude"
+    ]
 
 
 @pytest.mark.parametrize("home", [Home(-35.363262, 149.165237, 584.0), None])
@@ -105,10 +115,54 @@ READ = Mission((MissionItem(16, 3, x=47.5, y=8.6, z=50.0),), Home(47.4, 8.5, 400
         GOOD.replace("QGC WPL 110", "QGC\tWPL  110 "),
         GOOD.replace("\t1\t0\t16", "\t0\t0\t16", 1),  # no current item
         GOOD.replace("47.5", "+4.75e1").replace("8.6", "8.60"),
+        GOOD.replace("\t16\t", "\t0\t", 1),  # home as Mission Planner has written it
+        f"QGC WPL 120\n{ITEM}\n".replace("\n1\t0", "\n0\t1"),
     ],
 )
 def test_harmless_oddities_are_read(text):
-    assert read_wpl(text, "x") == READ
+    read = read_wpl(text, "x")
+    assert read.items == READ.items
+    assert read.home == (None if "120" in text else READ.home)
+
+
+V100 = (
+    "QGC WPL 100\n"
+    "0\t0\t25\t0\t0\t0\t0\t1\t8.5\t47.4\t400\t0\t1\n"
+    "1\t3\t24\t3\t4\t1\t2\t0\t8.6\t47.5\t50\t90\t1\n"
+    "2\t3\t27\t15\t1\t0\t0\t0\t8.7\t47.6\t60\t0\t0\n"
+)
+
+
+def test_version_100_is_read_as_pymavlink_reads_it(tmp_path):
+    path = tmp_path / "old.txt"
+    path.write_text(V100)
+    loader = MAVWPLoader()
+    assert loader.load(str(path)) == 3
+    mission = read_mission(path)
+    home = loader.wp(0)
+    assert mission.home == Home(home.x, home.y, home.z)
+    for row, item in zip((loader.wp(1), loader.wp(2)), mission.items, strict=True):
+        assert (row.command, row.frame, row.autocontinue) == (
+            *(item.command, item.frame),
+            item.autocontinue,
+        )
+        assert (row.param1, row.param2, row.param3, row.param4) == item.params
+        assert (row.x, row.y, row.z) == (item.x, item.y, item.z)
+
+
+def jump(target):
+    return MissionItem(177, 2, (target, 3.0, 0.0, 0.0))
+
+
+def test_a_jump_goes_to_the_same_item_with_and_without_a_home_row():
+    mission = Mission((READ.items[0], jump(1.0)), READ.home)
+    rows = write_wpl(mission).splitlines()
+    target = int(float(rows[3].split("\t")[4]))
+    assert rows[1 + target].split("\t")[3] == "16"
+    assert read_wpl("\n".join(rows), "x") == mission
+    bare = "QGC WPL 120\n" + "\n".join(rows[2:]).replace("1\t0", "0\t1", 1)
+    bare = bare.replace("\n2\t", "\n1\t").replace("177\t1.", "177\t0.")
+    assert read_wpl(bare, "x").items == mission.items
 
 
 def with_field(index, value, row=ITEM):
@@ -124,8 +178,11 @@ def with_field(index, value, row=ITEM):
         ("\n\n", "nothing in it"),
         ("QGC WPL 110\n", "a header but no items"),
         (f"{HOME}\n{ITEM}\n", "line 1: '0"),
-        ("QGC WPL 120\n" + HOME, "line 1: 'QGC WPL 120'; expected 'QGC WPL 110'"),
-        ("QGC WPL 100\n" + HOME, "line 1: QGC WPL 100 has other fields"),
+        ("QGC WPL 130\n" + HOME, "line 1: 'QGC WPL 130'; expected 'QGC WPL 110'"),
+        ("QGC WPL 120\n", "a header but no items; expected items"),
+        ("QGC WPL 100\n" + HOME, "line 2: 12 fields; expected 13, tab-separated: index frame"),
+        (V100.replace("\t24\t", "\t16\t"), "line 3, field command: '16'; expected one of 2, 3, 4"),
+        (V100.replace("\t25\t", "\t24\t", 1), "line 2, field command: '24'; expected 16: row 0"),
         ("\x00\x01\x02", r"line 1: '\x00\x01\x02'; expected"),
         (GOOD.replace("\t50\t1", "\t50"), "line 3: 11 fields; expected 12"),
         (GOOD.replace("\t50\t1", "\t50\t1\t0"), "line 3: 13 fields; expected 12"),
@@ -138,7 +195,7 @@ def with_field(index, value, row=ITEM):
         (with_field(3, "16.0"), "field command: '16.0'; expected a whole number"),
         (with_field(3, "65536"), "field command: '65536'"),
         (with_field(3, "١٦"), "field command: '١٦'"),
-        (with_field(4, "nan"), "field param1: 'nan'; expected a finite number"),
+        (with_field(4, "+nan"), "field param1: '+nan'; expected a finite number or nan"),
         (with_field(4, "1_0"), "field param1: '1_0'"),
         (with_field(4, "0x10"), "field param1: '0x10'"),
         (with_field(7, "inf"), "field param4: 'inf'; expected a finite number or nan"),
@@ -193,17 +250,17 @@ def test_a_mutated_file_is_read_or_refused(data):
     reads_or_complains(text)
 
 
-@pytest.mark.parametrize("suffix", [*MISSION_SUFFIXES, ".WAYPOINTS"])
+@pytest.mark.parametrize("suffix", [".waypoints", ".txt", ".plan", ".WAYPOINTS", ".Plan"])
 def test_a_file_is_read_by_its_ending(mission, tmp_path, suffix):
     path = tmp_path / f"flight{suffix}"
     path.write_text(render_mission(mission, path), newline="")
     assert read_mission(path) == read_mission(str(path)) == mission
 
 
-@pytest.mark.parametrize("name", ["flight.plan", "flight.kml", "flight", ".waypoints"])
+@pytest.mark.parametrize("name", ["flight.mission", "flight", ".waypoints"])
 def test_an_unknown_ending_is_refused(mission, tmp_path, name):
     path = tmp_path / name
-    with pytest.raises(MissionFileError, match=r"ends in \.waypoints or \.txt .*not written yet"):
+    with pytest.raises(MissionFileError, match=r"ends in .*\.txt .*, \.plan .* or \.kml"):
         read_mission(path)
     with pytest.raises(MissionFileError, match=re.escape(str(path))):
         render_mission(mission, path)

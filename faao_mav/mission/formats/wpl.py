@@ -2,13 +2,17 @@ r"""QGC WPL 110, the plain-text mission file (`.waypoints`, `.txt`).
 
 A header line `QGC WPL 110`, then one row per item with twelve tab-separated fields: index,
 current, frame, command, param1 to param4, latitude, longitude, altitude, autocontinue. Row 0 is
-the home position: QGroundControl drops it, ArduPilot replaces it. Source: MAVLink developer
-guide, "File formats".
+the home position: QGroundControl drops it, ArduPilot replaces it. A DO_JUMP's target is the index
+of a row. Source: MAVLink developer guide, "File formats".
+
+Read, but not written: `QGC WPL 120`, QGroundControl's rows without a home row, and `QGC WPL 100`,
+thirteen fields in another order with command numbers of MAVLink before 1.0, as pymavlink reads it.
 """
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,10 +22,39 @@ from faao_mav.mission.item import Home, Mission, MissionItem
 
 HEADER = "QGC WPL 110"
 
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """What the rows under a header hold."""
+
+    fields: tuple[str, ...]
+    home_row: bool = True
+    commands: Mapping[int, int] = field(default_factory=dict)  # in the file: MAV_CMD
+
+
+_PARAMS = ("param1", "param2", "param3", "param4")
 _FIELDS = (
-    *("index", "current", "frame", "command", "param1", "param2", "param3", "param4"),
+    *("index", "current", "frame", "command", *_PARAMS),
     *("latitude", "longitude", "altitude", "autocontinue"),
 )
+_FIELDS_100 = (
+    *("index", "frame", "command", "param3", "param4", "param1", "param2", "current"),
+    *("longitude", "latitude", "altitude", "yaw", "autocontinue"),
+)
+_COMMANDS_100 = {
+    2: Command.NAV_TAKEOFF,
+    3: Command.NAV_RETURN_TO_LAUNCH,
+    4: Command.NAV_LAND,
+    24: Command.NAV_TAKEOFF,
+    25: Command.NAV_WAYPOINT,
+    26: Command.NAV_LAND,
+    27: Command.NAV_LOITER_UNLIM,
+}
+_LAYOUTS = {
+    HEADER: _Layout(_FIELDS),
+    "QGC WPL 120": _Layout(_FIELDS, home_row=False),
+    "QGC WPL 100": _Layout(_FIELDS_100, commands=_COMMANDS_100),
+}
 _INTEGER_LIMITS = {
     "index": 65_535,
     "current": 1,
@@ -41,7 +74,8 @@ def write_wpl(mission: Mission) -> str:
 
     Lines end in LF, row 0 is home and alone is current; a mission without home gets a row 0 of
     zeros, because readers take whatever is there for home. Numbers have at least 8 decimals and
-    as many more as they need to be read back bit for bit.
+    as many more as they need to be read back bit for bit. NaN is written as 0, and the fence and
+    the rally points are left out: `losses` tells.
     """
     home = mission.home or Home(0.0, 0.0, 0.0)
     row_0 = MissionItem(
@@ -56,30 +90,32 @@ def write_wpl(mission: Mission) -> str:
 
 
 def read_wpl(text: str, source: str) -> Mission:
-    """Return the mission that `text`, the content of a QGC WPL 110 file, describes.
+    """Return the mission that `text`, the content of a QGC WPL file, describes.
 
     Tolerated: spaces for tabs, CRLF or CR, a byte order mark, blank lines, lines that start with
-    `#`, no newline at the end, no current item. A row 0 of zeros means that there is no home.
-    A param4 (yaw) may be `nan`: not set. `source` is the file's name, for messages. Raises
-    `MissionFileError` for anything else; it names line, field, value and what is expected.
+    `#`, no newline at the end, no current item, a home row of command 0 (Mission Planner). A row
+    0 of zeros means that there is no home. A parameter may be `nan`: not set. `source` is the
+    file's name, for messages. Raises `MissionFileError` for anything else; it names line, field,
+    value and what is expected.
     """
     lines = _lines(text)
-    _check_header(next(lines, None), source)
-    rows = [_Row(source, number, line) for number, line in lines]
+    layout = _layout(next(lines, None), source)
+    rows = [_Row(source, number, line, layout) for number, line in lines]
     if not rows:
-        raise MissionFileError(
-            f"{source}: a header but no items; expected row 0, the home position, and the items"
-        )
+        first = "row 0, the home position, and the items" if layout.home_row else "items"
+        raise MissionFileError(f"{source}: a header but no items; expected {first}")
     current = None
     for expected, row in enumerate(rows):
         index = row.integer("index")
         if index != expected:
-            raise row.error("index", f"expected {expected}: rows count up from 0, the home row")
+            raise row.error("index", f"expected {expected}: rows count up from 0")
         if row.integer("current"):
             if current is not None:
                 raise row.error("current", f"expected 0: line {current} is already current")
             current = row.number
-    return Mission(tuple(row.item() for row in rows[1:]), rows[0].home())
+    if layout.home_row:
+        return Mission(tuple(row.item() for row in rows[1:]), rows[0].home())
+    return Mission(tuple(_after_home(row.item()) for row in rows))
 
 
 def _row(index: int, item: MissionItem) -> str:
@@ -88,7 +124,16 @@ def _row(index: int, item: MissionItem) -> str:
     return "\t".join([*map(str, head), *floats, str(int(item.autocontinue))])
 
 
+def _after_home(item: MissionItem) -> MissionItem:
+    """Return `item` with a jump to the same item, counted with a home row before it."""
+    if item.command != Command.DO_JUMP:
+        return item
+    return replace(item, params=(item.params[0] + 1, *item.params[1:]))
+
+
 def _format(value: float) -> str:
+    if math.isnan(value):
+        value = 0.0
     return np.format_float_positional(value, unique=True, min_digits=8, trim="k")
 
 
@@ -100,32 +145,28 @@ def _lines(text: str) -> Iterator[tuple[int, str]]:
             yield number, content
 
 
-def _check_header(line: tuple[int, str] | None, source: str) -> None:
+def _layout(line: tuple[int, str] | None, source: str) -> _Layout:
     if line is None:
         raise MissionFileError(f"{source}: nothing in it; expected '{HEADER}' and items")
     number, content = line
-    header = " ".join(content.split())
-    if header == "QGC WPL 100":
-        raise MissionFileError(
-            f"{source}: line {number}: {header} has other fields and command numbers; "
-            f"open the file in a ground station and save it as {HEADER}"
-        )
-    if header != HEADER:
+    layout = _LAYOUTS.get(" ".join(content.split()))
+    if layout is None:
         raise MissionFileError(f"{source}: line {number}: {_shown(content)}; expected '{HEADER}'")
+    return layout
 
 
 class _Row:
-    """A line's twelve fields, read on demand so that every complaint can name its place."""
+    """A line's fields, read on demand so that every complaint can name its place."""
 
-    def __init__(self, source: str, number: int, line: str) -> None:
-        self.source, self.number = source, number
+    def __init__(self, source: str, number: int, line: str, layout: _Layout) -> None:
+        self.source, self.number, self._commands = source, number, layout.commands
         fields = re.split(r"[ \t]+", line)
-        if len(fields) != len(_FIELDS):
+        if len(fields) != len(layout.fields):
             raise MissionFileError(
-                f"{source}: line {number}: {len(fields)} fields; expected {len(_FIELDS)}, "
-                f"tab-separated: {' '.join(_FIELDS)}"
+                f"{source}: line {number}: {len(fields)} fields; expected {len(layout.fields)}, "
+                f"tab-separated: {' '.join(layout.fields)}"
             )
-        self._texts = dict(zip(_FIELDS, fields, strict=True))
+        self._texts = dict(zip(layout.fields, fields, strict=True))
 
     def error(self, field: str, expected: str) -> MissionFileError:
         value = _shown(self._texts[field])
@@ -148,22 +189,32 @@ class _Row:
             raise self.error(field, f"expected a finite number{span}")
         return value
 
-    def yaw(self) -> float:
-        if self._texts["param4"].lower() == "nan":
+    def param(self, field: str) -> float:
+        if self._texts[field].lower() == "nan":
             return math.nan
         try:
-            return self.real("param4")
+            return self.real(field)
         except MissionFileError:
-            raise self.error("param4", "expected a finite number or nan") from None
+            raise self.error(field, "expected a finite number or nan") from None
+
+    def command(self) -> int:
+        number = self.integer("command")
+        if not self._commands:
+            return number
+        if number not in self._commands:
+            known = ", ".join(map(str, self._commands))
+            raise self.error("command", f"expected one of {known}: the header says QGC WPL 100")
+        return self._commands[number]
 
     def item(self) -> MissionItem:
         frame = self.integer("frame")
         # In the mission frame the three coordinates are plain parameters.
         limits = {} if frame == Frame.MISSION else _COORDINATE_LIMITS
+        param1, param2, param3, param4 = map(self.param, _PARAMS)
         return MissionItem(
-            command=self.integer("command"),
+            command=self.command(),
             frame=frame,
-            params=(self.real("param1"), self.real("param2"), self.real("param3"), self.yaw()),
+            params=(param1, param2, param3, param4),
             x=self.real("latitude", limits.get("latitude", math.inf)),
             y=self.real("longitude", limits.get("longitude", math.inf)),
             z=self.real("altitude"),
@@ -171,15 +222,16 @@ class _Row:
         )
 
     def home(self) -> Home | None:
-        item = self.item()
         # Every reader takes row 0 for home: an item there would never be flown.
-        if item.command != Command.NAV_WAYPOINT:
+        if self.integer("command") != 0 and self.command() != Command.NAV_WAYPOINT:
             raise self.error("command", "expected 16: row 0 is the home position, not an item")
-        if item.frame != Frame.GLOBAL:
+        if self.integer("frame") != Frame.GLOBAL:
             raise self.error("frame", "expected 0: row 0 is the home position, not an item")
-        if item.x == item.y == item.z == 0:
+        latitude, longitude = (self.real(name, limit) for name, limit in _COORDINATE_LIMITS.items())
+        altitude = self.real("altitude")
+        if latitude == longitude == altitude == 0:
             return None
-        return Home(item.x, item.y, item.z)
+        return Home(latitude, longitude, altitude)
 
 
 def _shown(text: str) -> str:

@@ -1,0 +1,77 @@
+"""What a mission file cannot hold, said aloud."""
+
+import math
+from typing import Literal
+
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_TERRAIN, Command
+from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.mission.vehicle import Vehicle
+
+_NAMES = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude")
+_SHOWN_ITEMS = 5
+
+
+def losses(
+    mission: Mission, file_format: Literal["wpl", "plan", "kml"], vehicle: Vehicle | None = None
+) -> list[str]:
+    """Return what of `mission` a file of that format for `vehicle` does not hold, one line each."""
+    match file_format:
+        case "wpl":
+            return [*_beside(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
+        case "plan":
+            refused = vehicle is not None and vehicle.autopilot == "ardupilot"
+            return [*(_not_set(mission) if refused else []), *_home(mission)]
+        case "kml":
+            return [*_beside(mission, "KML"), *_drawn(mission)]
+
+
+def _beside(mission: Mission, name: str) -> list[str]:
+    found = []
+    fence = mission.fence
+    if fence or fence.breach_return is not None:
+        count = _count(len(fence.polygons) + len(fence.circles), "area")
+        found.append(f"{name} holds no fence: {count} left out")
+    if mission.rally:
+        found.append(
+            f"{name} holds no rally points: {_count(len(mission.rally), 'point')} left out"
+        )
+    return found
+
+
+def _not_set(mission: Mission) -> list[str]:
+    """Name the values that are not set, by item: they are written as 0."""
+    places = [
+        f"item {number} {name}"
+        for number, item in enumerate(mission.items, start=1)
+        for name, value in zip(_NAMES, _values(item), strict=True)
+        if math.isnan(value)
+    ]
+    if not places:
+        return []
+    shown = ", ".join(places[:_SHOWN_ITEMS])
+    more = f" and {len(places) - _SHOWN_ITEMS} more" if len(places) > _SHOWN_ITEMS else ""
+    return [f"not set (NaN) becomes 0: {shown}{more}"]
+
+
+def _home(mission: Mission) -> list[str]:
+    return [] if mission.home else ["no home is known: the file says 0, 0, 0, which means none"]
+
+
+def _drawn(mission: Mission) -> list[str]:
+    found = ["KML holds the route alone: no commands, speeds or holds, and cannot be read back"]
+    frames = {item.frame for item in mission.items}
+    if mission.home is None and frames & ABOVE_HOME:
+        found.append("no home is known: heights above home are drawn above the ground")
+    if frames & ABOVE_TERRAIN:
+        found.append("heights above terrain are drawn above Google Earth's own")
+    if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
+        found.append("spline waypoints are joined by straight lines")
+    return found
+
+
+def _values(item: MissionItem) -> tuple[float, ...]:
+    return (*item.params, item.x, item.y, item.z)
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
