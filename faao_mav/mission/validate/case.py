@@ -10,6 +10,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
+from faao_mav.mission.dialect import speed_change
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.mission.validate.limits import Limits
@@ -22,8 +23,6 @@ NAV_LAST = 95
 
 HOME = -1
 """The index of home, which is no item."""
-
-_AIRSPEED, _GROUND_SPEED = 0, 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,20 +189,13 @@ class Case:
             cruise = default.default
         speed, speeds = cruise, []
         for item in self.items:
+            change = None
             if item.command == Command.DO_CHANGE_SPEED:
-                speed = self._changed(item, speed, cruise)
+                change = speed_change(item, self.vehicle)
+            if change is not None and change.axis in ("horizontal", "airspeed"):
+                speed = cruise if change.speed is None else change.speed
             speeds.append(speed)
         return tuple(speeds)
-
-    def _changed(self, item: MissionItem, speed: float, cruise: float) -> float:
-        kind, value = item.params[0], item.params[1]
-        if self.vehicle.autopilot == "px4":
-            return value if value > 0 else cruise
-        if not value > 0:
-            return speed
-        # For ArduPlane type 1 is the least ground speed, for ArduCopter another name of type 0.
-        types = (_AIRSPEED,) if self.vehicle.kind == "plane" else (_AIRSPEED, _GROUND_SPEED)
-        return value if kind in types else speed
 
     @cached_property
     def track_positions(self) -> Real | None:
@@ -230,11 +222,3 @@ def on_earth(item: MissionItem) -> bool:
 def at_zero(item: MissionItem) -> bool:
     """Say whether x and y are 0, 0: for most files, not set."""
     return item.x == 0 and item.y == 0
-
-
-def command_name(command: int) -> str:
-    """Return `82 (NAV_SPLINE_WAYPOINT)` for a MAV_CMD, the bare number for one without a name."""
-    from pymavlink.dialects.v20 import ardupilotmega
-
-    entry = ardupilotmega.enums["MAV_CMD"].get(command)
-    return f"{command} ({entry.name.removeprefix('MAV_CMD_')})" if entry else f"{command}"

@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
+from faao_mav.mission.dialect.model import name_of
 from faao_mav.mission.validate import parameters
-from faao_mav.mission.validate.case import Case, Place, command_name, number
+from faao_mav.mission.validate.case import Case, Place, number
 from faao_mav.mission.validate.finding import Level
 from faao_mav.mission.validate.rule import Issue, Rules
 
@@ -36,8 +37,7 @@ def _rejected(case: Case) -> Iterator[Issue]:
         if item.frame == Frame.MISSION:
             yield Issue(
                 index,
-                f"command {command_name(item.command)} is acknowledged on upload, then the mission "
-                "is rejected",
+                f"{name_of(item.command)} is acknowledged on upload, then the mission is rejected",
                 "remove the item; to wait, use a hold (param1 of a waypoint) or NAV_DELAY",
             )
 
@@ -53,8 +53,7 @@ def _vtol(case: Case) -> Iterator[Issue]:
     for index, item in case.each(*_VTOL):
         yield Issue(
             index,
-            f"command {command_name(item.command)} is for VTOL aircraft, this is a "
-            f"{case.vehicle.kind}",
+            f"{name_of(item.command)} is for VTOL aircraft, this is a {case.vehicle.kind}",
             "use NAV_TAKEOFF and NAV_LAND",
         )
 

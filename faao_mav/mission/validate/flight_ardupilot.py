@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from faao_mav.mission.command import Command
+from faao_mav.mission.dialect import speed_change
 from faao_mav.mission.validate import parameters
 from faao_mav.mission.validate.case import NAV_LAST, Case, at_zero, number
 from faao_mav.mission.validate.finding import Level
@@ -12,7 +13,6 @@ from faao_mav.mission.validate.rule import Issue, Rules
 RULES = Rules()
 
 _WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
-_SPEED_TYPES = {"copter": (0, 1, 2, 3), "plane": (0, 1)}
 _HORIZONTAL = (0, 1)
 
 # Lean in degrees and the top speed that it gave, m/s: a quadrotor of ArduPilot's simulator.
@@ -65,20 +65,13 @@ def _stays(case: Case) -> Iterator[Issue]:
 )
 def _speed_ignored(case: Case) -> Iterator[Issue]:
     for index, item in case.each(Command.DO_CHANGE_SPEED):
-        kind, speed, throttle = item.params[:3]
-        types = _SPEED_TYPES[case.vehicle.kind]
-        default = case.vehicle.kind == "plane" and speed == -2
-        if kind not in types:
+        throttle = item.params[2] if case.vehicle.kind == "plane" else 0.0
+        if speed_change(item, case.vehicle) is None and not throttle > 0:
             yield Issue(
                 index,
-                f"speed type {kind:g} is not known; {types[0]} to {types[-1]} are",
-                "use type 0 or 1 in param1",
-            )
-        elif not speed > 0 and not default and not (case.vehicle.kind == "plane" and throttle > 0):
-            yield Issue(
-                index,
-                f"a speed of {speed:g} m/s is ignored: the speed before stays in force",
-                "give a speed above 0 in param2, or remove the item",
+                f"speed type {item.params[0]:g} with {item.params[1]:g} m/s does nothing: the "
+                "speed before stays in force",
+                "give type 0 in param1 and a speed above 0 in param2, or remove the item",
             )
 
 

@@ -1,10 +1,8 @@
 """Rules about items and their order that hold for every autopilot."""
 
-import math
 from collections.abc import Iterator
 
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
-from faao_mav.mission.item import MissionItem
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command
 from faao_mav.mission.validate.case import HOME, NAV_LAST, Case, number
 from faao_mav.mission.validate.finding import Level
 from faao_mav.mission.validate.rule import Issue, Rules
@@ -43,38 +41,6 @@ def _no_home(case: Case) -> Iterator[Issue]:
             "way back are not checked",
             "set the planned home in the ground station, or fill row 0 of the file",
         )
-
-
-@RULES.add(
-    "coordinates-range", Level.ERROR, "a latitude or longitude is no place on Earth", _COMMON
-)
-def _coordinates_range(case: Case) -> Iterator[Issue]:
-    for index, item in _flown(case):
-        if abs(item.x) > 90 or abs(item.y) > 180:
-            yield Issue(
-                index,
-                f"latitude {item.x:g}, longitude {item.y:g}: limits are 90 and 180 degrees",
-                "correct the coordinates; perhaps latitude and longitude are swapped",
-            )
-
-
-@RULES.add(
-    "coordinates-missing", Level.ERROR, "an item that flies somewhere does not say where", _COMMON
-)
-def _coordinates_missing(case: Case) -> Iterator[Issue]:
-    for index, item in _flown(case):
-        if math.isnan(item.x) or math.isnan(item.y):
-            yield Issue(
-                index,
-                "latitude or longitude is not set, and MISSION_ITEM_INT cannot leave it open",
-                "give the coordinates",
-            )
-
-
-def _flown(case: Case) -> Iterator[tuple[int, MissionItem]]:
-    for index, item in case.each(*FLOWN_TO):
-        if item.frame != Frame.MISSION:
-            yield index, item
 
 
 @RULES.add("unreachable", Level.WARNING, "items stand after one that ends the mission", _COMMON)

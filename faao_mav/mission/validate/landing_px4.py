@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 
 from faao_mav.mission.command import FLOWN_TO, Command
+from faao_mav.mission.dialect.model import name_of
 from faao_mav.mission.validate import parameters
-from faao_mav.mission.validate.case import Case, Place, command_name, number
+from faao_mav.mission.validate.case import Case, Place, number
 from faao_mav.mission.validate.finding import Level
 from faao_mav.mission.validate.rule import Issue, Rules
 
@@ -39,7 +40,7 @@ def _entrance(case: Case) -> Iterator[Issue]:
         if before is not None and before.command in FLOWN_TO and before.command not in _ENTRANCES:
             yield Issue(
                 index,
-                f"the item before the landing is {command_name(before.command)}",
+                f"the item before the landing is {name_of(before.command)}",
                 "put a NAV_WAYPOINT or NAV_LOITER_TO_ALT before the landing",
             )
 

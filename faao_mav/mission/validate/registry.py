@@ -12,19 +12,17 @@ from faao_mav.mission.validate import (
     link,
     shape,
     speeds,
-    storage_ardupilot,
-    upload_ardupilot,
-    upload_px4,
+    storage,
+    upload,
 )
 from faao_mav.mission.validate.rule import Rule
 
 RULES: tuple[Rule, ...] = (
     *items.RULES,
-    *upload_ardupilot.RULES,
+    *upload.RULES,
+    *storage.RULES,
     *arming_ardupilot.RULES,
     *flight_ardupilot.RULES,
-    *storage_ardupilot.RULES,
-    *upload_px4.RULES,
     *feasibility_px4.RULES,
     *landing_px4.RULES,
     *flight_px4.RULES,

@@ -1,6 +1,7 @@
 """Whether the speeds that are asked for can be flown."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -29,24 +30,55 @@ _SHORTEST = 1.0
 """Legs shorter than this, m, are corrections, not legs to speed up on."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Neighbouring legs that stay below their commanded speed, and what they reach, m/s."""
+
+    legs: list[Leg]
+    reached: list[float]
+
+    @property
+    def crawls(self) -> bool:
+        """Whether the run is long and slow enough to be called a crawl."""
+        commanded = sum(leg.speed for leg in self.legs)
+        return len(self.legs) >= CRAWL_LEGS and sum(self.reached) < CRAWL_SHARE * commanded
+
+    @property
+    def last(self) -> int:
+        """The number of the last item."""
+        return number(self.legs[-1].index)
+
+    @property
+    def mean_speed(self) -> float:
+        """The mean of what the legs reach, m/s."""
+        return sum(self.reached) / len(self.reached)
+
+
 @RULES.add(
     "speed-not-reached",
     Level.WARNING,
-    f"a leg that stays below {100 * REACHED_SHARE:g} % of the commanded speed",
+    f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed",
     _MEASURED,
     kind="copter",
 )
 def _not_reached(case: Case) -> Iterator[Issue]:
-    slow, reached = _slow_legs(case)
-    crawling = {leg.index for run in _crawls(slow, reached) for leg in run}
-    for leg, speed in zip(slow, reached, strict=True):
-        if speed < REACHED_SHARE * leg.speed and leg.index not in crawling:
-            yield Issue(
-                leg.index,
-                f"on this leg of {leg.length:.0f} m the aircraft gets to {speed:.1f} m/s, not to "
-                f"the commanded {leg.speed:g} m/s",
-                f"ask for {speed:.1f} m/s, or make the leg longer",
+    for run in _slow_runs(case):
+        if run.crawls:
+            continue
+        first, low, high = run.legs[0], min(run.reached), max(run.reached)
+        if len(run.legs) == 1:
+            what = f"on this leg of {first.length:.0f} m the aircraft gets to {low:.1f} m/s"
+        else:
+            span = f"{low:.1f}" if high - low < 0.05 else f"{low:.1f} to {high:.1f}"
+            what = (
+                f"on the {len(run.legs)} legs from here to item {run.last} the aircraft gets to "
+                f"{span} m/s"
             )
+        yield Issue(
+            first.index,
+            f"{what}, not to the commanded {max(leg.speed for leg in run.legs):g} m/s",
+            "ask for what it reaches, or make the legs longer",
+        )
 
 
 @RULES.add(
@@ -58,30 +90,28 @@ def _not_reached(case: Case) -> Iterator[Issue]:
     kind="copter",
 )
 def _crawl(case: Case) -> Iterator[Issue]:
-    slow, reached = _slow_legs(case)
-    speeds = {leg.index: speed for leg, speed in zip(slow, reached, strict=True)}
-    for run in _crawls(slow, reached):
-        spacing = sum(leg.length for leg in run) / len(run)
-        speed = sum(speeds[leg.index] for leg in run) / len(run)
-        yield Issue(
-            run[0].index,
-            f"{len(run)} legs up to item {number(run[-1].index)} are {spacing:.1f} m long on "
-            f"average: the aircraft crawls at about {speed:.1f} m/s of the commanded "
-            f"{max(leg.speed for leg in run):g}",
-            "thin the waypoints: keep those that the shape of the path needs",
-        )
+    for run in _slow_runs(case):
+        if run.crawls:
+            spacing = sum(leg.length for leg in run.legs) / len(run.legs)
+            yield Issue(
+                run.legs[0].index,
+                f"the {len(run.legs)} legs from here to item {run.last} are {spacing:.1f} m long "
+                f"on average: the aircraft crawls at about {run.mean_speed:.1f} m/s of the "
+                f"commanded {max(leg.speed for leg in run.legs):g}",
+                "thin the waypoints: keep those that the shape of the path needs",
+            )
 
 
-def _crawls(legs: list[Leg], reached: list[float]) -> Iterator[list[Leg]]:
-    """Yield the runs of neighbouring legs that crawl."""
-    pairs = zip(legs, reached, strict=True)
-    for crawling, run in groupby(pairs, lambda pair: pair[1] < CRAWL_SHARE * pair[0].speed):
-        found = [leg for leg, _ in run]
-        if crawling and len(found) >= CRAWL_LEGS:
-            yield found
+def _slow_runs(case: Case) -> Iterator[_Run]:
+    """Yield the runs of neighbouring legs that stay below their commanded speed."""
+    pairs = zip(*_reached_speeds(case), strict=True)
+    for slow, run in groupby(pairs, lambda pair: pair[1] < REACHED_SHARE * pair[0].speed):
+        if slow:
+            legs, reached = zip(*run, strict=True)
+            yield _Run(list(legs), list(reached))
 
 
-def _slow_legs(case: Case) -> tuple[list[Leg], list[float]]:
+def _reached_speeds(case: Case) -> tuple[list[Leg], list[float]]:
     """Return the level legs between waypoints, and the speed that each reaches, m/s.
 
     That is the greatest speed of the predicted flight towards the leg's end. Without one it is
@@ -145,7 +175,7 @@ def _above_limit(case: Case) -> Iterator[Issue]:
     if limit is None:
         return
     before = None
-    for leg in case.legs:
+    for leg in (leg for leg in case.legs if leg.length >= _SHORTEST):
         if leg.speed > limit and leg.speed != before:
             yield Issue(
                 leg.index,
