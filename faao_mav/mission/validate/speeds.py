@@ -126,8 +126,9 @@ def _reached_speeds(case: Case) -> tuple[list[Leg], list[float]]:
         and case.items[leg.index].command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
     ]
     if case.track is not None:
-        fastest = np.zeros(len(case.items))
+        fastest = np.full(len(case.items), -np.inf)
         np.maximum.at(fastest, case.track.item, np.hypot(*case.track.velocity[:, :2].T))
+        legs = [leg for leg in legs if fastest[leg.index] >= 0]  # the others are not flown
         return legs, [float(fastest[leg.index]) for leg in legs]
     legs = [leg for leg in legs if not leg.spline]
     lengths = np.array([leg.length for leg in legs], dtype=float)

@@ -99,4 +99,4 @@ def _stored(case: Case, item: MissionItem) -> MissionItem | None:
 
 def _same(value: float, kept: float) -> bool:
     """Say whether `value` is kept; where it is not set, nothing is lost."""
-    return math.isnan(value) or abs(value - kept) <= 1e-3 * max(1.0, abs(value))
+    return math.isnan(value) or abs(value - kept) <= 1e-4 + 1e-6 * abs(value)
