@@ -5,10 +5,8 @@ import pytest
 from faao_mav.mission.validate import Limits
 from missions import (
     COPTER,
-    LAND,
     PLANE,
     PX4,
-    RTL,
     TAKEOFF,
     Given,
     at,

@@ -79,6 +79,7 @@ CASES = [
     ),
     ("refused-on-upload", Given(flown(do(9999))), 2, Given(flown(do(207, 1)))),
     ("storage-full", Given(mission(*row(718, 30))), None, Given(mission(*row(717, 30)))),
+    ("number-too-large", Given(flown(at(0, 9, 9, 3.5e38))), 2, Given(flown(at(0, 9, 9, 3.4e38)))),
     (
         "storage-full",
         Given(mission(*row(724, 30)), PLANE),

@@ -21,6 +21,9 @@ from faao_mav.mission.vehicle import Vehicle
 NAV_LAST = 95
 """Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""
 
+LARGEST = float(np.finfo(np.float32).max)
+"""The largest number of single precision, which messages have."""
+
 HOME = -1
 """The index of home, which is no item."""
 
@@ -222,3 +225,8 @@ def on_earth(item: MissionItem) -> bool:
 def at_zero(item: MissionItem) -> bool:
     """Say whether x and y are 0, 0: for most files, not set."""
     return item.x == 0 and item.y == 0
+
+
+def fits_message(item: MissionItem) -> bool:
+    """Say whether a MISSION_ITEM_INT can carry the numbers of `item`."""
+    return not any(abs(value) > LARGEST for value in (*item.params, item.z))

@@ -193,20 +193,3 @@ def _stops(case: Case) -> Iterator[Issue]:
                 "autocontinue is off: PX4 does not go on to the next item",
                 "set autocontinue, the last field of the row",
             )
-
-
-@RULES.add(
-    "px4-drops-pass-by",
-    Level.NOTE,
-    "PX4 does not store a waypoint's pass-by radius",
-    "PX4 1.16 MavlinkMissionManager::parse_mavlink_mission_item",
-    autopilot="px4",
-)
-def _pass_by(case: Case) -> Iterator[Issue]:
-    for index, item in case.each(Command.NAV_WAYPOINT):
-        if abs(item.params[2]) > 0:
-            yield Issue(
-                index,
-                f"the pass-by radius of {item.params[2]:g} m (param3) is not stored",
-                "write 0",
-            )

@@ -7,7 +7,7 @@ from faao_mav.mission.command import FLOWN_TO, Command
 from faao_mav.mission.dialect import accepts, as_stored
 from faao_mav.mission.dialect.model import name_of
 from faao_mav.mission.item import MissionItem
-from faao_mav.mission.validate.case import Case
+from faao_mav.mission.validate.case import Case, fits_message
 from faao_mav.mission.validate.finding import Level
 from faao_mav.mission.validate.rule import Issue, Rules
 
@@ -94,7 +94,9 @@ def _altitude(case: Case) -> Iterator[Issue]:
 
 def _stored(case: Case, item: MissionItem) -> MissionItem | None:
     """Return what is read back for `item`, None if it is refused."""
-    return None if accepts(item, case.vehicle) else as_stored(item, case.vehicle)
+    if not fits_message(item) or accepts(item, case.vehicle):
+        return None
+    return as_stored(item, case.vehicle)
 
 
 def _same(value: float, kept: float) -> bool:

@@ -7,7 +7,7 @@ from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, Command, Frame
 from faao_mav.mission.dialect import accepts, dialect_of
 from faao_mav.mission.dialect.model import name_of
 from faao_mav.mission.validate import parameters
-from faao_mav.mission.validate.case import Case
+from faao_mav.mission.validate.case import LARGEST, Case, fits_message
 from faao_mav.mission.validate.finding import Level
 from faao_mav.mission.validate.rule import Issue, Rules
 
@@ -42,6 +42,23 @@ def _refused(case: Case) -> Iterator[Issue]:
             if not action:
                 action = _replacement(item.command, item.frame)
             yield Issue(index, message, action)
+
+
+@RULES.add(
+    "number-too-large",
+    Level.ERROR,
+    "a number that a message cannot carry",
+    "MAVLink: MISSION_ITEM_INT has numbers of single precision",
+)
+def _too_large(case: Case) -> Iterator[Issue]:
+    for index, item in enumerate(case.items):
+        if not fits_message(item):
+            largest = max(abs(v) for v in (*item.params, item.z) if not math.isnan(v))
+            yield Issue(
+                index,
+                f"{largest:g} does not fit into a message: numbers are at most {LARGEST:.2g}",
+                "correct the number",
+            )
 
 
 def _replacement(command: int, frame: int) -> str:
