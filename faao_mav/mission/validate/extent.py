@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from faao_mav.mission.command import Command
+from faao_mav.mission.command import ABOVE_HOME, Command
 from faao_mav.mission.validate import parameters
 from faao_mav.mission.validate.case import HOME, Case, Leg, number
 from faao_mav.mission.validate.finding import Level
@@ -32,14 +32,21 @@ _DELAYS = (*_HOLDS, Command.NAV_DELAY)
     "PX4: Waypoint below home; ArduPilot says nothing and flies there",
 )
 def _below_home(case: Case) -> Iterator[Issue]:
+    home = case.mission.home
     for place in case.places:
-        command = case.items[place.index].command
-        if place.up <= 0 and command not in _LANDINGS:
-            yield Issue(
-                place.index,
-                f"{place.up:g} m above home",
-                "raise the item, unless the ground there is lower than home",
-            )
+        item = case.items[place.index]
+        if not place.up <= 0 or item.command in _LANDINGS:
+            continue
+        how = f"{-place.up:g} m below home" if place.up < 0 else "at home's height"
+        if item.frame not in ABOVE_HOME and home is not None:
+            how = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: {how}"
+        yield Issue(
+            place.index,
+            how,
+            "use frame 3, height above home, or raise the item"
+            if item.frame not in ABOVE_HOME
+            else "raise the item, unless the ground there is lower than home",
+        )
 
 
 @RULES.add("above-ceiling", Level.ERROR, "higher than the ceiling that was set", _GIVEN)

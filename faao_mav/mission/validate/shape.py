@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from faao_mav.mission.command import Command
 from faao_mav.mission.validate import parameters
-from faao_mav.mission.validate.case import Case, Leg
+from faao_mav.mission.validate.case import HOME, Case, Leg
 from faao_mav.mission.validate.finding import Level
 from faao_mav.mission.validate.rule import Issue, Rules
 
@@ -28,7 +28,12 @@ _KC, _PC = 0.466, 1.013
 
 def _corners(case: Case) -> Iterator[tuple[Leg, Leg, float]]:
     """Yield the legs before and after each plain waypoint that is passed, and the turn, degrees."""
-    legs = [leg for leg in case.legs if not leg.jump and leg.length >= _SHORTEST]
+    # A return to launch starts from a stop.
+    legs = [
+        leg
+        for leg in case.legs
+        if not leg.jump and leg.end.index != HOME and leg.length >= _SHORTEST
+    ]
     for before, after in pairwise(legs):
         item = case.items[before.index]
         passed = item.command == Command.NAV_WAYPOINT and not item.params[0] > 0
@@ -120,7 +125,8 @@ def _steep(case: Case) -> Iterator[Issue]:
     for leg in case.legs:
         command = case.items[leg.index].command
         limit = climb if leg.rise > 0 else descent
-        if command != Command.NAV_WAYPOINT or leg.length < _SHORTEST or limit <= 0:
+        on_ground = leg.start.index == HOME
+        if on_ground or command != Command.NAV_WAYPOINT or leg.length < _SHORTEST or limit <= 0:
             continue
         level, vertical = leg.length / leg.speed, abs(leg.rise) / limit
         if math.isfinite(vertical) and level < _CLIMB_SHARE * vertical:
