@@ -13,6 +13,7 @@ from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, F
 from faao_mav.mission.dialect import speed_change
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.mission.validate.fence_map import FenceMap, fence_map
 from faao_mav.mission.validate.limits import Limits
 from faao_mav.mission.validate.link import LinkCheck
 from faao_mav.mission.validate.parameters import cruise_speed
@@ -199,6 +200,11 @@ class Case:
                 speed = cruise if change.speed is None else change.speed
             speeds.append(speed)
         return tuple(speeds)
+
+    @cached_property
+    def fence(self) -> FenceMap | None:
+        """The fence in the local frame, None without one."""
+        return fence_map(self)
 
     @cached_property
     def track_positions(self) -> Real | None:
