@@ -93,15 +93,9 @@ def test_the_flight_counts_for_the_margin() -> None:
 
 
 def test_legs_by_jumps_count() -> None:
-    items = [at(-90, 60, 30), at(-90, 0, 30), at(90, 0, 30), at(90, 60, 30)]
-    jump = flown(
-        *items,
-        at(0, -60, 30),
-        do(Command.DO_JUMP, 2, 1),
-        fence=fence(circle(-60, -30, 20)),
-        rally=(),
-    )
-    found = Given(jump).by("fence-leg")
+    around = [at(-90, 60, 30), at(-90, 0, 30), at(90, 0, 30), at(90, 60, 30), at(0, -60, 30)]
+    back = do(Command.DO_JUMP, 2, 1)
+    found = Given(flown(*around, back, fence=fence(circle(-22, -30, 10)))).by("fence-leg")
     assert [finding.item for finding in found] == [7]
     assert "by DO_JUMP" in found[0].message
 
@@ -125,5 +119,5 @@ def test_a_bow_tie_keeps_both_halves() -> None:
 
 def test_a_polygon_without_an_area_lets_nothing_in() -> None:
     areas = areas_of(fence(polygon((0, 0), (50, 50), (100, 100))), FRAME)
-    assert free_area(areas, any_inclusion=False).is_empty
+    assert free_area(areas, any_inclusion=False).area < 1e-6
     assert free_area((), any_inclusion=False) is None
