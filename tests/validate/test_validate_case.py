@@ -4,12 +4,7 @@ import math
 
 import numpy as np
 import pytest
-
-from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import Command
-from faao_mav.mission.validate.case import HOME as HOME_INDEX
-from faao_mav.mission.validate.case import Case
-from missions import (
+from judged import (
     COPTER,
     FRAME,
     HOME,
@@ -28,6 +23,11 @@ from missions import (
     speed,
     track,
 )
+
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import Command
+from faao_mav.mission.validate.case import HOME as HOME_INDEX
+from faao_mav.mission.validate.case import Case
 
 
 def ups(case: Case) -> list[float]:

@@ -3,8 +3,7 @@
 import math
 
 import pytest
-
-from missions import PLANE, PX4, Given, at, check, flown
+from judged import PLANE, PX4, Given, at, check, flown
 
 NAN = math.nan
 

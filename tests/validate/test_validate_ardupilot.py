@@ -1,9 +1,7 @@
 """What ArduPilot does not arm for or start, and what it flies unexpectedly."""
 
 import pytest
-
-from faao_mav.mission.command import Command
-from missions import (
+from judged import (
     COPTER,
     LAND,
     PLANE,
@@ -20,6 +18,8 @@ from missions import (
     speed,
     spline,
 )
+
+from faao_mav.mission.command import Command
 
 DELAY = Command.NAV_DELAY
 

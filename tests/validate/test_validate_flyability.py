@@ -1,9 +1,7 @@
 """Speeds, corners and climbs."""
 
 import pytest
-
-from faao_mav.mission.validate import Limits
-from missions import (
+from judged import (
     COPTER,
     PLANE,
     PX4,
@@ -18,6 +16,8 @@ from missions import (
     speed,
     track,
 )
+
+from faao_mav.mission.validate import Limits
 
 OUT_AND_BACK = ((0, 0, 0), (0, 0, 30), (0, 100, 30), (0, 0, 30))
 

@@ -1,10 +1,10 @@
 """How high, how far, how long."""
 
 import pytest
+from judged import COPTER, LAND, PX4, Given, at, check, flown, having, track
 
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.validate import Limits
-from missions import COPTER, LAND, PX4, Given, at, check, flown, having, track
 
 
 def flight(*points: tuple[float, float, float]) -> Track:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import typer
+from judged import TAKEOFF, at, flown, mission, speed, track
 from typer.testing import CliRunner
 
 from faao_mav.cli.validate import validate
@@ -17,7 +18,6 @@ from faao_mav.mission.formats import render_mission
 from faao_mav.mission.item import Mission
 from faao_mav.mission.validate import RULES
 from faao_mav.mission.vehicle import Vehicle
-from missions import TAKEOFF, at, flown, mission, speed, track
 
 Run = Callable[..., Any]
 

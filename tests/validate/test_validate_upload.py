@@ -3,9 +3,7 @@
 import math
 
 import pytest
-
-from faao_mav.mission.command import Command
-from missions import (
+from judged import (
     COPTER,
     PLANE,
     PX4,
@@ -25,6 +23,8 @@ from missions import (
     spline,
     square,
 )
+
+from faao_mav.mission.command import Command
 
 JUMP, NAN = Command.DO_JUMP, math.nan
 

@@ -3,9 +3,9 @@
 import math
 
 import pytest
+from judged import LAND, PX4, RTL, TAKEOFF, Given, at, check, do, flown, mission, speed
 
 from faao_mav.mission.command import Command
-from missions import LAND, PX4, RTL, TAKEOFF, Given, at, check, do, flown, mission, speed
 
 NAN = math.nan
 JUMP, START = Command.DO_JUMP, Command.DO_LAND_START

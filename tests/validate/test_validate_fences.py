@@ -1,8 +1,7 @@
 """Fences: legs and flights, not only points."""
 
 import pytest
-
-from missions import (
+from judged import (
     COPTER,
     PX4,
     Given,

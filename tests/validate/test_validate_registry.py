@@ -5,9 +5,9 @@ from importlib import import_module
 from itertools import chain
 
 import pytest
+from judged import VEHICLES, Given, at, flown, having, mission, raw, speed
 
 from faao_mav.mission.validate import RULES, Finding, Level, validate
-from missions import VEHICLES, Given, at, flown, having, mission, raw, speed
 
 MODULES = (
     *("ardupilot", "extent", "fences", "flyability", "items", "link", "px4", "storage", "upload"),
@@ -15,7 +15,7 @@ MODULES = (
 
 
 def test_every_rule_is_tried_from_both_sides() -> None:
-    cases = chain.from_iterable(import_module(f"test_{name}").CASES for name in MODULES)
+    cases = chain.from_iterable(import_module(f"test_validate_{name}").CASES for name in MODULES)
     assert {case[0] for case in cases} == {rule.id for rule in RULES}
 
 

@@ -3,10 +3,7 @@
 import math
 
 import pytest
-
-from faao_mav.mission.command import Command
-from faao_mav.mission.item import Mission, MissionItem
-from missions import (
+from judged import (
     LAND,
     PX4,
     PX4_PLANE,
@@ -22,6 +19,9 @@ from missions import (
     raw,
     speed,
 )
+
+from faao_mav.mission.command import Command
+from faao_mav.mission.item import Mission, MissionItem
 
 NAN = math.nan
 DELAY, START = Command.NAV_DELAY, Command.DO_LAND_START

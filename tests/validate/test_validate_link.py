@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import pytest
+from judged import LINK, Given, check, flown
 
 from faao_mav.mission.validate import Stretch
-from missions import LINK, Given, check, flown
 
 # the rule, what it speaks about, the item that it names, what it lets pass
 CASES = [

@@ -6,11 +6,7 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import given
-
-from faao_mav.mission.command import Command
-from faao_mav.mission.validate.area import areas_of, free_area
-from faao_mav.mission.validate.case import Case
-from missions import (
+from judged import (
     COPTER,
     FRAME,
     PX4,
@@ -26,6 +22,10 @@ from missions import (
     square,
     track,
 )
+
+from faao_mav.mission.command import Command
+from faao_mav.mission.validate.area import areas_of, free_area
+from faao_mav.mission.validate.case import Case
 
 metres = st.floats(-500, 500)
 places = st.tuples(metres, metres)
