@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from faao_mav.faao.solution import Solution, load_solution, save_solution
     from faao_mav.mission import Mission, MissionItem, to_mission
     from faao_mav.mission.formats import read_mission, render_mission
+    from faao_mav.mission.parameter_file import read_parameters, render_parameters
     from faao_mav.plan import Plan, parse_plan, read_plan
 
 _HOMES = {
@@ -28,8 +29,10 @@ _HOMES = {
     "parse_plan": "plan",
     "price": "faao.pricing",
     "read_mission": "mission.formats",
+    "read_parameters": "mission.parameter_file",
     "read_plan": "plan",
     "render_mission": "mission.formats",
+    "render_parameters": "mission.parameter_file",
     "saturation": "faao.pricing",
     "save_solution": "faao.solution",
     "to_mission": "mission",
@@ -46,8 +49,10 @@ __all__ = [
     "parse_plan",
     "price",
     "read_mission",
+    "read_parameters",
     "read_plan",
     "render_mission",
+    "render_parameters",
     "saturation",
     "save_solution",
     "to_mission",

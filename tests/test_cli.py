@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
-from faao_mav.mission.formats import read_mission
+from faao_mav.mission.formats import read_mission, read_mission_file
 
 
 def run(*arguments: object) -> Any:
@@ -44,6 +44,16 @@ def test_the_main_job(plan: Path, tmp_path: Path) -> None:
     with np.load(save) as archive:
         assert archive["w"].shape == (20, 2)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["m.waypoints", "plan.yaml", "r.npz"]
+
+
+def test_the_mission_as_a_plan_of_qgroundcontrol_is_the_same(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(edited(SMALL, {"vehicle.autopilot": "px4"}))
+    for name in ("m.waypoints", "m.plan", "m.kml"):
+        assert run(plan, "--out", tmp_path / name, "--quiet").output == ""
+    read = read_mission_file(tmp_path / "m.plan")
+    assert (read.autopilot, read.kind) == ("px4", "copter")
+    assert read.mission == read_mission(tmp_path / "m.waypoints")
+    assert "<LineString>" in (tmp_path / "m.kml").read_text()
 
 
 def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -> None:

@@ -2,10 +2,14 @@
 
 import dataclasses
 import re
+import shutil
 from pathlib import Path
 
+import pytest
 import yaml
+from typer.testing import CliRunner
 
+from faao_mav.cli.main import app
 from faao_mav.plan import parse_plan
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
@@ -25,3 +29,15 @@ def test_the_plan_in_the_readme_shows_the_defaults() -> None:
     least["radio"] = {s: {"position": full["radio"][s]["position"]} for s in stations}
     shown, default = parse_plan(found[1]), parse_plan(yaml.safe_dump(least))
     assert dataclasses.replace(shown, text="") == dataclasses.replace(default, text="")
+
+
+def test_the_conversion_in_the_readme_says_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    source = Path(__file__).parent / "data" / "missions" / "fence_and_rally.plan"
+    shutil.copy(source, tmp_path / "site.plan")
+    found = re.search(r"\$ faao-mission (convert .*)\n((?:.*\n)*?)```", README)
+    assert found is not None
+    result = CliRunner().invoke(app, found[1].split())
+    assert result.stderr + result.stdout == found[2]

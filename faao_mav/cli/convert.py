@@ -2,42 +2,65 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.outcome import exit_status, note
 from faao_mav.errors import InputError
 from faao_mav.files import check_writable, write_whole
 
+Autopilot = Literal["ardupilot", "px4"]
+
 
 def convert(
-    mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission to read.")],
-    out: Annotated[
-        Path, typer.Option(metavar="OTHER", help="The mission to write; its ending is the format.")
+    mission_file: Annotated[
+        Path,
+        typer.Argument(metavar="MISSION", help="The mission: .waypoints, .txt or .plan."),
     ],
+    out: Annotated[
+        Path,
+        typer.Option(metavar="OTHER", help="What to write: .waypoints, .txt, .plan or .kml."),
+    ],
+    autopilot: Annotated[
+        Autopilot | None,
+        typer.Option(help="Whom a .plan is for; else whom the mission read says it is for."),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object instead of the summary.")
     ] = False,
 ) -> None:
-    """Write a mission in another format.
+    """Write a mission in another format, and say what that cannot hold.
 
     Exit status: 0 done; 2 unusable arguments or input.
     """
     with exit_status():
-        _run(mission_file, out, as_json)
+        _run(mission_file, out, autopilot, as_json)
 
 
-def _run(mission_file: Path, out: Path, as_json: bool) -> None:
-    from faao_mav.mission.formats import check_suffix, read_mission, render_mission
+def _run(mission_file: Path, out: Path, autopilot: Autopilot | None, as_json: bool) -> None:
+    from faao_mav.mission.formats import (
+        check_readable,
+        check_suffix,
+        losses_in,
+        read_mission_file,
+        render_mission,
+    )
+    from faao_mav.mission.vehicle import Vehicle
 
+    check_readable(mission_file)
     check_suffix(out)
     check_writable(out)
     if out.exists() and mission_file.exists() and out.samefile(mission_file):
-        raise InputError(f"--out {out}: is the file to convert; give another name")
-    mission = read_mission(mission_file)
-    write_whole(out, render_mission(mission, out).encode())
+        raise InputError(f"--out {out}: is the mission to read; give another name")
+    read = read_mission_file(mission_file)
+    vehicle = Vehicle(autopilot, read.kind or "copter") if autopilot else read.vehicle
+    lost = losses_in(read.mission, out, vehicle)
+    write_whole(out, render_mission(read.mission, out, vehicle).encode())
+    for line in lost:
+        note(f"{out}: {line}")
+    items = len(read.mission.items)
     if as_json:
-        typer.echo(json.dumps({"items": len(mission.items), "written": str(out)}))
+        typer.echo(json.dumps({"items": items, "lost": lost, "written": str(out)}))
     else:
-        typer.echo(f"{len(mission.items)} items written to {out}")
+        typer.echo(f"{items} items written to {out}")

@@ -18,7 +18,8 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="MISSION", help="Write the mission: .waypoints or .txt (QGC WPL 110)."
+            metavar="MISSION",
+            help="Write the mission: .waypoints, .txt, .plan or .kml.",
         ),
     ] = None,
     save: Annotated[
@@ -63,6 +64,7 @@ def _run(
     from faao_mav.mission import assemble, plan_route
     from faao_mav.mission.autopilot import legs_of
     from faao_mav.mission.formats import check_suffix, render_mission
+    from faao_mav.mission.vehicle import vehicle_of
     from faao_mav.plan import read_plan
 
     started = time.perf_counter()
@@ -84,7 +86,7 @@ def _run(
         route = plan_route(solution.t, solution.w, read)
         mission = assemble(route, read)
         if out is not None:
-            write_whole(out, render_mission(mission, out).encode())
+            write_whole(out, render_mission(mission, out, vehicle_of(read)).encode())
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None

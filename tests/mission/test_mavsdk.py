@@ -1,8 +1,10 @@
 """MAVSDK, an independent client, reads the files."""
 
+import math
 import socket
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from mavsdk.component_type import ComponentType
@@ -11,7 +13,12 @@ from mavsdk.plugins.mission_raw import MissionRaw
 from pymavlink import mavutil
 from relay_flights import dash_hover_dash, mission_of, plan_with
 
-from faao_mav.mission.formats import write_wpl
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission.formats import read_mission, write_qgc_plan, write_wpl
+from faao_mav.mission.vehicle import Vehicle
+
+DATA = Path(__file__).parent.parent / "data" / "missions"
 
 
 def free_endpoint() -> str:
@@ -63,11 +70,65 @@ def test_mavsdk_imports_the_mission(client):
     assert (home.command, home.frame) == (16, 0)
     assert (home.x, home.y) == (round(mission.home.latitude * 1e7), 1491652370)
     assert home.z == mission.home.altitude
-    for row, item in zip(rows[1:], mission.items, strict=True):
+    assert_same(rows[1:], mission.items)
+
+
+def assert_same(rows, items):
+    for row, item in zip(rows, items, strict=True):
         assert (row.command, row.frame) == (item.command, item.frame)
-        assert (row.param1, row.param2, row.param3, row.param4) == pytest.approx(item.params)
+        params = (row.param1, row.param2, row.param3, row.param4)
+        assert params == pytest.approx(item.params, nan_ok=True)
         scale = 1 if item.frame == 2 else 1e7
         assert abs(row.x - item.x * scale) <= 1
         assert abs(row.y - item.y * scale) <= 1
         assert row.z == pytest.approx(item.z)
-        assert row.autocontinue == 1
+        assert row.autocontinue == item.autocontinue
+
+
+def test_mavsdk_imports_the_plan(client):
+    autopilot, raw = client
+    planned = mission_of(*dash_hover_dash(), plan_with(autopilot=autopilot))
+    pause = MissionItem(16, 3, (2.5, 0.0, 0.0, math.nan), 47.0, 8.0, 30.0, autocontinue=False)
+    yaw = math.nan if autopilot == "px4" else 0.0
+    mission = Mission(
+        (*planned.items, pause, MissionItem(177, 2, (3.0, 2.0, 0.0, 0.0))),
+        Home(47.397742, 8.545594, 488.25),
+        Fence(
+            (Polygon(((47.0, 8.0), (47.5, 8.0), (47.5, 8.5)), True),),
+            (Circle((47.25, 8.125), 12.5, False),),
+        ),
+        (RallyPoint(47.25, 8.25, 40.0), RallyPoint(47.125, 8.125, 30.0)),
+    )
+    text = write_qgc_plan(mission, Vehicle(autopilot))
+    imported = raw.import_qgroundcontrol_mission_from_string(text)
+
+    rows = imported.mission_items
+    if autopilot == "ardupilot":  # it puts the planned home before them
+        home, *rows = rows
+        assert (home.command, home.x, home.y, home.z) == (16, 473977420, 85455940, 488.25)
+    *most, last, jump = rows
+    assert_same(most, planned.items)
+    assert (last.param1, last.autocontinue) == (2.5, 0)
+    assert last.param4 == pytest.approx(yaw, nan_ok=True)
+    assert (jump.command, jump.param1, jump.param2) == (177, 3, 2)
+
+    fence = [(row.command, row.frame, row.param1, row.x) for row in imported.geofence_items]
+    assert fence == [
+        (5001, 0, 3, 470000000),
+        (5001, 0, 3, 475000000),
+        (5001, 0, 3, 475000000),
+        (5004, 0, 12.5, 472500000),
+    ]
+    rally = [(row.command, row.frame, row.x, row.y, row.z) for row in imported.rally_items]
+    assert rally == [
+        (5100, 3, 472500000, 82500000, 40),
+        (5100, 3, 471250000, 81250000, 30),
+    ]
+
+
+@pytest.mark.parametrize("name", ["px4.plan", "survey.plan", "fence_and_rally.plan"])
+def test_plans_of_the_corpus_are_read_as_mavsdk_reads_them(client, name):
+    autopilot, raw = client
+    mission = read_mission(DATA / name)
+    rows = raw.import_qgroundcontrol_mission_from_string((DATA / name).read_text()).mission_items
+    assert_same(rows[autopilot == "ardupilot" :], mission.items)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from faao_mav.mission.dialect.ardupilot import ARDUCOPTER, ARDUPLANE
 from faao_mav.mission.dialect.model import Dialect, Limit, SpeedAxis, SpeedChange
 from faao_mav.mission.dialect.px4 import PX4
-from faao_mav.mission.dialect.rows import as_received, as_sent
+from faao_mav.mission.dialect.rows import as_received, as_sent, home_item
 
 if TYPE_CHECKING:
     from faao_mav.mission.item import MissionItem
@@ -24,6 +24,7 @@ __all__ = [
     "as_sent",
     "as_stored",
     "dialect_of",
+    "home_item",
     "item_limit",
     "speed_change",
 ]

@@ -5,7 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, Command, Frame
+from faao_mav.mission.command import (
+    ABOVE_HOME,
+    ABOVE_SEA,
+    ABOVE_TERRAIN,
+    FLOWN_TO,
+    Command,
+    Frame,
+)
 from faao_mav.mission.dialect.model import (
     Codec,
     Codecs,
@@ -91,25 +98,13 @@ _OTHERS = frozenset(
 )
 """Commands that are taken too; what is stored of them is not written down here."""
 
-_PLACED = frozenset(
-    {
-        Command.NAV_WAYPOINT,
-        Command.NAV_LOITER_UNLIM,
-        Command.NAV_LOITER_TURNS,
-        Command.NAV_LOITER_TIME,
-        Command.NAV_LAND,
-        Command.NAV_TAKEOFF,
-        Command.NAV_LOITER_TO_ALT,
-        Command.NAV_SPLINE_WAYPOINT,
-        Command.NAV_VTOL_TAKEOFF,
-        Command.NAV_VTOL_LAND,
-        Command.DO_SET_HOME,
-        Command.DO_LAND_START,
-        Command.DO_SET_ROI_LOCATION,
-        Command.DO_SET_ROI,
-        *(30, 92, 94, 188, 191),
-    }
-)
+_PLACED = FLOWN_TO | {
+    Command.DO_SET_HOME,
+    Command.DO_LAND_START,
+    Command.DO_SET_ROI_LOCATION,
+    Command.DO_SET_ROI,
+    *(30, 92, 94, 188, 191),
+}
 """Commands that are stored with a place; the others come back at 0, 0, 0 in frame 0."""
 
 _FRAMES = ABOVE_SEA | ABOVE_HOME | ABOVE_TERRAIN | {Frame.MISSION}

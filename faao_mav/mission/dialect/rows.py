@@ -7,6 +7,14 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 
 
+def home_item(home: Home | None) -> MissionItem:
+    """Return the row 0 that stands for `home`; zeros for none."""
+    known = home or Home(0.0, 0.0, 0.0)
+    return MissionItem(
+        Command.NAV_WAYPOINT, Frame.GLOBAL, x=known.latitude, y=known.longitude, z=known.altitude
+    )
+
+
 def as_sent(mission: Mission, *, home_row: bool) -> tuple[MissionItem, ...]:
     """Return the items to send, the first as number 0.
 
@@ -15,15 +23,7 @@ def as_sent(mission: Mission, *, home_row: bool) -> tuple[MissionItem, ...]:
     """
     if not home_row:
         return tuple(_jump_moved(item, -1) for item in mission.items)
-    home = mission.home or Home(0.0, 0.0, 0.0)
-    row = MissionItem(
-        Command.NAV_WAYPOINT,
-        Frame.GLOBAL,
-        x=home.latitude,
-        y=home.longitude,
-        z=home.altitude,
-    )
-    return (row, *mission.items)
+    return (home_item(mission.home), *mission.items)
 
 
 def as_received(rows: Sequence[MissionItem], *, home_row: bool) -> Mission:

@@ -19,8 +19,7 @@ def losses(
         case "wpl":
             return [*_beside(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
         case "plan":
-            refused = vehicle is not None and vehicle.autopilot == "ardupilot"
-            return [*(_not_set(mission) if refused else []), *_home(mission)]
+            return [*_for_whom(mission, vehicle), *_home(mission)]
         case "kml":
             return [*_beside(mission, "KML"), *_drawn(mission)]
 
@@ -51,6 +50,12 @@ def _not_set(mission: Mission) -> list[str]:
     shown = ", ".join(places[:_SHOWN_ITEMS])
     more = f" and {len(places) - _SHOWN_ITEMS} more" if len(places) > _SHOWN_ITEMS else ""
     return [f"not set (NaN) becomes 0: {shown}{more}"]
+
+
+def _for_whom(mission: Mission, vehicle: Vehicle | None) -> list[str]:
+    if vehicle is None:
+        return ["no autopilot is known: the plan is for a generic one"]
+    return _not_set(mission) if vehicle.autopilot == "ardupilot" else []
 
 
 def _home(mission: Mission) -> list[str]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from faao_mav.errors import MissionFileError
 from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.dialect.rows import home_item
 from faao_mav.mission.item import Home, Mission, MissionItem
 
 HEADER = "QGC WPL 110"
@@ -77,15 +78,8 @@ def write_wpl(mission: Mission) -> str:
     as many more as they need to be read back bit for bit. NaN is written as 0, and the fence and
     the rally points are left out: `losses` tells.
     """
-    home = mission.home or Home(0.0, 0.0, 0.0)
-    row_0 = MissionItem(
-        Command.NAV_WAYPOINT,
-        Frame.GLOBAL,
-        x=home.latitude,
-        y=home.longitude,
-        z=home.altitude,
-    )
-    rows = [_row(index, item) for index, item in enumerate((row_0, *mission.items))]
+    items = (home_item(mission.home), *mission.items)
+    rows = [_row(index, item) for index, item in enumerate(items)]
     return "\n".join([HEADER, *rows, ""])
 
 

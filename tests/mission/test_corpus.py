@@ -1,0 +1,123 @@
+"""Mission files as the field has them: which are read, and what the others are told."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from faao_mav.errors import MissionFileError
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.formats import read_mission, read_mission_file
+
+FOLDER = Path(__file__).parent.parent / "data" / "missions"
+
+TAKEOFF = (22, (0, 0, 0, 0), 30)
+SPEED = (178, (1, 5, -1, 0), 0)
+WAYPOINT = (16, (10, 0, 0, 0), 30)
+JUMP = (177, (3, 2, 0, 0), 0)
+RTL = (20, (0, 0, 0, 0), 0)
+FLIGHT = [TAKEOFF, SPEED, WAYPOINT, JUMP, RTL]
+SURVEY = [TAKEOFF, SPEED, (16, (0, 0, 0, 0), 30), (206, (25, 0, 1, 0), 0),
+          (16, (0, 0, 0, 0), 30), (206, (0, 0, 0, 0), 0), RTL]  # fmt: skip
+
+READ = {
+    "plain.waypoints": FLIGHT,
+    "crlf.waypoints": FLIGHT,
+    "bom.waypoints": FLIGHT,
+    "no_last_newline.waypoints": FLIGHT,
+    "spaces.waypoints": FLIGHT,
+    "comments.waypoints": FLIGHT,
+    "mavproxy.txt": FLIGHT,
+    "mission_planner_home.waypoints": FLIGHT,
+    "no_current.waypoints": FLIGHT,
+    "nan_yaw.waypoints": FLIGHT,
+    "version_100.txt": [TAKEOFF, WAYPOINT],
+    "version_120.waypoints": FLIGHT,
+    "px4.plan": FLIGHT,
+    "bom.plan": FLIGHT,
+    "no_fence_no_rally.plan": FLIGHT,
+    "fence_and_rally.plan": FLIGHT,
+    "empty_rally_version_1.plan": FLIGHT,
+    "jump_ids_with_gaps.plan": FLIGHT,
+    "survey.plan": SURVEY,
+    "corridor.plan": SURVEY,
+}
+REFUSED = {
+    "nan_latitude.waypoints": "line 5, field latitude: 'nan'; expected a finite number from -90",
+    "inf_altitude.waypoints": "line 5, field altitude: 'inf'; expected a finite number",
+    "eleven_columns.waypoints": "line 5: 11 fields; expected 12, tab-separated: index current",
+    "thirteen_columns.waypoints": "line 5: 13 fields; expected 12, tab-separated: index current",
+    "gap.waypoints": "line 4, field index: '3'; expected 2: rows count up from 0",
+    "two_current.waypoints": "line 4, field current: '1'; expected 0: line 2 is already current",
+    "header_only.waypoints": "a header but no items; expected row 0, the home position",
+    "no_home_row.waypoints": "line 2, field command: '22'; expected 16: row 0 is the home",
+    "decimal_comma.waypoints": "line 5, field latitude: '-35,3625'; expected a finite number",
+    "protobuf.waypoints": "line 1: 'QGC WPL PB 110'; expected 'QGC WPL 110'",
+    "latin1.waypoints": "line 3: byte 0xe9 is not UTF-8; expected a text file",
+    "nan_literal.plan": "mission.items[2].params[3]: NaN; expected a finite number or null",
+    "truncated.plan": "line 28, column 13: not JSON: Expecting value",
+    "duplicate_key.plan": "mission.items[2].frame: is there twice; remove one",
+    "wrong_type.plan": 'fileType: "Mission"; expected "Plan"',
+    "plan_version_2.plan": "version: 2; expected 1: open the file in a current QGroundControl",
+    "mission_version_1.plan": "mission.version: 1; expected 2: open the file in a current",
+    "no_mission.plan": "mission: is missing",
+    "six_params.plan": "mission.items[2].params: an array of 6; expected an array of 7 values",
+    "text_latitude.plan": 'mission.items[2].params[4]: "47.3985"; expected a finite number',
+    "scaled_latitude.plan": "mission.items[2].params[4]: 473985000; expected null or degrees",
+    "jump_to_nowhere.plan": "mission.items[3].params[0]: 9; expected the doJumpId of an item",
+    "fence_of_two_corners.plan": "geoFence.polygons[0].polygon: fence polygon: 2 vertices; exp",
+    "fence_version_1.plan": "geoFence.version: 1; expected 2: open the file in a current",
+    "survey_without_items.plan": "mission.items[2].TransectStyleComplexItem.Items: is missing: "
+    "the survey was saved without its waypoints; open the file in a current QGroundControl",
+    "structure_scan.plan": 'mission.items[2].complexItemType: "StructureScan"; expected simple '
+    "items, survey or CorridorScan: replace the pattern by waypoints, or upload the plan from",
+    "landing_pattern.plan": 'mission.items[2].complexItemType: "fwLandingPattern"; expected simpl',
+    "unknown_item_type.plan": 'mission.items[2].type: "missionItem"; expected "SimpleItem" or',
+    "not_an_object.plan": "an array of 0; expected an object",
+}
+
+
+def outline(mission: Mission) -> list[tuple[int, tuple[float, ...], float]]:
+    # NaN, a yaw that is not set, is in some of the files and 0 in the others.
+    return [
+        (item.command, tuple(0 if math.isnan(p) else p for p in item.params), item.z)
+        for item in mission.items
+    ]
+
+
+def test_every_file_is_accounted_for() -> None:
+    assert sorted(READ | REFUSED) == sorted(path.name for path in FOLDER.iterdir())
+
+
+@pytest.mark.parametrize("name", READ)
+def test_is_read(name: str) -> None:
+    mission = read_mission(FOLDER / name)
+    assert outline(mission) == READ[name]
+    assert (mission.home is None) == (name == "version_120.waypoints")
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_is_refused(name: str) -> None:
+    with pytest.raises(MissionFileError, match=re.escape(REFUSED[name])) as caught:
+        read_mission(FOLDER / name)
+    assert str(caught.value).startswith(f"{FOLDER / name}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_what_else_the_files_tell() -> None:
+    read = read_mission_file(FOLDER / "fence_and_rally.plan")
+    assert (read.autopilot, read.kind) == ("px4", "copter")
+    mission = read.mission
+    assert mission.home == Home(47.397742, 8.545594, 488.2)
+    assert mission.items[2] == MissionItem(
+        16, 3, mission.items[2].params, 47.3985, 8.5461, 30, autocontinue=True
+    )
+    (circle,), (polygon,) = mission.fence.circles, mission.fence.polygons
+    assert (circle.center, circle.radius, circle.inclusion) == ((47.398, 8.546), 25.5, False)
+    assert (len(polygon.vertices), polygon.inclusion) == (4, True)
+    assert polygon.vertices[1] == (47.396, 8.549)
+    assert mission.fence.breach_return is not None
+    assert mission.fence.breach_return.altitude == 50
+    assert [(p.latitude, p.longitude, p.altitude) for p in mission.rally] == [(47.3976, 8.5457, 40)]
+    assert read_mission_file(FOLDER / "plain.waypoints").vehicle is None

@@ -1,0 +1,93 @@
+"""`faao-mission convert`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.mission.formats import read_mission, read_mission_file
+
+MISSIONS = Path(__file__).parent / "data" / "missions"
+
+
+def run(*arguments: object) -> Any:
+    return CliRunner().invoke(app, ["convert", *map(str, arguments)])
+
+
+def test_a_plan_becomes_a_text_file_and_says_what_it_lost(tmp_path: Path) -> None:
+    out = tmp_path / "m.waypoints"
+    result = run(MISSIONS / "fence_and_rally.plan", "--out", out)
+    assert result.exit_code == 0
+    assert result.stdout == f"5 items written to {out}\n"
+    assert result.stderr.splitlines() == [
+        f"faao-mission: {out}: QGC WPL holds no fence: 2 areas left out",
+        f"faao-mission: {out}: QGC WPL holds no rally points: 1 point left out",
+        f"faao-mission: {out}: not set (NaN) becomes 0: item 1 param4, item 3 param4",
+    ]
+    assert [item.command for item in read_mission(out).items] == [22, 178, 16, 177, 20]
+
+
+def test_there_and_back_is_the_same(tmp_path: Path) -> None:
+    first = MISSIONS / "plain.waypoints"
+    plan, last = tmp_path / "m.plan", tmp_path / "m.txt"
+    assert run(first, "--out", plan, "--autopilot", "ardupilot").stderr == ""
+    assert run(plan, "--out", last).stderr == ""
+    assert read_mission(last) == read_mission(plan) == read_mission(first)
+    assert read_mission_file(plan).autopilot == "ardupilot"
+
+
+def test_whom_a_plan_is_for(tmp_path: Path) -> None:
+    out = tmp_path / "m.plan"
+    result = run(MISSIONS / "plain.waypoints", "--out", out)
+    assert result.stderr == (
+        f"faao-mission: {out}: no autopilot is known: the plan is for a generic one\n"
+    )
+    assert run(MISSIONS / "px4.plan", "--out", out).stderr == ""
+    assert read_mission_file(out).autopilot == "px4"
+    result = run(MISSIONS / "px4.plan", "--out", out, "--autopilot", "ardupilot")
+    assert "not set (NaN) becomes 0: item 1 param4, item 3 param4" in result.stderr
+    assert read_mission_file(out).autopilot == "ardupilot"
+
+
+def test_json_is_one_object(tmp_path: Path) -> None:
+    out = tmp_path / "m.kml"
+    result = run(MISSIONS / "px4.plan", "--out", out, "--json")
+    data = json.loads(result.stdout)
+    assert (data["items"], data["written"]) == (5, str(out))
+    assert [f"faao-mission: {out}: {line}" for line in data["lost"]] == result.stderr.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "part"),
+    [
+        ("gap.waypoints", "m.plan", "field index: '3'; expected 2"),
+        ("plain.waypoints", "m.gpx", "'.gpx'; expected a name that ends in .waypoints"),
+        ("plain.waypoints", "absent/m.plan", "there is no directory"),
+        ("absent.waypoints", "m.plan", "cannot be read: No such file"),
+        ("plain.kml", "m.plan", "KML is written for drawing"),
+    ],
+)
+def test_a_refused_conversion_writes_nothing(
+    source: str, target: str, part: str, tmp_path: Path
+) -> None:
+    result = run(MISSIONS / source, "--out", tmp_path / target)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("faao-mission: ")
+    assert part in result.stderr
+    assert result.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_input_is_not_overwritten(tmp_path: Path) -> None:
+    mission = tmp_path / "m.waypoints"
+    mission.write_text((MISSIONS / "plain.waypoints").read_text())
+    (tmp_path / "link.waypoints").symlink_to(mission)
+    before = mission.read_bytes()
+    for out in (mission, tmp_path / "." / "m.waypoints", tmp_path / "link.waypoints"):
+        result = run(mission, "--out", out)
+        assert result.exit_code == 2
+        assert "is the mission to read; give another name" in result.stderr
+    assert mission.read_bytes() == before
