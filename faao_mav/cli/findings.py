@@ -90,7 +90,9 @@ def show(verdict: Verdict, console: Console) -> None:
     else:
         for group in _groups(verdict.findings):
             finding = group[0]
-            where = f"item {_items(group)}: " if finding.item is not None else ""
+            numbers = _items(group)
+            plural = "" if numbers.isdigit() else "s"
+            where = f"item{plural} {numbers}: " if finding.item is not None else ""
             _line(
                 console,
                 f"{finding.level}: {where}{_message(group)} [{finding.rule}]\n"

@@ -165,6 +165,7 @@ def _track(mission: "Mission", vehicle: "Vehicle") -> tuple["Track | None", str]
     )
 
     try:
-        return predict(mission, vehicle), ""
+        track = predict(mission, vehicle)
     except FaaoError as error:
         return None, str(error)
+    return (track, "") if len(track.t) else (None, "there is nothing to fly")

@@ -1,6 +1,8 @@
 """`faao-mission validate`, by itself."""
 
 import json
+import re
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +14,7 @@ import typer
 from judged import TAKEOFF, at, flown, mission, speed, track
 from typer.testing import CliRunner
 
+import faao_mav
 from faao_mav.cli.validate import validate
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.formats import render_mission
@@ -73,6 +76,13 @@ def test_nothing_wrong(run: Run, sound: Path) -> None:
     assert "0 errors, 0 warnings, 0 notes" in result.stdout
 
 
+def test_the_python_names() -> None:
+    found = faao_mav.validate(
+        SOUND, faao_mav.Vehicle("px4"), limits=faao_mav.Limits(max_altitude=20)
+    )
+    assert isinstance(found[0], faao_mav.Finding)
+
+
 def test_errors_fail_and_say_item_rule_and_cure(run: Run, broken: Path) -> None:
     result = run(broken)
     assert result.exit_code == 1
@@ -92,7 +102,7 @@ def test_many_of_a_kind_are_one_line(run: Run, tmp_path: Path) -> None:
     lines = run(path).stdout.splitlines()
     found = [line for line in lines if "[hold-changed]" in line]
     assert len(found) == 1
-    assert "item 2-4, 6: " in found[0]
+    assert "items 2-4, 6: " in found[0]
     assert "(and 3 more like it)" in found[0]
 
 
@@ -188,3 +198,19 @@ def test_a_terminal_gets_tables(broken: Path) -> None:
     assert "refused-on-upload" in shown
     assert "what is the case, and what to do" in shown
     assert "px4-null-island" in shown
+
+
+def test_the_readme_shows_what_is_printed(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    repository = Path(__file__).parents[2]
+    source = repository / "tests" / "data" / "validate" / "crosses-no-fly-circle.plan"
+    shutil.copy(source, tmp_path / "site.plan")
+    monkeypatch.chdir(tmp_path)
+    readme = (repository / "README.md").read_text()
+    found = re.search(r"\$ faao-mission validate (.*)\n((?:.*\n)*?)```", readme)
+    assert found is not None
+    printed = run(*found[1].split()).stdout.splitlines()
+    shown = [line for line in found[2].splitlines() if line != "..."]
+    assert shown
+    assert [line for line in shown if line not in printed] == []
