@@ -169,7 +169,7 @@ def _fence_circle(case: Case) -> Iterator[Issue]:
     radius = parameters.FENCE_RADIUS.of(case.vehicle)
     if _fence_on(case, _CIRCLE) and case.home is not None:
         for place in case.places:
-            distance = math.hypot(place.east, place.north)
+            distance = place.from_origin
             if distance > radius:
                 yield Issue(
                     place.index,

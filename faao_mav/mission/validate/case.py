@@ -42,6 +42,11 @@ class Place:
     north: float
     up: float
 
+    @property
+    def from_origin(self) -> float:
+        """Metres over ground from the origin of the frame, which is home if there is one."""
+        return math.hypot(self.east, self.north)
+
 
 @dataclass(frozen=True, slots=True)
 class Leg:

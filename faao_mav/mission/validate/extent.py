@@ -1,6 +1,5 @@
 """How high, how far and how long the mission goes."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -115,11 +114,11 @@ def _beyond(case: Case) -> Iterator[Issue]:
     limit = case.limits.max_distance
     if limit is None or case.home is None:
         return
-    far = [place for place in case.places if math.hypot(place.east, place.north) > limit]
+    far = [place for place in case.places if place.from_origin > limit]
     for place in far:
         yield Issue(
             place.index,
-            f"{math.hypot(place.east, place.north):.0f} m from home; the limit is {limit:g} m",
+            f"{place.from_origin:.0f} m from home; the limit is {limit:g} m",
             "move the item nearer, or raise --max-distance",
         )
     positions = case.track_positions
@@ -142,7 +141,7 @@ def _far(case: Case) -> Iterator[Issue]:
     if case.home is None or case.limits.max_distance is not None:
         return
     for place in case.places:
-        distance = math.hypot(place.east, place.north)
+        distance = place.from_origin
         if distance > FAR:
             yield Issue(
                 place.index,

@@ -180,7 +180,7 @@ def _first_far(case: Case) -> Iterator[Issue]:
     limit = parameters.PX4_FIRST_DISTANCE.of(case.vehicle)
     if case.home is not None and case.places and limit > 0:
         first = case.places[0]
-        distance = math.hypot(first.east, first.north)
+        distance = first.from_origin
         if distance >= limit:
             yield Issue(
                 first.index,
@@ -228,7 +228,7 @@ def _max_horizontal(case: Case) -> Iterator[Issue]:
     limit = parameters.PX4_MAX_HORIZONTAL.of(case.vehicle)
     if limit > 0 and case.home is not None:
         for place in case.places:
-            distance = math.hypot(place.east, place.north)
+            distance = place.from_origin
             if distance > limit:
                 yield Issue(
                     place.index,

@@ -168,7 +168,7 @@ def _takeoff_elsewhere(case: Case) -> Iterator[Issue]:
         return
     radius = parameters.acceptance_radius(case.vehicle).of(case.vehicle)
     for place in case.places:
-        distance = math.hypot(place.east, place.north)
+        distance = place.from_origin
         if case.items[place.index].command == Command.NAV_TAKEOFF and distance > radius:
             yield Issue(
                 place.index,
