@@ -16,14 +16,20 @@ if TYPE_CHECKING:
     from faao_mav.mission import Mission, MissionItem, to_mission
     from faao_mav.mission.formats import read_mission, render_mission
     from faao_mav.mission.parameter_file import read_parameters, render_parameters
+    from faao_mav.mission.validate import Finding, Limits, LinkCheck, validate
+    from faao_mav.mission.vehicle import Vehicle
     from faao_mav.plan import Plan, parse_plan, read_plan
 
 _HOMES = {
     "FaaoError": "errors",
+    "Finding": "mission.validate",
+    "Limits": "mission.validate",
+    "LinkCheck": "mission.validate",
     "Mission": "mission",
     "MissionItem": "mission",
     "Plan": "plan",
     "Solution": "faao.solution",
+    "Vehicle": "mission.vehicle",
     "load_solution": "faao.solution",
     "optimize": "faao.optimize",
     "parse_plan": "plan",
@@ -36,14 +42,19 @@ _HOMES = {
     "saturation": "faao.pricing",
     "save_solution": "faao.solution",
     "to_mission": "mission",
+    "validate": "mission.validate",
 }
 
 __all__ = [
     "FaaoError",
+    "Finding",
+    "Limits",
+    "LinkCheck",
     "Mission",
     "MissionItem",
     "Plan",
     "Solution",
+    "Vehicle",
     "load_solution",
     "optimize",
     "parse_plan",
@@ -56,6 +67,7 @@ __all__ = [
     "saturation",
     "save_solution",
     "to_mission",
+    "validate",
 ]
 
 

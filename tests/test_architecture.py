@@ -65,6 +65,8 @@ def test_every_public_name_can_be_had() -> None:
         ("import faao_mav.cli.main", {"numpy", "cvxpy", "pyproj", "pydantic", "rich.progress"}),
         ("import faao_mav.plan", {"scipy", "cvxpy", "pyproj", "pymavlink"}),
         ("import faao_mav.radio.mutual_information, faao_mav.radio.precoder", {"scipy", "cvxpy"}),
+        ("import faao_mav.mission.validate", {"scipy", "cvxpy", "pyproj", "pymavlink", "shapely"}),
+        ("import faao_mav.cli.validate", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
         ("import faao_mav.mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
     ],
 )  # fmt: skip

@@ -1,0 +1,84 @@
+"""Any mission can be judged, for any vehicle."""
+
+import math
+
+import hypothesis.strategies as st
+from hypothesis import given, settings
+from judged import HOME, VEHICLES, having, track
+
+from faao_mav.mission.command import Command
+from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.validate import Limits, validate
+
+odd = st.sampled_from([0.0, -0.0, math.nan, 1e-320, 1e300, -1e300, -1.0, 1.0, 2.7, 255.5, 65_536.0])
+values = st.one_of(odd, st.floats(-200, 200), st.floats(allow_infinity=False))
+commands = st.one_of(st.sampled_from([*Command]), st.integers(0, 65_535))
+latitudes = st.one_of(odd, st.floats(-90, 90), st.floats(-35.4, -35.3))
+longitudes = st.one_of(odd, st.floats(-180, 180), st.floats(149.1, 149.2))
+items = st.builds(
+    MissionItem,
+    command=commands,
+    frame=st.one_of(st.sampled_from([0, 2, 3, 5, 6, 10, 11]), st.integers(0, 255)),
+    params=st.tuples(values, values, values, values),
+    x=latitudes,
+    y=longitudes,
+    z=values,
+    autocontinue=st.booleans(),
+)
+places = st.one_of(
+    st.tuples(st.floats(-90, 90), st.floats(-180, 180)),
+    st.tuples(st.floats(-35.4, -35.3), st.floats(149.1, 149.2)),
+)
+homes = st.one_of(
+    st.none(),
+    st.just(HOME),
+    st.builds(Home, st.floats(-90, 90), st.floats(-180, 180), st.floats(-500, 9_000)),
+)
+fences = st.builds(
+    Fence,
+    polygons=st.lists(
+        st.builds(Polygon, st.lists(places, min_size=3, max_size=6).map(tuple), st.booleans()),
+        max_size=3,
+    ).map(tuple),
+    circles=st.lists(
+        st.builds(Circle, places, st.floats(1e-3, 1e7), st.booleans()), max_size=3
+    ).map(tuple),
+    breach_return=st.one_of(st.none(), places.map(lambda place: RallyPoint(*place, 50.0))),
+)
+missions = st.builds(
+    Mission,
+    items=st.lists(items, max_size=12).map(tuple),
+    home=homes,
+    fence=st.one_of(st.just(Fence()), fences),
+    rally=st.lists(places.map(lambda place: RallyPoint(*place, 50.0)), max_size=2).map(tuple),
+)
+ZEROS = ("WPNAV_SPEED", "WPNAV_ACCEL", "WPNAV_JERK", "MPC_ACC_HOR", "MPC_JERK_AUTO", "NAV_ACC_RAD")
+STRICT = {
+    "ARMING_MIS_ITEMS": 127.0,
+    "FENCE_ENABLE": 1.0,
+    "FENCE_TYPE": 15.0,
+    "MIS_TKO_LAND_REQ": 3.0,
+    "GF_MAX_HOR_DIST": 10.0,
+    "GF_MAX_VER_DIST": 10.0,
+}
+
+
+@given(mission=missions, bare=st.booleans())
+@settings(max_examples=300)
+def test_any_mission_can_be_judged(mission: Mission, bare: bool) -> None:
+    for vehicle in VEHICLES:
+        judged = vehicle if bare else having(vehicle, **dict.fromkeys(ZEROS, 0.0), **STRICT)
+        limits = None if bare else Limits(60.0, 500.0, 50.0, 5.0, 2.0)
+        for finding in validate(mission, judged, limits=limits):
+            assert finding.item is None or 1 <= finding.item <= len(mission.items)
+
+
+@given(mission=missions.filter(lambda mission: len(mission.items) >= 2))
+@settings(max_examples=50)
+def test_any_mission_can_be_judged_with_a_flight(mission: Mission) -> None:
+    flight = track(((0, 0, 0), (0, 0, 30), (0, 90, 30)), [0, 1], 5.0)
+    for vehicle in VEHICLES:
+        limits = Limits(1.0, 50.0, 20.0, 5.0, 2.0)
+        for finding in validate(mission, vehicle, track=flight, limits=limits):
+            assert finding.item is None or 1 <= finding.item <= len(mission.items)

@@ -1,0 +1,123 @@
+"""Fences in the plane, against plain distances."""
+
+import math
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given
+from judged import (
+    COPTER,
+    FRAME,
+    PX4,
+    Given,
+    at,
+    circle,
+    do,
+    fence,
+    flown,
+    having,
+    mission,
+    polygon,
+    square,
+    track,
+)
+
+from faao_mav.mission.command import Command
+from faao_mav.mission.validate.area import areas_of, free_area
+from faao_mav.mission.validate.case import Case
+
+metres = st.floats(-500, 500)
+places = st.tuples(metres, metres)
+
+
+def distance_to_segment(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    along = b - a
+    if not along.any():
+        return math.dist(point, a)
+    share = np.clip((point - a) @ along / (along @ along), 0, 1)
+    return math.dist(point, a + share * along)
+
+
+def broken(case: Case) -> list[bool]:
+    return case.fence.broken_legs.any.tolist()
+
+
+@given(a=places, b=places, center=places, radius=st.floats(1, 300))
+def test_a_leg_enters_a_circle_when_it_comes_nearer_than_the_radius(
+    a: tuple[float, float], b: tuple[float, float], center: tuple[float, float], radius: float
+) -> None:
+    case = Case(mission(at(*a, 30), at(*b, 30), fence=fence(circle(*center, radius))), COPTER)
+    nearest = distance_to_segment(np.array(center), np.array(a), np.array(b))
+    spare = nearest - radius
+    if abs(spare) > 1e-3 * radius:
+        assert broken(case)[1] == (spare < 0)
+
+
+@given(a=places, b=places, center=places, radius=st.floats(1, 1000))
+def test_a_leg_stays_in_a_circle_when_its_ends_do(
+    a: tuple[float, float], b: tuple[float, float], center: tuple[float, float], radius: float
+) -> None:
+    inside = circle(*center, radius, inclusion=True)
+    case = Case(mission(at(*a, 30), at(*b, 30), fence=fence(inside)), COPTER)
+    spare = radius - max(math.dist(center, a), math.dist(center, b))
+    if abs(spare) > 1e-3 * radius:
+        assert broken(case)[1] == (spare < 0)
+
+
+def test_circles_err_on_the_safe_side() -> None:
+    inclusion, exclusion = areas_of(
+        fence(circle(0, 0, 100, inclusion=True), circle(0, 0, 100)), FRAME
+    )
+    assert inclusion.shape.area < math.pi * 100**2 < exclusion.shape.area
+    assert inclusion.shape.area == pytest.approx(exclusion.shape.area, rel=1e-3)
+
+
+@pytest.mark.parametrize("spare", [3.0, 25.0, 40.0])
+def test_the_margin_is_the_distance_to_the_nearest_edge(spare: float) -> None:
+    inside = Given(flown(at(0, 100 - spare, 30), fence=fence(square(200))))
+    around = Given(flown(at(0, 100, 30), fence=fence(circle(50 + spare, 50, 50))))
+    for given_ in (inside, around):
+        (margin,) = given_.by("fence-margin")
+        assert float(margin.message.split(" m ")[0]) == pytest.approx(spare, abs=0.06)
+
+
+def test_the_flight_counts_for_the_margin() -> None:
+    bulge = track(((0, 0, 0), (60, 50, 30), (0, 100, 30)), [0, 1], 5.0)
+    given_ = Given(flown(at(0, 100, 30), fence=fence(square(300))), track=bulge)
+    assert given_.by("fence-margin")[0].message.startswith("50.0 m")
+    closer = Given(given_.mission, track=track(((0, 0, 0), (120, 50, 30)), [1], 5.0))
+    (margin,) = closer.by("fence-margin")
+    assert margin.message.startswith("30.0 m")
+    assert margin.item == 2
+
+
+def test_legs_by_jumps_count() -> None:
+    around = [at(-90, 60, 30), at(-90, 0, 30), at(90, 0, 30), at(90, 60, 30), at(0, -60, 30)]
+    back = do(Command.DO_JUMP, 2, 1)
+    found = Given(flown(*around, back, fence=fence(circle(-22, -30, 10)))).by("fence-leg")
+    assert [finding.item for finding in found] == [7]
+    assert "by DO_JUMP" in found[0].message
+
+
+def test_one_inclusion_is_enough_for_px4_only() -> None:
+    two = fence(square(100), square(100, east=80))
+    case = Case(flown(at(90, 0, 30), fence=two), PX4)
+    assert not any(broken(case))
+    assert any(broken(Case(case.mission, COPTER)))
+    assert not any(broken(Case(case.mission, having(COPTER, FENCE_OPTIONS=2))))
+    apart = fence(square(100), square(100, east=180))
+    between = Given(flown(at(180, 0, 30), fence=apart), PX4).by("fence-leg")
+    assert "80.0 m of it outside all inclusions" in between[0].message
+
+
+def test_a_bow_tie_keeps_both_halves() -> None:
+    (area,) = areas_of(fence(polygon((0, 0), (100, 100), (100, 0), (0, 100))), FRAME)
+    assert area.crosses_itself
+    assert area.shape.area == pytest.approx(5000, rel=1e-3)
+
+
+def test_a_polygon_without_an_area_lets_nothing_in() -> None:
+    areas = areas_of(fence(polygon((0, 0), (50, 50), (100, 100))), FRAME)
+    assert free_area(areas, any_inclusion=False).area < 1e-6
+    assert free_area((), any_inclusion=False) is None

@@ -1,0 +1,216 @@
+"""`faao-mission validate`, by itself."""
+
+import json
+import re
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import typer
+from judged import TAKEOFF, at, flown, mission, speed, track
+from typer.testing import CliRunner
+
+import faao_mav
+from faao_mav.cli.validate import validate
+from faao_mav.errors import InfeasibleError
+from faao_mav.mission.formats import render_mission
+from faao_mav.mission.item import Mission
+from faao_mav.mission.validate import RULES
+from faao_mav.mission.vehicle import Vehicle
+
+Run = Callable[..., Any]
+
+SOUND = flown(speed(8), at(0, 100, 30, 6), at(100, 150, 30), at(200, 160, 30, 10))
+LEVEL = track(((0, 0, 0), (0, 0, 30), (0, 100, 30)), [0, 2], 8.0)
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run the command with a prediction that is always the same, or none."""
+    app = typer.Typer()
+    app.command()(validate)
+
+    def runner(*arguments: object, predicted: bool = False) -> Any:
+        def predict(mission: Mission, vehicle: Vehicle) -> object:
+            if predicted:
+                return LEVEL
+            raise InfeasibleError(f"no model of {len(mission.items)} items for {vehicle.autopilot}")
+
+        fake = SimpleNamespace(predict=predict)
+        monkeypatch.setitem(sys.modules, "faao_mav.mission.flight.predict", fake)
+        return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+    return runner
+
+
+def written(path: Path, content: Mission, vehicle: Vehicle | None = None) -> Path:
+    path.write_text(render_mission(content, path, vehicle))
+    return path
+
+
+@pytest.fixture
+def sound(tmp_path: Path) -> Path:
+    return written(tmp_path / "sound.waypoints", SOUND)
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> Path:
+    """A warning and nothing worse."""
+    return written(tmp_path / "slow.waypoints", flown(speed(0), at(0, 200, 30)))
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> Path:
+    return written(tmp_path / "broken.waypoints", flown(at(0, 9, 9, frame=1)))
+
+
+def test_nothing_wrong(run: Run, sound: Path) -> None:
+    result = run(sound)
+    assert result.exit_code == 0
+    assert "sound.waypoints: 6 items, for ArduPilot and a copter (by default" in result.stdout
+    assert "flight not predicted: no model of 6 items for ardupilot" in result.stdout
+    assert "0 errors, 0 warnings, 0 notes" in result.stdout
+
+
+def test_the_python_names() -> None:
+    found = faao_mav.validate(
+        SOUND, faao_mav.Vehicle("px4"), limits=faao_mav.Limits(max_altitude=20)
+    )
+    assert isinstance(found[0], faao_mav.Finding)
+
+
+def test_errors_fail_and_say_item_rule_and_cure(run: Run, broken: Path) -> None:
+    result = run(broken)
+    assert result.exit_code == 1
+    assert "error: item 2: " in result.stdout
+    assert "[refused-on-upload]" in result.stdout
+    assert "to do: give one of 0, 2, 3" in result.stdout
+
+
+def test_warnings_fail_only_when_strict(run: Run, slow: Path) -> None:
+    assert run(slow).exit_code == 0
+    assert run(slow, "--strict").exit_code == 1
+
+
+def test_many_of_a_kind_are_one_line(run: Run, tmp_path: Path) -> None:
+    items = [at(0, 50 * k, 30, 2.5) for k in (1, 2, 3, 5)]
+    path = written(tmp_path / "half.waypoints", mission(TAKEOFF, *items[:3], speed(5), items[3]))
+    lines = run(path).stdout.splitlines()
+    found = [line for line in lines if "[hold-changed]" in line]
+    assert len(found) == 1
+    assert "items 2-4, 6: " in found[0]
+    assert "(and 3 more like it)" in found[0]
+
+
+def test_json_is_for_programs(run: Run, broken: Path) -> None:
+    result = run(broken, "--json", predicted=True)
+    assert result.exit_code == 1
+    answer = json.loads(result.stdout)
+    assert (answer["autopilot"], answer["type"], answer["items"]) == ("ardupilot", "copter", 3)
+    assert answer["errors"] == 1
+    assert answer["predicted"]["duration"] == pytest.approx(float(LEVEL.t[-1]))
+    finding = answer["findings"][0]
+    assert (finding["level"], finding["rule"], finding["item"]) == ("error", "refused-on-upload", 2)
+    assert finding["message"]
+    assert finding["action"]
+
+
+def test_who_flies_it(run: Run, tmp_path: Path) -> None:
+    plan = written(tmp_path / "px4.plan", SOUND, Vehicle("px4", "copter"))
+    assert "for PX4 and a copter (as the file says)" in run(plan).stdout
+    asked = run(plan, "--autopilot", "ardupilot", "--type", "plane").stdout
+    assert "for ArduPilot and a plane (as asked)" in asked
+    assert run(plan, "--autopilot", "betaflight").exit_code == 2
+    assert run(plan, "--type", "boat").exit_code == 2
+
+
+def test_parameters_come_from_a_file(run: Run, sound: Path, tmp_path: Path) -> None:
+    parameters = tmp_path / "my.param"
+    parameters.write_text("ARMING_MIS_ITEMS,1\n")
+    result = run(sound, "--parameters", parameters, "--json")
+    rules = [finding["rule"] for finding in json.loads(result.stdout)["findings"]]
+    assert rules == ["ardupilot-required-item"]
+    assert run(sound, "--parameters", tmp_path / "none.param").exit_code == 2
+
+
+def test_limits(run: Run, sound: Path) -> None:
+    result = run(
+        *(sound, "--max-altitude", 20, "--max-distance", 150, "--max-duration", 30, "--json")
+    )
+    rules = {finding["rule"] for finding in json.loads(result.stdout)["findings"]}
+    assert rules == {"above-ceiling", "beyond-distance", "too-long"}
+    assert run(sound, "--max-altitude", -5).exit_code == 2
+
+
+def test_the_predicted_flight_counts(run: Run, sound: Path) -> None:
+    result = run(sound, "--max-duration", 17, predicted=True)
+    assert "predicted flight: 16 s" in result.stdout
+    assert result.exit_code == 0
+    assert run(sound, "--max-duration", 16, predicted=True).exit_code == 1
+
+
+def test_a_plan_tells_vehicle_and_top_speed(run: Run, sound: Path, tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "missions" / "copter_relay.yaml").read_text()
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(text.replace("max_speed: 8", "max_speed: 7"))
+    assert plan.read_text() != text
+    result = run(sound, "--plan", plan, "--json")
+    assert [finding["rule"] for finding in json.loads(result.stdout)["findings"]] == [
+        "speed-above-limit"
+    ]
+    assert "(as the plan says)" in run(sound, "--plan", plan).stdout
+
+
+def test_what_cannot_be_read(run: Run, tmp_path: Path) -> None:
+    missing = run(tmp_path / "none.waypoints")
+    assert missing.exit_code == 2
+    assert "none.waypoints" in missing.stderr
+    assert missing.stdout == ""
+    assert run().exit_code == 2
+
+
+def test_rules_are_listed(run: Run) -> None:
+    text = run("--rules")
+    assert text.exit_code == 0
+    assert len(text.stdout.splitlines()) == len(RULES)
+    listed = json.loads(run("--rules", "--json").stdout)["rules"]
+    assert [rule["id"] for rule in listed] == [rule.id for rule in RULES]
+    assert {"level", "summary", "source", "autopilot", "type"} <= listed[0].keys()
+
+
+def test_a_terminal_gets_tables(broken: Path) -> None:
+    from rich.console import Console
+
+    from faao_mav.cli.findings import Verdict, show, show_rules
+    from faao_mav.mission.formats import read_mission
+    from faao_mav.mission.validate import validate as findings_of
+
+    content = read_mission(broken)
+    found = findings_of(content, Vehicle())
+    console = Console(force_terminal=True, width=100, record=True, file=sys.stderr)
+    show(Verdict(broken, 3, Vehicle(), "asked", LEVEL, "", found), console)
+    show_rules(RULES, console)
+    shown = console.export_text()
+    assert "refused-on-upload" in shown
+    assert "what is the case, and what to do" in shown
+    assert "px4-null-island" in shown
+
+
+def test_the_readme_shows_what_is_printed(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    repository = Path(__file__).parents[2]
+    source = repository / "tests" / "data" / "validate" / "crosses-no-fly-circle.plan"
+    shutil.copy(source, tmp_path / "site.plan")
+    monkeypatch.chdir(tmp_path)
+    readme = (repository / "README.md").read_text()
+    found = re.search(r"\$ faao-mission validate (.*)\n((?:.*\n)*?)```", readme)
+    assert found is not None
+    printed = run(*found[1].split()).stdout.splitlines()
+    shown = [line for line in found[2].splitlines() if line != "..."]
+    assert shown
+    assert [line for line in shown if line not in printed] == []

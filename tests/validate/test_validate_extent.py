@@ -1,0 +1,94 @@
+"""How high, how far, how long."""
+
+import pytest
+from judged import COPTER, LAND, PX4, Given, at, check, flown, having, track
+
+from faao_mav.mission.flight.track import Track
+from faao_mav.mission.validate import Limits
+
+
+def flight(*points: tuple[float, float, float]) -> Track:
+    return track(points, range(len(points) - 1), 5.0)
+
+
+# the rule, what it speaks about, the item that it names, what it lets pass
+CASES = [
+    ("below-home", Given(flown(at(0, 9, 0))), 2, Given(flown(at(0, 9, 0.1), LAND))),
+    (
+        "above-ceiling",
+        Given(flown(at(0, 9, 50.1)), limits=Limits(max_altitude=50)),
+        2,
+        Given(flown(at(0, 9, 50)), limits=Limits(max_altitude=50)),
+    ),
+    (
+        "above-ceiling",
+        Given(
+            flown(at(0, 9, 50)),
+            track=flight((0, 0, 0), (0, 0, 51.1)),
+            limits=Limits(max_altitude=50),
+        ),
+        1,
+        Given(
+            flown(at(0, 9, 50)),
+            track=flight((0, 0, 0), (0, 0, 50.9)),
+            limits=Limits(max_altitude=50),
+        ),
+    ),
+    ("above-120-m", Given(flown(at(0, 9, 121))), 2, Given(flown(at(0, 9, 120)))),
+    (
+        "return-above-ceiling",
+        Given(flown(), limits=Limits(max_altitude=14.9)),
+        None,
+        Given(flown(), limits=Limits(max_altitude=15)),
+    ),
+    (
+        "return-above-ceiling",
+        Given(flown(), PX4, limits=Limits(max_altitude=59)),
+        None,
+        Given(flown(), PX4, limits=Limits(max_altitude=60)),
+    ),
+    (
+        "return-above-ceiling",
+        Given(flown(), having(COPTER, RTL_ALT=6000), limits=Limits(max_altitude=59)),
+        None,
+        Given(flown(), having(COPTER, RTL_ALT=5900), limits=Limits(max_altitude=59)),
+    ),
+    (
+        "beyond-distance",
+        Given(flown(at(0, 100.1, 30)), limits=Limits(max_distance=100)),
+        2,
+        Given(flown(at(0, 99.9, 30)), limits=Limits(max_distance=100)),
+    ),
+    (
+        "beyond-distance",
+        Given(flown(), track=flight((0, 0, 0), (0, 101.1, 9)), limits=Limits(max_distance=100)),
+        1,
+        Given(flown(), track=flight((0, 0, 0), (0, 100.9, 9)), limits=Limits(max_distance=100)),
+    ),
+    ("far-from-home", Given(flown(at(0, 10_001, 30))), 2, Given(flown(at(0, 9_999, 30)))),
+    (
+        "long-leg",
+        Given(flown(at(0, -5_001, 30), at(0, 5_000, 30))),
+        3,
+        Given(flown(at(0, -4_999, 30), at(0, 5_000, 30))),
+    ),
+    (
+        "too-long",
+        Given(flown(at(0, 100, 30, 10)), limits=Limits(max_duration=41.9)),
+        None,
+        Given(flown(at(0, 100, 30, 10)), limits=Limits(max_duration=42.1)),
+    ),
+    (
+        "too-long",
+        Given(flown(), track=flight((0, 0, 0), (0, 50, 0)), limits=Limits(max_duration=9.8)),
+        None,
+        Given(flown(), track=flight((0, 0, 0), (0, 50, 0)), limits=Limits(max_duration=10.2)),
+    ),
+]
+
+
+@pytest.mark.parametrize(("rule", "trips", "item", "passes"), CASES)
+def test_the_rule_speaks_and_is_silent(
+    rule: str, trips: Given, item: int | None, passes: Given
+) -> None:
+    check(rule, trips, item, passes)

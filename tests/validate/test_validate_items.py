@@ -1,0 +1,67 @@
+"""Items and their order."""
+
+import math
+
+import pytest
+from judged import LAND, PX4, RTL, TAKEOFF, Given, at, check, do, flown, mission, speed
+
+from faao_mav.mission.command import Command
+
+NAN = math.nan
+JUMP, START = Command.DO_JUMP, Command.DO_LAND_START
+
+# the rule, what it speaks about, the item that it names, what it lets pass
+CASES = [
+    ("empty", Given(mission()), None, Given(mission(TAKEOFF))),
+    ("no-home", Given(mission(TAKEOFF, home=None)), None, Given(mission(TAKEOFF))),
+    ("unreachable", Given(flown(at(0, 9, 9), RTL, at(0, 9, 9))), 4, Given(flown(at(0, 9, 9)))),
+    (
+        "unreachable",
+        Given(mission(TAKEOFF, LAND, RTL)),
+        3,
+        Given(mission(TAKEOFF, LAND, TAKEOFF, LAND)),
+    ),
+    (
+        "unreachable",
+        Given(flown(at(0, 9, 9, command=17))),
+        3,
+        Given(mission(TAKEOFF, RTL, do(START), LAND)),
+    ),
+    (
+        "unreachable",
+        Given(mission(do(JUMP, 1, 1), RTL, LAND)),
+        3,
+        Given(mission(do(JUMP, 3, 1), RTL, LAND)),
+    ),
+    ("no-ending", Given(mission(TAKEOFF, at(0, 9, 9))), 2, Given(flown(at(0, 9, 9)))),
+    ("mixed-heights", Given(flown(at(0, 9, 600, frame=0))), 2, Given(flown(at(0, 9, 9, frame=6)))),
+    ("jump-target", Given(flown(do(JUMP, 4, 1))), 2, Given(flown(do(JUMP, 3, 1)))),
+    ("jump-target", Given(flown(do(JUMP, 0, 1))), 2, Given(flown(do(JUMP, 1, 1)))),
+    ("jump-target", Given(flown(do(JUMP, NAN, 1)), PX4), 2, Given(flown(do(JUMP, 1, 1)), PX4)),
+    (
+        "jump-forever",
+        Given(flown(at(0, 9, 9), do(JUMP, 2, -1))),
+        3,
+        Given(flown(at(0, 9, 9), do(JUMP, 2, 0))),
+    ),
+    (
+        "jump-in-place",
+        Given(flown(speed(5), do(JUMP, 2, 3))),
+        3,
+        Given(flown(at(0, 9, 9), do(JUMP, 2, 3))),
+    ),
+    ("jump-in-place", Given(flown(do(JUMP, 2, 3))), 2, Given(flown(do(JUMP, 3, 3)))),
+    (
+        "same-place",
+        Given(flown(at(0, 9, 9), at(0, 9.049, 9))),
+        3,
+        Given(flown(at(0, 9, 9), at(0, 9.051, 9))),
+    ),
+]
+
+
+@pytest.mark.parametrize(("rule", "trips", "item", "passes"), CASES)
+def test_the_rule_speaks_and_is_silent(
+    rule: str, trips: Given, item: int | None, passes: Given
+) -> None:
+    check(rule, trips, item, passes)
