@@ -20,7 +20,8 @@ FLOORS = {
     "plan": 2,
     "faao": 3,
     "mission": 4,
-    "cli": 5,
+    "mavlink": 5,
+    "cli": 6,
 }
 
 

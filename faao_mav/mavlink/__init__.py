@@ -1,0 +1,1 @@
+"""The wire: missions to and from vehicles, and a mock autopilot."""
