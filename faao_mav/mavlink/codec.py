@@ -140,9 +140,13 @@ class Codec:
             kind = _PLAIN[name]
             message = kind(*(_clean(getattr(found, field.name)) for field in fields(kind)))
         elif name in _IDENTIFIED:
-            identified = _IDENTIFIED[name]
-            plain = (getattr(found, field.name) for field in fields(identified)[:-1])
-            message = identified(*plain, _opaque_id(found))
+            message = _IDENTIFIED[name](
+                found.target_system,
+                found.target_component,
+                found.count if name == "MISSION_COUNT" else found.type,
+                found.mission_type,
+                _opaque_id(found),
+            )
         elif name in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
             message = MissionRequestInt(
                 found.target_system,

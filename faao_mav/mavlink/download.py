@@ -14,14 +14,14 @@ from faao_mav.mavlink.messages import (
     Row,
 )
 from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.transfer import Outcome, Peer, Status, Texts, Timeouts
+from faao_mav.mavlink.transfer import Outcome, Pace, Peer, Status, Texts, Timeouts
 
 
 class Download:
     """A machine that downloads a list, one row at a time, and acknowledges it.
 
-    A row is asked for again after `Timeouts.item`, then ever less often: on a slow link the answer
-    is under way. After `Timeouts.silence`, or an error (which may be about a duplicate, and makes
+    A row is asked for again after `Timeouts.item`, or later on a link that is known to be slow.
+    After `Timeouts.silence`, or an error (which may be about a duplicate, and makes
     PX4 forget the transfer), it begins anew, `Timeouts.attempts` times. UNSUPPORTED changes to
     MISSION_REQUEST, once.
     """
@@ -42,7 +42,8 @@ class Download:
         self._rows: list[Row] = []
         self._count = 0
         self._opaque_id = 0
-        self._due = self._wait = self._heard = 0.0
+        self._pace = Pace(self._timeouts)
+        self._due = self._heard = 0.0
         self._left = 0
         self._refusal: int | None = None
 
@@ -97,7 +98,7 @@ class Download:
             return self._ask_list(now)
         if now - self._heard >= self._timeouts.silence:
             return self._again(now)
-        self._wait = min(2 * self._wait, self._timeouts.response)
+        self._pace.repeat()
         return self._ask_row(now)
 
     def _on_count(self, count: int, opaque_id: int, now: float) -> Sequence[Message]:
@@ -111,6 +112,7 @@ class Download:
         if self._phase != "items" or seq != len(self._rows):
             return ()
         self._rows.append(row)
+        self._pace.answer(now)
         return self._next(now)
 
     def _on_ack(self, result: int, now: float) -> Sequence[Message]:
@@ -131,8 +133,9 @@ class Download:
 
     def _next(self, now: float) -> Sequence[Message]:
         self._refusal = None
-        self._heard, self._wait = now, self._timeouts.item
+        self._heard = now
         if len(self._rows) < self._count:
+            self._pace.ask(now)
             return self._ask_row(now)
         self._end("accepted")
         return [self._peer.ack(Result.ACCEPTED, self._type)]
@@ -149,7 +152,7 @@ class Download:
         return [MissionRequestList(vehicle.system, vehicle.component, self._type)]
 
     def _ask_row(self, now: float) -> Sequence[Message]:
-        self._due = now + self._wait
+        self._due = now + self._pace.wait
         vehicle, seq = self._peer.vehicle, len(self._rows)
         target = (vehicle.system, vehicle.component)
         return [MissionRequestInt(*target, seq, self._type, self._legacy)]

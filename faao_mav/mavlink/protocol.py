@@ -129,5 +129,8 @@ class Address:
         return system in (0, self.system) and component in (0, self.component)
 
 
+NOBODY = Address(0, 0)
+"""No sender has this address."""
+
 GROUND_STATION = Address(255, 190)
 """MAV_COMP_ID_MISSIONPLANNER of the system that ground stations use by custom."""

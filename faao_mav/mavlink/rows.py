@@ -190,7 +190,10 @@ def _settled(item: MissionItem, index: int, firmware: Firmware) -> MissionItem:
 
 
 def row_of(item: MissionItem, index: int, *, current: bool = False) -> Row:
-    """Return `item`, number `index` of its list, as a row; raises `InputError` if it does not fit."""
+    """Return `item`, number `index` of its list, as a row.
+
+    Raises `InputError` for numbers that the wire does not carry.
+    """
     scale = coordinate_scale(item.frame)
     x, y = (0 if math.isnan(value) else round(value * scale) for value in (item.x, item.y))
     if max(abs(x), abs(y)) > _INT32:

@@ -66,7 +66,8 @@ def upload_parts(
 
     A transfer that the link broke is begun again, and one whose last answer was lost or whose
     list reads back differently too, at most `Timeouts.attempts` times and not if it reads back
-    the same again. A refusal is final.
+    the same again. A refusal is final,
+    except an ERROR, which may be about something else.
     """
     reports: list[PartReport] = []
     for part, rows in parts:
@@ -143,8 +144,9 @@ def _upload_part(
                 return replace(report, verdict="cancelled")
             elif sent.status == "accepted":
                 report = replace(report, verdict="unread", said=read.said)
-        final = report.verified or report.verdict == "refused" or _by_us(sent)
-        if final or (last is not None and report.differences and _alike(report, last)):
+        # PX4 says ERROR when busy, and of packets that come late or twice: that may pass.
+        refused = report.verdict == "refused" and report.result != Result.ERROR
+        if report.verified or refused or _by_us(sent) or _alike(report, last):
             return report
         last = report
     assert last is not None
@@ -169,8 +171,8 @@ def _by_us(outcome: Outcome) -> bool:
     return outcome.status == "cancelled" and outcome.result is None
 
 
-def _alike(one: PartReport, other: PartReport) -> bool:
-    return one.differences == other.differences
+def _alike(one: PartReport, other: PartReport | None) -> bool:
+    return other is not None and bool(one.differences) and one.differences == other.differences
 
 
 def _home_rows(part: MissionType, peer: Peer) -> int:

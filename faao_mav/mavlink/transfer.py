@@ -114,6 +114,44 @@ class Machine(Protocol[T_co]):
         ...
 
 
+class Pace:
+    """When to ask again: twice the time that answers take, and slower the longer none comes.
+
+    An answer to a repeated question does not tell how long answers take (Karn's rule): the next
+    question starts as slowly as the last one ended.
+    """
+
+    def __init__(self, timeouts: Timeouts) -> None:
+        self._timeouts = timeouts
+        self._round_trip: float | None = None
+        self._asked = 0.0
+        self._repeated = False
+        self.wait = timeouts.item
+
+    def ask(self, now: float) -> None:
+        """Note a new question."""
+        self._asked, self._repeated = now, False
+
+    def repeat(self) -> None:
+        """Note that it is asked again."""
+        self._repeated = True
+        known = self._round_trip is not None
+        slowest = 2 * self._least() if known else self._timeouts.response
+        self.wait = min(1.5 * self.wait, slowest)
+
+    def answer(self, now: float) -> None:
+        """Note its answer."""
+        if not self._repeated:
+            took = now - self._asked
+            old = took if self._round_trip is None else self._round_trip
+            self._round_trip = 0.75 * old + 0.25 * took
+            self.wait = self._least()
+
+    def _least(self) -> float:
+        longest = self._timeouts.response
+        return min(max(self._timeouts.item, 2 * (self._round_trip or 0.0)), longest)
+
+
 class Texts:
     """The last things that the vehicle said in plain words."""
 

@@ -15,11 +15,11 @@ from faao_mav.mavlink.messages import (
     Row,
 )
 from faao_mav.mavlink.protocol import MissionType, Result, State
-from faao_mav.mavlink.transfer import Outcome, Peer, Status, Texts, Timeouts
+from faao_mav.mavlink.transfer import Outcome, Pace, Peer, Status, Texts, Timeouts
 
 
 class Upload:
-    """A machine that uploads `rows`; the vehicle leads, and is never hurried along.
+    """A machine that uploads `rows`; the vehicle leads.
 
     - Any row below the count is sent whenever it is asked for, by either request, as
       MISSION_ITEM_INT.
@@ -29,6 +29,9 @@ class Upload:
     - When everything was sent and no answer comes, PX4 is sent the last item again, which it
       acknowledges again. ArduPilot would say ERROR: the outcome is "unknown", and reading back
       must tell.
+    - ArduPilot asks again only after 1 s, so an item (but not the last) is sent again before. If
+      it answers INVALID_SEQUENCE it has that item, and its next request was lost: then the next
+      item is sent.
     - NO_SPACE from an ArduPilot that is still booting means "not yet".
 
     Raises `InputError` without rows: an empty list is what `Clear` is for.
@@ -50,8 +53,11 @@ class Upload:
         self._phase: Literal["count", "items", "booting"] = "count"
         self._due = 0.0
         self._left = 0
-        self._asked: set[int] = set()
-        self._last: int | None = None
+        self._sent: set[int] = set()
+        self._heard = 0.0
+        self._pace = Pace(self._timeouts)
+        self._repeated = False
+        self._last = 0
         self._booting = False
         self._doubt: int | None = None
 
@@ -62,12 +68,12 @@ class Upload:
 
     @property
     def progress(self) -> tuple[str, int, int]:
-        """Rows asked for, of all."""
-        return f"uploading {self._type.title}", len(self._asked), len(self._rows)
+        """Rows sent, of all."""
+        return f"uploading {self._type.title}", len(self._sent), len(self._rows)
 
     def start(self, now: float) -> Sequence[Message]:
         """Announce the rows."""
-        self._phase, self._asked, self._doubt = "count", set(), None
+        self._phase, self._sent, self._doubt = "count", set(), None
         self._left = self._timeouts.retries
         return self._announce(now)
 
@@ -89,7 +95,7 @@ class Upload:
             case MissionRequestInt(seq=seq) if self._peer.said(envelope, self._type):
                 return self._on_request(seq, now)
             case MissionAck() as ack if self._peer.said(envelope, self._type):
-                self._on_ack(ack, now)
+                return self._on_ack(ack, now)
         return ()
 
     def tick(self, now: float) -> Sequence[Message]:
@@ -113,21 +119,33 @@ class Upload:
     def _on_request(self, seq: int, now: float) -> Sequence[Message]:
         if seq >= len(self._rows):
             return ()
-        self._phase = "items"
-        self._asked.add(seq)
-        self._last, self._doubt = seq, None
+        if seq == self._last + 1:
+            self._pace.answer(now)
+        self._phase, self._heard, self._doubt = "items", now, None
         self._left = self._timeouts.retries
-        self._due = now + (self._patience() if self._complete() else self._timeouts.silence)
+        return self._send(seq, now)
+
+    def _send(self, seq: int, now: float) -> Sequence[Message]:
+        self._last = seq
+        self._sent.add(seq)
+        self._repeated = False
+        self._pace.ask(now)
+        if self._complete():
+            self._due = now + self._patience()
+        elif self._repeats():
+            self._due = now + self._pace.wait
+        else:
+            self._due = self._heard + self._timeouts.silence
         return [self._item(seq)]
 
-    def _on_ack(self, ack: MissionAck, now: float) -> None:
+    def _on_ack(self, ack: MissionAck, now: float) -> Sequence[Message]:
         result = ack.type
         if result == Result.ACCEPTED:
             # Before the last row was asked for it can only be about something else.
             if self._complete():
                 self._end("accepted", result, ack.opaque_id)
         elif result == Result.INVALID_SEQUENCE and self._peer.firmware != "px4":
-            pass
+            return self._on_out_of_turn(now)
         elif result == Result.ERROR:
             self._doubt = result
             if self._phase == "items":
@@ -139,8 +157,20 @@ class Upload:
             self._end("cancelled", result)
         else:
             self._end("refused", result)
+        return ()
+
+    def _on_out_of_turn(self, now: float) -> Sequence[Message]:
+        if not self._repeated or self._last + 2 >= len(self._rows):
+            return ()
+        self._heard = now
+        return self._send(self._last + 1, now)
 
     def _tick_items(self, now: float) -> Sequence[Message]:
+        quiet = now - self._heard >= self._timeouts.silence
+        if not self._complete() and self._repeats() and not quiet and self._doubt is None:
+            self._pace.repeat()
+            self._due, self._repeated = now + self._pace.wait, True
+            return [self._item(self._last)]
         if not self._complete():
             self._end("silent" if self._doubt is None else "refused", self._doubt)
             return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
@@ -152,7 +182,10 @@ class Upload:
         return ()
 
     def _complete(self) -> bool:
-        return len(self._asked) == len(self._rows)
+        return len(self._sent) == len(self._rows)
+
+    def _repeats(self) -> bool:
+        return self._peer.firmware == "ardupilot" and self._last != len(self._rows) - 1
 
     def _patience(self) -> float:
         """Return how long to wait for the last answer: ArduPilot asks again after 1 s or more."""
@@ -169,4 +202,5 @@ class Upload:
 
     def _end(self, status: Status, result: int | None = None, opaque_id: int = 0) -> None:
         said = self._texts.all()
-        self.outcome = Outcome(status, result, self._last, (), said, opaque_id)
+        last = self._last if self._sent else None
+        self.outcome = Outcome(status, result, last, (), said, opaque_id)

@@ -34,6 +34,7 @@ from faao_mav.mavlink.protocol import ARMED, Address, Autopilot, MissionType, St
 from faao_mav.mavlink.rows import mission_of
 from faao_mav.mission.flight import Track
 from faao_mav.mission.item import Home, Mission
+from faao_mav.mission.vehicle import Autopilot as Family
 from faao_mav.mission.vehicle import Vehicle
 
 Fly: TypeAlias = Callable[[Mission], Track]
@@ -87,7 +88,7 @@ class MockAutopilot:
     ) -> None:
         self.manners = manners or Manners()
         self.address, self.home = address, home
-        autopilot = "ardupilot" if self.manners.kind == "ardupilot" else "px4"
+        autopilot: Family = "ardupilot" if self.manners.kind == "ardupilot" else "px4"
         self._modes = Modes(autopilot)
         self.lists = Lists(Vehicle(autopilot), home)
         self.parameters = Parameters(autopilot)

@@ -17,7 +17,7 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock.lists import Lists
 from faao_mav.mavlink.mock.manners import COUNT, Manners, check_row
-from faao_mav.mavlink.protocol import ALL_TYPES, Address, MissionType, Result
+from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
 
 _CRITICAL = 2
 _INFO = 6
@@ -28,7 +28,7 @@ class _Transfer:
     """The one transfer that there is, or the last that there was (state "idle")."""
 
     state: Literal["idle", "receiving", "sending"] = "idle"
-    partner: Address = Address(0, 0)
+    partner: Address = NOBODY
     part: MissionType = MissionType.MISSION
     next: int = 0
     count: int = 0
@@ -97,7 +97,7 @@ class Px4Server:
             transfer.heard = now
             return [self._ask(now)]
         if transfer.state != "idle":
-            if sender == transfer.partner:
+            if transfer.state == "receiving":
                 transfer.heard = now
             return [_ack(sender, Result.ERROR, kind), _said("WPM: IGN MISSION_COUNT: Busy")]
         if kind not in tuple(MissionType):
