@@ -12,6 +12,7 @@ from faao_mav.cli.options import AsJson, Component, Log, SigningKey, System, Wai
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
     from faao_mav.mavlink.session import PartReport
+    from faao_mav.mavlink.verify import Difference
 
 
 def upload(
@@ -68,8 +69,7 @@ def as_text(report: "UploadReport") -> str:
     lines = [f"vehicle      {report.vehicle}"]
     lines += [_part_line(part) for part in report.parts if part.verified]
     for part in report.parts:
-        dropped = [str(each) for each in part.differences if each.kind == "dropped"]
-        lines += [f"not kept     {text}" for text in dropped]
+        lines += [f"not kept     {text}" for text in _dropped(part)]
     lines += [f"failed       {problem}" for problem in report.problems]
     if report.verified:
         lines.append(f"verified     read back and compared, {report.seconds:.1f} s")
@@ -111,6 +111,18 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
             for part in report.parts
         ],
     }
+
+
+def _dropped(part: "PartReport") -> list[str]:
+    """Return what storage lost, one line for each field."""
+    lost: dict[str, list[Difference]] = {}
+    for each in part.differences:
+        if each.kind == "dropped":
+            lost.setdefault(each.field, []).append(each)
+    return [
+        str(each[0]) + (f" (and so in {len(each) - 1} more items)" if len(each) > 1 else "")
+        for each in lost.values()
+    ]
 
 
 def _part_line(part: "PartReport") -> str:

@@ -138,7 +138,9 @@ class Download:
             self._pace.ask(now)
             return self._ask_row(now)
         self._end("accepted")
-        return [self._peer.ack(Result.ACCEPTED, self._type)]
+        # Twice for PX4: until it hears this, nobody else can begin a transfer for 5 s.
+        times = 2 if self._peer.firmware == "px4" else 1
+        return [self._peer.ack(Result.ACCEPTED, self._type)] * times
 
     def _again(self, now: float) -> Sequence[Message]:
         if self._attempts == 0:

@@ -23,7 +23,7 @@ RALLY_POINT: Final = 5100
 
 GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
 _INT32 = 2**31 - 1
-_FLOAT32 = 3.4028234e38
+_FLOAT32 = 2.0**128 - 2.0**104  # the largest single-precision number
 
 
 def coordinate_scale(frame: int) -> float:

@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass, replace
 
 from faao_mav.mavlink.rows import CIRCLE, FENCE_RETURN_POINT, GLOBAL_FRAMES, POLYGON, RALLY_POINT
+from faao_mav.mission.command import Frame
 from faao_mav.mission.item import MissionItem, Params
 from faao_mav.mission.vehicle import Vehicle
 
@@ -86,10 +87,9 @@ def _ardupilot(item: MissionItem, vehicle: Vehicle) -> MissionItem:
     if item.command == RALLY_POINT:
         return replace(item, z=float(math.trunc(item.z)))
     kept = kept_by(item.command, vehicle)
-    if kept is None:
-        return replace(item, frame=_plain_frame(item.frame), autocontinue=True)
-    params = _reduced(item.params, kept)
-    if not kept.place:
+    params = item.params if kept is None else _reduced(item.params, kept)
+    placed = item.frame != Frame.MISSION if kept is None else kept.place
+    if not placed:
         return MissionItem(item.command, 0, params)
     place = (_number(item.x), _number(item.y), math.trunc(round(item.z * 100, 3)) / 100)
     return MissionItem(item.command, _plain_frame(item.frame), params, *place)

@@ -19,7 +19,8 @@ Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "cancell
 class Timeouts:
     """How long a transfer waits, s.
 
-    `response`, `item` and `retries` are the guide's: what to re-send, when, how often. `silence`
+    `response`, `item` and `retries` are the guide's: what to re-send, when, how often; on a link
+    that is known to be quick, items are re-sent after `quickest` at the earliest. `silence`
     is how long a vehicle may say nothing in the middle of a transfer before it has given up
     itself: PX4 asks again for 5 s, ArduPilot for 8 s, so that six lost packets in a row end
     nothing. `attempts` is how often a whole transfer is begun.
@@ -27,6 +28,7 @@ class Timeouts:
 
     response: float = 1.5
     item: float = 0.25
+    quickest: float = 0.05
     retries: int = 5
     silence: float = 9.0
     boot: float = 60.0
@@ -115,15 +117,17 @@ class Machine(Protocol[T_co]):
 
 
 class Pace:
-    """When to ask again: twice the time that answers take, and slower the longer none comes.
+    """When to ask again: as TCP does it (RFC 6298), from how long answers take.
 
-    An answer to a repeated question does not tell how long answers take (Karn's rule): the next
-    question starts as slowly as the last one ended.
+    Before the first answer that is `Timeouts.item`; after it, mean and four deviations of the
+    time that answers take, at least `Timeouts.quickest`. An answer to a repeated question tells
+    nothing (Karn's rule): the next question starts as slowly as the last one ended.
     """
 
     def __init__(self, timeouts: Timeouts) -> None:
         self._timeouts = timeouts
-        self._round_trip: float | None = None
+        self._mean: float | None = None
+        self._deviation = 0.0
         self._asked = 0.0
         self._repeated = False
         self.wait = timeouts.item
@@ -135,21 +139,26 @@ class Pace:
     def repeat(self) -> None:
         """Note that it is asked again."""
         self._repeated = True
-        known = self._round_trip is not None
-        slowest = 2 * self._least() if known else self._timeouts.response
-        self.wait = min(1.5 * self.wait, slowest)
+        slowest = self._timeouts.response
+        if self._mean is not None:
+            slowest = min(max(2 * self._timeouts.item, 2 * self._least()), slowest)
+        self.wait = min(2 * self.wait, slowest)
 
     def answer(self, now: float) -> None:
         """Note its answer."""
-        if not self._repeated:
-            took = now - self._asked
-            old = took if self._round_trip is None else self._round_trip
-            self._round_trip = 0.75 * old + 0.25 * took
-            self.wait = self._least()
+        if self._repeated:
+            return
+        took = now - self._asked
+        if self._mean is None:
+            self._mean, self._deviation = took, took / 2
+        else:
+            self._deviation += (abs(took - self._mean) - self._deviation) / 4
+            self._mean += (took - self._mean) / 8
+        self.wait = self._least()
 
     def _least(self) -> float:
-        longest = self._timeouts.response
-        return min(max(self._timeouts.item, 2 * (self._round_trip or 0.0)), longest)
+        least = (self._mean or 0.0) + 4 * self._deviation
+        return min(max(least, self._timeouts.quickest), self._timeouts.response)
 
 
 class Texts:

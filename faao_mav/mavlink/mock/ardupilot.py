@@ -119,12 +119,12 @@ class ArduPilotServer:
         if count > limit:
             text = Statustext(_WARNING, f"Only {limit} items are supported")
             return [_ack(sender, Result.NO_SPACE, part), text]
-        if part is not MissionType.FENCE:
-            self._lists.truncate(part, count)
         if count == 0:
             self._lists.clear(part)
             self._uploads.pop(part, None)
             return [_ack(sender, Result.ACCEPTED, part)]
+        if part is not MissionType.FENCE:
+            self._lists.truncate(part, count)
         return self._begin(sender, part, 0, count - 1, now)
 
     def _on_partial(

@@ -4,6 +4,7 @@ Sources: `MissionItemProtocol` of ArduPilot, `mavlink_mission` of PX4 (behaviour
 both did in their simulators.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
@@ -68,7 +69,9 @@ def check_row(row: Row, mission_type: int, kind: MockKind) -> Result:
     if mission_type == MissionType.FENCE:
         return _check_fence_row(row, kind)
     if mission_type == MissionType.RALLY:
-        return Result.ACCEPTED if row.command == RALLY_POINT else Result.UNSUPPORTED
+        if row.command != RALLY_POINT:
+            return Result.UNSUPPORTED
+        return Result.INVALID_PARAM7 if math.isnan(row.z) else _check_place(row)
     if kind == "ardupilot":
         return _check_ardupilot(row)
     return _check_px4(row)
@@ -82,8 +85,10 @@ def _check_ardupilot(row: Row) -> Result:
     if row.command in _FENCE_COMMANDS or row.command == RALLY_POINT:
         return Result.UNSUPPORTED
     for number, value in enumerate(row.params):
-        if value != value or abs(value) == float("inf"):
+        if not math.isfinite(value):
             return Result(Result.INVALID_PARAM1 + number)
+    if not math.isfinite(row.z):
+        return Result.INVALID_PARAM7
     return _check_place(row)
 
 
