@@ -93,7 +93,8 @@ def upload(
         script = Script(upload_parts(parts, peer, vehicle.kind, options.timeouts))
         reports = link.run(script, observe)
         seconds = time.monotonic() - started
-    return UploadReport(vehicle, reports, seconds, _problems(reports, vehicle, peer, mission))
+        problems = _problems(reports, vehicle, peer, mission, link.lacks_key)
+    return UploadReport(vehicle, reports, seconds, problems)
 
 
 def download(
@@ -158,7 +159,7 @@ def clear(
         script = Script(clear_lists(types, peer, options.timeouts))
         reports = link.run(script, observe)
         seconds = time.monotonic() - started
-    problems = _problems(reports, vehicle, peer, Mission(()))
+        problems = _problems(reports, vehicle, peer, Mission(()), link.lacks_key)
     return UploadReport(vehicle, reports, seconds, problems)
 
 
@@ -187,7 +188,11 @@ def _check_disarmed(vehicle: FoundVehicle, connection: str, allow_armed: bool) -
 
 
 def _problems(
-    reports: Sequence[PartReport], vehicle: FoundVehicle, peer: Peer, mission: Mission
+    reports: Sequence[PartReport],
+    vehicle: FoundVehicle,
+    peer: Peer,
+    mission: Mission,
+    lacks_key: bool,
 ) -> tuple[str, ...]:
     limit = 0
     if peer.firmware != "generic":
@@ -201,7 +206,10 @@ def _problems(
         return f"item {item} (command {mission.items[item].command})"
 
     failed = [report for report in reports if not report.verified]
-    return tuple(
+    problems = [
         explain(report, peer, limit, describe if report.part is MissionType.MISSION else str)
         for report in failed
-    )
+    ]
+    if lacks_key and any(report.verdict == "silent" for report in failed):
+        problems.append("the vehicle signs its packets, and may want them signed: --signing-key")
+    return tuple(problems)

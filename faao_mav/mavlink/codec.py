@@ -71,7 +71,8 @@ class Codec:
     """One end of a link: writes packets as `address`, reads those of others.
 
     With `key` (32 bytes) packets are signed, and unsigned or wrongly signed ones are passed over.
-    `clock` gives seconds since 1970, for signatures.
+    `clock` gives seconds since 1970, for signatures. `lacks_key` says that others sign, and that
+    there is no key here.
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class Codec:
         from pymavlink.dialects.v20 import common
 
         self.address, self._clock = address, clock
+        self.lacks_key = False
         self._dialect: Any = common
         self._mav: Any = common.MAVLink(None, address.system, address.component)
         self._mav.robust_parsing = True
@@ -101,12 +103,11 @@ class Codec:
         return packet
 
     def parse(self, data: bytes) -> list[Packet]:
-        """Return the packets completed by `data`; what is damaged or foreign is passed over."""
-        return [
-            Packet(bytes(found.get_msgbuf()), self._envelope(found))
-            for found in self._mav.parse_buffer(data) or []
-            if found.get_type() != "BAD_DATA"
-        ]
+        """Return the packets completed by `data`; what is damaged is passed over."""
+        found = [m for m in self._mav.parse_buffer(data) or [] if m.get_type() != "BAD_DATA"]
+        if self._mav.signing.secret_key is None and self._mav.signing.sig_count:
+            self.lacks_key = True
+        return [Packet(bytes(m.get_msgbuf()), self._envelope(m)) for m in found]
 
     def _encode(self, message: Message) -> bytes:
         mav, dialect = self._mav, self._dialect

@@ -62,6 +62,11 @@ class Link:
         if self._log is not None:
             self._log.close()
 
+    @property
+    def lacks_key(self) -> bool:
+        """Whether others on the link sign their packets, and this end has no key."""
+        return self._codec.lacks_key
+
     def run(self, machine: Machine[T], observe: Observe | None = None) -> T:
         """Run `machine` to its end and return the outcome.
 

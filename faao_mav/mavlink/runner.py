@@ -96,14 +96,14 @@ def serve(
 @contextmanager
 def running(
     mock: MockAutopilot,
-    connection: str,
+    connection: str | Transport,
     *,
     faults: Faults | None = None,
     key: bytes | None = None,
 ) -> Iterator[MockAutopilot]:
     """Run `mock` at `connection` in the background for as long as the `with` block lasts."""
     ended = threading.Event()
-    transport = open_transport(connection)
+    transport = open_transport(connection) if isinstance(connection, str) else connection
     thread = threading.Thread(
         target=serve,
         args=(mock, transport),

@@ -213,6 +213,7 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
                 text += f", at {describe(report.item - home)}"
     if report.said:
         text += f". The vehicle says: {'; '.join(report.said)}"
-    if peer.firmware == "ardupilot" and report.verdict in ("silent", "cancelled", "refused"):
+    begun = report.item is not None and report.verdict in ("silent", "cancelled", "refused")
+    if peer.firmware == "ardupilot" and begun:
         text += ". ArduPilot may now hold old and new items mixed: upload again before flying"
     return text

@@ -169,19 +169,24 @@ class _Tcp:
         try:
             data = self._socket.recv(_MAX_DATAGRAM)
         except OSError as error:
-            raise LinkError(f"{self._name}: {error.strerror or error}") from None
+            raise self._broken(error) from None
         if not data:
-            raise LinkError(f"{self._name}: the other side closed the connection")
+            raise self._broken(None)
         return [data]
 
     def write(self, data: bytes) -> None:
         try:
             self._socket.sendall(data)
         except OSError as error:
-            raise LinkError(f"{self._name}: {error.strerror or error}") from None
+            raise self._broken(error) from None
 
     def close(self) -> None:
         self._socket.close()
+
+    def _broken(self, error: OSError | None) -> LinkError:
+        if error is None or isinstance(error, ConnectionError):
+            return LinkError(f"{self._name}: the other side closed the connection")
+        return LinkError(f"{self._name}: {error.strerror or error}")
 
 
 class _TcpServer:

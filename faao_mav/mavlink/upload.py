@@ -17,6 +17,8 @@ from faao_mav.mavlink.messages import (
 from faao_mav.mavlink.protocol import MissionType, Result, State
 from faao_mav.mavlink.transfer import Outcome, Pace, Peer, Status, Texts, Timeouts
 
+_REASONS = 0.3  # s: a vehicle that refuses says why a little later
+
 
 class Upload:
     """A machine that uploads `rows`; the vehicle leads.
@@ -50,7 +52,7 @@ class Upload:
         self._rows, self._peer, self._type = tuple(rows), peer, mission_type
         self._timeouts = timeouts or Timeouts()
         self._texts = Texts(peer.vehicle)
-        self._phase: Literal["count", "items", "booting"] = "count"
+        self._phase: Literal["count", "items", "booting", "refused"] = "count"
         self._due = 0.0
         self._left = 0
         self._sent: set[int] = set()
@@ -89,6 +91,8 @@ class Upload:
         if self.outcome is not None:
             return ()
         self._texts.note(envelope)
+        if self._phase == "refused":
+            return ()
         match envelope.message:
             case Heartbeat() as heartbeat if envelope.sender == self._peer.vehicle:
                 return self._on_heartbeat(heartbeat, now)
@@ -104,7 +108,7 @@ class Upload:
             return ()
         if self._phase == "items":
             return self._tick_items(now)
-        if self._phase == "booting" or self._left == 0:
+        if self._phase in ("booting", "refused") or self._left == 0:
             self._end("silent" if self._doubt is None else "refused", self._doubt)
             return ()
         self._left -= 1
@@ -156,7 +160,8 @@ class Upload:
         elif result == Result.OPERATION_CANCELLED:
             self._end("cancelled", result)
         else:
-            self._end("refused", result)
+            self._phase, self._doubt = "refused", result
+            self._due = now + _REASONS
         return ()
 
     def _on_out_of_turn(self, now: float) -> Sequence[Message]:

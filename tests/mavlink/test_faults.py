@@ -130,7 +130,7 @@ def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way():
             client,
             Station(mock, VEHICLE),
             Faults(lost=(Lost(MISSION_ACK, 1),)),
-            heard=lambda envelope, now, heard=heard: heard.append(envelope.message),
+            heard=lambda *told, heard=heard: heard.append(told[0].message),
         )
         assert upload.outcome.status == ("accepted" if kind == "px4" else "unknown")
         acks = [message for message in heard if isinstance(message, MissionAck)]

@@ -175,8 +175,10 @@ def test_a_refusal_is_final_at_any_moment(firmware, result, requests):
     desk = desk_for(firmware)
     for seq in range(requests):
         desk.tell(request(seq))
-    desk.tell(Statustext(4, "because"))
     desk.tell(ack(result))
+    desk.tell(Statustext(4, "because"))
+    assert desk.tell(request(0)) == []
+    desk.wait(0.5)
     outcome = desk.machine.outcome
     assert (outcome.status, outcome.result, outcome.said) == ("refused", result, ("because",))
     assert outcome.item == (requests - 1 if requests else None)
@@ -224,6 +226,7 @@ def test_no_space_while_booting_means_not_yet():
     desk.tell(Heartbeat(2, 3, 0, 0, 2))
     assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(1, 1, 3, 0)]
     desk.tell(ack(Result.NO_SPACE))
+    desk.wait(0.5)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
         "refused",
         Result.NO_SPACE,

@@ -69,7 +69,7 @@ class MockAutopilot:
 
     It boots for `boot` seconds, in which it refuses lists. Armed and set to the mission it flies
     what it holds, `speedup` times as fast as predicted, reports its position `rate` times a
-    second, and disarms where the flight ends on the ground.
+    second, and disarms where the flight ends on the ground. Heartbeats are `beat` seconds apart.
     """
 
     outcome: None = None
@@ -84,6 +84,7 @@ class MockAutopilot:
         fly: Fly | None = None,
         speedup: float = 1.0,
         rate: float = 4.0,
+        beat: float = 1.0,
         boot: float = 0.0,
     ) -> None:
         self.manners = manners or Manners()
@@ -99,6 +100,7 @@ class MockAutopilot:
         )
         self._fly, self._speedup = fly, speedup
         self._period = 1 / rate if rate > 0 else None
+        self._beat = beat
         self._boot = boot
         self._booted = self._ready_at = self._now = 0.0
         self._next_beat = self._next_report = 0.0
@@ -146,7 +148,7 @@ class MockAutopilot:
         if self._flight is not None:
             out += self._follow(self._flight, now)
         if now >= self._next_beat:
-            self._next_beat = now + 1.0
+            self._next_beat = now + self._beat
             out += [self._heartbeat(), self._mission_current()]
         if self._period is not None and now >= self._next_report:
             self._next_report = now + self._period
