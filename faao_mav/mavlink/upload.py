@@ -31,9 +31,9 @@ class Upload:
     - When everything was sent and no answer comes, PX4 is sent the last item again, which it
       acknowledges again. ArduPilot would say ERROR: the outcome is "unknown", and reading back
       must tell.
-    - ArduPilot asks again only after 1 s, so an item (but not the last) is sent again before. If
-      it answers INVALID_SEQUENCE it has that item, and its next request was lost: then the next
-      item is sent.
+    - PX4 asks again after 0.25 s, ArduPilot after 1 s. An item (but not the last) is sent again
+      before that, which both bear. If ArduPilot answers INVALID_SEQUENCE it has that item, and
+      its next request was lost: then the next item is sent.
     - NO_SPACE from an ArduPilot that is still booting means "not yet".
 
     Raises `InputError` without rows: an empty list is what `Clear` is for.
@@ -190,7 +190,7 @@ class Upload:
         return len(self._sent) == len(self._rows)
 
     def _repeats(self) -> bool:
-        return self._peer.firmware == "ardupilot" and self._last != len(self._rows) - 1
+        return self._peer.firmware != "generic" and self._last != len(self._rows) - 1
 
     def _patience(self) -> float:
         """Return how long to wait for the last answer: ArduPilot asks again after 1 s or more."""

@@ -49,7 +49,7 @@ def found_places(items: list[SdkItem]) -> list[tuple[int, int, int, float]]:
 def flown(request: pytest.FixtureRequest) -> Iterator[tuple[MockAutopilot, MissionRaw]]:
     kind: MockKind = request.param
     port = free_port()
-    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, beat=0.1, speedup=100.0)
+    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, beat=0.1, speedup=40.0)
     sdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     try:
         sdk.add_any_connection(f"udpin://127.0.0.1:{port}")

@@ -115,7 +115,7 @@ class MockAutopilot:
         if self._period is not None:
             due.append(self._next_report)
         if self._flight is not None:
-            due.append(max(self._flight.end, self._now))
+            due.append(self._flight.next_event)
         if self._server.deadline is not None:
             due.append(self._server.deadline)
         return min(due)
@@ -264,7 +264,10 @@ class MockAutopilot:
 
     def _follow(self, flight: Flight, now: float) -> list[Message]:
         out = flight.reached(now, self._first_number())
-        self._current = flight.at(now).item + self._first_number()
+        current = flight.at(now).item + self._first_number()
+        if current != self._current:
+            self._current = current
+            out.append(self._mission_current())
         if now >= flight.end and flight.lands:
             self._flight, self._armed = None, False
             out.append(Statustext(_INFO, "Landed, disarming"))

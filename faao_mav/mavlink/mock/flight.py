@@ -49,6 +49,13 @@ class Flight:
         return self._started + float(self._track.t[-1]) / self._speedup
 
     @property
+    def next_event(self) -> float:
+        """When the next item is reached, or the track ends."""
+        if not self._pending:
+            return self.end
+        return min(self._started + self._pending[0][0] / self._speedup, self.end)
+
+    @property
     def lands(self) -> bool:
         """Whether it ends on the ground."""
         return bool(self._track.position[-1, 2] < _GROUND)
@@ -68,7 +75,8 @@ class Flight:
     def reached(self, now: float, first: int) -> list[Message]:
         """Return what has been reached since the last call; `first` is the first item's number."""
         time = (now - self._started) * self._speedup
-        due = [number for when, number in self._pending if when <= time]
+        # A little early rather than a tick late: the clock was asked for exactly this time.
+        due = [number for when, number in self._pending if when <= time + 1e-6]
         self._pending = self._pending[len(due) :]
         return [MissionItemReached(number + first) for number in due]
 
