@@ -27,9 +27,9 @@ def fly(mission: Mission) -> Track:
             items.append(index)
     legs = [np.linalg.norm(b - a) / SPEED for a, b in pairwise(points)]
     times = np.concatenate([[0.0], np.cumsum(legs)])
-    t = np.arange(0.0, times[-1] + 0.1, 0.1).clip(max=times[-1])
+    t = np.linspace(0.0, times[-1], int(times[-1] * 10) + 2)
     position = np.column_stack([np.interp(t, times, np.array(points)[:, k]) for k in range(3)])
-    velocity = np.gradient(position, t + 1e-9 * np.arange(t.size), axis=0)
+    velocity = np.gradient(position, t, axis=0)
     following = np.searchsorted(times[1:], t, side="left").clip(max=len(legs) - 1)
     reached = np.full(len(mission.items), math.nan)
     for index, time in zip(items[1:], times[1:], strict=True):

@@ -44,10 +44,11 @@ def test_a_mission_there_and_back(kind, loss, port):
     mission = a_mission(8)
     faults = Faults(loss=loss, latency=0.0, seed=3)
     with running(mock_of(kind), f"udpin:127.0.0.1:{port}", faults=faults) as mock:
-        report = upload(mission, f"udpout:127.0.0.1:{port}", system=1)
+        connection, timeouts = f"udpout:127.0.0.1:{port}", Timeouts(response=0.4)
+        report = upload(mission, connection, system=1, timeouts=timeouts)
         assert report.verified, report.problems
         assert places(mock.lists.rows(MISSION)) == places(rows_of(mission, MISSION, kind))
-        found = download(f"udpout:127.0.0.1:{port}", system=1)
+        found = download(connection, system=1, timeouts=timeouts)
     assert places(rows_of(found, MISSION, kind)) == places(rows_of(mission, MISSION, kind))
     assert found.home == HOME
 

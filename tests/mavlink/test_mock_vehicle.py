@@ -191,6 +191,16 @@ def test_what_ground_stations_ask_for(kind):
 
 
 @BOTH
+@pytest.mark.parametrize("number", [176, 224, 300, 400, 511, 512, 520, 16, 0, 65_535])
+def test_no_command_brings_it_down(kind, number):
+    nan, inf = float("nan"), float("inf")
+    for value in (nan, inf, -1.0, 1e30):
+        desk = desk_for(kind, a_mission(3))
+        desk.tell(command(number, *[value] * 7))
+        assert only(desk.wait(2.0), Heartbeat)
+
+
+@BOTH
 def test_parameters(kind):
     desk = desk_for(kind)
     values = desk.tell(ParamRequestList(*TO))

@@ -27,7 +27,7 @@ from faao_mav.mavlink.mock.feasible import infeasible
 from faao_mav.mavlink.mock.flight import Flight, Posture, telemetry
 from faao_mav.mavlink.mock.lists import Lists
 from faao_mav.mavlink.mock.manners import Manners
-from faao_mav.mavlink.mock.modes import Modes
+from faao_mav.mavlink.mock.modes import Modes, whole
 from faao_mav.mavlink.mock.parameters import Parameters
 from faao_mav.mavlink.mock.px4 import Px4Server
 from faao_mav.mavlink.protocol import ARMED, Address, Autopilot, MissionType, State
@@ -201,12 +201,12 @@ class MockAutopilot:
             case Cmd.SET_MODE:
                 result = self._set_mode(self._modes.of_command(command), now)
             case Cmd.SET_CURRENT:
-                found = self._set_current(int(command.param1))
+                found = self._set_current(whole(command.param1))
                 result = ACCEPTED if found else DENIED
                 answers += found
             case Cmd.REQUEST_MESSAGE | Cmd.REQUEST_CAPABILITIES as asked:
                 by_number = asked == Cmd.REQUEST_MESSAGE
-                kind = int(command.param1) if by_number else _AUTOPILOT_VERSION
+                kind = whole(command.param1) if by_number else _AUTOPILOT_VERSION
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
             case Cmd.SET_INTERVAL:

@@ -95,14 +95,19 @@ def telemetry(posture: Posture, home: Home, since_boot: float) -> list[Message]:
             round(longitude * 1e7),
             round((home.altitude + up) * 1000),
             round(up * 1000),
-            round(100 * v_north),
-            round(100 * v_east),
-            round(-100 * v_up),
+            _int16(100 * v_north),
+            _int16(100 * v_east),
+            _int16(-100 * v_up),
             round(math.degrees(heading) % 360 * 100) % 36_000,
         ),
         LocalPositionNed(milliseconds, north, east, -up, v_north, v_east, -v_up),
         Attitude(milliseconds, 0.0, 0.0, heading, 0.0, 0.0, 0.0),
     ]
+
+
+def _int16(value: float) -> int:
+    """What the field holds: 300 m/s and more, flown many times as fast, are cut."""
+    return round(min(max(value, -32_767.0), 32_767.0))
 
 
 def _geodetic(home: Home, east: float, north: float) -> tuple[float, float]:

@@ -1,5 +1,7 @@
 """Flight modes, as far as they start a mission."""
 
+import math
+
 from faao_mav.mavlink.messages import CommandLong
 from faao_mav.mission.vehicle import Autopilot
 
@@ -39,12 +41,19 @@ class Modes:
     def of_command(self, command: CommandLong) -> int:
         """Return the custom mode that DO_SET_MODE asks for."""
         if self.autopilot == "ardupilot":
-            return int(command.param2)
-        return _px4_mode(int(command.param2), int(command.param3))
+            return max(whole(command.param2), 0)
+        return _px4_mode(whole(command.param2), whole(command.param3))
 
     def _mission_mode(self) -> int:
         return _COPTER_AUTO if self.autopilot == "ardupilot" else _px4_mode(_PX4_AUTO, _PX4_MISSION)
 
 
+def whole(param: float) -> int:
+    """Return a command's parameter as a number of something, -1 if it is not set."""
+    return int(param) if math.isfinite(param) else -1
+
+
 def _px4_mode(main: int, sub: int) -> int:
+    if not (0 <= main < 256 and 0 <= sub < 256):
+        return 0
     return main << 16 | sub << 24
