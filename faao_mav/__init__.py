@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from faao_mav.faao.optimize import optimize
     from faao_mav.faao.pricing import price, saturation
     from faao_mav.faao.solution import Solution, load_solution, save_solution
+    from faao_mav.mavlink import download, upload
     from faao_mav.mission import Mission, MissionItem, to_mission
     from faao_mav.mission.formats import read_mission, render_mission
     from faao_mav.plan import Plan, parse_plan, read_plan
@@ -23,6 +24,7 @@ _HOMES = {
     "MissionItem": "mission",
     "Plan": "plan",
     "Solution": "faao.solution",
+    "download": "mavlink",
     "load_solution": "faao.solution",
     "optimize": "faao.optimize",
     "parse_plan": "plan",
@@ -33,6 +35,7 @@ _HOMES = {
     "saturation": "faao.pricing",
     "save_solution": "faao.solution",
     "to_mission": "mission",
+    "upload": "mavlink",
 }
 
 __all__ = [
@@ -41,6 +44,7 @@ __all__ = [
     "MissionItem",
     "Plan",
     "Solution",
+    "download",
     "load_solution",
     "optimize",
     "parse_plan",
@@ -51,6 +55,7 @@ __all__ = [
     "saturation",
     "save_solution",
     "to_mission",
+    "upload",
 ]
 
 

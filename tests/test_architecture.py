@@ -66,6 +66,9 @@ def test_every_public_name_can_be_had() -> None:
         ("import faao_mav.cli.main", {"numpy", "cvxpy", "pyproj", "pydantic", "rich.progress"}),
         ("import faao_mav.plan", {"scipy", "cvxpy", "pyproj", "pymavlink"}),
         ("import faao_mav.radio.mutual_information, faao_mav.radio.precoder", {"scipy", "cvxpy"}),
+        ("import faao_mav.mavlink.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
+        ("import faao_mav.cli.upload, faao_mav.cli.download", {"numpy", "pymavlink"}),
+        ("import faao_mav.cli.autopilot", {"numpy", "pymavlink"}),
         ("import faao_mav.mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
     ],
 )  # fmt: skip

@@ -1,6 +1,7 @@
 """`faao-mission autopilot`: the mock autopilot."""
 
 import math
+import time
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -9,8 +10,12 @@ from faao_mav.cli.options import SigningKey, reported
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
+    from faao_mav.mavlink.messages import Row
     from faao_mav.mavlink.mock import MockAutopilot
+    from faao_mav.mavlink.protocol import MissionType
     from faao_mav.mission.item import Home
+
+_REST = 0.5  # s without a change, after which a list is told
 
 
 def autopilot(
@@ -82,32 +87,44 @@ def autopilot(
         key = None if signing_key is None else read_key(signing_key)
         transport = open_transport(listen)
         typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
+        diary = Diary()
         try:
-            serve(mock, transport, faults=faults, key=key, observe=Diary())
+            serve(mock, transport, faults=faults, key=key, observe=diary)
         except KeyboardInterrupt:
+            diary.finish()
             typer.echo("ended")
 
 
 class Diary:
-    """Tells what changes on a mock autopilot."""
+    """Tells what changes on a mock autopilot, lists when they have come to rest."""
 
     def __init__(self) -> None:
-        self._lists: tuple[object, ...] | None = None
+        self._told: dict[MissionType, tuple[Row, ...]] = {}
+        self._seen: dict[MissionType, tuple[Row, ...]] = {}
+        self._changed = 0.0
         self._armed = False
 
     def __call__(self, mock: "MockAutopilot") -> None:
         """Print what is new since the last call."""
         from faao_mav.mavlink.protocol import MissionType
 
-        lists = tuple(mock.lists.rows(part) for part in MissionType)
-        if self._lists is not None:
-            for part, rows, before in zip(MissionType, lists, self._lists, strict=True):
-                if rows != before:
-                    typer.echo(f"{part.title}: {len(rows)} rows")
-        self._lists = lists
+        lists = {part: mock.lists.rows(part) for part in MissionType}
+        if not self._told:
+            self._told = self._seen = lists
+        if lists != self._seen:
+            self._seen, self._changed = lists, time.monotonic()
+        elif time.monotonic() > self._changed + _REST:
+            self.finish()
         if mock.armed != self._armed:
             self._armed = mock.armed
             typer.echo("armed" if self._armed else "disarmed")
+
+    def finish(self) -> None:
+        """Print what has been seen and not told."""
+        for part, rows in self._seen.items():
+            if rows != self._told[part]:
+                typer.echo(f"{part.title}: {len(rows)} rows")
+        self._told = self._seen
 
 
 def read_home(text: str) -> "Home":

@@ -127,7 +127,12 @@ def download(
                     reason = f"refused: {meaning(outcome.result, peer.firmware)}"
                 raise LinkError(f"{connection}: {part.title}: not read: {reason}")
         rows = [lists.rows.get(part, ()) for part in MissionType]
-        mission = mission_of(rows[0], rows[1], rows[2], peer.firmware)
+        try:
+            mission = mission_of(rows[0], rows[1], rows[2], peer.firmware)
+        except InputError as error:
+            raise LinkError(
+                f"{connection}: what the vehicle holds is no mission: {error}"
+            ) from None
         if mission.home is None:
             homes = link.run(AskHome(vehicle.address), observe)
             mission = replace(mission, home=homes[0] if homes else None)

@@ -78,10 +78,10 @@ class Link:
             what, done, total = machine.progress
             self._send(machine.cancel(time.monotonic()))
             at = f" at item {done} of {total}" if total else ""
-            raise LinkError(
-                f"interrupted while {what}{at}: cancelled. What the vehicle holds now is not "
-                "known; download it, or upload again"
-            ) from None
+            left = ""
+            if what.startswith(("uploading", "clearing")):
+                left = ". What the vehicle holds now is not known: upload again, or download it"
+            raise LinkError(f"interrupted while {what}{at}: cancelled{left}") from None
 
     def _run(self, machine: Machine[T], observe: Observe | None) -> T:
         self._beat(time.monotonic())

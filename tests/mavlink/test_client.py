@@ -17,6 +17,7 @@ from faao_mav.mavlink import Timeouts, clear, download, upload
 from faao_mav.mavlink.codec import key_of_phrase
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.link import Link
+from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.mock import COUNT, MockAutopilot, ardupilot, manners_of
 from faao_mav.mavlink.protocol import Address, MissionType, Result
 from faao_mav.mavlink.rows import rows_of
@@ -162,6 +163,17 @@ def test_several_vehicles_and_other_ground_stations(port):
         thread.join()
     assert len(two.mission().items) == 5
     assert one.mission().items == ()
+
+
+def test_a_vehicle_that_holds_nonsense(port):
+    vertex = Row(5001, 0, (4.0, 0.0, 0.0, 0.0), -350_000_000, 1_490_000_000, 0.0)
+    mock = mock_of("px4")
+    mock.lists.replace(MissionType.FENCE, [vertex] * 3)
+    with (
+        running(mock, f"udpin:127.0.0.1:{port}"),
+        pytest.raises(LinkError, match="no mission: fence: a polygon stops after 3"),
+    ):
+        download(f"udpout:127.0.0.1:{port}", system=1)
 
 
 def test_no_vehicle(port):

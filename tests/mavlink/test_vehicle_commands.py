@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.autopilot import autopilot, read_home
 from faao_mav.cli.download import download
+from faao_mav.cli.transfer_progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
 from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
@@ -194,6 +195,15 @@ def test_the_mock_autopilot_as_a_command(mission_file, port, monkeypatch):
     lines = result.stdout.splitlines()
     assert lines[0] == f"px4, system 1, at udpin:127.0.0.1:{port}; Ctrl-C ends"
     assert lines[1:] == ["mission: 6 rows", "fence: 4 rows", "ended"]
+
+
+def test_progress_is_drawn_on_a_terminal_only(capsys):
+    with transfer_progress(shown=False) as nothing:
+        assert nothing is None
+    with transfer_progress(shown=True) as observe:
+        observe("uploading mission", 3, 9)
+        observe("asking for home", 0, 0)
+    assert capsys.readouterr().out == ""
 
 
 def test_homes_are_read():

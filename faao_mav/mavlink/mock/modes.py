@@ -1,7 +1,5 @@
 """Flight modes, as far as they start a mission."""
 
-import math
-
 from faao_mav.mavlink.messages import CommandLong
 from faao_mav.mission.vehicle import Autopilot
 
@@ -49,8 +47,8 @@ class Modes:
 
 
 def whole(param: float) -> int:
-    """Return a command's parameter as a number of something, -1 if it is not set."""
-    return int(param) if math.isfinite(param) else -1
+    """Return a command's parameter as a number of something, -1 if it cannot be one."""
+    return int(param) if 0 <= param < 2**32 else -1
 
 
 def _px4_mode(main: int, sub: int) -> int:
