@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from faao_mav.mavlink.messages import Envelope, Message, MissionAck, MissionClearAll
 from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.transfer import Outcome, Peer, Status, Texts, Timeouts
+from faao_mav.mavlink.transfer import Exchange, Outcome, Peer, Status, Timeouts
 
 
-class Clear:
+class Clear(Exchange):
     """A machine that clears a list; asking twice does no harm, so it asks until answered.
 
     An ERROR is the end only if it is repeated: PX4 says nothing while busy, ArduPilot ERROR.
@@ -16,18 +16,9 @@ class Clear:
     def __init__(
         self, peer: Peer, mission_type: MissionType, timeouts: Timeouts | None = None
     ) -> None:
-        self.outcome: Outcome | None = None
-        self._peer, self._type = peer, mission_type
-        self._timeouts = timeouts or Timeouts()
-        self._texts = Texts(peer.vehicle)
+        super().__init__(peer, mission_type, timeouts)
         self._left = self._timeouts.retries
-        self._due = 0.0
         self._refusal: int | None = None
-
-    @property
-    def deadline(self) -> float | None:
-        """When `tick` is due."""
-        return None if self.outcome else self._due
 
     @property
     def progress(self) -> tuple[str, int, int]:
@@ -39,11 +30,6 @@ class Clear:
         self._due = now + self._timeouts.response
         vehicle = self._peer.vehicle
         return [MissionClearAll(vehicle.system, vehicle.component, self._type)]
-
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Give up; there is nothing to take back."""
-        self._end("cancelled", None)
-        return ()
 
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Take the answer."""

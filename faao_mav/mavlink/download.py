@@ -14,10 +14,10 @@ from faao_mav.mavlink.messages import (
     Row,
 )
 from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.transfer import Outcome, Pace, Peer, Status, Texts, Timeouts
+from faao_mav.mavlink.transfer import Exchange, Outcome, Pace, Peer, Status, Timeouts
 
 
-class Download:
+class Download(Exchange):
     """A machine that downloads a list, one row at a time, and acknowledges it.
 
     A row is asked for again after `Timeouts.item`, or later on a link that is known to be slow.
@@ -32,10 +32,7 @@ class Download:
         mission_type: MissionType = MissionType.MISSION,
         timeouts: Timeouts | None = None,
     ) -> None:
-        self.outcome: Outcome | None = None
-        self._peer, self._type = peer, mission_type
-        self._timeouts = timeouts or Timeouts()
-        self._texts = Texts(peer.vehicle)
+        super().__init__(peer, mission_type, timeouts)
         self._attempts = self._timeouts.attempts
         self._phase: Literal["list", "items"] = "list"
         self._legacy = False
@@ -43,14 +40,9 @@ class Download:
         self._count = 0
         self._opaque_id = 0
         self._pace = Pace(self._timeouts)
-        self._due = self._heard = 0.0
+        self._heard = 0.0
         self._left = 0
         self._refusal: int | None = None
-
-    @property
-    def deadline(self) -> float | None:
-        """When `tick` is due."""
-        return None if self.outcome else self._due
 
     @property
     def progress(self) -> tuple[str, int, int]:
@@ -63,13 +55,6 @@ class Download:
         self._attempts -= 1
         self._left = self._timeouts.retries
         return self._ask_list(now)
-
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Give up and tell the vehicle."""
-        if self.outcome is not None:
-            return ()
-        self._end("cancelled")
-        return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
 
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Take the count or a row, ask for the next."""

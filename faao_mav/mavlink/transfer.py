@@ -179,6 +179,29 @@ class Texts:
         return tuple(dict.fromkeys(self._texts))
 
 
+class Exchange:
+    """What the transfer of one list always has: both ends, a deadline, an outcome."""
+
+    def __init__(self, peer: Peer, mission_type: MissionType, timeouts: Timeouts | None) -> None:
+        self.outcome: Outcome | None = None
+        self._peer, self._type = peer, mission_type
+        self._timeouts = timeouts or Timeouts()
+        self._texts = Texts(peer.vehicle)
+        self._due = 0.0
+
+    @property
+    def deadline(self) -> float | None:
+        """When `tick` is due."""
+        return None if self.outcome else self._due
+
+    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
+        """Give up and tell the vehicle."""
+        if self.outcome is not None:
+            return ()
+        self.outcome = Outcome("cancelled", said=self._texts.all())
+        return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
+
+
 class Script(Generic[T]):
     """A machine made of machines: a generator yields one after the other and is sent its outcome.
 

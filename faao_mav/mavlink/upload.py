@@ -15,12 +15,12 @@ from faao_mav.mavlink.messages import (
     Row,
 )
 from faao_mav.mavlink.protocol import MissionType, Result, State
-from faao_mav.mavlink.transfer import Outcome, Pace, Peer, Status, Texts, Timeouts
+from faao_mav.mavlink.transfer import Exchange, Outcome, Pace, Peer, Status, Timeouts
 
 _REASONS = 0.3  # s: a vehicle that refuses says why a little later
 
 
-class Upload:
+class Upload(Exchange):
     """A machine that uploads `rows`; the vehicle leads.
 
     - Any row below the count is sent whenever it is asked for, by either request, as
@@ -48,12 +48,9 @@ class Upload:
     ) -> None:
         if not rows:
             raise InputError(f"upload: no {mission_type.title} items; clear the list instead")
-        self.outcome: Outcome | None = None
-        self._rows, self._peer, self._type = tuple(rows), peer, mission_type
-        self._timeouts = timeouts or Timeouts()
-        self._texts = Texts(peer.vehicle)
+        super().__init__(peer, mission_type, timeouts)
+        self._rows = tuple(rows)
         self._phase: Literal["count", "items", "booting", "refused"] = "count"
-        self._due = 0.0
         self._left = 0
         self._sent: set[int] = set()
         self._heard = 0.0
@@ -62,11 +59,6 @@ class Upload:
         self._last = 0
         self._booting = False
         self._doubt: int | None = None
-
-    @property
-    def deadline(self) -> float | None:
-        """When `tick` is due."""
-        return None if self.outcome else self._due
 
     @property
     def progress(self) -> tuple[str, int, int]:
@@ -78,13 +70,6 @@ class Upload:
         self._phase, self._sent, self._doubt = "count", set(), None
         self._left = self._timeouts.retries
         return self._announce(now)
-
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Give up and tell the vehicle."""
-        if self.outcome is not None:
-            return ()
-        self._end("cancelled")
-        return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
 
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Answer a request, take an acknowledgement."""
