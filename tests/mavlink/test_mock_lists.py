@@ -92,10 +92,10 @@ def test_ardupilot_keeps_its_own_home_in_row_0():
 
 
 def test_storage_loses_what_the_real_one_loses():
-    fussy = Row(16, 6, (2.7, 5.0, 1.0, 30.0), *PLACE, 20.123)
+    fussy = Row(16, 6, (2.75, 5.0, 1.0, 30.0), *PLACE, 20.123)
     for kind, params, frame in (
         ("ardupilot", (2.0, 0.0, 0.0, 0.0), 3),
-        ("px4", (2.7, 5.0, 0.0, 30.0), 6),
+        ("px4", (2.75, 5.0, 0.0, 30.0), 6),
     ):
         desk = desk_for(kind)
         first = rows_for(kind, 2)[:1]
