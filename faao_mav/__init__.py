@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from faao_mav.faao.optimize import optimize
     from faao_mav.faao.pricing import price, saturation
     from faao_mav.faao.solution import Solution, load_solution, save_solution
+    from faao_mav.mavlink import download, upload
     from faao_mav.mission import Mission, MissionItem, to_mission
     from faao_mav.mission.formats import read_mission, render_mission
     from faao_mav.mission.parameter_file import read_parameters, render_parameters
@@ -30,6 +31,7 @@ _HOMES = {
     "Plan": "plan",
     "Solution": "faao.solution",
     "Vehicle": "mission.vehicle",
+    "download": "mavlink",
     "load_solution": "faao.solution",
     "optimize": "faao.optimize",
     "parse_plan": "plan",
@@ -42,6 +44,7 @@ _HOMES = {
     "saturation": "faao.pricing",
     "save_solution": "faao.solution",
     "to_mission": "mission",
+    "upload": "mavlink",
     "validate": "mission.validate",
 }
 
@@ -55,6 +58,7 @@ __all__ = [
     "Plan",
     "Solution",
     "Vehicle",
+    "download",
     "load_solution",
     "optimize",
     "parse_plan",
@@ -67,6 +71,7 @@ __all__ = [
     "saturation",
     "save_solution",
     "to_mission",
+    "upload",
     "validate",
 ]
 

@@ -27,3 +27,7 @@ class InfeasibleError(FaaoError):
 
 class SolverError(FaaoError):
     """A numerical solver gave up before there was anything to return."""
+
+
+class LinkError(FaaoError):
+    """A vehicle cannot be reached, or did not do what was asked."""

@@ -20,7 +20,8 @@ FLOORS = {
     "plan": 2,
     "faao": 3,
     "mission": 4,
-    "cli": 5,
+    "mavlink": 5,
+    "cli": 6,
 }
 
 
@@ -67,6 +68,9 @@ def test_every_public_name_can_be_had() -> None:
         ("import faao_mav.radio.mutual_information, faao_mav.radio.precoder", {"scipy", "cvxpy"}),
         ("import faao_mav.mission.validate", {"scipy", "cvxpy", "pyproj", "pymavlink", "shapely"}),
         ("import faao_mav.cli.validate", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
+        ("import faao_mav.mavlink.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
+        ("import faao_mav.cli.upload, faao_mav.cli.download", {"numpy", "pymavlink"}),
+        ("import faao_mav.cli.autopilot", {"numpy", "pymavlink"}),
         ("import faao_mav.mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
     ],
 )  # fmt: skip

@@ -1,0 +1,142 @@
+"""`faao-mission autopilot`: the mock autopilot."""
+
+import math
+import time
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from faao_mav.cli.options import SigningKey, reported
+from faao_mav.errors import InputError
+
+if TYPE_CHECKING:
+    from faao_mav.mavlink.messages import Row
+    from faao_mav.mavlink.mock import MockAutopilot
+    from faao_mav.mavlink.protocol import MissionType
+    from faao_mav.mission.item import Home
+
+_REST = 0.5  # s without a change, after which a list is told
+
+
+def autopilot(
+    listen: Annotated[
+        str,
+        typer.Option(
+            metavar="CONNECTION",
+            help="Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
+            "udpout:HOST:PORT to call one.",
+        ),
+    ] = "udpin:127.0.0.1:14550",
+    kind: Annotated[
+        Literal["ardupilot", "px4", "px4-legacy-first"],
+        typer.Option(help="Whose manners it has."),
+    ] = "ardupilot",
+    system: Annotated[int, typer.Option(min=1, max=255, metavar="N", help="Its number.")] = 1,
+    home: Annotated[
+        str, typer.Option(metavar="LAT,LON,ALT", help="Where it stands: degrees, m AMSL.")
+    ] = "-35.363262,149.165237,584",
+    speedup: Annotated[
+        float, typer.Option(min=0.01, metavar="X", help="Fly X times as fast as predicted.")
+    ] = 1.0,
+    boot: Annotated[float, typer.Option(min=0.0, metavar="S", help="Boot for S seconds.")] = 0.0,
+    drop: Annotated[
+        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Lose packets, both ways.")
+    ] = 0.0,
+    duplicate: Annotated[
+        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Repeat packets.")
+    ] = 0.0,
+    corrupt: Annotated[
+        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Damage packets.")
+    ] = 0.0,
+    delay: Annotated[
+        float,
+        typer.Option(min=0.0, metavar="S", help="Delay every other packet by up to S seconds."),
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of what the link does.")] = 0,
+    signing_key: SigningKey = None,
+) -> None:
+    """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.
+
+    It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
+    """
+    with reported():
+        from faao_mav.mavlink.codec import read_key
+        from faao_mav.mavlink.faults import Faults
+        from faao_mav.mavlink.mock import MockAutopilot, manners_of
+        from faao_mav.mavlink.protocol import Address
+        from faao_mav.mavlink.runner import predicted, serve
+        from faao_mav.mavlink.transport import open_transport
+
+        mock = MockAutopilot(
+            manners_of(kind),
+            address=Address(system, 1),
+            home=read_home(home),
+            fly=predicted("ardupilot" if kind == "ardupilot" else "px4"),
+            speedup=speedup,
+            boot=boot,
+        )
+        faults = Faults(
+            loss=drop,
+            duplication=duplicate,
+            corruption=corrupt,
+            reordering=0.5 if delay else 0.0,
+            delay=delay,
+            latency=0.0,
+            seed=seed,
+        )
+        key = None if signing_key is None else read_key(signing_key)
+        transport = open_transport(listen)
+        typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
+        diary = Diary()
+        try:
+            serve(mock, transport, faults=faults, key=key, observe=diary)
+        except KeyboardInterrupt:
+            diary.finish()
+            typer.echo("ended")
+
+
+class Diary:
+    """Tells what changes on a mock autopilot, lists when they have come to rest."""
+
+    def __init__(self) -> None:
+        self._told: dict[MissionType, tuple[Row, ...]] = {}
+        self._seen: dict[MissionType, tuple[Row, ...]] = {}
+        self._changed = 0.0
+        self._armed = False
+
+    def __call__(self, mock: "MockAutopilot") -> None:
+        """Print what is new since the last call."""
+        from faao_mav.mavlink.protocol import MissionType
+
+        lists = {part: mock.lists.rows(part) for part in MissionType}
+        if not self._told:
+            self._told = self._seen = lists
+        if lists != self._seen:
+            self._seen, self._changed = lists, time.monotonic()
+        elif time.monotonic() > self._changed + _REST:
+            self.finish()
+        if mock.armed != self._armed:
+            self._armed = mock.armed
+            typer.echo("armed" if self._armed else "disarmed")
+
+    def finish(self) -> None:
+        """Print what has been seen and not told."""
+        for part, rows in self._seen.items():
+            if rows != self._told[part]:
+                typer.echo(f"{part.title}: {len(rows)} rows")
+        self._told = self._seen
+
+
+def read_home(text: str) -> "Home":
+    """Return the home that `LAT,LON,ALT` names; raises `InputError`."""
+    from faao_mav.mission.item import Home
+
+    try:
+        latitude, longitude, altitude = map(float, text.split(","))
+    except ValueError:
+        raise InputError(
+            f"--home {text}: expected LAT,LON,ALT, as in 47.397742,8.545594,488"
+        ) from (None)
+    if not all(map(math.isfinite, (latitude, longitude, altitude))):
+        raise InputError(f"--home {text}: expected finite numbers")
+    return Home(latitude, longitude, altitude)

@@ -1,0 +1,57 @@
+"""`faao-mission download`: what a vehicle holds, to a mission file."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from faao_mav.cli.options import Component, Log, SigningKey, System, Wait, reported
+
+
+def download(
+    source: Annotated[
+        str,
+        typer.Option(
+            "--from",
+            metavar="CONNECTION",
+            help="The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option(metavar="MISSION", help="Write the mission.")],
+    system: System = None,
+    component: Component = None,
+    log: Log = None,
+    timeout: Wait = 10.0,
+    signing_key: SigningKey = None,
+) -> None:
+    """Download the mission, fence and rally points of a vehicle.
+
+    Exit status: 0 done; 1 there is no such vehicle, or a list did not come whole; 2 unusable
+    arguments.
+    """
+    with reported():
+        from faao_mav.cli.transfer_progress import transfer_progress
+        from faao_mav.files import check_writable, write_whole
+        from faao_mav.mavlink.client import download as run
+        from faao_mav.mission.formats import check_suffix, render_mission
+
+        check_suffix(out)
+        check_writable(out)
+        with transfer_progress(shown=sys.stderr.isatty()) as observe:
+            mission = run(
+                source,
+                system=system,
+                component=component,
+                log=log,
+                signing_key=signing_key,
+                wait=timeout,
+                observe=observe,
+            )
+        write_whole(out, render_mission(mission, out).encode())
+    fence = len(mission.fence.polygons) + len(mission.fence.circles)
+    typer.echo(
+        f"mission      {len(mission.items)} items, {fence} fence areas, "
+        f"{len(mission.rally)} rally points"
+    )
+    typer.echo(f"written      {out}")

@@ -1,0 +1,139 @@
+"""`faao-mission upload`: a mission file to a vehicle, verified."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from faao_mav.cli.options import AsJson, Component, Log, SigningKey, System, Wait, reported
+
+if TYPE_CHECKING:
+    from faao_mav.mavlink.client import UploadReport
+    from faao_mav.mavlink.session import PartReport
+    from faao_mav.mavlink.verify import Difference
+
+
+def upload(
+    mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            metavar="CONNECTION",
+            help="The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD.",
+        ),
+    ],
+    as_json: AsJson = False,
+    system: System = None,
+    component: Component = None,
+    allow_armed: Annotated[
+        bool, typer.Option("--allow-armed", help="Replace the mission of an armed vehicle too.")
+    ] = False,
+    log: Log = None,
+    timeout: Wait = 10.0,
+    signing_key: SigningKey = None,
+) -> None:
+    """Upload a mission, read it back and compare.
+
+    Exit status: 0 it is on the vehicle, whole and equal; 1 it is not, or that is not known; 2
+    unusable arguments or input.
+    """
+    with reported():
+        from faao_mav.cli.transfer_progress import transfer_progress
+        from faao_mav.mavlink.client import upload as run
+        from faao_mav.mission.formats import read_mission
+
+        mission = read_mission(mission_file)
+        with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
+            report = run(
+                mission,
+                to,
+                system=system,
+                component=component,
+                allow_armed=allow_armed,
+                log=log,
+                signing_key=signing_key,
+                wait=timeout,
+                observe=observe,
+            )
+    typer.echo(json.dumps(as_dict(report), allow_nan=False) if as_json else as_text(report))
+    if not report.verified:
+        if not as_json:
+            typer.echo("faao-mission: the mission is not verified; do not fly it", err=True)
+        raise typer.Exit(1)
+
+
+def as_text(report: "UploadReport") -> str:
+    """Return `report` for people."""
+    lines = [f"vehicle      {report.vehicle}"]
+    lines += [_part_line(part) for part in report.parts if part.verified]
+    for part in report.parts:
+        lines += [f"not kept     {text}" for text in _dropped(part)]
+    lines += [f"failed       {problem}" for problem in report.problems]
+    if report.verified:
+        lines.append(f"verified     read back and compared, {report.seconds:.1f} s")
+    return "\n".join(lines)
+
+
+def as_dict(report: "UploadReport") -> dict[str, Any]:
+    """Return `report` as JSON takes it."""
+    vehicle = report.vehicle
+    return {
+        "verified": report.verified,
+        "vehicle": {
+            "system": vehicle.address.system,
+            "component": vehicle.address.component,
+            "autopilot": vehicle.firmware,
+            "type": vehicle.kind,
+        },
+        "seconds": round(report.seconds, 3),
+        "problems": list(report.problems),
+        "lists": [
+            {
+                "list": part.part.name.lower(),
+                "items": part.items,
+                "verdict": part.verdict,
+                "result": part.result,
+                "attempts": part.attempts,
+                "opaque_id": part.opaque_id,
+                "differences": [
+                    {
+                        "item": each.item,
+                        "field": each.field,
+                        "sent": _plain(each.sent),
+                        "found": _plain(each.found),
+                        "kind": each.kind,
+                    }
+                    for each in part.differences
+                ],
+            }
+            for part in report.parts
+        ],
+    }
+
+
+def _dropped(part: "PartReport") -> list[str]:
+    """Return what storage lost, one line for each field."""
+    lost: dict[str, list[Difference]] = {}
+    for each in part.differences:
+        if each.kind == "dropped":
+            lost.setdefault(each.field, []).append(each)
+    return [
+        str(each[0]) + (f" (and so in {len(each) - 1} more items)" if len(each) > 1 else "")
+        for each in lost.values()
+    ]
+
+
+def _part_line(part: "PartReport") -> str:
+    what = "items" if part.items != 1 else "item"
+    again = "" if part.attempts == 1 else f", in {part.attempts} attempts"
+    title = {"rally points": "rally"}.get(part.part.title, part.part.title)
+    return f"{title:<13}{part.items} {what} stored{again}"
+
+
+def _plain(value: Any) -> Any:
+    """NaN, which JSON does not have, is null."""
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    return None if value != value else value

@@ -1,0 +1,77 @@
+"""A bad link: what it does to packets, from a seed."""
+
+from dataclasses import dataclass, field
+from random import Random
+
+_MAVLINK_2 = 0xFD
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """One particular packet that does not arrive: the `number`-th (from 1) with `message_id`."""
+
+    message_id: int
+    number: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """What happens to packets, in each direction.
+
+    `loss`, `duplication` and `corruption` are probabilities. Every packet takes `latency` seconds;
+    with probability `reordering` it takes up to `delay` longer, so that later ones overtake it.
+    Nothing passes during `outages` (from, to; seconds). `lost` names packets one by one.
+    """
+
+    loss: float = 0.0
+    duplication: float = 0.0
+    corruption: float = 0.0
+    reordering: float = 0.0
+    delay: float = 0.0
+    latency: float = 0.002
+    outages: tuple[tuple[float, float], ...] = ()
+    lost: tuple[Lost, ...] = ()
+    seed: int = 0
+
+
+@dataclass(slots=True)
+class Channel:
+    """One direction of a link; `name` sets its randomness apart from that of others."""
+
+    faults: Faults
+    name: str
+    _random: Random = field(init=False)
+    _seen: dict[int, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._random = Random(f"{self.faults.seed} {self.name}")
+        self._seen = {}
+
+    def carry(self, packet: bytes, now: float) -> list[tuple[float, bytes]]:
+        """Return when `packet`, sent at `now`, arrives, and as what; not at all, once or twice."""
+        faults, random = self.faults, self._random
+        if self._is_lost(packet) or any(begin <= now < end for begin, end in faults.outages):
+            return []
+        copies = 1 + (random.random() < faults.duplication)
+        arrivals = []
+        for _ in range(copies):
+            if random.random() < faults.loss:
+                continue
+            late = random.random() < faults.reordering
+            time = now + faults.latency + (random.uniform(0.0, faults.delay) if late else 0.0)
+            damaged = random.random() < faults.corruption
+            arrivals.append((time, self._damaged(packet) if damaged else packet))
+        return arrivals
+
+    def _is_lost(self, packet: bytes) -> bool:
+        if not self.faults.lost or packet[0] != _MAVLINK_2:
+            return False
+        message_id = int.from_bytes(packet[7:10], "little")
+        self._seen[message_id] = self._seen.get(message_id, 0) + 1
+        return Lost(message_id, self._seen[message_id]) in self.faults.lost
+
+    def _damaged(self, packet: bytes) -> bytes:
+        content = bytearray(packet)
+        place = self._random.randrange(len(content))
+        content[place] ^= 1 << self._random.randrange(8)
+        return bytes(content)

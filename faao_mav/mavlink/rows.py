@@ -1,0 +1,214 @@
+"""Missions, fences and rally points as the rows of the mission protocol, and back.
+
+ArduPilot's row 0 is the home position, PX4 has none. Targets of DO_JUMP count in a `Mission` as
+in mission files, where home is 0 and the first item 1: on PX4 they are one less on the wire.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from faao_mav.errors import InputError
+from faao_mav.mavlink.messages import Row
+from faao_mav.mavlink.protocol import FIRMWARE_NAMES, Firmware, MissionType
+from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.fence import Circle, Fence, Place, Polygon, RallyPoint
+from faao_mav.mission.item import Home, Mission, MissionItem
+
+DO_JUMP: Final = 177
+FENCE_RETURN_POINT: Final = 5000
+POLYGON: Final = {True: 5001, False: 5002}
+CIRCLE: Final = {True: 5003, False: 5004}
+RALLY_POINT: Final = 5100
+
+GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
+_INT32 = 2**31 - 1
+_FLOAT32 = 2.0**128 - 2.0**104  # the largest single-precision number
+
+
+def coordinate_scale(frame: int) -> float:
+    """Return what one degree, metre or unit of x and y is on the wire, in `frame`."""
+    if frame in GLOBAL_FRAMES:
+        return 1e7
+    return 1.0 if frame == Frame.MISSION else 1e4
+
+
+def rows_of(mission: Mission, mission_type: MissionType, firmware: Firmware) -> tuple[Row, ...]:
+    """Return the rows that `firmware` is sent for one of the lists of `mission`.
+
+    What is not set (NaN) is 0 for ArduPilot, which refuses NaN and takes 0, 0 for "here". PX4
+    would fly to 0, 0. Raises `InputError` for that, and for numbers that the wire does not carry.
+    """
+    if mission_type is MissionType.FENCE:
+        items = fence_items(mission.fence)
+    elif mission_type is MissionType.RALLY:
+        items = rally_items(mission.rally)
+    else:
+        items = wire_items(mission.items, firmware)
+        if firmware == "ardupilot":
+            items = (_home_item(mission.home), *items)
+    first = 0 if mission_type is MissionType.MISSION else None
+    return tuple(
+        row_of(_settled(item, index, firmware), index, current=index == first)
+        for index, item in enumerate(items)
+    )
+
+
+def item_of(row: Row) -> MissionItem:
+    """Return `row` as an item."""
+    scale = coordinate_scale(row.frame)
+    params = tuple(map(_finite_or_nan, row.params))
+    return MissionItem(
+        row.command,
+        row.frame,
+        (params[0], params[1], params[2], params[3]),
+        row.x / scale,
+        row.y / scale,
+        _finite_or_nan(row.z),
+        bool(row.autocontinue),
+    )
+
+
+def wire_items(items: Sequence[MissionItem], firmware: Firmware) -> tuple[MissionItem, ...]:
+    """Return `items` with the targets of DO_JUMP as `firmware` counts them."""
+    return _with_jumps_moved(items, 0 if firmware == "ardupilot" else -1)
+
+
+def mission_of(
+    rows: Sequence[Row],
+    fence: Sequence[Row],
+    rally: Sequence[Row],
+    firmware: Firmware,
+) -> Mission:
+    """Return the mission that three downloaded lists make.
+
+    Raises `InputError` for a fence that is none.
+    """
+    items = [item_of(row) for row in rows]
+    home = None
+    if firmware == "ardupilot" and items:
+        first = items.pop(0)
+        if first.x or first.y or first.z:
+            home = Home(first.x, first.y, first.z)
+    moved = _with_jumps_moved(items, 0 if firmware == "ardupilot" else 1)
+    points = tuple(RallyPoint(item.x, item.y, item.z) for item in map(item_of, rally))
+    return Mission(moved, home, _fence_of([item_of(row) for row in fence]), points)
+
+
+def fence_items(fence: Fence) -> tuple[MissionItem, ...]:
+    """Return `fence` as items: return point, polygons vertex by vertex, circles."""
+    items = []
+    if fence.breach_return is not None:
+        point = fence.breach_return
+        place = (point.latitude, point.longitude, point.altitude)
+        items.append(_place_item(FENCE_RETURN_POINT, Frame.GLOBAL_RELATIVE_ALT, 0.0, *place))
+    for polygon in fence.polygons:
+        command, count = POLYGON[polygon.inclusion], float(len(polygon.vertices))
+        items += [_place_item(command, Frame.GLOBAL, count, *v) for v in polygon.vertices]
+    for circle in fence.circles:
+        command = CIRCLE[circle.inclusion]
+        items.append(_place_item(command, Frame.GLOBAL, circle.radius, *circle.center))
+    return tuple(items)
+
+
+def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
+    """Return rally points as items."""
+    frame = Frame.GLOBAL_RELATIVE_ALT
+    return tuple(
+        _place_item(RALLY_POINT, frame, 0.0, point.latitude, point.longitude, point.altitude)
+        for point in points
+    )
+
+
+def _fence_of(items: Sequence[MissionItem]) -> Fence:
+    polygons, circles, breach_return = [], [], None
+    vertices: list[Place] = []
+    for number, item in enumerate(items):
+        if item.command in POLYGON.values():
+            vertices.append((item.x, item.y))
+            if len(vertices) == int(item.params[0]):
+                polygons.append(Polygon(tuple(vertices), item.command == POLYGON[True]))
+                vertices = []
+            continue
+        if vertices:
+            break
+        if item.command in CIRCLE.values():
+            inclusion = item.command == CIRCLE[True]
+            circles.append(Circle((item.x, item.y), item.params[0], inclusion))
+        elif item.command == FENCE_RETURN_POINT:
+            breach_return = RallyPoint(item.x, item.y, item.z)
+        else:
+            raise InputError(f"fence item {number}: command {item.command}; expected 5000 to 5004")
+    if vertices:
+        raise InputError(
+            f"fence: a polygon stops after {len(vertices)} of its vertices; expected as many as "
+            "its items say"
+        )
+    return Fence(tuple(polygons), tuple(circles), breach_return)
+
+
+def _with_jumps_moved(items: Sequence[MissionItem], shift: int) -> tuple[MissionItem, ...]:
+    return tuple(
+        MissionItem(
+            item.command,
+            item.frame,
+            (item.params[0] + shift, *item.params[1:]),
+            *(item.x, item.y, item.z),
+            item.autocontinue,
+        )
+        if item.command == DO_JUMP
+        else item
+        for item in items
+    )
+
+
+def _home_item(home: Home | None) -> MissionItem:
+    place = (home.latitude, home.longitude, home.altitude) if home else (0.0, 0.0, 0.0)
+    return _place_item(Command.NAV_WAYPOINT, Frame.GLOBAL, 0.0, *place)
+
+
+def _place_item(
+    command: int, frame: int, param1: float, x: float, y: float, z: float = 0.0
+) -> MissionItem:
+    return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), x, y, z)
+
+
+def _settled(item: MissionItem, index: int, firmware: Firmware) -> MissionItem:
+    values = (*item.params, item.x, item.y, item.z)
+    if not any(map(math.isnan, values)):
+        return item
+    if firmware == "ardupilot":
+        one, two, three, four, x, y, z = (0.0 if math.isnan(value) else value for value in values)
+        params = (one, two, three, four)
+        return MissionItem(item.command, item.frame, params, x, y, z, item.autocontinue)
+    if item.frame in GLOBAL_FRAMES and (math.isnan(item.x) or math.isnan(item.y)):
+        raise InputError(
+            f"item {index}: latitude or longitude is not set; {FIRMWARE_NAMES[firmware]} would "
+            "fly to 0, 0: give the place"
+        )
+    return item
+
+
+def row_of(item: MissionItem, index: int, *, current: bool = False) -> Row:
+    """Return `item`, number `index` of its list, as a row.
+
+    Raises `InputError` for numbers that the wire does not carry.
+    """
+    scale = coordinate_scale(item.frame)
+    x, y = (0 if math.isnan(value) else round(value * scale) for value in (item.x, item.y))
+    if max(abs(x), abs(y)) > _INT32:
+        raise InputError(
+            f"item {index}: x {item.x}, y {item.y}; expected degrees within 180, or in frame "
+            f"{item.frame} what 32 bits hold"
+        )
+    if any(abs(value) > _FLOAT32 for value in (*item.params, item.z)):
+        raise InputError(
+            f"item {index}: params {item.params}, z {item.z}; expected single-precision numbers"
+        )
+    return Row(
+        item.command, item.frame, item.params, x, y, item.z, int(current), int(item.autocontinue)
+    )
+
+
+def _finite_or_nan(value: float) -> float:
+    return value if math.isfinite(value) else math.nan

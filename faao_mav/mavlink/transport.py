@@ -1,0 +1,267 @@
+"""Bytes to and from a connection string: UDP, TCP, serial.
+
+The strings are pymavlink's. The sockets are not: its connections print on standard output, hide
+errors, and share UDP ports silently with whoever else listens.
+"""
+
+import contextlib
+import errno
+import select
+import socket
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from faao_mav.errors import InputError, LinkError
+
+FORMS = (
+    "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
+    "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
+)
+_KINDS = ("udpin", "udpout", "udp", "tcp", "tcpin")
+_CONNECT_TIMEOUT = 5.0
+_FORGET = 30.0  # s after which a silent UDP sender is not answered any more
+_MAX_DATAGRAM = 65_535
+_DEFAULT_BAUD = 57_600
+
+
+class Transport(Protocol):
+    """Bytes in, bytes out."""
+
+    def read(self, timeout: float) -> list[bytes]:
+        """Return what arrives within `timeout` seconds, as soon as something does."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send one packet."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A connection string, taken apart; `kind` "serial" has a device and a baud rate."""
+
+    kind: str
+    host: str
+    port: int
+
+
+def parse_connection(text: str) -> Endpoint:
+    """Return what the connection string `text` says; raises `InputError`."""
+    kind, colon, rest = text.partition(":")
+    if colon and kind in _KINDS:
+        host, colon, port = rest.rpartition(":")
+        if not colon or not host or not port.isascii() or not port.isdigit():
+            raise InputError(f"connection {text!r}: expected {kind}:HOST:PORT")
+        if not 0 < int(port) < 65_536:
+            raise InputError(f"connection {text!r}: port {port}; expected 1 to 65535")
+        return Endpoint("udpin" if kind == "udp" else kind, host, int(port))
+    device, comma, baud = text.partition(",")
+    if not device or (colon and "/" not in kind) or not (comma or "/" in device):
+        raise InputError(f"connection {text!r}: expected {FORMS}")
+    if comma and not (baud.isascii() and baud.isdigit() and int(baud) > 0):
+        raise InputError(f"connection {text!r}: baud rate {baud!r}; expected a number, as in 57600")
+    return Endpoint("serial", device, int(baud) if comma else _DEFAULT_BAUD)
+
+
+def open_transport(text: str) -> Transport:
+    """Return a transport for the connection string `text`.
+
+    Raises `InputError` for a string or device that is none, `LinkError` if it cannot be opened.
+    """
+    endpoint = parse_connection(text)
+    if endpoint.kind == "serial":
+        return _Serial(endpoint)
+    try:
+        address = socket.getaddrinfo(endpoint.host, endpoint.port, socket.AF_INET)[0][4]
+    except OSError:
+        raise LinkError(f"connection {text!r}: there is no host {endpoint.host}") from None
+    host_port = (str(address[0]), endpoint.port)
+    try:
+        match endpoint.kind:
+            case "udpin":
+                return _Udp(host_port, None)
+            case "udpout":
+                return _Udp(None, host_port)
+            case "tcp":
+                return _Tcp(host_port)
+            case _:
+                return _TcpServer(host_port)
+    except OSError as error:
+        raise LinkError(f"connection {text!r}: {_reason(error)}") from None
+
+
+def _reason(error: OSError) -> str:
+    match error.errno:
+        case errno.EADDRINUSE:
+            return "the port is in use; stop the program that listens there, or take another port"
+        case errno.EADDRNOTAVAIL:
+            return "this machine does not have that address; to listen on all, use 0.0.0.0"
+        case errno.ECONNREFUSED:
+            return "nothing listens there"
+        case errno.EACCES:
+            return "not permitted; ports below 1024 are reserved"
+    if isinstance(error, TimeoutError):
+        return f"no answer within {_CONNECT_TIMEOUT:g} s"
+    return error.strerror or str(error)
+
+
+class _Udp:
+    """A UDP socket that sends to one place, or to whoever was heard."""
+
+    def __init__(self, listen: tuple[str, int] | None, target: tuple[str, int] | None) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._target = target
+        self._heard: dict[tuple[str, int], float] = {}
+        try:
+            self._socket.setblocking(False)
+            if listen is not None:
+                self._socket.bind(listen)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def read(self, timeout: float) -> list[bytes]:
+        if not select.select([self._socket], [], [], max(timeout, 0.0))[0]:
+            return []
+        found: list[bytes] = []
+        # A refused datagram is told as an error of the next call: the other side is not up yet.
+        with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+            while True:
+                data, sender = self._socket.recvfrom(_MAX_DATAGRAM)
+                if self._target is None:
+                    self._heard[sender] = time.monotonic()
+                found.append(data)
+        return found
+
+    def write(self, data: bytes) -> None:
+        targets = [self._target] if self._target is not None else self._listeners()
+        for target in targets:
+            # Full buffers and absent receivers lose datagrams: that is what retries are for.
+            with contextlib.suppress(BlockingIOError, ConnectionRefusedError, OSError):
+                self._socket.sendto(data, target)
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _listeners(self) -> list[tuple[str, int]]:
+        recent = time.monotonic() - _FORGET
+        self._heard = {who: when for who, when in self._heard.items() if when > recent}
+        return list(self._heard)
+
+
+class _Tcp:
+    """A TCP connection."""
+
+    def __init__(self, target: tuple[str, int]) -> None:
+        self._name = f"tcp:{target[0]}:{target[1]}"
+        self._socket = socket.create_connection(target, timeout=_CONNECT_TIMEOUT)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def read(self, timeout: float) -> list[bytes]:
+        if not select.select([self._socket], [], [], max(timeout, 0.0))[0]:
+            return []
+        try:
+            data = self._socket.recv(_MAX_DATAGRAM)
+        except OSError as error:
+            raise self._broken(error) from None
+        if not data:
+            raise self._broken(None)
+        return [data]
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise self._broken(error) from None
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _broken(self, error: OSError | None) -> LinkError:
+        if error is None or isinstance(error, ConnectionError):
+            return LinkError(f"{self._name}: the other side closed the connection")
+        return LinkError(f"{self._name}: {error.strerror or error}")
+
+
+class _TcpServer:
+    """A listening TCP socket and whoever has connected to it."""
+
+    def __init__(self, listen: tuple[str, int]) -> None:
+        self._listener = socket.create_server(listen)
+        self._listener.setblocking(False)
+        self._clients: list[socket.socket] = []
+
+    def read(self, timeout: float) -> list[bytes]:
+        ready = select.select([self._listener, *self._clients], [], [], max(timeout, 0.0))[0]
+        found: list[bytes] = []
+        for ready_socket in ready:
+            if ready_socket is self._listener:
+                with contextlib.suppress(OSError):
+                    self._clients.append(self._listener.accept()[0])
+                continue
+            data = b""
+            with contextlib.suppress(OSError):
+                data = ready_socket.recv(_MAX_DATAGRAM)
+            if data:
+                found.append(data)
+            else:
+                self._drop(ready_socket)
+        return found
+
+    def write(self, data: bytes) -> None:
+        for client in list(self._clients):
+            try:
+                client.sendall(data)
+            except OSError:
+                self._drop(client)
+
+    def close(self) -> None:
+        for client in list(self._clients):
+            self._drop(client)
+        self._listener.close()
+
+    def _drop(self, client: socket.socket) -> None:
+        self._clients.remove(client)
+        client.close()
+
+
+class _Serial:
+    """A serial port."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        import serial
+
+        self._name = endpoint.host
+        self._error: type[Exception] = serial.SerialException
+        if "/" in endpoint.host and not Path(endpoint.host).exists():
+            raise InputError(
+                f"connection {endpoint.host!r}: there is no such device; is the vehicle plugged in?"
+            )
+        try:
+            self._port: Any = serial.Serial(endpoint.host, endpoint.port, timeout=0)
+        except (serial.SerialException, ValueError, OSError) as error:
+            raise LinkError(f"connection {endpoint.host!r}: {error}") from None
+
+    def read(self, timeout: float) -> list[bytes]:
+        try:
+            self._port.timeout = max(timeout, 0.0)
+            data = bytes(self._port.read(1))
+            data += bytes(self._port.read(self._port.in_waiting))
+        except (self._error, OSError) as error:
+            raise LinkError(f"{self._name}: {error}") from None
+        return [data] if data else []
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._port.write(data)
+        except (self._error, OSError) as error:
+            raise LinkError(f"{self._name}: {error}") from None
+
+    def close(self) -> None:
+        self._port.close()

@@ -1,0 +1,196 @@
+"""Uploading one list: MISSION_COUNT, then whatever the vehicle asks for."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from faao_mav.errors import InputError
+from faao_mav.mavlink.messages import (
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionAck,
+    MissionCount,
+    MissionItemInt,
+    MissionRequestInt,
+    Row,
+)
+from faao_mav.mavlink.protocol import MissionType, Result, State
+from faao_mav.mavlink.transfer import Exchange, Outcome, Pace, Peer, Status, Timeouts
+
+_REASONS = 0.3  # s: a vehicle that refuses says why a little later
+
+
+class Upload(Exchange):
+    """A machine that uploads `rows`; the vehicle leads.
+
+    - Any row below the count is sent whenever it is asked for, by either request, as
+      MISSION_ITEM_INT.
+    - INVALID_SEQUENCE is no end for ArduPilot: it says so of duplicates and goes on asking. An
+      ERROR may be about a duplicate too (PX4: of MISSION_COUNT, ArduPilot: of the last item): it
+      counts when nothing more is asked for.
+    - When everything was sent and no answer comes, PX4 is sent the last item again, which it
+      acknowledges again. ArduPilot would say ERROR: the outcome is "unknown", and reading back
+      must tell.
+    - PX4 asks again after 0.25 s, ArduPilot after 1 s. An item (but not the last) is sent again
+      before that, which both bear. If ArduPilot answers INVALID_SEQUENCE it has that item, and
+      its next request was lost: then the next item is sent.
+    - NO_SPACE from an ArduPilot that is still booting means "not yet".
+
+    Raises `InputError` without rows: an empty list is what `Clear` is for.
+    """
+
+    def __init__(
+        self,
+        rows: Sequence[Row],
+        peer: Peer,
+        mission_type: MissionType = MissionType.MISSION,
+        timeouts: Timeouts | None = None,
+    ) -> None:
+        if not rows:
+            raise InputError(f"upload: no {mission_type.title} items; clear the list instead")
+        super().__init__(peer, mission_type, timeouts)
+        self._rows = tuple(rows)
+        self._phase: Literal["count", "items", "booting", "refused"] = "count"
+        self._left = 0
+        self._sent: set[int] = set()
+        self._heard = 0.0
+        self._pace = Pace(self._timeouts)
+        self._repeated = False
+        self._last = 0
+        self._booting = False
+        self._doubt: int | None = None
+
+    @property
+    def progress(self) -> tuple[str, int, int]:
+        """Rows sent, of all."""
+        return f"uploading {self._type.title}", len(self._sent), len(self._rows)
+
+    def start(self, now: float) -> Sequence[Message]:
+        """Announce the rows."""
+        self._phase, self._sent, self._doubt = "count", set(), None
+        self._left = self._timeouts.retries
+        return self._announce(now)
+
+    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        """Answer a request, take an acknowledgement."""
+        if self.outcome is not None:
+            return ()
+        self._texts.note(envelope)
+        if self._phase == "refused":
+            return ()
+        match envelope.message:
+            case Heartbeat() as heartbeat if envelope.sender == self._peer.vehicle:
+                return self._on_heartbeat(heartbeat, now)
+            case MissionRequestInt(seq=seq) if self._peer.said(envelope, self._type):
+                return self._on_request(seq, now)
+            case MissionAck() as ack if self._peer.said(envelope, self._type):
+                return self._on_ack(ack, now)
+        return ()
+
+    def tick(self, now: float) -> Sequence[Message]:
+        """Send again, wait on, or end."""
+        if self.outcome is not None or now < self._due:
+            return ()
+        if self._phase == "items":
+            return self._tick_items(now)
+        if self._phase in ("booting", "refused") or self._left == 0:
+            self._end("silent" if self._doubt is None else "refused", self._doubt)
+            return ()
+        self._left -= 1
+        return self._announce(now)
+
+    def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> Sequence[Message]:
+        self._booting = heartbeat.system_status < State.STANDBY
+        if self._phase == "booting" and not self._booting:
+            return self.start(now)
+        return ()
+
+    def _on_request(self, seq: int, now: float) -> Sequence[Message]:
+        if seq >= len(self._rows):
+            return ()
+        if seq == self._last + 1:
+            self._pace.answer(now)
+        self._phase, self._heard, self._doubt = "items", now, None
+        self._left = self._timeouts.retries
+        return self._send(seq, now)
+
+    def _send(self, seq: int, now: float) -> Sequence[Message]:
+        self._last = seq
+        self._sent.add(seq)
+        self._repeated = False
+        self._pace.ask(now)
+        if self._complete():
+            self._due = now + self._patience()
+        elif self._repeats():
+            self._due = now + self._pace.wait
+        else:
+            self._due = self._heard + self._timeouts.silence
+        return [self._item(seq)]
+
+    def _on_ack(self, ack: MissionAck, now: float) -> Sequence[Message]:
+        result = ack.type
+        if result == Result.ACCEPTED:
+            # Before the last row was asked for it can only be about something else.
+            if self._complete():
+                self._end("accepted", result, ack.opaque_id)
+        elif result == Result.INVALID_SEQUENCE and self._peer.firmware != "px4":
+            return self._on_out_of_turn(now)
+        elif result == Result.ERROR:
+            self._doubt = result
+            if self._phase == "items":
+                self._due = now + self._timeouts.response
+        elif result == Result.NO_SPACE and self._booting:
+            self._phase, self._doubt = "booting", result
+            self._due = now + self._timeouts.boot
+        elif result == Result.OPERATION_CANCELLED:
+            self._end("cancelled", result)
+        else:
+            self._phase, self._doubt = "refused", result
+            self._due = now + _REASONS
+        return ()
+
+    def _on_out_of_turn(self, now: float) -> Sequence[Message]:
+        if not self._repeated or self._last + 2 >= len(self._rows):
+            return ()
+        self._heard = now
+        return self._send(self._last + 1, now)
+
+    def _tick_items(self, now: float) -> Sequence[Message]:
+        quiet = now - self._heard >= self._timeouts.silence
+        if not self._complete() and self._repeats() and not quiet and self._doubt is None:
+            self._pace.repeat()
+            self._due, self._repeated = now + self._pace.wait, True
+            return [self._item(self._last)]
+        if not self._complete():
+            self._end("silent" if self._doubt is None else "refused", self._doubt)
+            return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
+        if self._peer.firmware == "px4" and self._left > 0 and self._doubt is None:
+            self._left -= 1
+            self._due = now + self._timeouts.response
+            return [self._item(len(self._rows) - 1)]
+        self._end("unknown", self._doubt)
+        return ()
+
+    def _complete(self) -> bool:
+        return len(self._sent) == len(self._rows)
+
+    def _repeats(self) -> bool:
+        return self._peer.firmware != "generic" and self._last != len(self._rows) - 1
+
+    def _patience(self) -> float:
+        """Return how long to wait for the last answer: ArduPilot asks again after 1 s or more."""
+        return self._timeouts.response * (1 if self._peer.firmware == "px4" else 2)
+
+    def _announce(self, now: float) -> Sequence[Message]:
+        self._due = now + self._timeouts.response
+        vehicle = self._peer.vehicle
+        return [MissionCount(vehicle.system, vehicle.component, len(self._rows), self._type)]
+
+    def _item(self, seq: int) -> Message:
+        vehicle = self._peer.vehicle
+        return MissionItemInt(vehicle.system, vehicle.component, seq, self._type, self._rows[seq])
+
+    def _end(self, status: Status, result: int | None = None, opaque_id: int = 0) -> None:
+        said = self._texts.all()
+        last = self._last if self._sent else None
+        self.outcome = Outcome(status, result, last, (), said, opaque_id)

@@ -1,0 +1,109 @@
+"""Missions, peers and short ways to run machines for the tests of the wire."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from faao_mav.mavlink.faults import Faults
+from faao_mav.mavlink.messages import Envelope, Message, Row
+from faao_mav.mavlink.mock import Manners, MockAutopilot, MockKind, manners_of
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, Firmware, MissionType
+from faao_mav.mavlink.rows import rows_of
+from faao_mav.mavlink.session import PartReport, upload_parts
+from faao_mav.mavlink.simulate import Station, simulate
+from faao_mav.mavlink.transfer import Machine, Peer, Script, Timeouts
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+
+VEHICLE = Address(1, 1)
+FOREIGN = Address(250, 190)
+KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")
+HOME = Home(-35.363262, 149.165237, 584.0)
+FENCE = Fence(
+    (Polygon(((-35.3, 149.1), (-35.4, 149.1), (-35.4, 149.2)), inclusion=True),),
+    (Circle((-35.36, 149.16), 40.0, inclusion=False),),
+)
+RALLY = (RallyPoint(-35.36, 149.16, 30.0), RallyPoint(-35.37, 149.17, 40.0))
+
+
+def firmware_of(kind: MockKind) -> Firmware:
+    return "ardupilot" if kind == "ardupilot" else "px4"
+
+
+def peer_of(firmware: Firmware) -> Peer:
+    return Peer(GROUND_STATION, VEHICLE, firmware)
+
+
+def a_mission(count: int, shift: float = 0.0, **more: Any) -> Mission:
+    """Return a mission of take-off, waypoints and a return, `shift` degrees away."""
+    start = MissionItem(22, 3, x=HOME.latitude, y=HOME.longitude, z=20.0)
+    way = [
+        MissionItem(16, 3, (float(k % 7), 0.0, 0.0, 0.0), -35.36 + shift + k * 1e-5, 149.16, 30.0)
+        for k in range(count - 2)
+    ]
+    return Mission((start, *way, MissionItem(20, 2)), HOME, **more)
+
+
+def rows_for(firmware: Firmware, count: int = 5, shift: float = 0.0) -> tuple[Row, ...]:
+    """Return the rows of a mission of `count` items."""
+    return rows_of(a_mission(count, shift), MissionType.MISSION, firmware)
+
+
+def places(rows: Sequence[Row]) -> list[tuple[int, int, int, float]]:
+    """Return what tells rows apart and no autopilot changes."""
+    return [(row.command, row.x, row.y, row.z) for row in rows]
+
+
+class Desk:
+    """A machine on a table: told things by hand, one at a time."""
+
+    def __init__(self, machine: Machine[Any], sender: Address = VEHICLE) -> None:
+        self.machine, self.sender = machine, sender
+        self.now = 0.0
+        self.sent: list[Message] = []
+
+    def start(self) -> list[Message]:
+        return self._note(self.machine.start(self.now))
+
+    def tell(self, message: Message, sender: Address | None = None) -> list[Message]:
+        """Return the answer to `message`."""
+        envelope = Envelope(sender or self.sender, message)
+        return self._note(self.machine.on(envelope, self.now))
+
+    def wait(self, seconds: float) -> list[Message]:
+        """Return what is sent within `seconds` of silence."""
+        end, out = self.now + seconds, list[Message]()
+        while (due := self.machine.deadline) is not None and due <= end:
+            if self.machine.outcome is not None:
+                break
+            self.now = max(self.now, due)
+            out += self._note(self.machine.tick(self.now))
+        self.now = end
+        return out
+
+    def _note(self, messages: Sequence[Message]) -> list[Message]:
+        self.sent += messages
+        return list(messages)
+
+
+def upload_to(
+    mock: MockAutopilot,
+    rows: Sequence[Row],
+    faults: Faults | None = None,
+    *,
+    part: MissionType = MissionType.MISSION,
+    timeouts: Timeouts | None = None,
+    until: float = 600.0,
+    **more: Any,
+) -> tuple[PartReport | None, float]:
+    """Upload `rows` to `mock` over a simulated link, verified; report and time taken."""
+    peer = peer_of(firmware_of(mock.manners.kind))
+    script = Script(upload_parts([(part, tuple(rows))], peer, timeouts=timeouts))
+    client = Station(script, GROUND_STATION)
+    took = simulate(client, Station(mock, VEHICLE), faults, until, **more)
+    return (script.outcome[0] if script.outcome else None), took
+
+
+def mock_of(kind: MockKind | Manners, **options: Any) -> MockAutopilot:
+    """Return a mock autopilot that sends no position reports."""
+    manners = kind if isinstance(kind, Manners) else manners_of(kind)
+    return MockAutopilot(manners, home=HOME, rate=0.0, **options)

@@ -1,0 +1,202 @@
+"""The downloading and the clearing client."""
+
+import pytest
+from stations import FOREIGN, Desk, peer_of, rows_for
+
+from faao_mav.mavlink.clear import Clear
+from faao_mav.mavlink.download import Download
+from faao_mav.mavlink.messages import (
+    MissionAck,
+    MissionClearAll,
+    MissionCount,
+    MissionItemInt,
+    MissionRequestInt,
+    MissionRequestList,
+)
+from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.transfer import Timeouts
+
+ME = (255, 190)
+ROWS = rows_for("px4", 3)
+
+
+def desk_for(firmware="ardupilot"):
+    desk = Desk(Download(peer_of(firmware)))
+    desk.start()
+    return desk
+
+
+def item(seq, *, target=ME, mission_type=0):
+    return MissionItemInt(*target, seq, mission_type, ROWS[seq])
+
+
+def wants(seq, *, legacy=False):
+    return MissionRequestInt(1, 1, seq, 0, legacy)
+
+
+def test_a_whole_download():
+    desk = desk_for()
+    assert desk.sent == [MissionRequestList(1, 1, 0)]
+    assert desk.tell(MissionCount(*ME, 3, 0, 99)) == [wants(0)]
+    assert desk.tell(item(0)) == [wants(1)]
+    assert desk.tell(item(1)) == [wants(2)]
+    assert desk.tell(item(2)) == [MissionAck(1, 1, Result.ACCEPTED, 0)]
+    assert desk.machine.outcome.rows == ROWS
+    assert desk.machine.outcome.opaque_id == 99
+
+
+def test_an_empty_list_is_acknowledged_too():
+    desk = desk_for()
+    assert desk.tell(MissionCount(*ME, 0, 0)) == [MissionAck(1, 1, Result.ACCEPTED, 0)]
+    assert (desk.machine.outcome.status, desk.machine.outcome.rows) == ("accepted", ())
+
+
+def test_px4_is_told_of_the_end_twice():
+    desk = desk_for("px4")
+    assert desk.tell(MissionCount(*ME, 0, 0)) == [MissionAck(1, 1, Result.ACCEPTED, 0)] * 2
+
+
+def test_the_list_is_asked_for_again_and_given_up():
+    desk = desk_for()
+    assert desk.wait(3.1) == [MissionRequestList(1, 1, 0)] * 2
+    desk.wait(120)
+    attempts = Timeouts().attempts
+    assert desk.sent.count(MissionRequestList(1, 1, 0)) == 6 * attempts
+    assert desk.machine.outcome.status == "silent"
+
+
+@pytest.mark.parametrize("seq", [0, 1])
+def test_an_item_is_asked_for_again(seq):
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 3, 0))
+    for before in range(seq):
+        desk.wait(0.1)
+        desk.tell(item(before))
+    desk.wait(0.2)
+    assert set(desk.wait(0.4)) == {wants(seq)}
+    assert desk.tell(item(seq)) == [wants(seq + 1)]
+
+
+def test_questions_come_less_often_the_longer_none_is_answered():
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 3, 0))
+    assert len(desk.wait(0.26)) == 1
+    assert len(desk.wait(0.5)) == 1
+    assert len(desk.wait(6.0)) == 4
+
+
+def test_a_slow_link_is_not_flooded_once_it_is_known():
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 3, 0))
+    desk.wait(0.24)
+    desk.tell(item(0))
+    assert desk.wait(0.4) == []
+
+
+def test_duplicates_and_items_ahead_are_ignored():
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 3, 0))
+    desk.tell(item(0))
+    assert desk.tell(item(0)) == []
+    assert desk.tell(item(2)) == []
+    assert desk.tell(MissionCount(*ME, 3, 0)) == []
+    desk.tell(item(1))
+    desk.tell(item(2))
+    assert desk.machine.outcome.rows == ROWS
+
+
+def test_what_is_for_others_is_ignored():
+    desk = desk_for()
+    assert desk.tell(MissionCount(250, 190, 7, 0)) == []
+    assert desk.tell(MissionCount(*ME, 7, 1)) == []
+    assert desk.tell(MissionCount(*ME, 7, 0), FOREIGN) == []
+    desk.tell(MissionCount(*ME, 3, 0))
+    assert desk.tell(item(0, target=(250, 190))) == []
+    assert desk.tell(item(0, mission_type=1)) == []
+    assert desk.tell(item(0)) == [wants(1)]
+
+
+def test_a_list_that_changes_meanwhile_is_read_anew():
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 2, 0))
+    desk.tell(item(0))
+    assert desk.tell(MissionCount(*ME, 3, 0)) == [MissionRequestList(1, 1, 0)]
+    desk.tell(MissionCount(*ME, 3, 0))
+    for seq in range(3):
+        desk.tell(item(seq))
+    assert desk.machine.outcome.rows == ROWS
+
+
+def test_unsupported_changes_to_the_old_request():
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 3, 0))
+    assert desk.tell(MissionAck(*ME, Result.UNSUPPORTED, 0)) == [wants(0, legacy=True)]
+    assert desk.tell(item(0)) == [wants(1, legacy=True)]
+
+
+@pytest.mark.parametrize("result", [Result.DENIED, Result.ERROR, Result.UNSUPPORTED])
+def test_a_refusal_that_is_repeated_is_final(result):
+    desk = desk_for()
+    for _ in range(Timeouts().attempts):
+        assert desk.machine.outcome is None
+        desk.tell(MissionAck(*ME, result, 0))
+        desk.wait(0.3)
+    assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", result)
+
+
+def test_one_stray_refusal_is_survived():
+    desk = desk_for()
+    desk.tell(MissionAck(*ME, Result.ERROR, 0))
+    assert desk.wait(0.3) == [MissionRequestList(1, 1, 0)]
+    desk.tell(MissionCount(*ME, 3, 0))
+    for seq in range(3):
+        desk.tell(item(seq))
+    assert desk.machine.outcome.status == "accepted"
+
+
+def test_a_vehicle_that_falls_silent_is_asked_from_the_beginning():
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 3, 0))
+    desk.tell(item(0))
+    assert MissionRequestList(1, 1, 0) in desk.wait(11)
+
+
+def test_who_gives_up_tells_the_vehicle():
+    desk = desk_for()
+    desk.tell(MissionCount(*ME, 3, 0))
+    assert desk.machine.cancel(desk.now) == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
+    assert desk.machine.outcome.status == "cancelled"
+
+
+def clearing(part=MissionType.FENCE):
+    desk = Desk(Clear(peer_of("ardupilot"), part))
+    desk.start()
+    return desk
+
+
+def test_clearing():
+    desk = clearing()
+    assert desk.sent == [MissionClearAll(1, 1, 1)]
+    desk.tell(MissionAck(*ME, Result.ACCEPTED, 0))
+    assert desk.machine.outcome is None
+    desk.tell(MissionAck(*ME, Result.ACCEPTED, 1))
+    assert desk.machine.outcome.status == "accepted"
+
+
+def test_clearing_is_repeated_then_given_up():
+    desk = clearing()
+    desk.wait(60)
+    assert desk.sent == [MissionClearAll(1, 1, 1)] * 6
+    assert desk.machine.outcome.status == "silent"
+
+
+def test_clearing_may_be_refused():
+    desk = clearing()
+    desk.tell(MissionAck(*ME, Result.DENIED, 1))
+    assert desk.machine.outcome.status == "refused"
+    desk = clearing()
+    desk.tell(MissionAck(*ME, Result.ERROR, 1))
+    assert desk.machine.outcome is None
+    desk.wait(1.6)
+    desk.tell(MissionAck(*ME, Result.ERROR, 1))
+    assert desk.machine.outcome.status == "refused"

@@ -1,0 +1,319 @@
+"""Whatever the link does: an upload is verified and right, or reported as failed, and ends."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from stations import (
+    FENCE,
+    FOREIGN,
+    KINDS,
+    RALLY,
+    VEHICLE,
+    a_mission,
+    firmware_of,
+    mock_of,
+    peer_of,
+    places,
+    rows_for,
+    upload_to,
+)
+
+from faao_mav.mavlink.faults import Channel, Faults, Lost
+from faao_mav.mavlink.messages import Heartbeat, MissionAck, MissionCount
+from faao_mav.mavlink.mock import COUNT, ardupilot, px4
+from faao_mav.mavlink.mock.lists import Lists
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.rows import rows_of
+from faao_mav.mavlink.session import clear_lists, download_lists, upload_parts
+from faao_mav.mavlink.simulate import Station, simulate
+from faao_mav.mavlink.transfer import Peer, Script
+from faao_mav.mavlink.upload import Upload
+
+MISSION = MissionType.MISSION
+REQUEST, MISSION_ACK, COUNT_ID, REQUEST_INT, ITEM_INT = 40, 47, 44, 51, 73
+
+shares = st.floats(0, 0.4)
+bad_links = st.builds(
+    Faults,
+    loss=shares,
+    duplication=shares,
+    corruption=st.floats(0, 0.1),
+    reordering=shares,
+    delay=st.floats(0, 2),
+    latency=st.floats(0, 0.3),
+    outages=st.lists(
+        st.tuples(st.floats(0, 20), st.floats(0, 3)).map(lambda t: (t[0], t[0] + t[1])), max_size=2
+    ).map(tuple),
+    seed=st.integers(0, 2**32),
+)
+
+
+def vehicle_holds(mock, rows, part=MISSION):
+    """Tell whether the list of the vehicle is `rows`, by its own storage."""
+    return places(mock.lists.rows(part)) == places(rows)
+
+
+@settings(max_examples=400)
+@given(st.sampled_from([*KINDS, "px4-late-items"]), st.integers(2, 12), bad_links, st.booleans())
+def test_no_wrong_mission_is_ever_called_verified(kind, count, faults, occupied):
+    manners = px4(complete_only=False) if kind == "px4-late-items" else kind
+    mock = mock_of(manners)
+    firmware = firmware_of(mock.manners.kind)
+    if occupied:
+        mock.lists.replace(MISSION, rows_for(firmware, 7, shift=0.1))
+    rows = rows_for(firmware, count)
+    report, took = upload_to(mock, rows, faults, until=1000.0)
+    assert report is not None, "it does not end"
+    assert took < 600
+    if report.verified:
+        assert vehicle_holds(mock, rows)
+        assert not [d for d in report.differences if d.kind == "wrong"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("loss", [0.05, 0.2, 0.4])
+def test_plain_loss_is_overcome(kind, loss):
+    for seed in range(15):
+        mock = mock_of(kind)
+        rows = rows_for(firmware_of(kind), 12)
+        report, _ = upload_to(mock, rows, Faults(loss=loss, latency=0.03, seed=seed))
+        assert report.verified, (seed, report)
+        assert vehicle_holds(mock, rows)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_link_that_dies_for_3_s_is_overcome(kind):
+    for begin in (0.0, 0.05, 0.2, 0.5, 1.0):
+        mock, rows = mock_of(kind), rows_for(firmware_of(kind), 30)
+        faults = Faults(latency=0.01, outages=((begin, begin + 3.0),))
+        report, _ = upload_to(mock, rows, faults)
+        assert (report.verified, report.attempts) == (True, 1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_link_that_dies_for_a_minute_is_reported(kind):
+    mock, rows = mock_of(kind), rows_for(firmware_of(kind), 30)
+    report, _ = upload_to(mock, rows, Faults(latency=0.01, outages=((0.2, 90.0),)))
+    assert report.verdict == "silent"
+    assert report.attempts == 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "lost"),
+    [
+        ("ardupilot", Lost(REQUEST, 1)),
+        ("ardupilot", Lost(REQUEST, 4)),
+        ("ardupilot", Lost(ITEM_INT, 4)),
+        ("ardupilot", Lost(COUNT_ID, 1)),
+        ("ardupilot", Lost(MISSION_ACK, 1)),
+        ("px4", Lost(REQUEST_INT, 1)),
+        ("px4", Lost(REQUEST_INT, 4)),
+        ("px4", Lost(ITEM_INT, 4)),
+        ("px4", Lost(COUNT_ID, 1)),
+        ("px4", Lost(MISSION_ACK, 1)),
+    ],
+)
+def test_any_one_packet_may_be_lost(kind, lost):
+    mock, rows = mock_of(kind), rows_for(kind, 4)
+    report, took = upload_to(mock, rows, Faults(lost=(lost,)))
+    assert (report.verified, report.attempts) == (True, 1)
+    assert took < 4
+
+
+def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way():
+    for kind, repeated in (("px4", 1), ("ardupilot", 0)):
+        mock, rows = mock_of(kind), rows_for(kind, 4)
+        upload = Upload(rows, peer_of(kind))
+        client = Station(upload, GROUND_STATION)
+        heard = []
+        simulate(
+            client,
+            Station(mock, VEHICLE),
+            Faults(lost=(Lost(MISSION_ACK, 1),)),
+            heard=lambda *told, heard=heard: heard.append(told[0].message),
+        )
+        assert upload.outcome.status == ("accepted" if kind == "px4" else "unknown")
+        acks = [message for message in heard if isinstance(message, MissionAck)]
+        assert len(acks) == repeated
+
+
+@pytest.mark.parametrize("make", [ardupilot, px4])
+@pytest.mark.parametrize("result", sorted(set(Result) - {Result.ACCEPTED, Result.INVALID_SEQUENCE}))
+@pytest.mark.parametrize("seq", [COUNT, 0, 3, 5])
+def test_refusals_of_every_kind_are_reported(make, result, seq):
+    if make is ardupilot and seq == 0:
+        seq = 1
+    mock = mock_of(make(refusals={(MISSION, seq): result}))
+    rows = rows_for(firmware_of(mock.manners.kind), 6)[:6]
+    report, _ = upload_to(mock, rows)
+    assert not report.verified
+    assert report.result == result
+    assert report.verdict == ("cancelled" if result == Result.OPERATION_CANCELLED else "refused")
+    if result not in (Result.ERROR, Result.OPERATION_CANCELLED):
+        assert report.attempts == 1
+        assert report.item == (None if seq == COUNT else seq)
+
+
+def test_a_refused_mission_leaves_px4_as_it_was():
+    mock = mock_of(px4(refusals={(MISSION, 3): Result.INVALID_PARAM1}))
+    old = rows_for("px4", 7, shift=0.1)
+    mock.lists.replace(MISSION, old)
+    upload_to(mock, rows_for("px4", 6))
+    assert vehicle_holds(mock, old)
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("when", [0.03, 0.1, 0.2])
+def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind, when):
+    mock, rows = mock_of(kind, boot=4.0), rows_for(kind, 40)
+    faults = Faults(latency=0.005)
+    report, _ = upload_to(mock, rows, faults, events=[(4.5 + when, mock.reboot)])
+    assert report.verified
+    assert vehicle_holds(mock, rows)
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+def test_another_ground_station_uploads_something_else_at_the_same_time(kind):
+    """One of the two is refused, or both come in turn: nobody is told a wrong thing."""
+    for head_start in range(4):
+        mock = mock_of(kind)
+        ours, theirs = rows_for(kind, 8), rows_for(kind, 9, shift=0.1)
+        rival = Upload(theirs, Peer(FOREIGN, VEHICLE, kind))
+        faults = Faults(latency=0.004 * (1 + head_start), reordering=0.5, delay=0.05)
+        report, _ = upload_to(mock, ours, faults, others=[Station(rival, FOREIGN)])
+        if report.verified:
+            assert vehicle_holds(mock, ours)
+        else:
+            assert report.verdict in ("refused", "different", "unread")
+
+
+def test_another_vehicle_with_the_same_list_does_not_mix_in():
+    mock, rows = mock_of("px4"), rows_for("px4", 6)
+    other = mock_of("px4", address=Address(2, 1))
+    report, _ = upload_to(mock, rows, others=[Station(other, other.address)])
+    assert report.verified
+    assert other.lists.rows(MISSION) == ()
+
+
+def test_all_three_lists_of_a_mission():
+    for kind in KINDS:
+        firmware, mock = firmware_of(kind), mock_of(kind)
+        mission = a_mission(6, fence=FENCE, rally=RALLY)
+        parts = [(part, rows_of(mission, part, firmware)) for part in MissionType]
+        script = Script(upload_parts(parts, peer_of(firmware)))
+        simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
+        assert [report.verdict for report in script.outcome] == ["verified"] * 3
+        stored = mock.mission()
+        assert (stored.fence, stored.rally) == (mission.fence, mission.rally)
+
+        lists = Script(download_lists(tuple(MissionType), peer_of(firmware)))
+        simulate(Station(lists, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
+        for part, rows in parts:
+            assert places(lists.outcome.rows[part]) == places(rows)
+
+        cleared = Script(clear_lists(tuple(MissionType), peer_of(firmware)))
+        simulate(Station(cleared, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
+        assert [report.verdict for report in cleared.outcome] == ["verified"] * 3
+        assert mock.mission().items == ()
+
+
+def test_an_upload_stops_at_the_list_that_fails():
+    mock = mock_of(px4(refusals={(MissionType.FENCE, COUNT): Result.NO_SPACE}))
+    mission = a_mission(6, fence=FENCE, rally=RALLY)
+    parts = [(part, rows_of(mission, part, "px4")) for part in MissionType]
+    script = Script(upload_parts(parts, peer_of("px4")))
+    simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE))
+    assert [report.verdict for report in script.outcome] == ["verified", "refused"]
+    assert mock.lists.rows(MissionType.RALLY) == ()
+
+
+def test_a_vehicle_that_stores_something_else_is_found_out():
+    class Forgetful(Lists):
+        def kept(self, part, seq, row):
+            kept = super().kept(part, seq, row)
+            return super().kept(part, seq, rows_for("px4", 8)[3]) if seq == 5 else kept
+
+    mock = mock_of("px4")
+    mock.lists.__class__ = Forgetful
+    report, _ = upload_to(mock, rows_for("px4", 8))
+    assert report.verdict == "different"
+    assert {d.item for d in report.differences} == {5}
+    assert report.attempts == 2  # the same again: no third
+
+
+def test_650_items_over_a_bad_link():
+    for kind in ("ardupilot", "px4"):
+        mock, rows = mock_of(kind), rows_for(kind, 650)
+        report, took = upload_to(mock, rows, Faults(loss=0.2, latency=0.01), until=2000)
+        assert report.verified
+        assert took < 400
+
+
+def test_who_is_interrupted_frees_the_vehicle():
+    mock, rows = mock_of("px4"), rows_for("px4", 30)
+    script = Script(upload_parts([(MISSION, rows)], peer_of("px4")))
+    client = Station(script, GROUND_STATION)
+    out = []
+
+    def interrupt(now):
+        out.extend(script.cancel(now))
+
+    simulate(client, Station(mock, VEHICLE), Faults(latency=0.01), events=[(0.1, interrupt)])
+    assert script.outcome[0].verdict == "cancelled"
+    assert out == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
+
+
+def test_clearing_over_a_bad_link():
+    for kind in KINDS:
+        for seed in range(10):
+            mock = mock_of(kind)
+            mock.lists.replace(MissionType.RALLY, rows_for("px4", 3))
+            steps = clear_lists([MissionType.RALLY], peer_of(firmware_of(kind)))
+            script = Script(steps)
+            client = Station(script, GROUND_STATION)
+            simulate(client, Station(mock, VEHICLE), Faults(loss=0.4, seed=seed))
+            (report,) = script.outcome
+            assert report.verified
+            assert mock.lists.rows(MissionType.RALLY) == ()
+
+
+def test_the_same_seed_gives_the_same_link():
+    faults = Faults(loss=0.3, duplication=0.3, reordering=0.5, delay=1.0, corruption=0.2, seed=4)
+    packets = [bytes([0xFD, index]) * 8 for index in range(50)]
+
+    def carried(name, seed=4):
+        channel = Channel(Faults(**{**vars_of(faults), "seed": seed}), name)
+        return [channel.carry(packet, 1.0) for packet in packets]
+
+    assert carried("a") == carried("a")
+    assert carried("a") != carried("b")
+    assert carried("a") != carried("a", seed=5)
+
+
+def vars_of(faults):
+    return {name: getattr(faults, name) for name in faults.__slots__}
+
+
+def test_what_a_channel_does():
+    assert Channel(Faults(latency=0.5), "x").carry(b"abc", 1.0) == [(1.5, b"abc")]
+    assert Channel(Faults(loss=1.0), "x").carry(b"abc", 1.0) == []
+    assert Channel(Faults(outages=((0.5, 1.5),)), "x").carry(b"abc", 1.0) == []
+    assert len(Channel(Faults(duplication=1.0), "x").carry(b"abc", 1.0)) == 2
+    ((_, damaged),) = Channel(Faults(corruption=1.0), "x").carry(b"abc", 1.0)
+    assert sum((a ^ b).bit_count() for a, b in zip(damaged, b"abc", strict=True)) == 1
+    ((late, _),) = Channel(Faults(reordering=1.0, delay=2.0), "x").carry(b"abc", 1.0)
+    assert 1.0 < late <= 3.1
+    channel = Channel(Faults(lost=(Lost(MISSION_ACK, 2),)), "x")
+    packet = bytes([0xFD, 0, 0, 0, 0, 0, 0, MISSION_ACK, 0, 0])
+    assert [len(channel.carry(packet, 0.0)) for _ in range(3)] == [1, 0, 1]
+
+
+def test_messages_used_here_are_what_the_numbers_say():
+    from faao_mav.mavlink.codec import Codec
+
+    codec = Codec(VEHICLE)
+    numbers = [
+        int.from_bytes(codec.pack(message)[7:10], "little")
+        for message in (MissionAck(1, 1, 0, 0), MissionCount(1, 1, 0, 0), Heartbeat(0, 0, 0, 0, 0))
+    ]
+    assert numbers == [MISSION_ACK, COUNT_ID, 0]

@@ -1,0 +1,254 @@
+"""The rest of the mock autopilot: heartbeats, commands, parameters, flight."""
+
+import dataclasses
+
+import pytest
+from flights import fly
+from stations import HOME, VEHICLE, Desk, a_mission, rows_for
+
+from faao_mav.mavlink.messages import (
+    AutopilotVersion,
+    CommandAck,
+    CommandLong,
+    GlobalPositionInt,
+    Heartbeat,
+    HomePosition,
+    LocalPositionNed,
+    MissionClearAll,
+    MissionCurrent,
+    MissionItemReached,
+    MissionSetCurrent,
+    ParamRequestList,
+    ParamRequestRead,
+    ParamSet,
+    ParamValue,
+    SetMode,
+)
+from faao_mav.mavlink.mock import MockAutopilot, manners_of
+from faao_mav.mavlink.protocol import GROUND_STATION, MissionType, Result
+from faao_mav.mavlink.rows import rows_of
+from faao_mav.mission import Mission, MissionItem
+from faao_mav.mission.fence import Fence
+
+TO = (VEHICLE.system, VEHICLE.component)
+BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
+
+
+def desk_for(kind, mission=None, **options):
+    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, **options)
+    desk = Desk(mock, GROUND_STATION)
+    desk.start()
+    if mission is not None:
+        rows = rows_of(mission, MissionType.MISSION, kind)
+        mock.lists.replace(MissionType.MISSION, rows)
+    return desk
+
+
+def command(number, *params):
+    return CommandLong(*TO, number, 0, *map(float, params))
+
+
+def result(messages):
+    (ack,) = [message for message in messages if isinstance(message, CommandAck)]
+    return ack.result
+
+
+def only(messages, kind):
+    return [message for message in messages if isinstance(message, kind)]
+
+
+def take_off(desk, kind):
+    assert result(desk.tell(command(400, 1))) == 0
+    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
+
+
+@BOTH
+def test_a_heartbeat_a_second_that_tells_booting_from_ready(kind):
+    desk = desk_for(kind, boot=3.0)
+    desk.wait(6.0)
+    states = [beat.system_status for beat in only(desk.sent, Heartbeat)]
+    assert states == [2, 2, 2, 3, 3, 3, 3]
+    assert {beat.autopilot for beat in only(desk.sent, Heartbeat)} == {
+        3 if kind == "ardupilot" else 12
+    }
+
+
+@BOTH
+def test_a_whole_flight(kind):
+    mission = a_mission(12)
+    desk = desk_for(kind, mission, speedup=10.0)
+    take_off(desk, kind)
+    assert desk.machine.armed
+    out = desk.wait(60.0)
+    assert not desk.machine.armed
+    first = 1 if kind == "ardupilot" else 0
+    reached = [message.seq for message in only(out, MissionItemReached)]
+    assert reached == [*range(first, first + 11), first + 11]
+    heights = [message.relative_alt / 1000 for message in only(out, GlobalPositionInt)]
+    assert max(heights) == pytest.approx(30.0, abs=0.1)
+    assert heights[-1] == 0
+    currents = [message.seq for message in only(out, MissionCurrent)]
+    assert currents == sorted(currents)
+    assert only(out, Heartbeat)[-1].base_mode & 128 == 0
+
+
+def test_positions_are_those_of_the_track():
+    mission = a_mission(12)
+    desk = desk_for("px4", mission)
+    take_off(desk, "px4")
+    desk.wait(5.0)
+    track = fly(mission)
+    (place,) = only(desk.wait(0.3), GlobalPositionInt)
+    (local,) = only(desk.sent[-4:], LocalPositionNed)
+    up = track.position[abs(track.t - place.time_boot_ms / 1000).argmin(), 2]
+    assert place.relative_alt / 1000 == pytest.approx(up, abs=1.1)
+    assert place.alt - place.relative_alt == 584_000
+    assert local.z == pytest.approx(-place.relative_alt / 1000, abs=1e-3)
+    assert (local.vz < 0) == (place.vz < 0)
+
+
+def test_a_waypoint_before_a_do_item_is_told_by_the_do_items_number():
+    items = list(a_mission(4).items)
+    items.insert(2, MissionItem(178, 2, (1.0, 5.0, -1.0, 0.0)))
+    desk = desk_for("ardupilot", Mission(tuple(items), HOME), speedup=50.0)
+    take_off(desk, "ardupilot")
+    out = desk.wait(20.0)
+    # Numbers with home: take-off 1, waypoint 2 (told as 3, the speed), waypoint 4, return 5.
+    assert [message.seq for message in only(out, MissionItemReached)] == [1, 3, 4, 5]
+
+
+@BOTH
+def test_it_does_not_fly_without_being_armed_and_told_to(kind):
+    desk = desk_for(kind, a_mission(5))
+    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
+    assert only(desk.wait(5.0), GlobalPositionInt)[-1].relative_alt == 0
+    desk = desk_for(kind, a_mission(5))
+    assert result(desk.tell(command(400, 1))) == 0
+    assert only(desk.wait(5.0), GlobalPositionInt)[-1].relative_alt == 0
+    assert result(desk.tell(command(300))) == 0
+    assert only(desk.wait(5.0), GlobalPositionInt)[-1].relative_alt > 0
+
+
+@BOTH
+def test_without_a_mission_there_is_nothing_to_fly(kind):
+    desk = desk_for(kind)
+    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 2
+    assert result(desk.tell(command(300))) == 2
+
+
+def test_px4_takes_what_it_will_not_fly():
+    mission = a_mission(5)
+    low = dataclasses.replace(mission.items[0], z=0.0)
+    for items in (
+        (low, *mission.items[1:]),
+        (*mission.items[1:3], mission.items[0], mission.items[3]),
+        (MissionItem(21, 3, x=-35.0, y=149.0), *mission.items[1:]),
+        (*mission.items, MissionItem(112, 2, (5.0, 0.0, 0.0, 0.0))),
+    ):
+        desk = desk_for("px4", Mission(items, HOME))
+        assert result(desk.tell(command(176, 1, 4, 4))) == 2
+    assert result(desk_for("px4", mission).tell(command(176, 1, 4, 4))) == 0
+
+
+def test_ardupilot_does_not_clear_what_it_flies():
+    desk = desk_for("ardupilot", a_mission(5))
+    take_off(desk, "ardupilot")
+    (ack,) = desk.tell(MissionClearAll(*TO, 0))
+    assert ack.type == Result.ERROR
+
+
+@BOTH
+def test_disarming_ends_the_flight(kind):
+    desk = desk_for(kind, a_mission(5))
+    take_off(desk, kind)
+    desk.wait(3.0)
+    assert result(desk.tell(command(400, 0))) == 0
+    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt == 0
+
+
+@BOTH
+def test_another_mode_ends_the_mission(kind):
+    desk = desk_for(kind, a_mission(5))
+    take_off(desk, kind)
+    assert result(desk.tell(SetMode(1, 1, 0))) == 0
+    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt == 0
+    assert desk.machine.armed
+
+
+@BOTH
+def test_what_ground_stations_ask_for(kind):
+    desk = desk_for(kind)
+    ack, version = desk.tell(command(512, 148))
+    assert (ack.result, type(version)) == (0, AutopilotVersion)
+    assert version.capabilities & 4
+    ack, home = desk.tell(command(512, 242))
+    assert home == HomePosition(-353_632_620, 1_491_652_370, 584_000)
+    assert result(desk.tell(command(512, 30))) == 3
+    assert result(desk.tell(command(511, 33, 1e5))) == 0
+    assert result(desk.tell(command(520, 1))) == 0
+    assert result(desk.tell(command(31_000))) == 3
+
+
+@BOTH
+@pytest.mark.parametrize("number", [176, 224, 300, 400, 511, 512, 520, 16, 0, 65_535])
+def test_no_command_brings_it_down(kind, number):
+    nan, inf = float("nan"), float("inf")
+    for value in (nan, inf, -1.0, 1e30):
+        desk = desk_for(kind, a_mission(3))
+        desk.tell(command(number, *[value] * 7))
+        assert only(desk.wait(2.0), Heartbeat)
+
+
+@BOTH
+def test_parameters(kind):
+    desk = desk_for(kind)
+    values = desk.tell(ParamRequestList(*TO))
+    assert [value.param_index for value in values] == list(range(len(values)))
+    assert {value.param_count for value in values} == {len(values)}
+    second = values[1]
+    assert desk.tell(ParamRequestRead(*TO, "", 1)) == [second]
+    assert desk.tell(ParamRequestRead(*TO, second.param_id, -1)) == [second]
+    assert desk.tell(ParamRequestRead(*TO, "NO_SUCH", -1)) == []
+    assert desk.tell(ParamRequestRead(*TO, "", 999)) == []
+    (changed,) = desk.tell(ParamSet(*TO, second.param_id, 7.0, 9))
+    assert isinstance(changed, ParamValue)
+    assert changed.param_value == 7.0
+
+
+@BOTH
+def test_the_current_item(kind):
+    desk = desk_for(kind, a_mission(5))
+    (current,) = desk.tell(MissionSetCurrent(*TO, 3))
+    assert (current.seq, current.total) == (3, 5)
+    assert desk.tell(MissionSetCurrent(*TO, 99)) == []
+    assert result(desk.tell(command(224, 2))) == 0
+    assert result(desk.tell(command(224, 99))) == 2
+
+
+def test_a_reboot_keeps_what_is_stored():
+    desk = desk_for("px4", a_mission(5), boot=2.0)
+    desk.wait(3.0)
+    take_off(desk, "px4")
+    assert result(desk.tell(command(246, 1))) == 0
+    assert not desk.machine.armed
+    assert result(desk.tell(command(400, 1))) == 1
+    assert len(desk.machine.lists.rows(MissionType.MISSION)) == 5
+    desk.wait(2.5)
+    assert result(desk.tell(command(400, 1))) == 0
+
+
+def test_commands_to_others_are_not_obeyed():
+    desk = desk_for("px4")
+    assert desk.tell(CommandLong(2, 1, 400, 0, 1.0)) == []
+    assert desk.tell(CommandLong(1, 154, 400, 0, 1.0)) == []
+    assert not desk.machine.armed
+
+
+def test_what_it_holds_as_a_mission():
+    mission = a_mission(5)
+    for kind in ("ardupilot", "px4"):
+        held = desk_for(kind, mission).machine.mission()
+        assert [item.x for item in held.items] == pytest.approx([i.x for i in mission.items])
+        assert held.fence == Fence()
+    assert rows_for("px4", 5) == rows_of(mission, MissionType.MISSION, "px4")

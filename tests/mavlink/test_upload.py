@@ -1,0 +1,306 @@
+"""The uploading client, told everything that a vehicle or a link may do to it."""
+
+import pytest
+from stations import FOREIGN, VEHICLE, Desk, peer_of, rows_for
+
+from faao_mav.errors import InputError
+from faao_mav.mavlink.messages import (
+    Heartbeat,
+    MissionAck,
+    MissionCount,
+    MissionItemInt,
+    MissionRequestInt,
+    Statustext,
+)
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.upload import Upload
+
+ME = (GROUND_STATION.system, GROUND_STATION.component)
+ROWS = rows_for("px4", 3)
+BOTH = pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
+
+
+def request(seq, *, legacy=False, target=ME, mission_type=0):
+    return MissionRequestInt(*target, seq, mission_type, legacy)
+
+
+def ack(result, *, target=ME, mission_type=0, opaque_id=0):
+    return MissionAck(*target, result, mission_type, opaque_id)
+
+
+def desk_for(firmware, rows=ROWS, part=MissionType.MISSION):
+    desk = Desk(Upload(rows, peer_of(firmware), part))
+    desk.start()
+    return desk
+
+
+def asked_for_all(firmware):
+    desk = desk_for(firmware)
+    for seq in range(3):
+        desk.tell(request(seq))
+    return desk
+
+
+@BOTH
+def test_a_whole_upload(firmware):
+    desk = desk_for(firmware)
+    assert desk.sent == [MissionCount(1, 1, 3, 0)]
+    for seq in range(3):
+        assert desk.tell(request(seq)) == [MissionItemInt(1, 1, seq, 0, ROWS[seq])]
+    desk.tell(ack(Result.ACCEPTED, opaque_id=77))
+    assert desk.machine.outcome.status == "accepted"
+    assert desk.machine.outcome.opaque_id == 77
+    assert desk.machine.deadline is None
+
+
+def test_an_empty_list_is_not_uploaded():
+    with pytest.raises(InputError, match="clear the list instead"):
+        Upload((), peer_of("px4"))
+
+
+@BOTH
+def test_both_requests_are_answered_with_the_precise_item(firmware):
+    desk = desk_for(firmware)
+    (item,) = desk.tell(request(0, legacy=True))
+    assert isinstance(item, MissionItemInt)
+    assert not item.legacy
+
+
+@BOTH
+def test_any_row_is_sent_as_often_as_asked_for_in_any_order(firmware):
+    desk = desk_for(firmware)
+    for seq in (0, 0, 2, 1, 1, 0, 2):
+        assert desk.tell(request(seq)) == [MissionItemInt(1, 1, seq, 0, ROWS[seq])]
+    assert desk.tell(request(3)) == []
+
+
+@BOTH
+def test_the_count_is_repeated_then_given_up(firmware):
+    desk = desk_for(firmware)
+    assert desk.wait(1.49) == []
+    assert desk.wait(1.51) == [MissionCount(1, 1, 3, 0)] * 2
+    desk.wait(60)
+    assert desk.sent == [MissionCount(1, 1, 3, 0)] * 6
+    assert desk.machine.outcome.status == "silent"
+
+
+def test_a_slow_vehicle_is_no_silent_one():
+    desk = desk_for("px4")
+    for seq in range(3):
+        desk.wait(0.8 * 1.5)
+        desk.tell(request(seq))
+    desk.wait(0.8 * 1.5)
+    desk.tell(ack(Result.ACCEPTED))
+    assert desk.machine.outcome.status == "accepted"
+    assert desk.sent.count(MissionCount(1, 1, 3, 0)) == 1
+
+
+@BOTH
+def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware):
+    desk = desk_for(firmware)
+    desk.tell(request(0))
+    desk.wait(8.9)
+    assert desk.machine.outcome is None
+    sent = desk.wait(2.0)
+    assert sent[-1] == MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)
+    assert desk.machine.outcome.status == "silent"
+    assert desk.machine.outcome.item == 0
+
+
+def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that():
+    desk = desk_for("ardupilot", rows_for("ardupilot", 5))
+    desk.tell(request(0))
+    again = desk.wait(0.3)
+    assert [message.seq for message in again] == [0]
+    (following,) = desk.tell(ack(Result.INVALID_SEQUENCE))
+    assert following.seq == 1
+    # Said again, of the same repetition, it is no news.
+    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []
+
+
+def test_invalid_sequence_from_ardupilot_ends_nothing():
+    desk = asked_for_all("ardupilot")
+    desk.tell(ack(Result.INVALID_SEQUENCE))
+    assert desk.machine.outcome is None
+    desk.tell(ack(Result.ACCEPTED))
+    assert desk.machine.outcome.status == "accepted"
+
+
+def test_a_lost_last_answer_of_px4_is_asked_for_by_the_last_item():
+    desk = asked_for_all("px4")
+    assert desk.wait(1.6) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
+    desk.tell(ack(Result.ACCEPTED))
+    assert desk.machine.outcome.status == "accepted"
+
+
+def test_without_any_last_answer_of_px4_it_is_unknown_what_it_holds():
+    desk = asked_for_all("px4")
+    assert desk.wait(60) == [MissionItemInt(1, 1, 2, 0, ROWS[2])] * 5
+    assert desk.machine.outcome.status == "unknown"
+
+
+def test_ardupilot_is_never_sent_the_last_item_unasked():
+    desk = asked_for_all("ardupilot")
+    assert desk.wait(60) == []
+    assert desk.machine.outcome.status == "unknown"
+
+
+def test_an_error_after_everything_was_sent_leaves_it_to_reading_back():
+    # ArduPilot says it of a duplicate of the last item; ACCEPTED may have been lost before.
+    desk = asked_for_all("ardupilot")
+    desk.tell(ack(Result.ERROR))
+    desk.wait(3)
+    assert desk.machine.outcome.status == "unknown"
+    assert desk.machine.outcome.result == Result.ERROR
+
+
+def test_an_early_acceptance_is_about_something_else():
+    desk = desk_for("px4")
+    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(request(0))
+    desk.tell(ack(Result.ACCEPTED))
+    assert desk.machine.outcome is None
+
+
+FINAL = sorted(
+    set(Result)
+    - {Result.ACCEPTED, Result.ERROR, Result.INVALID_SEQUENCE, Result.OPERATION_CANCELLED}
+)
+
+
+@BOTH
+@pytest.mark.parametrize("result", FINAL)
+@pytest.mark.parametrize("requests", [0, 1, 3])
+def test_a_refusal_is_final_at_any_moment(firmware, result, requests):
+    desk = desk_for(firmware)
+    for seq in range(requests):
+        desk.tell(request(seq))
+    desk.tell(ack(result))
+    desk.tell(Statustext(4, "because"))
+    assert desk.tell(request(0)) == []
+    desk.wait(0.5)
+    outcome = desk.machine.outcome
+    assert (outcome.status, outcome.result, outcome.said) == ("refused", result, ("because",))
+    assert outcome.item == (requests - 1 if requests else None)
+    assert desk.tell(request(0)) == []
+
+
+def test_an_error_is_final_when_nothing_more_is_asked_for():
+    desk = desk_for("px4")
+    desk.tell(request(0))
+    desk.tell(ack(Result.ERROR))
+    desk.wait(1.6)
+    assert desk.machine.outcome.status == "refused"
+
+
+def test_an_error_about_a_duplicate_count_does_not_end_the_transfer():
+    desk = desk_for("px4")
+    desk.tell(request(0))
+    desk.tell(ack(Result.ERROR))
+    desk.wait(0.2)
+    desk.tell(request(1))
+    desk.wait(5)
+    assert desk.machine.outcome is None
+
+
+def test_a_busy_px4_is_asked_again_until_it_is_free():
+    desk = desk_for("px4")
+    for _ in range(3):
+        desk.tell(ack(Result.ERROR))
+        assert desk.wait(1.5) == [MissionCount(1, 1, 3, 0)]
+    assert desk.tell(request(0)) == [MissionItemInt(1, 1, 0, 0, ROWS[0])]
+
+
+def test_a_px4_that_stays_busy_has_refused():
+    desk = desk_for("px4")
+    desk.tell(ack(Result.ERROR))
+    desk.wait(60)
+    assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", Result.ERROR)
+
+
+def test_no_space_while_booting_means_not_yet():
+    desk = desk_for("ardupilot")
+    desk.tell(Heartbeat(2, 3, 0, 0, 2))
+    desk.tell(ack(Result.NO_SPACE))
+    assert desk.wait(20) == []
+    desk.tell(Heartbeat(2, 3, 0, 0, 2))
+    assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(1, 1, 3, 0)]
+    desk.tell(ack(Result.NO_SPACE))
+    desk.wait(0.5)
+    assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
+        "refused",
+        Result.NO_SPACE,
+    )
+
+
+def test_booting_for_ever_ends_too():
+    desk = desk_for("ardupilot")
+    desk.tell(Heartbeat(2, 3, 0, 0, 1))
+    desk.tell(ack(Result.NO_SPACE))
+    desk.wait(120)
+    assert desk.machine.outcome.result == Result.NO_SPACE
+
+
+@pytest.mark.parametrize(
+    ("message", "sender"),
+    [
+        (request(0), FOREIGN),
+        (request(0), Address(2, 1)),
+        (request(0), Address(1, 2)),
+        (request(0, target=(250, 190)), VEHICLE),
+        (request(0, target=(255, 1)), VEHICLE),
+        (request(0, mission_type=1), VEHICLE),
+        (ack(Result.DENIED), FOREIGN),
+        (ack(Result.DENIED, target=(250, 190)), VEHICLE),
+        (ack(Result.DENIED, mission_type=2), VEHICLE),
+        (MissionCount(*ME, 3, 0), VEHICLE),
+        (Heartbeat(2, 3, 128, 0, 4), VEHICLE),
+    ],
+)
+def test_what_is_said_to_others_or_about_other_lists_is_ignored(message, sender):
+    desk = desk_for("px4")
+    assert desk.tell(message, sender) == []
+    assert desk.machine.outcome is None
+    assert desk.tell(request(0)) != []
+
+
+@BOTH
+def test_acceptance_by_another_vehicle_is_none(firmware):
+    desk = asked_for_all(firmware)
+    desk.tell(ack(Result.ACCEPTED), Address(2, 1))
+    desk.tell(ack(Result.ACCEPTED, target=(250, 190)))
+    desk.tell(ack(Result.ACCEPTED, mission_type=1))
+    assert desk.machine.outcome is None
+
+
+def test_who_gives_up_tells_the_vehicle():
+    desk = desk_for("px4")
+    desk.tell(request(0))
+    assert desk.machine.cancel(desk.now) == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
+    assert desk.machine.outcome.status == "cancelled"
+    assert desk.machine.cancel(desk.now) == ()
+
+
+def test_the_vehicle_may_give_up_as_well():
+    desk = desk_for("ardupilot")
+    desk.tell(request(0))
+    desk.tell(ack(Result.OPERATION_CANCELLED))
+    outcome = desk.machine.outcome
+    assert (outcome.status, outcome.result) == ("cancelled", Result.OPERATION_CANCELLED)
+
+
+def test_progress_counts_rows():
+    desk = desk_for("px4")
+    assert desk.machine.progress == ("uploading mission", 0, 3)
+    desk.tell(request(0))
+    desk.tell(request(0))
+    desk.tell(request(1))
+    assert desk.machine.progress == ("uploading mission", 2, 3)
+
+
+@pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
+def test_other_lists_go_the_same_way(part):
+    desk = desk_for("px4", part=part)
+    assert desk.sent == [MissionCount(1, 1, 3, part)]
+    assert desk.tell(request(0)) == []
+    assert desk.tell(request(0, mission_type=part)) == [MissionItemInt(1, 1, 0, part, ROWS[0])]

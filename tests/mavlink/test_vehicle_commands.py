@@ -1,0 +1,214 @@
+"""The commands that talk to vehicles."""
+
+import json
+import threading
+import time
+
+import pytest
+import typer
+from loopback import free_port
+from stations import FENCE, HOME, a_mission, places
+from typer.testing import CliRunner
+
+from faao_mav.cli.autopilot import autopilot, read_home
+from faao_mav.cli.download import download
+from faao_mav.cli.transfer_progress import transfer_progress
+from faao_mav.cli.upload import upload
+from faao_mav.errors import InputError
+from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
+from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.rows import rows_of
+from faao_mav.mavlink.runner import running
+from faao_mav.mission import Mission, MissionItem
+from faao_mav.mission.formats import read_mission, write_wpl
+
+app = typer.Typer(pretty_exceptions_enable=False)
+app.command()(upload)
+app.command()(download)
+app.command()(autopilot)
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+@pytest.fixture
+def mission_file(tmp_path):
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(a_mission(6)))
+    return path
+
+
+@pytest.fixture
+def port():
+    return free_port()
+
+
+def a_mock(kind="ardupilot", **options):
+    manners = manners_of(kind) if isinstance(kind, str) else kind
+    return MockAutopilot(manners, home=HOME, beat=0.1, **options)
+
+
+def test_upload_and_download(mission_file, port, tmp_path):
+    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+        result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
+        assert result.exit_code == 0, result.output
+        vehicle, mission, verified = result.stdout.splitlines()
+        assert vehicle == "vehicle      ArduPilot copter (system 1, component 1, disarmed)"
+        assert mission == "mission      6 items stored"
+        assert verified.startswith("verified     read back and compared, ")
+        assert result.stderr == ""
+        out = tmp_path / "back.waypoints"
+        result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out, "--system", 1)
+        assert result.exit_code == 0, result.output
+    assert "mission      6 items, 0 fence areas, 0 rally points" in result.stdout
+    found, sent = read_mission(out), read_mission(mission_file)
+    assert found.home == sent.home
+    rows, sent_rows = (rows_of(each, MissionType.MISSION, "ardupilot") for each in (found, sent))
+    assert places(rows) == places(sent_rows)
+
+
+def test_json_is_one_object(mission_file, port):
+    with running(a_mock("px4"), f"udpin:127.0.0.1:{port}"):
+        connection = f"udpout:127.0.0.1:{port}"
+        result = run("upload", mission_file, "--to", connection, "--json", "--system", 1)
+    assert result.exit_code == 0
+    assert result.stdout.count("\n") == 1
+    data = json.loads(result.stdout)
+    assert data["verified"] is True
+    assert data["vehicle"]["autopilot"] == "px4"
+    assert data["problems"] == []
+    (mission,) = data["lists"]
+    assert (mission["list"], mission["items"], mission["verdict"]) == ("mission", 6, "verified")
+    assert mission["opaque_id"] > 0
+
+
+def test_json_has_no_nan(tmp_path, port):
+    item = MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36, 149.16, 20.0)
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(Mission((item,), HOME)))
+    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+        result = run("upload", path, "--to", f"udpout:127.0.0.1:{port}", "--json", "--system", 1)
+    assert result.exit_code == 0
+    (difference,) = json.loads(result.stdout)["lists"][0]["differences"]
+    assert difference == {
+        "item": 0,
+        "field": "param1",
+        "sent": 2.5,
+        "found": 2.0,
+        "kind": "dropped",
+    }
+
+
+def test_what_is_not_kept_is_told_once_for_each_field(tmp_path, port):
+    items = tuple(
+        MissionItem(16, 3, (2.5, 0.0, 0.0, 0.0), -35.36 + k * 1e-4, 149.16, 20.0) for k in range(4)
+    )
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(Mission(items, HOME)))
+    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+        result = run("upload", path, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
+    told = [line for line in result.stdout.splitlines() if line.startswith("not kept")]
+    assert told == [
+        "not kept     mission item 0: param1 2.5 is kept as 2.0 (and so in 3 more items)"
+    ]
+
+
+def test_a_refused_upload_is_status_1(mission_file, port):
+    mock = a_mock(ardupilot(refusals={(0, 3): Result.INVALID_PARAM7}))
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
+    assert result.exit_code == 1
+    assert "failed       mission: refused: INVALID_PARAM7" in result.stdout
+    assert "item 2 (command 16)" in result.stdout
+    assert "not verified; do not fly it" in result.stderr
+    assert "verified     " not in result.stdout
+
+
+def test_no_vehicle_is_status_1(mission_file, port):
+    result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--timeout", 0.3)
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    assert "no heartbeat of an autopilot within 0.3 s" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["upload", "missing.waypoints", "--to", "udpout:127.0.0.1:9"], "missing.waypoints"),
+        (["upload", "FILE", "--to", "nonsense"], "expected udpin:HOST:PORT"),
+        (["upload", "FILE", "--to", "/dev/ttyNONE,57600"], "there is no such device"),
+        (["upload", "FILE", "--to", "udpout:127.0.0.1:9", "--log", "no/x.tlog"], "no directory"),
+        (["upload", "FILE", "--to", "udpout:127.0.0.1:9", "--signing-key", "no"], "cannot be read"),
+        (["download", "--from", "nonsense", "--out", "FILE"], "expected udpin:HOST:PORT"),
+        (["download", "--from", "udpout:127.0.0.1:9", "--out", "x.doc"], "expected a name"),
+        (["autopilot", "--listen", "nonsense"], "expected udpin:HOST:PORT"),
+        (["autopilot", "--home", "1,2"], "expected LAT,LON,ALT"),
+        (["autopilot", "--home", "91,2,3"], "latitude"),
+    ],
+)
+def test_unusable_input_is_status_2(arguments, told, mission_file):
+    result = run(*(mission_file if each == "FILE" else each for each in arguments))
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_a_port_in_use_is_status_1(port):
+    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+        result = run("autopilot", "--listen", f"udpin:127.0.0.1:{port}")
+    assert result.exit_code == 1
+    assert "the port is in use" in result.stderr
+
+
+def test_the_mock_autopilot_as_a_command(mission_file, port, monkeypatch):
+    """Its diary tells what it was given; it ends by the keyboard."""
+    from faao_mav.mavlink import runner
+
+    ended = threading.Event()
+    serve = runner.serve
+
+    def until_ended(mock, connection, **options):
+        serve(mock, connection, **options, stop=ended.is_set)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "serve", until_ended)
+    results = []
+
+    def serve_it():
+        results.append(
+            run("autopilot", "--listen", f"udpin:127.0.0.1:{port}", "--kind", "px4", "--drop", 0.05)
+        )
+
+    thread = threading.Thread(target=serve_it)
+    thread.start()
+    try:
+        time.sleep(0.3)
+        from faao_mav.mavlink import upload as put
+
+        assert put(a_mission(6, fence=FENCE), f"udpout:127.0.0.1:{port}", system=1).verified
+    finally:
+        ended.set()
+        thread.join()
+    (result,) = results
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert lines[0] == f"px4, system 1, at udpin:127.0.0.1:{port}; Ctrl-C ends"
+    assert lines[1:] == ["mission: 6 rows", "fence: 4 rows", "ended"]
+
+
+def test_progress_is_drawn_on_a_terminal_only(capsys):
+    with transfer_progress(shown=False) as nothing:
+        assert nothing is None
+    with transfer_progress(shown=True) as observe:
+        observe("uploading mission", 3, 9)
+        observe("asking for home", 0, 0)
+    assert capsys.readouterr().out == ""
+
+
+def test_homes_are_read():
+    home = read_home("47.397742, 8.545594, 488")
+    assert (home.latitude, home.longitude, home.altitude) == (47.397742, 8.545594, 488.0)
+    with pytest.raises(InputError, match="finite"):
+        read_home("1,2,nan")
+    assert MissionType.RALLY.title == "rally points"
