@@ -7,8 +7,12 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.convert import convert
+from faao_mav.cli.download import download
 from faao_mav.cli.plan import plan
+from faao_mav.cli.upload import upload
+from faao_mav.cli.validate import validate
 
 DEFAULT = "plan"
 """The command of an argument list that names none."""
@@ -44,7 +48,11 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command(DEFAULT)(plan)
+app.command("validate")(validate)
+app.command("upload")(upload)
+app.command("download")(download)
 app.command("convert")(convert)
+app.command("autopilot")(autopilot)
 
 
 def _version(asked: bool) -> None:

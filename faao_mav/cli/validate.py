@@ -160,9 +160,7 @@ def _vehicle(
 
 def _track(mission: "Mission", vehicle: "Vehicle") -> tuple["Track | None", str]:
     """Return the predicted flight, or None and why there is none."""
-    from faao_mav.mission.flight.predict import (  # type: ignore[import-not-found,unused-ignore]
-        predict,
-    )
+    from faao_mav.mission.flight.predict import predict
 
     try:
         track = predict(mission, vehicle)

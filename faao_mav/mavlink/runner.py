@@ -5,7 +5,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from itertools import count
 
 from faao_mav.mavlink.faults import Channel, Faults
@@ -122,9 +121,8 @@ def predicted(autopilot: Autopilot) -> Fly:
     """Return how a copter with `autopilot` flies missions, by the flight prediction."""
 
     def fly(mission: Mission) -> Track:
-        # By name: the flight models cost scipy, and most uses of a mock never fly.
-        predict = import_module("faao_mav.mission.flight.predict").predict
-        track: Track = predict(mission, Vehicle(autopilot))
-        return track
+        from faao_mav.mission.flight.predict import predict  # most uses of a mock never fly
+
+        return predict(mission, Vehicle(autopilot))
 
     return fly

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from faao_mav.mission.assemble import assemble
 from faao_mav.mission.autopilot import legs_of
-from faao_mav.mission.flight import flight_model
+from faao_mav.mission.flight import copter_model
 from faao_mav.mission.item import Mission
 from faao_mav.mission.outline import plan_route
 from faao_mav.mission.recommend import candidates
@@ -48,7 +48,7 @@ def convert(solution: "Solution") -> Conversion:
     for parameters in candidates(plan):
         vehicle = replace(given, parameters={**given.parameters, **parameters})
         legs = legs_of(vehicle)
-        scheduler = Scheduler(t, w, flight_model(vehicle), legs, top)
+        scheduler = Scheduler(t, w, copter_model(vehicle), legs, top)
         first = scheduler.first(with_run_in(outline, t, w, legs, top))
         tried.append((first, scheduler, vehicle, parameters))
     tried.sort(key=lambda trial: trial[0].rms)

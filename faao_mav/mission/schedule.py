@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from faao_mav.arrays import Integers, Real
 from faao_mav.mission.autopilot import Legs
 from faao_mav.mission.deviation import Deviation, deviation
-from faao_mav.mission.flight import FlightModel, FlightPath, Flown
+from faao_mav.mission.flight import CopterModel, FlightPath, Flown
 from faao_mav.mission.hover import SLOWEST
 from faao_mav.mission.route import Route
 from faao_mav.mission.timing import SHORTEST_HOLD, Clock, fit
@@ -91,7 +91,7 @@ class Scheduler:
 
     t: Real
     w: Real
-    model: FlightModel
+    model: CopterModel
     legs: Legs
     max_speed: float
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.mission.flight import FlightModel, FlightPath, Flown
+from faao_mav.mission.flight import CopterModel, FlightPath, Flown
 
 SPEED_STEP, HOLD_STEP = 0.02, 0.05
 """Finite differences, m/s and s: above the predictions' noise, below what the physics bends."""
@@ -61,7 +61,7 @@ class Clock:
 
 
 def fit(
-    model: FlightModel,
+    model: CopterModel,
     path: FlightPath,
     clock: Clock,
     *,

@@ -1,7 +1,15 @@
 """How a vehicle will fly a mission."""
 
-from faao_mav.mission.flight.models import flight_model
-from faao_mav.mission.flight.path import FlightModel, FlightPath, Flown
+from faao_mav.mission.flight.models import copter_model, flight_model
+from faao_mav.mission.flight.path import CopterModel, FlightModel, FlightPath, Flown
 from faao_mav.mission.flight.track import Track
 
-__all__ = ["FlightModel", "FlightPath", "Flown", "Track", "flight_model"]
+__all__ = [
+    "CopterModel",
+    "FlightModel",
+    "FlightPath",
+    "Flown",
+    "Track",
+    "copter_model",
+    "flight_model",
+]

@@ -1,14 +1,23 @@
 """Which model predicts the flight of a vehicle."""
 
 from faao_mav.mission.flight.arducopter import ArduCopter
-from faao_mav.mission.flight.path import FlightModel
+from faao_mav.mission.flight.path import CopterModel, FlightModel
 from faao_mav.mission.vehicle import Vehicle
 
 
-def flight_model(vehicle: Vehicle) -> FlightModel:
-    """Return the model of `vehicle` with its parameters; raises `InputError` for useless ones."""
+def copter_model(vehicle: Vehicle) -> CopterModel:
+    """Return the model of a multicopter; raises `InputError` for useless parameters."""
     if vehicle.autopilot == "px4":
         from faao_mav.mission.flight.px4 import Px4
 
         return Px4.from_vehicle(vehicle)
     return ArduCopter.from_vehicle(vehicle)
+
+
+def flight_model(vehicle: Vehicle) -> FlightModel:
+    """Return the model of `vehicle` with its parameters; raises `InputError` for useless ones."""
+    if vehicle.kind == "plane" and vehicle.autopilot == "ardupilot":
+        from faao_mav.mission.flight.plane import ArduPlane
+
+        return ArduPlane.from_vehicle(vehicle)
+    return copter_model(vehicle)

@@ -52,9 +52,18 @@ class Flown:
 class FlightModel(Protocol):
     """How one kind of vehicle flies legs."""
 
+    @property
+    def cruise_speed(self) -> float:
+        """The vehicle's own speed, flown where none is commanded, m/s."""
+        ...
+
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds."""
         ...
+
+
+class CopterModel(FlightModel, Protocol):
+    """A model that can be fitted to a plan."""
 
     def fly_many(
         self, path: FlightPath, speeds: Real, waits: Real, step: float = 0.1

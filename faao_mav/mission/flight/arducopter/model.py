@@ -31,7 +31,7 @@ LEAN_ACCELERATION = 9.81 * math.tan(math.radians(30))
 """At the default lean limit, m/s²."""
 
 _PARAMETERS = {
-    "speed": Parameter({"WP_SPD": 1.0, "WPNAV_SPEED": 0.01}, 0.1),
+    "cruise_speed": Parameter({"WP_SPD": 1.0, "WPNAV_SPEED": 0.01}, 0.1),
     "climb_speed": Parameter({"WP_SPD_UP": 1.0, "WPNAV_SPEED_UP": 0.01}, 0.1),
     "descent_speed": Parameter({"WP_SPD_DN": 1.0, "WPNAV_SPEED_DN": 0.01}, 0.1),
     "acceleration": Parameter({"WP_ACC": 1.0, "WPNAV_ACCEL": 0.01}, 0.1),
@@ -55,7 +55,7 @@ class ArduCopter:
 
     calibrated: ClassVar[bool] = True
 
-    speed: float = 10.0
+    cruise_speed: float = 10.0
     climb_speed: float = 2.5
     descent_speed: float = 1.5
     acceleration: float = 2.5
@@ -114,7 +114,7 @@ class _Flight:
         arrivals, departures = np.zeros_like(waits), np.zeros_like(waits)
         departures[:, 0] = waits[:, 0]
         begin = departures[:, 0] + START_LAG
-        before = model.speed if math.isnan(path.before) else path.before
+        before = model.cruise_speed if math.isnan(path.before) else path.before
         legs, begins, tau = [], [], 0 * begin
         for k, length in enumerate(lengths):
             share, acceleration = limits[k]
