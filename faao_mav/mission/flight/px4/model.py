@@ -96,7 +96,7 @@ class Px4:
             return _standing(path.points[0], hold, step)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
         variants = Variants(path.points, radii, speed, hold)
-        log = simulate(self._limits(), self.error_limit, variants)
+        log = simulate(self._limits(), self.error_limit, variants, beyond=step)
         return sampled(log, path.points[0, 2], step)
 
     def _limits(self) -> Limits:

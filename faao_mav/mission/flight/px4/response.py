@@ -42,7 +42,7 @@ class Response:
 
     def advance(self, state: Complex, dt: Real) -> Complex:
         """Return `state` (STATES, ...) after `dt` (...) seconds, each at most the step."""
-        after: Complex = np.tensordot(self._transition, state, 1)
+        after = (self._transition @ state.reshape(STATES, -1)).reshape(state.shape)
         short = dt < self._step
         if short.any():
             term = state[:, short]

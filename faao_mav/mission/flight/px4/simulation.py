@@ -52,14 +52,14 @@ class Log:
     velocity: Complex
 
 
-def simulate(limits: Limits, error_limit: float, variants: Variants) -> Log:
-    """Fly every variant to its end and on until the last one has ended.
+def simulate(limits: Limits, error_limit: float, variants: Variants, beyond: float) -> Log:
+    """Fly every variant until the last one has ended, and on for `beyond` seconds.
 
     `error_limit` is MPC_XY_ERR_MAX, m: the trajectory's clock runs slower by the share of it that
     the aircraft lags behind.
     """
     flight = _Flight(limits, error_limit, variants)
-    while not flight.over():
+    while not flight.over(beyond):
         flight.step()
     return flight.log()
 
@@ -92,10 +92,10 @@ class _Flight:
         self._far = self._distances()
         self._times, self._motions = [self._time], [self._state[:2]]
 
-    def over(self) -> bool:
+    def over(self, beyond: float) -> bool:
         if not self._ended.all():
             return False
-        return bool((self._time >= self._departures[:, -1].max()).all())
+        return bool(self._time.min() >= self._departures[:, -1].max() + beyond)
 
     def log(self) -> Log:
         motion = np.stack(self._motions)
