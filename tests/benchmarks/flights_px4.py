@@ -3,8 +3,9 @@
     python tests/benchmarks/flights_px4.py
 
 Four constants of the model are fitted to eight of the twelve flights: they make the rms over
-flights of the arrival error (s) and a sixth of the position error (m) least, and are then rounded.
-The other four flights are held out: nothing was fitted to them.
+flights of the arrival error (s) and a sixth of the position error (m) small, as round figures near
+a flat minimum. The other four flights are held out: no constant was fitted to them, but their
+errors were seen while the model was built, so they are no blind test.
 
 Prediction and record are aligned once per flight, at the start: the predicted time 0 is when the
 first leg becomes current, half-way between the two samples (0.2 s apart) that show it. Arrival

@@ -57,7 +57,7 @@ def test_variants_side_by_side_fly_as_they_do_alone(
     rng = np.random.default_rng(seed)
     speeds = path.speeds * rng.uniform(0.6, 1.4, (3, len(path.speeds)))
     holds = path.holds * rng.uniform(0.5, 2, (3, len(path.holds)))
-    many = model.fly_many(path, speeds, holds)
+    many = model.fly_batch(path, speeds, holds)
     for k in range(3):
         alone = model.fly(replace(path, speeds=speeds[k], holds=holds[k]))
         np.testing.assert_allclose(many.arrivals[k], alone.arrivals, atol=1e-6)
@@ -77,7 +77,7 @@ def test_a_faster_leg_is_never_later(lengths: list[float], data: st.DataObject, 
     leg = data.draw(st.integers(0, len(lengths) - 1))
     speeds = np.tile(path.speeds, (12, 1))
     speeds[:, leg] = np.linspace(2, 9, 12)
-    arrivals = model.fly_many(path, speeds, np.tile(path.holds, (12, 1))).arrivals[:, -1]
+    arrivals = model.fly_batch(path, speeds, np.tile(path.holds, (12, 1))).arrivals[:, -1]
     assert (np.diff(arrivals) <= 2e-3).all()
 
 
@@ -95,7 +95,7 @@ def test_arrivals_are_smooth_in_speeds(model: Px4, leg: int) -> None:
     speeds = np.tile(path.speeds, (41, 1))
     change = np.linspace(-0.02, 0.02, 41)
     speeds[:, leg] += change
-    arrivals = model.fly_many(path, speeds, np.tile(path.holds, (41, 1))).arrivals[:, -1]
+    arrivals = model.fly_batch(path, speeds, np.tile(path.holds, (41, 1))).arrivals[:, -1]
     noise = arrivals - np.polyval(np.polyfit(change, arrivals, 3), change)
     assert abs(noise).max() < 1e-3
 
@@ -104,7 +104,7 @@ def test_fractions_of_holds_count() -> None:
     path = path_of([0, 60, 60 + 60j])
     holds = np.zeros((4, 3))
     holds[:, 1] = [0.4, 5.0, 5.3, 12.5]
-    flown = Px4().fly_many(path, np.tile(path.speeds, (4, 1)), holds)
+    flown = Px4().fly_batch(path, np.tile(path.speeds, (4, 1)), holds)
     waited = flown.departures[:, 1] - flown.arrivals[:, 1]
     np.testing.assert_allclose(waited, holds[:, 1] + 0.1, atol=1e-9)
 
