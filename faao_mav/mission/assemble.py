@@ -57,7 +57,9 @@ def assemble(route: Route, plan: "Plan") -> Mission:
             hold = max(hold, SETTLING_HOLD)
         if plan.vehicle.autopilot == "px4":  # keeps fractions
             hold, delay = hold + delay, 0.0
-        items.append(_waypoint(place, altitude, hold, float(route.radii[k])))
+        items.append(
+            _waypoint(place, altitude, hold, float(route.radii[k]), spline=bool(route.splines[k]))
+        )
         if delay > 0:
             items.append(MissionItem(Command.NAV_DELAY, Frame.MISSION, (delay, -1.0, -1.0, -1.0)))
     items.append(_finish(plan, places[-1]))
@@ -83,11 +85,12 @@ def _finish(plan: "Plan", place: tuple[float, float]) -> MissionItem:
 
 
 def _waypoint(
-    place: tuple[float, float], altitude: float, hold: float, radius: float
+    place: tuple[float, float], altitude: float, hold: float, radius: float, *, spline: bool
 ) -> MissionItem:
+    command = Command.NAV_SPLINE_WAYPOINT if spline else Command.NAV_WAYPOINT
     frame = Frame.GLOBAL_RELATIVE_ALT
     params = (hold, radius, 0.0, 0.0)
-    return MissionItem(Command.NAV_WAYPOINT, frame, params, *place, float(altitude))
+    return MissionItem(command, frame, params, *place, float(altitude))
 
 
 def _at(command: Command, place: tuple[float, float], altitude: float) -> MissionItem:

@@ -106,15 +106,16 @@ class Scheduler:
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""
         best, top = first, self.max_speed
+        splines = bool(first.route.splines.any())
         if best.rms > ALLOWED:  # corners cost time that only speed makes up for
             top *= _FASTER
             best = self._fitted(best.route, top)
-        for _ in range(_ROUNDS):
+        for _ in range(0 if splines else _ROUNDS):
             finer = self._finer(best, top)
             if finer is None:
                 break
             best = finer
-        return self._rounded(self._shared(best, top), top)
+        return self._rounded(best if splines else self._shared(best, top), top)
 
     def _flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`."""
@@ -128,7 +129,7 @@ class Scheduler:
             speeds=route.speeds,
             holds=route.holds,
             delays=route.delays,
-            splines=np.zeros(len(route.positions), dtype=bool),
+            splines=route.splines,
             radii=route.radii,
         )
         leaving = route.first == 0
@@ -140,11 +141,12 @@ class Scheduler:
         first = self._flight(route)
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
+        free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
         speeds, waits = fit(
             self.model,
             first.path,
             first.clock,
-            groups=np.arange(len(route.speeds)) if groups is None else groups,
+            groups=_own_speeds(route) if groups is None else groups,
             free=free,
             min_speed=SLOWEST,
             max_speed=top,
@@ -229,6 +231,13 @@ class Scheduler:
         return self._flight(self._waiting(sent.route, waits))
 
 
+def _own_speeds(route: Route) -> Integers:
+    """Number the legs that have a speed of their own: each, or each run of splines."""
+    changes = ~route.splines[1:-1] | (route.holds + route.delays > 0)[1:-1]
+    groups: Integers = np.concatenate([[0], np.cumsum(changes)]).astype(int)
+    return groups[: len(route.speeds)]
+
+
 def _groups(speeds: Real, alike: float) -> Integers:
     """Number the runs of legs whose speeds stay within a factor 1 + `alike` of their first."""
     groups, leader = np.zeros(len(speeds), dtype=int), 0
@@ -253,5 +262,6 @@ def _split(route: Route, times: list[float], t: Real, w: Real) -> Route:
         holds=np.insert(route.holds, at, still),
         delays=np.insert(route.delays, at, still),
         radii=np.insert(route.radii, at, still),
+        splines=np.insert(route.splines, at, False),
         last=route.last + len(times),
     )
