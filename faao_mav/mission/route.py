@@ -18,6 +18,8 @@ class Route:
     at each waypoint, and `delays` (m,), s, how much longer, less than one; `radii` (m,), m, the
     acceptance radii, 0 for the autopilot's own; `splines` (m,) tells which are spline waypoints.
 
+    The aircraft sets out `lead` seconds before the plan does.
+
     The relay route goes from waypoint `first`, w_I, to waypoint `last`, w_F: one before it is
     flown to be at speed there, one after it to be still at speed there.
     """
@@ -32,6 +34,7 @@ class Route:
     splines: Flags
     first: int
     last: int
+    lead: float = 0.0
 
     @property
     def leg_lengths(self) -> Real:

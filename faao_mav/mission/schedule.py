@@ -134,7 +134,14 @@ class Scheduler:
         )
         leaving = route.first == 0
         at = route.departures if leaving else route.arrivals
-        clock = Clock(self.t - self.t[0], self.w, route.first, at[route.first] - self.t[0], leaving)
+        clock = Clock(
+            t=self.t - self.t[0],
+            w=self.w,
+            point=route.first,
+            at=at[route.first] - self.t[0],
+            leaving=leaving,
+            lead=route.lead,
+        )
         return Schedule(route, path, self.model.fly(path), clock)
 
     def _fitted(self, route: Route, top: float, groups: Integers | None = None) -> Schedule:
@@ -142,7 +149,7 @@ class Scheduler:
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
         free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
-        speeds, waits = fit(
+        speeds, waits, lead = fit(
             self.model,
             first.path,
             first.clock,
@@ -151,7 +158,7 @@ class Scheduler:
             min_speed=SLOWEST,
             max_speed=top,
         )
-        return self._flight(self._waiting(replace(route, speeds=speeds), waits))
+        return self._flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
 
     def _waiting(self, route: Route, waits: Real) -> Route:
         """Return `route` with `waits` (m,), s, as holds, and as delays what holds cannot say."""
@@ -221,7 +228,8 @@ class Scheduler:
         top = np.floor(top * 10**_SPEED_DIGITS) / 10**_SPEED_DIGITS or top
         waits = np.round(route.holds + route.delays, _HOLD_DIGITS)
         speeds = np.minimum(np.round(route.speeds, _SPEED_DIGITS), top)
-        sent = self._flight(self._waiting(replace(route, speeds=speeds), waits))
+        lead = round(route.lead, _HOLD_DIGITS)
+        sent = self._flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
         if route.last < len(waits) - 1:
             return sent
         # the relay is needed to the end of the plan's last slot
