@@ -23,7 +23,7 @@ _SPLINE_SPACING, _SPLINE_TIME = 15.0, 3.0
 _ASTRAY = 5.0
 """Metres of rms error that one metre beyond the path tolerance weighs."""
 
-_GOOD = 1.2
+_GOOD = 1.5
 """Metres of rms error at equal times that no better parameters are sought for."""
 
 

@@ -32,7 +32,7 @@ _SETTLING = 3.0
 """A hold at w_F at least while speeds are fitted, s: the aircraft comes to rest there."""
 
 _ROUNDS = 5
-_WORTHWHILE = 0.95
+_WORTHWHILE = 0.98
 """A round of splits has to bring the rms error below this share of what it was."""
 
 _ALIKE = (0.1, 0.03)
