@@ -103,7 +103,7 @@ def _run(
             write_whole(precoders, precoder_table(solution).encode())
         if tuned is not None:
             text = render_parameters(
-                conversion.parameters, read.vehicle.autopilot, header=f"for {out}"
+                conversion.parameters, read.vehicle.autopilot, header=f"for {out.name}"
             )
             write_whole(tuned, text.encode())
         if out is not None:
