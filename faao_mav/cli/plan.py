@@ -101,7 +101,7 @@ def _run(
             save_solution(solution, save, conversion.schedule.track())
         if precoders is not None:
             write_whole(precoders, precoder_table(solution).encode())
-        if tuned is not None:
+        if out is not None and tuned is not None:
             text = render_parameters(
                 conversion.parameters, read.vehicle.autopilot, header=f"for {out.name}"
             )
