@@ -67,6 +67,7 @@ def _run(
     from faao_mav.faao.problem import build_problem
     from faao_mav.faao.solution import save_solution
     from faao_mav.mission.convert import convert
+    from faao_mav.mission.drawing import draw_mission
     from faao_mav.mission.formats import check_suffix, render_mission
     from faao_mav.mission.parameter_file import parameter_path, render_parameters
     from faao_mav.mission.precoder_table import precoder_table
@@ -107,7 +108,11 @@ def _run(
             )
             write_whole(tuned, text.encode())
         if out is not None:
-            rendered = render_mission(conversion.mission, out, conversion.vehicle)
+            rendered = (
+                draw_mission(solution, conversion)
+                if out.suffix.lower() == ".kml"
+                else render_mission(conversion.mission, out, conversion.vehicle)
+            )
             write_whole(out, rendered.encode())
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
