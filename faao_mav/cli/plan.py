@@ -65,6 +65,7 @@ def _run(
     from faao_mav.faao.optimize import optimize
     from faao_mav.faao.pricing import fresh_rates, price, saturation
     from faao_mav.faao.problem import build_problem
+    from faao_mav.faao.progress import Progress
     from faao_mav.faao.solution import save_solution
     from faao_mav.mission.convert import convert
     from faao_mav.mission.drawing import draw_mission
@@ -91,6 +92,8 @@ def _run(
         optimizing = time.perf_counter()
         solution = optimize(read, observe=observe)
         optimized = time.perf_counter() - optimizing
+        if observe is not None:
+            observe(Progress(1, 1, "the mission's timing", solution.rates.R_avg))
         try:
             conversion = convert(solution)
         except FaaoError:

@@ -6,6 +6,7 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.recommend import FASTEST
 from faao_mav.mission.route import Route
 
 if TYPE_CHECKING:
@@ -45,8 +46,8 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
         here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
         items.append(_at(Command.NAV_TAKEOFF, here, altitude))
-    items.append(_change_speed(plan.vehicle.max_speed))
-    commanded = plan.vehicle.max_speed
+    commanded = min(plan.vehicle.max_speed, FASTEST)
+    items.append(_change_speed(commanded))
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
         if speed != commanded:

@@ -9,7 +9,7 @@ from faao_mav.mission.autopilot import legs_of
 from faao_mav.mission.flight import copter_model
 from faao_mav.mission.item import Mission
 from faao_mav.mission.outline import plan_route
-from faao_mav.mission.recommend import candidates
+from faao_mav.mission.recommend import FASTEST, candidates
 from faao_mav.mission.run_in import with_run_in
 from faao_mav.mission.schedule import Schedule, Scheduler
 from faao_mav.mission.vehicle import Vehicle, vehicle_of
@@ -48,7 +48,7 @@ def convert(solution: "Solution") -> Conversion:
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     plan, t, w = solution.plan, solution.t, solution.w
-    top = plan.vehicle.max_speed
+    top = min(plan.vehicle.max_speed, FASTEST)
     given, outlines = vehicle_of(plan), [plan_route(t, w, plan)]
     if plan.mission.parameters == "keep" and given.autopilot == "ardupilot":
         spacing = max(_SPLINE_SPACING, _SPLINE_TIME * top)

@@ -34,6 +34,9 @@ _ENOUGH = 0.05
 _LAST, _LAST_WEIGHT = 4.0, 3.5
 """The last seconds of the flight weigh more: they decide when it is over."""
 
+_NO_CRAWL = 0.5
+"""Legs are not slowed below this, m/s, unless the plan creeps."""
+
 _LEASH = 0.05
 """Metres that a speed's departure from the plan's mean by 1 m/s weighs: keeps idle speeds put."""
 
@@ -88,11 +91,12 @@ def fit(
     chosen = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
     t, w = clock.t[chosen], clock.w[chosen]
     count = int(groups.max()) + 1
+    means = np.bincount(groups, path.speeds) / np.bincount(groups)
     held_count, most = int(free.sum()), MOST_LEAD if clock.leaving else 0.0
-    low = np.concatenate([np.full(count, min_speed), np.full(held_count, SHORTEST_HOLD), [0.0]])
+    least = np.maximum(min_speed, np.minimum(_NO_CRAWL, means))
+    low = np.concatenate([least, np.full(held_count, SHORTEST_HOLD), [0.0]])
     high = np.concatenate([np.full(count, max_speed), np.full(held_count, np.inf), [most]])
     steps = np.repeat([SPEED_STEP, HOLD_STEP], [count, held_count + 1])
-    means = np.bincount(groups, path.speeds) / np.bincount(groups)
     begin = np.clip(np.concatenate([means, waits[free], [clock.lead]]), low, high)
 
     def flown(x: Real) -> tuple[Real, Real]:
