@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.options import SigningKey, reported
+from faao_mav.cli.options import SigningKey
+from faao_mav.cli.outcome import exit_status
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def autopilot(
 
     It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
     """
-    with reported():
+    with exit_status():
         from faao_mav.mavlink.codec import read_key
         from faao_mav.mavlink.faults import Faults
         from faao_mav.mavlink.mock import MockAutopilot, manners_of
