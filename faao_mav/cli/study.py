@@ -13,6 +13,7 @@ from faao_mav.cli.outcome import exit_status, note
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
+    from faao_mav.plan import Plan
     from faao_mav.study import Case, Row
 
 _INTERRUPTED = 130  # as a shell reports it
@@ -97,10 +98,24 @@ def _run(
         )
         note(f"interrupted; {kept}")
         raise typer.Exit(_INTERRUPTED) from None
-    written = [out / "rows.jsonl", out / "table.csv"] if out is not None else []
+    written = _draw(rows, plan, asked.figure, out) if out is not None else []
     _tell(rows, written, as_json)
     if all(row.error for row in rows):
         raise typer.Exit(1)
+
+
+def _draw(rows: "Sequence[Row]", plan: "Plan", kind: str, out: Path) -> list[Path]:
+    """Add the figure to what the study has written, where there is something to draw."""
+    from faao_mav.report.style import save_figure
+    from faao_mav.study.figure import can_draw, study_figure
+
+    written = [out / "rows.jsonl", out / "table.csv"]
+    if can_draw(rows, kind):
+        figure = study_figure(rows, plan, kind)
+        for path in (out / "figure.svg", out / "figure.png"):
+            save_figure(figure, path)
+            written.append(path)
+    return written
 
 
 def _check_cases(cases: "Sequence[Case]") -> None:

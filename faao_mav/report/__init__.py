@@ -1,0 +1,1 @@
+"""Figures, and the page that tells of a flight without a network."""
