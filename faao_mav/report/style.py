@@ -86,7 +86,12 @@ def mark_stations(axes: "Axes", places: Sequence[tuple[str, tuple[float, float],
     for name, (east, north), marker in places:
         axes.plot([east], [north], marker, color=INK, markersize=7, zorder=5)
         axes.annotate(
-            name, (east, north), xytext=(7, 5), textcoords="offset points", color=INK, zorder=6
+            name,
+            (east, north),
+            xytext=(7, 7),
+            textcoords="offset points",
+            zorder=6,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
         )
 
 
