@@ -68,6 +68,7 @@ def rates(solution: Solution, prediction: Prediction | None = None) -> "Figure":
 def precoder_power(solution: Solution) -> "Figure":
     """Return the power on each stream, the squared norm of each column of P_B and P_U, over time.
 
+    Streams are numbered by their power in each slot: the rate does not depend on their order.
     Precoders that know the draw are averaged over the draws.
     """
     with styled():
@@ -151,8 +152,8 @@ def _lengths(vectors: Real) -> Real:
 
 
 def _stream_powers(P: Complex) -> Real:
-    """Return (n, streams), W."""
-    power = np.sum(np.abs(P) ** 2, axis=-2)
+    """Return (n, streams), W, the strongest first."""
+    power = np.sort(np.sum(np.abs(P) ** 2, axis=-2), axis=-1)[..., ::-1]
     return np.asarray(power.mean(axis=0) if power.ndim == 3 else power)
 
 

@@ -39,7 +39,7 @@ def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -
     _coloured(plot, solution)
     if conversion is not None:
         track = conversion.schedule.track()
-        plot.plot(*track["predicted_w"].T, "--", color=INK, linewidth=0.9, label="predicted")
+        plot.plot(*track["predicted_w"].T, "--", color=SERIES[1], linewidth=1.1, label="predicted")
         _numbered(plot, conversion.schedule.route.positions)
         plot.legend(loc="best")
     radio = plan.radio

@@ -42,7 +42,9 @@ _SETTINGS: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "xtick.color": MUTED,
     "ytick.color": MUTED,
-    "legend.frameon": False,
+    "legend.framealpha": 0.8,
+    "legend.facecolor": PAPER,
+    "legend.edgecolor": "none",
     "figure.facecolor": PAPER,
     "lines.linewidth": 1.6,
 }
