@@ -30,6 +30,14 @@ def plan(
         Path | None,
         typer.Option(metavar="TABLE.csv", help="Write the precoders by time and position."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Write a page about the flight."),
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the flight: .png, .svg or .pdf."),
+    ] = None,
     method: Annotated[
         str | None,
         typer.Option(metavar="M", help="Replace optimizer.method: direct or algorithm1."),
@@ -47,7 +55,7 @@ def plan(
     Exit status: 0 done; 1 there is no such flight or mission; 2 unusable arguments or input.
     """
     with exit_status():
-        _run(plan_file, out, save, precoders, method, bound, as_json, quiet)
+        _run(plan_file, out, save, precoders, report, figure, method, bound, as_json, quiet)
 
 
 def _run(
@@ -55,11 +63,14 @@ def _run(
     out: Path | None,
     save: Path | None,
     precoders: Path | None,
+    report: Path | None,
+    figure: Path | None,
     method: str | None,
     bound: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
+    from faao_mav.cli import report as reports
     from faao_mav.cli.progress import progress
     from faao_mav.cli.summary import Result, as_dict, as_text
     from faao_mav.faao.optimize import optimize
@@ -85,7 +96,9 @@ def _run(
         tuned = parameter_path(out, read.vehicle.autopilot) if any(vehicles) else None
     if save is not None and save.suffix != ".npz":
         raise InputError(f"--save {save}: give a name that ends in .npz")
-    targets = [path for path in (out, tuned, save, precoders) if path is not None]
+    reports.check_names(report, figure)
+    files = (out, tuned, save, precoders, report, figure)
+    targets = [path for path in files if path is not None]
     for path in targets:
         check_writable(path)
     with progress(shown=sys.stderr.isatty() and not quiet) as observe:
@@ -117,6 +130,7 @@ def _run(
                 else render_mission(conversion.mission, out, conversion.vehicle)
             )
             write_whole(out, rendered.encode())
+        reports.write(report, figure, solution, conversion, prediction)
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None
