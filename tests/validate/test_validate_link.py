@@ -33,6 +33,12 @@ CASES = [
         None,
         Given(flown(), link=replace(LINK, path_error=2.0)),
     ),
+    (
+        "link-altitude",
+        Given(flown(), link=replace(LINK, altitude_error=2.1)),
+        None,
+        Given(flown(), link=replace(LINK, altitude_error=1.9)),
+    ),
     ("link-timing", Given(flown(), link=LINK), None, Given(flown())),
 ]
 
