@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.mission.formats import read_mission, read_mission_file
+from faao_mav.mission.parameter_file import read_parameters
 
 
 def run(*arguments: object) -> Any:
@@ -43,7 +44,15 @@ def test_the_main_job(plan: Path, tmp_path: Path) -> None:
     assert mission.items[-1].command == 20
     with np.load(save) as archive:
         assert archive["w"].shape == (20, 2)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.waypoints", "plan.yaml", "r.npz"]
+        assert archive["predicted_t"].shape == archive["predicted_w"].shape[:1]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "m.param",
+        "m.waypoints",
+        "plan.yaml",
+        "r.npz",
+    ]
+    parameters = read_parameters(tmp_path / "m.param")
+    assert parameters["WPNAV_ACCEL"] == pytest.approx(100 * parameters["WP_ACC"])
 
 
 def test_the_mission_as_a_plan_of_qgroundcontrol_is_the_same(plan: Path, tmp_path: Path) -> None:
@@ -71,7 +80,9 @@ def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -
     assert 0 < data["seconds"]["optimize"] <= data["seconds"]["total"]
     assert data["saturated"] is False
     assert data["mission"]["items"] == len(read_mission(tmp_path / "m.txt").items)
-    assert data["mission"]["duration"] == pytest.approx(9.5, abs=1)
+    assert data["mission"]["duration"] == data["predicted"]["duration"] > 9
+    assert 0 < data["predicted"]["average_rate"] < 2
+    assert data["predicted"]["rms_position_error"] <= data["predicted"]["max_position_error"]
     assert data["mission"]["distance"] > 70
     assert max(data["residuals"].values()) < 1e-6
 

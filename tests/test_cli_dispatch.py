@@ -57,7 +57,7 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     ("word", "part"),
     [
         ("convertt", "convertt: no command and no file of this name; did you mean convert?"),
-        ("zzz", "zzz: no command and no file of this name; commands: plan, convert"),
+        ("zzz", "zzz: no command and no file of this name; commands: plan, validate, "),
     ],
 )
 def test_a_mistyped_command_is_told_from_a_plan(word: str, part: str) -> None:

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from conftest import MakePlan
 
@@ -10,22 +9,23 @@ from faao_mav.cli.summary import Result, as_dict, as_text
 from faao_mav.faao.bound import Bound
 from faao_mav.faao.optimize import optimize
 from faao_mav.faao.pricing import MutualInformation, saturation
-from faao_mav.mission import assemble, plan_route
+from faao_mav.mission.convert import convert
+from faao_mav.mission.prediction import predict_delivery
 
 
 @pytest.fixture(scope="module")
 def result(small_plan: MakePlan) -> Result:
     plan = small_plan({"radio.fading": "none", "name": "over the hill"})
     solution = optimize(plan)
-    route = plan_route(solution.t, solution.w, plan)
+    conversion = convert(solution)
     return Result(
         solution=replace(solution, starts={"straight": 1.25, "bs-user": 1.5, "user": 1.0}),
         information=MutualInformation(1.9, 1.8, 0.001),
         fresh=None,
         saturation=saturation(solution),
         bound=Bound(2 * solution.rates.R_avg, exact=False),
-        mission=assemble(route, plan),
-        route=route,
+        conversion=conversion,
+        prediction=predict_delivery(solution, conversion),
         seconds_optimize=1.0,
         seconds_total=2.0,
         written=(),
@@ -56,7 +56,16 @@ def test_numbers_for_programs_are_the_solutions(result: Result) -> None:
     data = as_dict(result)
     assert data["average_rate"] == result.solution.rates.R_avg
     assert data["upper_bound"] == 2 * result.solution.rates.R_avg
-    assert data["mission"]["distance"] == pytest.approx(
-        np.linalg.norm(np.diff(result.route.positions, axis=0), axis=1).sum()
-    )
+    assert data["mission"]["distance"] == pytest.approx(result.conversion.schedule.route.distance)
+    assert data["mission"]["parameters"] == dict(result.conversion.parameters)
+    assert data["predicted"]["average_rate"] == result.prediction.rates.R_avg
+    assert data["predicted"]["rms_position_error"] == result.prediction.rms_position_error
     assert data["seconds"] == {"optimize": 1.0, "total": 2.0}
+
+
+def test_it_says_how_the_mission_will_fly_and_what_it_needs(result: Result) -> None:
+    text = as_text(result)
+    assert f"predicted    {result.prediction.rates.R_avg:.4f} bit/s/Hz" in text
+    assert f"{result.prediction.rms_position_error:.1f} m rms from the plan" in text
+    for name, value in result.conversion.parameters.items():
+        assert f"{name} {value:g}" in text

@@ -30,6 +30,14 @@ def plan(
         Path | None,
         typer.Option(metavar="TABLE.csv", help="Write the precoders by time and position."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Write a page about the flight."),
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the flight: .png, .svg or .pdf."),
+    ] = None,
     method: Annotated[
         str | None,
         typer.Option(metavar="M", help="Replace optimizer.method: direct or algorithm1."),
@@ -47,7 +55,7 @@ def plan(
     Exit status: 0 done; 1 there is no such flight or mission; 2 unusable arguments or input.
     """
     with exit_status():
-        _run(plan_file, out, save, precoders, method, bound, as_json, quiet)
+        _run(plan_file, out, save, precoders, report, figure, method, bound, as_json, quiet)
 
 
 def _run(
@@ -55,41 +63,56 @@ def _run(
     out: Path | None,
     save: Path | None,
     precoders: Path | None,
+    report: Path | None,
+    figure: Path | None,
     method: str | None,
     bound: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
+    from faao_mav.cli import report as reports
     from faao_mav.cli.progress import progress
     from faao_mav.cli.summary import Result, as_dict, as_text
     from faao_mav.faao.optimize import optimize
     from faao_mav.faao.pricing import fresh_rates, price, saturation
     from faao_mav.faao.problem import build_problem
+    from faao_mav.faao.progress import Progress
     from faao_mav.faao.solution import save_solution
+    from faao_mav.mission.autopilot import legs_of
     from faao_mav.mission.convert import convert
+    from faao_mav.mission.drawing import draw_mission
+    from faao_mav.mission.flight import copter_model
     from faao_mav.mission.formats import check_suffix, render_mission
     from faao_mav.mission.parameter_file import parameter_path, render_parameters
     from faao_mav.mission.precoder_table import precoder_table
     from faao_mav.mission.prediction import predict_delivery
     from faao_mav.mission.recommend import candidates
+    from faao_mav.mission.vehicle import vehicle_of
     from faao_mav.plan import read_plan
 
     started = time.perf_counter()
     read = read_plan(plan_file, method=method)
-    vehicles = candidates(read)  # a useless parameter is refused before the work, not after it
+    own = vehicle_of(read)
+    legs_of(own)  # a useless parameter is refused before the work, not after it
+    copter_model(own)
+    vehicles = candidates(read)
     tuned = None
     if out is not None:
         check_suffix(out)
         tuned = parameter_path(out, read.vehicle.autopilot) if any(vehicles) else None
     if save is not None and save.suffix != ".npz":
         raise InputError(f"--save {save}: give a name that ends in .npz")
-    targets = [path for path in (out, tuned, save, precoders) if path is not None]
+    reports.check_names(report, figure)
+    files = (out, tuned, save, precoders, report, figure)
+    targets = [path for path in files if path is not None]
     for path in targets:
         check_writable(path)
     with progress(shown=sys.stderr.isatty() and not quiet) as observe:
         optimizing = time.perf_counter()
         solution = optimize(read, observe=observe)
         optimized = time.perf_counter() - optimizing
+        if observe is not None:
+            observe(Progress(1, 1, "the mission's timing", solution.rates.R_avg))
         try:
             conversion = convert(solution)
         except FaaoError:
@@ -101,14 +124,19 @@ def _run(
             save_solution(solution, save, conversion.schedule.track())
         if precoders is not None:
             write_whole(precoders, precoder_table(solution).encode())
-        if tuned is not None:
+        if out is not None and tuned is not None:
             text = render_parameters(
-                conversion.parameters, read.vehicle.autopilot, header=f"for {out}"
+                conversion.parameters, read.vehicle.autopilot, header=f"for {out.name}"
             )
             write_whole(tuned, text.encode())
         if out is not None:
-            rendered = render_mission(conversion.mission, out, conversion.vehicle)
+            rendered = (
+                draw_mission(solution, conversion)
+                if out.suffix.lower() == ".kml"
+                else render_mission(conversion.mission, out, conversion.vehicle)
+            )
             write_whole(out, rendered.encode())
+        reports.write(report, figure, solution, conversion, prediction)
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None

@@ -64,4 +64,5 @@ def _with(route: Route, at: int, position: Real, time: float, speed: float) -> R
         holds=np.insert(route.holds, at, 0.0),
         delays=np.insert(route.delays, at, 0.0),
         radii=np.insert(route.radii, at, 0.0),
+        splines=np.insert(route.splines, at, False),
     )
