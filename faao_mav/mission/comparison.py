@@ -12,7 +12,10 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.outline import plan_route
 from faao_mav.mission.prediction import Prediction, price_flight
+from faao_mav.mission.timing import MOST_LEAD
 from faao_mav.mission.validate.link import LinkCheck, Stretch
+
+_LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 
 _LEAST = 1e-6
 """bit/s/Hz: less is not lost but rounded."""
@@ -22,8 +25,9 @@ def compare_with_plan(solution: Solution, track: Track) -> LinkCheck:
     """Return what the flight `track` makes of the plan that `solution` solves.
 
     The plan leaves w_I when the flight leaves the item that brings both closest at equal times,
-    rms: for the missions made here that is w_I itself. A track that is nowhere near is compared
-    all the same.
+    rms, for the missions made here w_I itself, or up to `timing.MOST_LEAD` seconds later: the
+    mission does not say by how much the aircraft sets out before the plan. A track that is
+    nowhere near is compared all the same.
     """
     w = _in_frame_of(solution, track)
     start = _start(solution, track, w)
@@ -54,16 +58,17 @@ def _in_frame_of(solution: Solution, track: Track) -> Real:
 
 
 def _start(solution: Solution, track: Track, w: Real) -> float:
-    """Return when, on the clock of `track`, the plan's reads 0."""
+    """Return when, on the clock of `track`, the plan's reads 0: up to `MOST_LEAD` after leaving."""
     waited = plan_route(solution.t, solution.w, solution.plan).departures[0] - solution.t[0]
     left = track.reached[np.isfinite(track.reached)]
-    starts = left - waited if len(left) else track.t[:1]
+    left = left - waited if len(left) else track.t[:1]
 
     def apart(start: float) -> float:
         at = [np.interp(solution.t + start, track.t, x) for x in w.T]
         return float(np.mean(np.sum((np.stack(at, axis=-1) - solution.w) ** 2, axis=1)))
 
-    return min((float(start) for start in starts), key=apart)
+    nearest = min(map(float, left), key=apart)
+    return min((nearest + lead for lead in map(float, _LEADS)), key=apart)
 
 
 def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
