@@ -10,8 +10,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from faao_mav.cli.finding_lines import count_of, grouped, items_of, line_of, message_of
-from faao_mav.mission.flight.track import Track
-from faao_mav.mission.validate import Finding, Level, Rule
+from faao_mav.mission.check import Check
+from faao_mav.mission.validate import Level, Rule
 from faao_mav.mission.vehicle import Vehicle
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
@@ -22,35 +22,31 @@ _NAMES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 class Verdict:
     """A validation of the mission in the file `source`.
 
-    `chosen_by` says what told the autopilot and the kind of vehicle; `unpredicted` why there is
-    no `track`.
+    `chosen_by` says what told the autopilot and the kind of vehicle.
     """
 
     source: Path
     items: int
     vehicle: Vehicle
     chosen_by: str
-    track: Track | None
-    unpredicted: str
-    findings: tuple[Finding, ...]
-
-    def count(self, level: Level) -> int:
-        """Return how many findings are of `level`."""
-        return sum(finding.level is level for finding in self.findings)
+    check: Check
 
 
 def as_dict(verdict: Verdict) -> dict[str, Any]:
-    """Return the JSON object of `--json`; `duration` in seconds."""
+    """Return the JSON object of `--json`; seconds, metres, bit/s/Hz."""
+    check = verdict.check
     return {
         "mission": str(verdict.source),
         "items": verdict.items,
         "autopilot": verdict.vehicle.autopilot,
         "type": verdict.vehicle.kind,
-        "predicted": {"duration": float(verdict.track.t[-1])} if verdict.track else None,
-        "errors": verdict.count(Level.ERROR),
-        "warnings": verdict.count(Level.WARNING),
-        "notes": verdict.count(Level.NOTE),
-        "findings": [asdict(finding) for finding in verdict.findings],
+        "parameters": verdict.vehicle.source if verdict.vehicle.parameters else None,
+        "predicted": {"duration": float(check.track.t[-1])} if check.track else None,
+        "link": asdict(check.link) | {"share": check.link.share} if check.link else None,
+        "errors": len(check.of(Level.ERROR)),
+        "warnings": len(check.of(Level.WARNING)),
+        "notes": len(check.of(Level.NOTE)),
+        "findings": [asdict(finding) for finding in check.findings],
     }
 
 
@@ -74,11 +70,12 @@ def rules_as_dict(rules: Sequence[Rule]) -> dict[str, Any]:
 def show(verdict: Verdict, console: Console) -> None:
     """Print what was found: a table on a terminal, else one line a finding."""
     _line(console, _head(verdict))
-    if verdict.findings and console.is_terminal:
+    findings = verdict.check.findings
+    if findings and console.is_terminal:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for column in ("item", "rule", "what is the case, and what to do"):
             table.add_column(column, justify="right" if column == "item" else "left")
-        for group in grouped(verdict.findings):
+        for group in grouped(findings):
             colour = _COLOURS[group[0].level]
             table.add_row(
                 items_of(group),
@@ -87,7 +84,7 @@ def show(verdict: Verdict, console: Console) -> None:
             )
         console.print(table)
     else:
-        for group in grouped(verdict.findings):
+        for group in grouped(findings):
             _line(console, f"{line_of(group)}\n    to do: {group[0].action}")
     _line(console, _tail(verdict))
 
@@ -117,15 +114,21 @@ def _head(verdict: Verdict) -> str:
         f"{vehicle.kind} ({verdict.chosen_by}); parameters: "
         f"{vehicle.source if vehicle.parameters else 'defaults'}"
     ]
-    if verdict.track is None:
-        lines.append(f"flight not predicted: {verdict.unpredicted}")
+    check = verdict.check
+    if check.track is None:
+        lines.append(f"flight not predicted: {check.unpredicted}")
     else:
-        lines.append(f"predicted flight: {verdict.track.t[-1]:.0f} s")
+        lines.append(f"predicted flight: {check.track.t[-1]:.0f} s")
+    if check.link is not None:
+        lines.append(
+            f"predicted link: {check.link.predicted_rate:.4f} bit/s/Hz, "
+            f"{100 * check.link.share:.2f} % of the plan's {check.link.planned_rate:.4f}"
+        )
     return "\n".join(lines)
 
 
 def _tail(verdict: Verdict) -> str:
-    return ", ".join(count_of(verdict.findings, level) for level in Level)
+    return ", ".join(count_of(verdict.check.findings, level) for level in Level)
 
 
 def _whom(rule: Rule) -> str:
