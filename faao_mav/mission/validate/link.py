@@ -18,6 +18,9 @@ LEAST_SHARE = 0.95
 GOOD_SHARE = 0.995
 """Of the planned rate; below it something can be won back."""
 
+LATE, LATE_SHARE = 3.0, 0.05
+"""Seconds, and share of the planned duration: both exceeded, the plan is not kept."""
+
 ALTITUDE_ERROR = 2.0
 """Metres; from 100 m up that is a tenth of a decibel."""
 
@@ -118,6 +121,27 @@ def _path(case: "Case") -> Iterator[Issue]:
             "use shorter legs or slower corners, or raise mission.path_tolerance if that is "
             "acceptable",
         )
+
+
+@RULES.add(
+    "link-late",
+    Level.WARNING,
+    f"the predicted flight ends later than planned by more than {100 * LATE_SHARE:g} % and "
+    f"{LATE:g} s: what the plan has at its end is not done in its time",
+    _SOURCE,
+)
+def _late(case: "Case") -> Iterator[Issue]:
+    link = case.link
+    if link is not None:
+        late = link.predicted_duration - link.planned_duration
+        if late > max(LATE, LATE_SHARE * link.planned_duration):
+            yield Issue(
+                None,
+                f"predicted {link.predicted_duration:.1f} s of flight, {late:.1f} s more than "
+                f"planned; position at equal times {link.rms_position_error:.1f} m rms",
+                "load the parameters that the mission was made for, or make it anew for this "
+                "vehicle's",
+            )
 
 
 @RULES.add(
