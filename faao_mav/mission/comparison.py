@@ -14,6 +14,7 @@ from faao_mav.mission.outline import plan_route
 from faao_mav.mission.prediction import Prediction, price_flight
 from faao_mav.mission.timing import MOST_LEAD
 from faao_mav.mission.validate.link import LinkCheck, Stretch
+from faao_mav.mission.vector import lengths
 
 _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 
@@ -24,8 +25,8 @@ _LEAST = 1e-6
 def compare_with_plan(solution: Solution, track: Track) -> LinkCheck:
     """Return what the flight `track` makes of the plan that `solution` solves.
 
-    The plan leaves w_I when the flight leaves the item that brings both closest at equal times,
-    rms, for the missions made here w_I itself, or up to `timing.MOST_LEAD` seconds later: the
+    The plan leaves w_I when the flight leaves the item nearest to it (of several the one that
+    brings both closest at equal times, rms), or up to `timing.MOST_LEAD` seconds later: the
     mission does not say by how much the aircraft sets out before the plan. A track that is
     nowhere near is compared all the same.
     """
@@ -61,13 +62,17 @@ def _start(solution: Solution, track: Track, w: Real) -> float:
     """Return when, on the clock of `track`, the plan's reads 0: up to `MOST_LEAD` after leaving."""
     waited = plan_route(solution.t, solution.w, solution.plan).departures[0] - solution.t[0]
     left = track.reached[np.isfinite(track.reached)]
-    left = left - waited if len(left) else track.t[:1]
+    if len(left) == 0:
+        return float(track.t[0])
+    where = np.stack([np.interp(left, track.t, x) for x in w.T], axis=-1)
+    away = lengths(where - solution.w[0])
+    near = left[away <= away.min() + solution.plan.mission.path_tolerance] - waited
 
     def apart(start: float) -> float:
         at = [np.interp(solution.t + start, track.t, x) for x in w.T]
         return float(np.mean(np.sum((np.stack(at, axis=-1) - solution.w) ** 2, axis=1)))
 
-    nearest = min(map(float, left), key=apart)
+    nearest = min(map(float, near), key=apart)
     return min((nearest + lead for lead in map(float, _LEADS)), key=apart)
 
 

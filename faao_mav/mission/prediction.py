@@ -51,12 +51,14 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     The times are the plan's: 0 when its first slot begins. They increase.
     """
     at = np.stack([np.interp(solution.t, t, x) for x in w.T], axis=-1)
-    within = (t >= solution.t[0]) & (t <= solution.t[-1])
+    near, end = solution.plan.mission.path_tolerance, solution.w[-1]
+    arrived = _settled(t, w, end, near)
+    # a path flown late is the same path: it counts up to w_F
+    within = (t >= solution.t[0]) & (t <= max(float(solution.t[-1]), arrived))
     apart = deviation(solution.w, at, w[within] if within.any() else at)
     I_U, I_G = delivered(solution, at)
     near_U, near_G = delivered(solution, at, nearest_slots(solution, at))
-    near, end = solution.plan.mission.path_tolerance, solution.w[-1]
-    late = _settled(t, w, end, near) - _settled(solution.t, solution.w, end, near)
+    late = arrived - _settled(solution.t, solution.w, end, near)
     return Prediction(
         w=at,
         I_U=I_U,

@@ -29,9 +29,9 @@ CASES = [
     ),
     (
         "link-path",
-        Given(flown(), link=replace(LINK, path_error=2.1)),
+        Given(flown(), link=replace(LINK, path_error=2.3)),
         None,
-        Given(flown(), link=replace(LINK, path_error=2.0)),
+        Given(flown(), link=replace(LINK, path_error=2.1)),
     ),
     (
         "link-late",

@@ -21,6 +21,9 @@ GOOD_SHARE = 0.995
 LATE, LATE_SHARE = 3.0, 0.05
 """Seconds, and share of the planned duration: both exceeded, the plan is not kept."""
 
+PATH_ALLOWANCE = 0.2
+"""Metres beyond the plan's path_tolerance: predictions are no better."""
+
 ALTITUDE_ERROR = 2.0
 """Metres; from 100 m up that is a tenth of a decibel."""
 
@@ -113,7 +116,7 @@ def _rate_issue(link: LinkCheck) -> Issue:
 )
 def _path(case: "Case") -> Iterator[Issue]:
     link = case.link
-    if link is not None and link.path_error > link.path_tolerance:
+    if link is not None and link.path_error > link.path_tolerance + PATH_ALLOWANCE:
         yield Issue(
             None,
             f"the predicted path is up to {link.path_error:.1f} m from the planned one, "
