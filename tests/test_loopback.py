@@ -1,7 +1,6 @@
 """From the plan to the vehicle and back: planned, uploaded, flown by the mock, priced."""
 
 import json
-import socket
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from conftest import MISSIONS, edited
+from conftest import MISSIONS, edited, free_port
 from pymavlink import mavutil
 from typer.testing import CliRunner
 
@@ -44,12 +43,6 @@ SHORTER: dict[str, Any] = {
 """Of `missions/copter_relay.yaml`: half a minute of flight, timed in seconds for PX4 too."""
 
 ARM, START = 400, 300
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @dataclass
