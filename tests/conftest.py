@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,14 @@ def edited(text: str, changes: dict[str, Any]) -> str:
             section = section.setdefault(key, {})
         section[last] = value
     return yaml.safe_dump(data)
+
+
+def free_port(kind: int = socket.SOCK_DGRAM) -> int:
+    """Return a free port of the loopback interface."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
 
 
 @pytest.fixture(scope="session")

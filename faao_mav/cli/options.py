@@ -8,6 +8,9 @@ import typer
 System: TypeAlias = Annotated[
     int | None, typer.Option(metavar="N", min=1, max=255, help="The vehicle's system number.")
 ]
+AllowArmed: TypeAlias = Annotated[
+    bool, typer.Option("--allow-armed", help="Replace the mission of an armed vehicle too.")
+]
 Component: TypeAlias = Annotated[
     int | None, typer.Option(metavar="N", min=1, max=255, help="The autopilot's component number.")
 ]

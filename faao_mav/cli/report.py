@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from faao_mav.errors import FaaoError, InputError
+from faao_mav.errors import InputError
 from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
@@ -29,28 +29,16 @@ def write(
     solution: "Solution",
     conversion: "Conversion",
     prediction: "Prediction",
+    findings: "tuple[Finding, ...]",
 ) -> None:
     """Write the page and the figure, where asked for."""
     if report is not None:
         from faao_mav.report import ReportData, render_report
 
-        found = _findings(conversion)
-        page = render_report(ReportData(solution, conversion, prediction, found))
+        page = render_report(ReportData(solution, conversion, prediction, findings))
         write_whole(report, page.encode())
     if figure is not None:
         from faao_mav.report.figures import flight_figure
         from faao_mav.report.style import save_figure
 
         save_figure(flight_figure(solution, conversion, prediction), figure)
-
-
-def _findings(conversion: "Conversion") -> "tuple[Finding, ...]":
-    """Return what `faao-mission validate` says of the mission."""
-    from faao_mav.mission.flight.predict import predict
-    from faao_mav.mission.validate import validate
-
-    try:
-        track = predict(conversion.mission, conversion.vehicle)
-    except FaaoError:  # some vehicles have no model; the other rules apply all the same
-        track = None
-    return tuple(validate(conversion.mission, conversion.vehicle, track=track))

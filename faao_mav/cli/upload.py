@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.options import AsJson, Component, Log, SigningKey, System, Wait
+from faao_mav.cli.options import AllowArmed, AsJson, Component, Log, SigningKey, System, Wait
 from faao_mav.cli.outcome import exit_status
 
 if TYPE_CHECKING:
@@ -28,9 +28,7 @@ def upload(
     as_json: AsJson = False,
     system: System = None,
     component: Component = None,
-    allow_armed: Annotated[
-        bool, typer.Option("--allow-armed", help="Replace the mission of an armed vehicle too.")
-    ] = False,
+    allow_armed: AllowArmed = False,
     log: Log = None,
     timeout: Wait = 10.0,
     signing_key: SigningKey = None,

@@ -26,6 +26,12 @@ _RANGE = {"ardupilot": (0.5, 5.0), "px4": (2.0, 15.0)}
 FASTEST = 20.0
 """The greatest speed that both autopilots can be told, m/s."""
 
+_HEADROOM = 1.1
+"""Of the plan's greatest speed: what a schedule may command."""
+
+_PX4_TOP = 12.0
+"""PX4's own MPC_XY_VEL_MAX, m/s, which caps every speed."""
+
 _JERK = {"ardupilot": 10.0, "px4": 20.0}
 
 
@@ -59,8 +65,11 @@ def _ardupilot(plan: "Plan", acceleration: float) -> dict[str, float]:
 
 
 def _px4(plan: "Plan", acceleration: float) -> dict[str, float]:
+    speed = min(plan.vehicle.max_speed, FASTEST)
+    top = min(_HEADROOM * speed, FASTEST)
     return {
-        "MPC_XY_CRUISE": min(plan.vehicle.max_speed, FASTEST),
+        "MPC_XY_CRUISE": speed,
+        **({"MPC_XY_VEL_MAX": round(top, 2)} if top > _PX4_TOP else {}),
         "MPC_ACC_HOR": acceleration,
         "MPC_JERK_AUTO": _JERK["px4"],
         "MPC_XY_ERR_MAX": 10.0,

@@ -208,7 +208,8 @@ class Scheduler:
         )
         for end, lasting in ends:
             length = lengths(self.w[inside] - end)
-            result &= length >= self.legs.shortest_leg(length / lasting)
+            shortest = self.legs.shortest_leg(length / lasting)
+            result &= length >= np.maximum(shortest, self.legs.least)
         return result
 
     def _shared(self, found: Schedule, top: float) -> Schedule:

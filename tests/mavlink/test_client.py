@@ -7,8 +7,8 @@ import threading
 import time
 
 import pytest
+from conftest import free_port
 from flights import fly
-from loopback import free_port
 from pymavlink import mavutil
 from stations import FENCE, HOME, RALLY, a_mission, places
 

@@ -5,8 +5,8 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from conftest import free_port
 from flights import fly
-from loopback import free_port
 from mavsdk.component_type import ComponentType
 from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins.action import Action

@@ -6,7 +6,7 @@ import time
 
 import pytest
 import typer
-from loopback import free_port
+from conftest import free_port
 from stations import FENCE, HOME, a_mission, places
 from typer.testing import CliRunner
 

@@ -1,0 +1,191 @@
+"""Commands joined: plan and validate, plan and upload, a saved solution, parameters beside."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import SMALL, edited, free_port
+from typer.testing import CliRunner
+
+from faao_mav import download
+from faao_mav.cli.main import app
+from faao_mav.mavlink.messages import ParamRequestRead
+from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
+from faao_mav.mavlink.protocol import Result
+from faao_mav.mavlink.runner import running
+from faao_mav.mavlink.transport import Transport
+from faao_mav.mission.formats import read_mission
+from faao_mav.mission.item import Home
+from faao_mav.mission.parameter_file import read_parameters
+
+HOME = Home(-35.363262, 149.165237, 584.0)
+GENTLE = edited(
+    SMALL,
+    {
+        "vehicle.max_speed": 8,
+        "vehicle.max_acceleration": 1.5,
+        "flight.duration": 16,
+        "radio.fading": "none",
+        "name": "gentle",
+    },
+)
+
+
+def run(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "plan.yaml"
+    path.write_text(GENTLE)
+    return path
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "m.waypoints"
+
+
+def test_a_mission_is_checked_when_it_is_written(plan: Path, out: Path) -> None:
+    result = run(plan, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert re.search(r"^checked      no errors or warnings, \d+ note", result.stdout, re.M)
+    found = json.loads(run(plan, "--json").stdout)
+    assert {each["level"] for each in found["validation"]} == {"note"}
+    assert {"rule", "item", "message", "action"} <= found["validation"][0].keys()
+    assert found["upload"] is None
+
+
+def test_warnings_are_in_the_summary(plan: Path, out: Path) -> None:
+    plan.write_text(edited(GENTLE, {"mission.takeoff": False}))
+    result = run(plan, "--out", out)
+    assert result.exit_code == 0
+    assert "checked      0 errors, 1 warning" in result.stdout
+    assert "             warning: there is no take-off" in result.stdout
+    assert result.stderr == ""
+
+
+@pytest.mark.parametrize("options", [[], ["--json"], ["--quiet"]])
+def test_a_mission_with_errors_is_kept_but_not_called_good(
+    plan: Path, out: Path, options: list[str]
+) -> None:
+    lame = {"vehicle.parameters": {"WPNAV_ACCEL": 50}, "mission.parameters": "keep"}
+    plan.write_text(edited(SMALL, lame | {"radio.fading": "none"}))
+    port = free_port()
+    result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", *options)
+    assert result.exit_code == 1
+    assert re.search(r"^faao-mission: error: .* \[link-rate-lost\]; ", result.stderr, re.M)
+    assert "does not pass validation; do not fly it" in result.stderr
+    assert read_mission(out).items
+    if "--json" in options:
+        found = json.loads(result.stdout)
+        assert found["validation"][0]["level"] == "error"
+        assert found["upload"] is None
+    else:
+        assert ("checked      1 error" in result.stdout) is not ("--quiet" in options)
+
+
+def test_upload_after_writing(plan: Path, out: Path) -> None:
+    port = free_port()
+    mock = MockAutopilot(manners_of("px4"), home=HOME, beat=0.1)
+    plan.write_text(edited(GENTLE, {"vehicle.autopilot": "px4", "mission.parameters": "keep"}))
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", "--system", 1)
+        assert result.exit_code == 0, result.output
+        assert "verified     read back and compared" in result.stdout
+        found = download(f"udpout:127.0.0.1:{port}")
+    assert [item.command for item in found.items] == [i.command for i in read_mission(out).items]
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: bool) -> None:
+    port = free_port()
+    mock = MockAutopilot(ardupilot(refusals={(0, 2): Result.UNSUPPORTED}), home=HOME, beat=0.1)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        options = ["--json"] if as_json else []
+        result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", *options)
+    assert result.exit_code == 1
+    assert "the mission is not verified; do not fly it" in result.stderr
+    assert read_mission(out).items
+    if as_json:
+        assert json.loads(result.stdout)["upload"]["verified"] is False
+    else:
+        assert "failed       mission: refused: UNSUPPORTED" in result.stdout
+
+
+def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:
+    port = free_port()
+    mock = MockAutopilot(home=HOME, beat=0.1)
+    mock._armed = True
+    connection = f"udpout:127.0.0.1:{port}"
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        refused = run(plan, "--out", out, "--upload", connection)
+        assert refused.exit_code == 1
+        assert "--allow-armed" in refused.stderr
+        assert "written" in refused.stdout
+        assert run(plan, "--upload", connection, "--allow-armed", "--quiet").exit_code == 0
+
+
+def test_a_useless_connection_is_refused_before_the_work(plan: Path, out: Path) -> None:
+    result = run(plan, "--out", out, "--upload", "nonsense")
+    assert result.exit_code == 2
+    assert "expected udpin:HOST:PORT" in result.stderr
+    assert not out.exists()
+
+
+def test_validate_with_the_plan(plan: Path, out: Path, tmp_path: Path) -> None:
+    save = tmp_path / "r.npz"
+    told = json.loads(run(plan, "--out", out, "--save", save, "--json").stdout)
+    by_plan = run("validate", out, "--plan", plan, "--json")
+    assert by_plan.exit_code == 0, by_plan.output
+    found = json.loads(by_plan.stdout)
+    assert found["link"]["planned_rate"] == told["average_rate"]
+    assert found["link"]["predicted_rate"] == pytest.approx(
+        told["predicted"]["average_rate"], rel=0.01
+    )
+    assert found["findings"] == told["validation"]
+    assert found == json.loads(run("validate", out, "--solution", save, "--json").stdout)
+    both = run("validate", out, "--plan", plan, "--solution", save)
+    assert both.exit_code == 2
+    assert "give one" in both.stderr
+
+
+def test_parameters_beside_the_mission_are_used_and_that_is_said(plan: Path, out: Path) -> None:
+    run(plan, "--out", out)
+    beside = out.with_suffix(".param")
+    tuned = run("validate", out)
+    assert f"parameters: {beside}, beside the mission" in tuned.stdout
+    other = out.with_name("other.param")
+    other.write_text("WPNAV_ACCEL,50\n")
+    assert f"parameters: {other}" in run("validate", out, "--parameters", other).stdout
+    beside.unlink()
+    assert "parameters: defaults" in run("validate", out).stdout
+
+
+def test_the_mock_flies_by_its_parameters(
+    plan: Path, out: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    run(plan, "--out", out)
+    mission, made = read_mission(out), []
+
+    def serve(mock: MockAutopilot, transport: Transport, **_: object) -> None:
+        transport.close()
+        made.append(mock)
+
+    monkeypatch.setattr("faao_mav.mavlink.runner.serve", serve)
+    listen = ["--listen", f"udpin:127.0.0.1:{free_port()}"]
+    slow = tmp_path / "slow.param"
+    slow.write_text("WPNAV_ACCEL,50\nWPNAV_SPEED,300\n")
+    assert run("autopilot", *listen, "--parameters", out.with_suffix(".param")).exit_code == 0
+    assert run("autopilot", *listen, "--parameters", slow).exit_code == 0
+    quick, late = (mock._fly(mission).t[-1] for mock in made)
+    assert late > quick + 20
+    (answer,) = made[1].parameters.on(ParamRequestRead(1, 1, "WPNAV_ACCEL", -1))
+    assert answer.param_value == read_parameters(slow)["WPNAV_ACCEL"]
+    slow.write_text("WPNAV_ACCEL,0\n")
+    refused = run("autopilot", *listen, "--parameters", slow)
+    assert refused.exit_code == 2
+    assert "WPNAV_ACCEL" in refused.stderr

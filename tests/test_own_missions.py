@@ -1,0 +1,124 @@
+"""What the tool writes passes its own checks, for the vehicle that it is timed for."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from conftest import MISSIONS, SMALL, MakePlan, edited
+
+from faao_mav.faao.optimize import optimize
+from faao_mav.mission.check import Check, check
+from faao_mav.mission.convert import Conversion, convert
+from faao_mav.mission.prediction import predict_delivery
+from faao_mav.mission.validate import Limits
+from faao_mav.plan import parse_plan
+
+SHORT: dict[str, Any] = {
+    "vehicle.max_speed": 8.0,
+    "vehicle.max_acceleration": 1.5,
+    "flight.start": [0, 30],
+    "flight.end": [30, 0],
+    "flight.altitude": 40,
+    "flight.duration": 14,
+    "flight.time_step": 0.5,
+    "radio.ground_user.position": [40, 40],
+}
+"""Of the sample plans: seconds of flight, at a copter's speeds."""
+
+
+def checked(text: str, changes: dict[str, Any]) -> tuple[Conversion, Check]:
+    plan = parse_plan(edited(text, changes))
+    solution = optimize(plan)
+    conversion = convert(solution)
+    limits = Limits(max_speed=plan.vehicle.max_speed)
+    found = check(conversion.mission, conversion.vehicle, limits=limits, solution=solution)
+    return conversion, found
+
+
+def complaints(found: Check) -> list[str]:
+    return [f"{f.rule}: {f.message}" for f in found.findings if f.level != "note"]
+
+
+@pytest.mark.parametrize("parameters", ["recommend", "keep"])
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+@pytest.mark.parametrize("name", ["copter_relay", "paper", "paper_active"])
+def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
+    text = (MISSIONS / f"{name}.yaml").read_text()
+    changes = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
+    if name == "copter_relay":
+        changes["radio.fading_samples"] = 4
+    _, found = checked(text, SHORT | changes)
+    assert found.track is not None
+    told = complaints(found)
+    if parameters == "keep":  # the defaults may be too slow for a plan, and that is said
+        told = [each for each in told if not each.startswith("link-")]
+    assert told == []
+
+
+@pytest.mark.parametrize("finish", ["rtl", "land", "hover"])
+@pytest.mark.parametrize("takeoff", [True, False])
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_all_ways_to_begin_and_end(autopilot: str, takeoff: bool, finish: str) -> None:
+    changes = {
+        "vehicle.autopilot": autopilot,
+        "mission.takeoff": takeoff,
+        "mission.on_finish": finish,
+        "mission.parameters": "keep",
+        "radio.fading": "none",
+        "flight.time_step": 1,
+    }
+    _, found = checked(SMALL, SHORT | changes)
+    rules = {each.split(":")[0] for each in complaints(found) if not each.startswith("link-")}
+    assert rules == (set() if takeoff or autopilot == "px4" else {"ardupilot-no-takeoff"})
+
+
+def test_a_fast_px4_is_told_to_fly_so_fast() -> None:
+    fast = {"vehicle.autopilot": "px4", "vehicle.max_speed": 15, "radio.fading": "none"}
+    conversion, found = checked(SMALL, fast)
+    assert conversion.parameters["MPC_XY_VEL_MAX"] == pytest.approx(16.5)
+    assert "px4-speed-capped" not in {finding.rule for finding in found.findings}
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_the_whole_flight_agrees_with_the_relay_flight(
+    autopilot: str, small_plan: MakePlan
+) -> None:
+    """The mission, predicted from take-off, against the route that it was timed by."""
+    solution = optimize(small_plan(SHORT | {"vehicle.autopilot": autopilot}))
+    conversion = convert(solution)
+    relay = predict_delivery(solution, conversion)
+    whole = check(conversion.mission, conversion.vehicle, solution=solution).link
+    assert whole is not None
+    assert whole.predicted_rate == pytest.approx(relay.rates.R_avg, rel=0.005)
+    assert whole.path_error == pytest.approx(relay.max_path_error, abs=0.3)
+    assert abs(whole.predicted_duration - relay.duration) < 1
+
+
+def test_another_vehicle_is_told_what_it_loses(small_plan: MakePlan) -> None:
+    solution = optimize(small_plan(SHORT))
+    conversion = convert(solution)
+    slow = replace(conversion.vehicle, parameters={"WPNAV_ACCEL": 50, "WPNAV_SPEED": 800})
+    found = check(conversion.mission, slow, solution=solution)
+    assert "link-late" in {finding.rule for finding in found.findings}
+    assert found.link is not None
+    assert found.link.worst is not None
+
+
+def test_a_mission_edited_to_another_height_is_noticed(small_plan: MakePlan) -> None:
+    solution = optimize(small_plan(SHORT))
+    conversion = convert(solution)
+    items = tuple(replace(item, z=item.z + 10) for item in conversion.mission.items)
+    found = check(replace(conversion.mission, items=items), conversion.vehicle, solution=solution)
+    assert found.link is not None
+    assert found.link.altitude_error == pytest.approx(10)
+    assert "link-altitude" in {finding.rule for finding in found.findings}
+
+
+def test_a_mission_that_goes_elsewhere_does_not_do_the_job(small_plan: MakePlan) -> None:
+    solution = optimize(small_plan(SHORT))
+    conversion = convert(solution)
+    items = tuple(
+        replace(item, x=item.x + 0.02 if item.x else 0.0) for item in conversion.mission.items
+    )
+    found = check(replace(conversion.mission, items=items), conversion.vehicle, solution=solution)
+    assert found.findings[0].rule == "link-rate-lost"
