@@ -23,6 +23,8 @@ Outline: TypeAlias = tuple[Real, bool]
 _PIECES = 240
 """Pieces of the route with a colour each, at most: more cannot be told apart."""
 _LEVELS = 32
+_SHADES = (0.85, 0.3)
+"""Slow and fast on the scale of viridis: its ends vanish on white and on black paper."""
 _ROUND = 72
 _NUMBERED = 30
 
@@ -39,7 +41,7 @@ def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -
     _coloured(plot, solution)
     if conversion is not None:
         track = conversion.schedule.track()
-        plot.plot(*track["predicted_w"].T, "--", color=SERIES[1], linewidth=1.1, label="predicted")
+        plot.plot(*track["predicted_w"].T, "--", color=INK, linewidth=0.9, label="predicted")
         _numbered(plot, conversion.schedule.route.positions)
         plot.legend(loc="best")
     radio = plan.radio
@@ -59,15 +61,15 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     """Draw the planned route, light where it is slow."""
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap
 
     step = max(1, -(-(len(solution.w) - 1) // _PIECES))
     ends = np.unique(np.append(np.arange(0, len(solution.w), step), len(solution.w) - 1))
     pieces = [solution.w[a : b + 1] for a, b in itertools.pairwise(ends)]
     speeds = np.hypot(*solution.v.T)
     means = np.array([speeds[a : b + 1].mean() for a, b in itertools.pairwise(ends)])
-    lines = LineCollection(
-        pieces, cmap=colormaps["viridis_r"].resampled(_LEVELS), linewidths=3, capstyle="round"
-    )
+    colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
+    lines = LineCollection(pieces, cmap=colours, linewidths=3, capstyle="round")
     lines.set_array(means)
     lines.set_clim(0, max(float(means.max()), 1e-9))
     plot.add_collection(lines)
