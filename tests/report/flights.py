@@ -13,7 +13,7 @@ from faao_mav.mission.prediction import Prediction, predict_delivery
 from faao_mav.mission.validate import Finding, Level
 from faao_mav.plan import parse_plan
 
-HOSTILE = "</title><script>alert('x')</script> $\\frac & \" 'π'"
+HOSTILE = "</title><script>alert('x')</script> $\\frac & \" 'π' 中"
 
 FINDINGS = (
     Finding(Level.ERROR, "fence-leg", 4, "the leg is <b>outside</b>", "go around & back"),

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.plan import parse_plan
+from faao_mav.report.style import save_figure
 from faao_mav.study import Row, load_rows, make_cases, run_study
 from faao_mav.study.figure import study_figure
 
@@ -156,11 +157,13 @@ def test_figures_are_written_and_labelled(plan: Path, tmp_path: Path) -> None:
     assert (out / "figure.svg").read_bytes() == again
 
 
-def test_routes_are_drawn_on_a_map(whole: tuple[Path, tuple[Row, ...]]) -> None:
-    figure = study_figure(whole[1], parse_plan(QUICK), "trajectories")
+def test_routes_are_drawn_on_a_map(whole: tuple[Path, tuple[Row, ...]], tmp_path: Path) -> None:
+    name = "中 $\\frac"
+    figure = study_figure(whole[1], parse_plan(edited(QUICK, {"name": name})), "trajectories")
+    save_figure(figure, tmp_path / "f.svg")
+    assert name in (tmp_path / "f.svg").read_text()
     (axes,) = figure.axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("east, m", "north, m")
-    assert axes.get_title("left")
     names = [text.get_text() for text in axes.texts]
     assert {"base station", "user", "start", "end"} <= set(names)
 
