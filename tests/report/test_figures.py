@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import MakePlan
-from flights import flown
+from reported import flown
 
 from faao_mav import optimize
 from faao_mav.errors import InputError

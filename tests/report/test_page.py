@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from conftest import SMALL
-from flights import FINDINGS, HOSTILE, flown
+from reported import FINDINGS, HOSTILE, flown
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
