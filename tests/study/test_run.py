@@ -176,7 +176,11 @@ def test_without_results_there_is_nothing_to_draw() -> None:
 
 def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    code = "from faao_mav.cli.main import run; run()"
+    # parallel tests run with the signal ignored, which a child inherits
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from faao_mav.cli.main import run; run()"
+    )
     command = [sys.executable, "-c", code, "study", plan, "--power", "0:20:0.1", "--out", out]
     process = subprocess.Popen(
         [*map(str, command)], stderr=subprocess.PIPE, text=True, start_new_session=True
