@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from conftest import SMALL, edited
+from distributed import LocalCluster
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -86,6 +87,23 @@ def test_a_resumed_study_is_the_uninterrupted_one(
 
 def test_processes_do_not_change_the_result(whole: tuple[Path, tuple[Row, ...]]) -> None:
     assert timeless(run_study(CASES, jobs=2)) == timeless(whole[1])
+
+
+def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[Row, ...]]) -> None:
+    local = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": None}
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, **local) as cluster:
+        rows = run_study(CASES, cluster=cluster.scheduler_address)
+    assert timeless(rows) == timeless(whole[1])
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x"])
+def test_a_cluster_that_is_not_there(
+    plan: Path, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("faao_mav.study.runner._CONNECTING", 0.5)
+    result = run(plan, "--cluster", address)
+    assert result.exit_code == 2
+    assert f"cluster {address}: no scheduler there" in result.stderr
 
 
 def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> None:
