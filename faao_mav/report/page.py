@@ -111,7 +111,7 @@ def _drawn(data: ReportData, solution: "Solution") -> Iterator[str]:
         figures.route(solution, conversion),
         f"Map of the route from {_place(start)} to {_place(end)}, east and north in metres, "
         "coloured by speed, with both stations"
-        + (", numbered waypoints and the predicted track" if conversion else ""),
+        + (", waypoints by item number and the predicted track" if conversion else ""),
     )
     yield _figure(
         "motion",

@@ -9,8 +9,10 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import Command
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.fence import Fence
+from faao_mav.mission.item import Mission
 from faao_mav.plan import Plan
 from faao_mav.report.style import INK, MUTED, PAPER, SERIES, label, mark_stations
 
@@ -42,7 +44,7 @@ def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -
     if conversion is not None:
         track = conversion.schedule.track()
         plot.plot(*track["predicted_w"].T, "--", color=INK, linewidth=0.9, label="predicted")
-        _numbered(plot, conversion.schedule.route.positions)
+        _numbered(plot, conversion.mission, plan)
         plot.legend(loc="best")
     radio = plan.radio
     mark_stations(
@@ -79,14 +81,21 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     figure.colorbar(lines, ax=plot, label="speed, m/s", shrink=0.7)
 
 
-def _numbered(plot: "Axes", positions: Real) -> None:
-    """Mark the waypoints, and number as many as can be read."""
-    plot.plot(*positions.T, ".", color=INK, markersize=4, linestyle="none")
-    step = -(-len(positions) // _NUMBERED)
-    for k in range(0, len(positions), step):
+def _numbered(plot: "Axes", mission: Mission, plan: Plan) -> None:
+    """Mark the waypoints, and give as many as can be read the numbers that findings name."""
+    items = [
+        (number, item)
+        for number, item in enumerate(mission.items, 1)
+        if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+    ]
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    places = frame.to_local([item.x for _, item in items], [item.y for _, item in items])
+    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none")
+    step = -(-len(items) // _NUMBERED) or 1
+    for (number, _), place in list(zip(items, places.tolist(), strict=True))[::step]:
         plot.annotate(
-            str(k + 1),
-            (float(positions[k, 0]), float(positions[k, 1])),
+            str(number),
+            place,
             xytext=(-4, -4),
             textcoords="offset points",
             ha="right",
