@@ -37,6 +37,10 @@ def study(
         int | None, typer.Option(metavar="N", min=1, help="Draws of the fading, from radio.seed.")
     ] = None,
     jobs: Annotated[int, typer.Option(metavar="N", help="Processes; -1: one a core.")] = -1,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A Dask scheduler, tcp://host:port, not processes."),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Keep rows there as they finish; go on where it ended."),
@@ -53,7 +57,7 @@ def study(
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
     with exit_status():
-        _run(plan_file, vary or [], power, schemes, seeds, jobs, out, as_json)
+        _run(plan_file, vary or [], power, schemes, seeds, jobs, cluster, out, as_json)
 
 
 def _run(
@@ -63,6 +67,7 @@ def _run(
     schemes: str | None,
     seeds: int | None,
     jobs: int,
+    cluster: str | None,
     out: Path | None,
     as_json: bool,
 ) -> None:
@@ -89,7 +94,7 @@ def _run(
     _check_cases(cases)
     try:
         with _progress(len(cases), shown=sys.stderr.isatty()) as observe:
-            rows = run_study(cases, jobs=jobs, directory=out, observe=observe)
+            rows = run_study(cases, jobs=jobs, cluster=cluster, directory=out, observe=observe)
     except KeyboardInterrupt:
         kept = (
             f"finished rows are in {out}; the same command goes on there"

@@ -111,7 +111,7 @@ def _drawn(data: ReportData, solution: "Solution") -> Iterator[str]:
         figures.route(solution, conversion),
         f"Map of the route from {_place(start)} to {_place(end)}, east and north in metres, "
         "coloured by speed, with both stations"
-        + (", numbered waypoints and the predicted track" if conversion else ""),
+        + (", waypoints by item number and the predicted track" if conversion else ""),
     )
     yield _figure(
         "motion",
@@ -128,18 +128,25 @@ def _drawn(data: ReportData, solution: "Solution") -> Iterator[str]:
         + (" and along the predicted flight" if prediction else ""),
     )
     yield _figure(
-        "power",
-        "Precoders",
-        figures.precoder_power(solution),
-        "Power on each stream over time, base station and UAV, strongest stream first",
-    )
-    yield _figure(
         "convergence",
         "Convergence",
         figures.convergence(solution),
         f"Rate after each iteration, from {solution.history[0]:.4f} to {solution.history[-1]:.4f} "
         f"bit/s/Hz; ended: {solution.ending}",
     )
+    yield _figure(
+        "power",
+        "Precoders",
+        figures.precoder_power(solution),
+        "Power on each stream over time, base station and UAV, strongest stream first",
+    )
+    if len(solution.starts) > 1:
+        ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
+        rows = "".join(
+            f"<tr><td>{html.escape(name)}</td><td>{rate:.4f}</td></tr>" for name, rate in ranked
+        )
+        head = "<thead><tr><th>start</th><th>R_avg, bit/s/Hz</th></tr></thead>"
+        yield _section("Starts", f"<table>{head}<tbody>{rows}</tbody></table>")
 
 
 def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:

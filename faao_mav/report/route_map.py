@@ -9,8 +9,10 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import Command
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.fence import Fence
+from faao_mav.mission.item import Mission
 from faao_mav.plan import Plan
 from faao_mav.report.style import INK, MUTED, PAPER, SERIES, label, mark_stations
 
@@ -23,6 +25,8 @@ Outline: TypeAlias = tuple[Real, bool]
 _PIECES = 240
 """Pieces of the route with a colour each, at most: more cannot be told apart."""
 _LEVELS = 32
+_SHADES = (0.85, 0.3)
+"""Slow and fast on the scale of viridis: its ends vanish on white and on black paper."""
 _ROUND = 72
 _NUMBERED = 30
 
@@ -39,8 +43,8 @@ def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -
     _coloured(plot, solution)
     if conversion is not None:
         track = conversion.schedule.track()
-        plot.plot(*track["predicted_w"].T, "--", color=SERIES[1], linewidth=1.1, label="predicted")
-        _numbered(plot, conversion.schedule.route.positions)
+        plot.plot(*track["predicted_w"].T, "--", color=INK, linewidth=0.9, label="predicted")
+        _numbered(plot, conversion.mission, plan)
         plot.legend(loc="best")
     radio = plan.radio
     mark_stations(
@@ -59,15 +63,15 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     """Draw the planned route, light where it is slow."""
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap
 
     step = max(1, -(-(len(solution.w) - 1) // _PIECES))
     ends = np.unique(np.append(np.arange(0, len(solution.w), step), len(solution.w) - 1))
     pieces = [solution.w[a : b + 1] for a, b in itertools.pairwise(ends)]
     speeds = np.hypot(*solution.v.T)
     means = np.array([speeds[a : b + 1].mean() for a, b in itertools.pairwise(ends)])
-    lines = LineCollection(
-        pieces, cmap=colormaps["viridis_r"].resampled(_LEVELS), linewidths=3, capstyle="round"
-    )
+    colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
+    lines = LineCollection(pieces, cmap=colours, linewidths=3, capstyle="round")
     lines.set_array(means)
     lines.set_clim(0, max(float(means.max()), 1e-9))
     plot.add_collection(lines)
@@ -77,14 +81,21 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     figure.colorbar(lines, ax=plot, label="speed, m/s", shrink=0.7)
 
 
-def _numbered(plot: "Axes", positions: Real) -> None:
-    """Mark the waypoints, and number as many as can be read."""
-    plot.plot(*positions.T, ".", color=INK, markersize=4, linestyle="none")
-    step = -(-len(positions) // _NUMBERED)
-    for k in range(0, len(positions), step):
+def _numbered(plot: "Axes", mission: Mission, plan: Plan) -> None:
+    """Mark the waypoints, and give as many as can be read the numbers that findings name."""
+    items = [
+        (number, item)
+        for number, item in enumerate(mission.items, 1)
+        if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+    ]
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    places = frame.to_local([item.x for _, item in items], [item.y for _, item in items])
+    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none")
+    step = -(-len(items) // _NUMBERED) or 1
+    for (number, _), place in list(zip(items, places.tolist(), strict=True))[::step]:
         plot.annotate(
-            str(k + 1),
-            (float(positions[k, 0]), float(positions[k, 1])),
+            str(number),
+            place,
             xytext=(-4, -4),
             textcoords="offset points",
             ha="right",

@@ -4,6 +4,7 @@ Figures are matplotlib's, made without pyplot: there is no global state and no w
 """
 
 import io
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,7 +56,8 @@ def styled() -> Iterator[None]:
     """Draw and save within this: matplotlib's settings are its global state."""
     import matplotlib as mpl
 
-    with mpl.rc_context():
+    with mpl.rc_context(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")  # names in any script
         mpl.rcdefaults()
         mpl.rcParams.update(_SETTINGS)
         yield

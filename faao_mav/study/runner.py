@@ -2,12 +2,16 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import write_whole
 from faao_mav.study.rows import TABLE, Row, append_row, in_order, load_rows, table
 from faao_mav.study.sweep import Case
+
+_CONNECTING = 10
+"""Seconds that a cluster has to answer."""
 
 
 def run_case(case: Case) -> Row:
@@ -54,20 +58,23 @@ def run_study(
     cases: Sequence[Case],
     *,
     jobs: int = -1,
+    cluster: str | None = None,
     directory: Path | None = None,
     observe: Callable[[Row], None] | None = None,
 ) -> tuple[Row, ...]:
     """Return the rows of `cases` in their order.
 
-    `jobs` processes, -1 for one on each core. With a `directory` every row is kept there when it
-    is done, rows that are there already are not run again, and the table is written at the end.
-    `observe` is told each row, old ones first. Raises `InputError` for a directory of no use.
+    `jobs` processes, -1 for one on each core; or the workers of the Dask `cluster` at an address as
+    `tcp://host:8786`, which need this package too. With a `directory` every row is kept there when
+    it is done, rows that are there already are not run again, and the table is written at the end.
+    `observe` is told each row, old ones first. Raises `InputError` for a directory or a cluster of
+    no use.
     """
     done = _prepare(directory) if directory is not None else {}
     for row in in_order(cases, done):
         if observe is not None:
             observe(row)
-    for row in _rows([case for case in cases if case.key not in done], jobs):
+    for row in _rows([case for case in cases if case.key not in done], jobs, cluster):
         if directory is not None:
             append_row(row, directory)
         done[row.key] = row
@@ -79,15 +86,36 @@ def run_study(
     return rows
 
 
-def _rows(cases: Sequence[Case], jobs: int) -> Iterator[Row]:
+def _rows(cases: Sequence[Case], jobs: int, cluster: str | None) -> Iterator[Row]:
     """Run `cases`; yield their rows as they finish."""
     from joblib import Parallel, delayed, effective_n_jobs
 
-    if min(effective_n_jobs(jobs), len(cases)) <= 1:
+    if cluster is not None:
+        with _connected(cluster):
+            workers = Parallel(return_as="generator_unordered", batch_size=1)
+            yield from workers(delayed(run_case)(case) for case in cases)
+    elif min(effective_n_jobs(jobs), len(cases)) <= 1:
         yield from map(run_case, cases)
-        return
-    workers = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-    yield from workers(delayed(run_case)(case) for case in cases)
+    else:
+        workers = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
+        yield from workers(delayed(run_case)(case) for case in cases)
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[None]:
+    """Let joblib send its work to the Dask scheduler at `address`."""
+    from joblib import parallel_config
+
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise InputError("a cluster needs Dask: pip install 'faao-mav[cluster]'") from None
+    try:
+        client = Client(address, timeout=_CONNECTING)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise InputError(f"cluster {address}: no scheduler there: {error}") from None
+    with client, parallel_config(backend="dask"):
+        yield
 
 
 def _prepare(directory: Path) -> dict[str, Row]:

@@ -1,0 +1,188 @@
+"""The page: complete, safe, and without a network."""
+
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from conftest import SMALL
+from reported import FINDINGS, HOSTILE, flown
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.report import ReportData, render_report
+
+VOID = {"meta", "br", "link", "img", "input", "hr"}
+FIGURES = ("Route", "Motion", "Link", "Precoders", "Convergence")
+
+
+class Page(HTMLParser):
+    """The elements of a page: their attributes, their texts; every one is closed in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[tuple[str, str]] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open:
+            self.texts.append((self.open[-1], data))
+
+    def of(self, tag: str) -> list[str]:
+        return [text for element, text in self.texts if element == tag]
+
+
+@pytest.fixture(scope="module")
+def full() -> str:
+    found = flown()
+    return render_report(ReportData(found.solution, found.conversion, found.prediction, FINDINGS))
+
+
+def test_every_section_is_there(full: str) -> None:
+    page = Page(full)
+    headings = page.of("h2")
+    assert headings == [
+        *("Result", "Findings", "Route", "Motion", "Link", "Convergence", "Precoders"),
+        *("Starts", "Plan"),
+    ]
+    pictures = [attributes for tag, attributes in page.elements if tag == "svg"]
+    assert len(pictures) == len(FIGURES)
+    assert all(picture["role"] == "img" for picture in pictures)
+    titles = {a["id"] for tag, a in page.elements if tag == "title" and "id" in a}
+    assert titles == {picture["aria-labelledby"] for picture in pictures}
+    shown = " ".join(text for _, text in page.texts)
+    solution, prediction = flown().solution, flown().prediction
+    assert f"{solution.rates.R_avg:.4f} bit/s/Hz" in shown
+    assert f"{prediction.duration:.1f} s" in shown
+    assert "v_max" in shown
+    assert "to user, predicted" in shown
+    assert re.search(r"faao-mav \d.*numpy \d.*Python \d", shown)
+
+
+def test_a_part_that_is_not_there_leaves_its_sections_out() -> None:
+    solution = flown().solution
+    alone = Page(render_report(ReportData(solution)))
+    assert "Findings" not in alone.of("h2")
+    assert "predicted" not in " ".join(alone.of("text"))
+    checked = Page(render_report(ReportData(findings=(), title="Checked")))
+    assert checked.of("h2") == ["Findings"]
+    assert checked.of("h1") == ["Checked"]
+    assert Page(render_report(ReportData())).of("h1") == ["Relay flight"]
+
+
+def test_nothing_comes_from_elsewhere(full: str) -> None:
+    page = Page(full)
+    assert {tag for tag, _ in page.elements} & {
+        "script",
+        "link",
+        "img",
+        "iframe",
+        "object",
+    } == set()
+    for tag, attributes in page.elements:
+        for name, value in attributes.items():
+            assert not name.startswith("on"), (tag, name)
+            if name in ("href", "src", "xlink:href"):
+                assert (value or "").startswith("#"), (tag, value)
+    assert "http:" not in full
+    assert "https:" not in full
+    assert "@import" not in full
+    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", full))
+
+
+def test_what_is_referred_to_is_in_the_page_once(full: str) -> None:
+    page = Page(full)
+    names = [a["id"] for _, a in page.elements if a.get("id")]
+    assert len(names) == len(set(names))
+    used = re.findall(r"url\(#([^)]*)\)", full) + re.findall(r'href="#([^"]*)"', full)
+    assert set(used) <= set(names)
+    assert used
+
+
+def test_names_and_messages_are_text(full: str) -> None:
+    page = Page(full)
+    assert page.of("h1") == [HOSTILE]
+    assert page.of("title")[0] == HOSTILE
+    assert "<script" not in full
+    assert "the leg is <b>outside</b> (item 4) [fence-leg]" in "".join(page.of("li"))
+    assert page.of("b") == ["error", "note"]
+    assert "".join(page.of("pre")) == flown().solution.plan.text
+
+
+def test_the_same_flight_gives_the_same_page(full: str) -> None:
+    found = flown()
+    data = ReportData(found.solution, found.conversion, found.prediction, FINDINGS)
+    assert render_report(data) == full
+
+
+def test_dark_paper_has_every_colour_of_the_light(full: str) -> None:
+    light, dark = (
+        set(re.findall(r"(--\w+):", block))
+        for block in re.findall(r":root \{(.*?)\}", full, re.DOTALL)
+    )
+    assert light == dark
+    assert set(re.findall(r"var\((--\w+)\)", full)) <= light
+
+
+def test_the_main_job_writes_page_and_figure(tmp_path: Path) -> None:
+    (tmp_path / "plan.yaml").write_text(SMALL)
+    names = ("m.waypoints", "r.html", "f.png")
+    options = zip(("--out", "--report", "--figure"), names, strict=True)
+    arguments = [word for option, name in options for word in (option, str(tmp_path / name))]
+    result = CliRunner().invoke(app, [str(tmp_path / "plan.yaml"), *arguments])
+    assert result.exit_code == 0, result.output
+    page = Page((tmp_path / "r.html").read_text())
+    assert "Findings" in page.of("h2")
+    assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
+    assert all(str(tmp_path / name) in result.stdout for name in names)
+
+
+@pytest.mark.parametrize(("option", "name"), [("--report", "r.pdf"), ("--figure", "f.jpg")])
+def test_other_formats_are_refused_before_the_work(tmp_path: Path, option: str, name: str) -> None:
+    (tmp_path / "plan.yaml").write_text(SMALL)
+    out = tmp_path / "m.waypoints"
+    arguments = [str(tmp_path / "plan.yaml"), "--out", str(out), option, str(tmp_path / name)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    assert f"{option} {tmp_path / name}: give a name that ends in" in result.stderr
+    assert not out.exists()
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium to show the page with")
+@pytest.mark.parametrize("width", [320, 1200])
+def test_a_browser_shows_it_without_scrolling_sideways(
+    tmp_path: Path, full: str, width: int
+) -> None:
+    probe = (
+        f'<iframe id="f" src="page.html" width="{width}" height="600"></iframe><script>'
+        'f.onload = () => { const d = f.contentDocument; document.title = "wide " + '
+        "(d.documentElement.scrollWidth <= f.clientWidth) + "
+        '" drawn " + [...d.querySelectorAll("svg")].every('
+        "s => s.getBoundingClientRect().height > 99) }</script>"
+    )
+    (tmp_path / "page.html").write_text(full)
+    (tmp_path / "probe.html").write_text(probe)
+    shown = subprocess.run(
+        ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000",
+         "--allow-file-access-from-files", f"--user-data-dir={tmp_path / 'profile'}",
+         "--dump-dom", (tmp_path / "probe.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    assert "<title>wide true drawn true</title>" in shown.stdout

@@ -1,0 +1,215 @@
+"""A study runs, is interrupted, goes on, and fails in parts."""
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import SMALL, edited
+from distributed import LocalCluster
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.errors import InputError
+from faao_mav.plan import parse_plan
+from faao_mav.report.style import save_figure
+from faao_mav.study import Row, load_rows, make_cases, run_study
+from faao_mav.study.figure import study_figure
+
+QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
+CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
+
+
+def timeless(rows: tuple[Row, ...]) -> list[Row]:
+    return [replace(row, seconds=None) for row in rows]
+
+
+def run(*arguments: object) -> Any:
+    return CliRunner().invoke(app, ["study", *map(str, arguments)])
+
+
+def table_in(directory: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((directory / "table.csv").read_text().splitlines()))
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "plan.yaml"
+    path.write_text(QUICK)
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[Row, ...]]:
+    directory = tmp_path_factory.mktemp("whole")
+    return directory, run_study(CASES, jobs=1, directory=directory)
+
+
+def test_a_row_is_what_the_plan_gives(whole: tuple[Path, tuple[Row, ...]]) -> None:
+    from faao_mav import optimize, price
+
+    row, solution = whole[1][2], optimize(parse_plan(CASES[2].text))
+    assert (row.values, row.scheme) == ({"power_dbm": 10}, "faao")
+    assert row.R_avg == solution.rates.R_avg == min(row.R_U or 0, row.R_G or 0)
+    assert row.mutual_information == price(solution).average
+    assert (row.converged, row.iterations, row.error) == (True, solution.iterations, "")
+    assert len(row.route) == len(solution.w)
+
+
+def test_a_resumed_study_is_the_uninterrupted_one(
+    tmp_path: Path, whole: tuple[Path, tuple[Row, ...]]
+) -> None:
+    seen: list[Row] = []
+
+    def stop(row: Row) -> None:
+        seen.append(row)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(CASES, jobs=1, directory=tmp_path, observe=stop)
+    rows = tmp_path / "rows.jsonl"
+    kept = rows.read_bytes()
+    assert kept.count(b"\n") == 2
+    rows.write_bytes(kept + kept[:100])  # the machine stopped in the middle of a row
+    again = run_study(CASES, jobs=1, directory=tmp_path)
+    assert timeless(again) == timeless(whole[1])
+    assert again[:2] == tuple(seen)  # not run again
+    assert len(load_rows(tmp_path)) == len(CASES)
+    assert [row["scheme"] for row in table_in(tmp_path)] == (["faao", "mrt"] * 3)
+
+
+def test_processes_do_not_change_the_result(whole: tuple[Path, tuple[Row, ...]]) -> None:
+    assert timeless(run_study(CASES, jobs=2)) == timeless(whole[1])
+
+
+def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[Row, ...]]) -> None:
+    local = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": None}
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, **local) as cluster:
+        rows = run_study(CASES, cluster=cluster.scheduler_address)
+    assert timeless(rows) == timeless(whole[1])
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x"])
+def test_a_cluster_that_is_not_there(
+    plan: Path, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("faao_mav.study.runner._CONNECTING", 0.5)
+    result = run(plan, "--cluster", address)
+    assert result.exit_code == 2
+    assert f"cluster {address}: no scheduler there" in result.stderr
+
+
+def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    result = run(plan, "--vary", "flight.duration=2,10", "--jobs", 1, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "1 of 2 rows failed, first:" in result.stdout
+    short, good = table_in(out)
+    assert "too short" in short["error"]
+    assert short["R_avg"] == good["error"] == ""
+    assert float(good["R_avg"]) > 0
+
+
+def test_a_study_in_which_nothing_can_run_is_refused(plan: Path, tmp_path: Path) -> None:
+    result = run(plan, "--vary", "radio.modulation=fsk,ook", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "radio.modulation: 'fsk' is not accepted" in result.stderr
+    assert not (tmp_path / "out").exists()
+    mistyped = run(plan, "--vary", "flight.duraton=10")
+    assert mistyped.exit_code == 2
+    assert "did you mean flight.duration?" in mistyped.stderr
+
+
+def test_a_study_without_any_result_says_so(plan: Path) -> None:
+    plan.write_text(edited(QUICK, {"radio.fading": "ergodic"}))
+    result = run(plan, "--schemes", "algorithm1", "--jobs", 1)
+    assert result.exit_code == 1
+    assert "1 of 1 rows failed" in result.stdout
+    assert "ergodic" in result.stdout
+
+
+def test_options_go_before_the_plans_study(plan: Path, tmp_path: Path) -> None:
+    study = {"vary": {"power_dbm": [0, 10]}, "schemes": ["faao"], "seeds": 2}
+    plan.write_text(edited(QUICK, {"study": study}))
+    rows = json.loads(run(plan, "--json", "--jobs", 1).stdout)["rows"]
+    assert [(row["power_dbm"], row["seed"]) for row in rows] == [(0, 0), (0, 1), (10, 0), (10, 1)]
+    other = run(plan, "--power", "5", "--seeds", 1, "--schemes", "zf", "--json", "--jobs", 1)
+    rows = json.loads(other.stdout)["rows"]
+    assert [(row["power_dbm"], row["scheme"], row["seed"]) for row in rows] == [(5, "zf", 0)]
+
+
+def test_the_main_job_takes_no_notice_of_a_study(plan: Path, tmp_path: Path) -> None:
+    written = []
+    for study in ({}, {"study": {"vary": {"flight.duration": [20]}, "seeds": 3}}):
+        plan.write_text(edited(QUICK, study))
+        out = tmp_path / "m.waypoints"
+        result = CliRunner().invoke(app, [str(plan), "--out", str(out), "--quiet"])
+        assert result.exit_code == 0, result.output
+        written.append(out.read_bytes())
+    assert written[0] == written[1]
+
+
+def test_a_strange_directory_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "rows.jsonl").write_text('{"not": "a row"}\n')
+    with pytest.raises(InputError, match="line 1: no row of a study"):
+        run_study(CASES, jobs=1, directory=tmp_path)
+
+
+def test_figures_are_written_and_labelled(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arguments = (plan, "--power", "0,10", "--schemes", "faao,mrt", "--out", out)
+    assert run(*arguments, "--jobs", 1).exit_code == 0
+    drawn = (out / "figure.svg").read_text()
+    for text in ("power W of both stations, dBm", "rate R_avg, bit/s/Hz", "FAAO", "MRT"):
+        assert text in drawn
+    assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
+    again = (out / "figure.svg").read_bytes()
+    assert run(*arguments, "--jobs", 1).exit_code == 0
+    assert (out / "figure.svg").read_bytes() == again
+
+
+def test_routes_are_drawn_on_a_map(whole: tuple[Path, tuple[Row, ...]], tmp_path: Path) -> None:
+    name = "中 $\\frac"
+    figure = study_figure(whole[1], parse_plan(edited(QUICK, {"name": name})), "trajectories")
+    save_figure(figure, tmp_path / "f.svg")
+    assert name in (tmp_path / "f.svg").read_text()
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("east, m", "north, m")
+    names = [text.get_text() for text in axes.texts]
+    assert {"base station", "user", "start", "end"} <= set(names)
+
+
+def test_without_results_there_is_nothing_to_draw() -> None:
+    failed = (Row("k", {"power_dbm": 1}, "faao", 0, error="no"),)
+    with pytest.raises(InputError, match="nothing to draw"):
+        study_figure(failed, parse_plan(QUICK), "trajectories")
+
+
+def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    # parallel tests run with the signal ignored, which a child inherits
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from faao_mav.cli.main import run; run()"
+    )
+    command = [sys.executable, "-c", code, "study", plan, "--power", "0:20:0.1", "--out", out]
+    process = subprocess.Popen(
+        [*map(str, command)], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    rows = out / "rows.jsonl"
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and not (rows.exists() and rows.read_bytes().count(b"\n")):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert f"interrupted; finished rows are in {out}; the same command goes on there" in said
+    assert "Traceback" not in said
+    assert load_rows(out)
