@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.mission.formats import read_mission, read_mission_file
+from faao_mav.mission.parameter_file import read_parameters
 
 
 def run(*arguments: object) -> Any:
@@ -43,13 +44,30 @@ def test_the_main_job(plan: Path, tmp_path: Path) -> None:
     assert mission.items[-1].command == 20
     with np.load(save) as archive:
         assert archive["w"].shape == (20, 2)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.waypoints", "plan.yaml", "r.npz"]
+        assert archive["predicted_w"].shape == (len(archive["predicted_t"]), 2)
+    written = ["m.param", "m.waypoints", "plan.yaml", "r.npz"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == written
+    assert all(str(tmp_path / name) in result.stdout for name in written if name != "plan.yaml")
+
+
+def test_the_parameters_that_the_mission_is_timed_for(plan: Path, tmp_path: Path) -> None:
+    data = json.loads(run(plan, "--out", tmp_path / "m.waypoints", "--json").stdout)
+    parameters = read_parameters(tmp_path / "m.param")
+    assert parameters == data["mission"]["parameters"]
+    assert parameters["WPNAV_SPEED"] == 2000
+    assert parameters["WPNAV_ACCEL"] >= 500
+    plan.write_text(edited(SMALL, {"mission.parameters": "keep"}))
+    (tmp_path / "m.param").unlink()
+    data = json.loads(run(plan, "--out", tmp_path / "m.waypoints", "--json").stdout)
+    assert data["mission"]["parameters"] == {}
+    assert not (tmp_path / "m.param").exists()
 
 
 def test_the_mission_as_a_plan_of_qgroundcontrol_is_the_same(plan: Path, tmp_path: Path) -> None:
     plan.write_text(edited(SMALL, {"vehicle.autopilot": "px4"}))
     for name in ("m.waypoints", "m.plan", "m.kml"):
         assert run(plan, "--out", tmp_path / name, "--quiet").output == ""
+    assert "MPC_ACC_HOR" in read_parameters(tmp_path / "m.params")
     read = read_mission_file(tmp_path / "m.plan")
     assert (read.autopilot, read.kind) == ("px4", "copter")
     assert read.mission == read_mission(tmp_path / "m.waypoints")
@@ -71,8 +89,13 @@ def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -
     assert 0 < data["seconds"]["optimize"] <= data["seconds"]["total"]
     assert data["saturated"] is False
     assert data["mission"]["items"] == len(read_mission(tmp_path / "m.txt").items)
-    assert data["mission"]["duration"] == pytest.approx(9.5, abs=1)
+    assert data["mission"]["duration"] == data["predicted"]["duration"]
+    assert data["mission"]["duration"] == pytest.approx(10, abs=1)
     assert data["mission"]["distance"] > 70
+    predicted = data["predicted"]
+    assert predicted["average_rate"] == pytest.approx(data["average_rate"], rel=0.05)
+    assert 0 < predicted["rms_position_error"] <= predicted["max_position_error"]
+    assert 0 < predicted["max_path_error"] <= predicted["max_position_error"] + 0.1
     assert max(data["residuals"].values()) < 1e-6
 
 
@@ -146,7 +169,7 @@ def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
     plan.write_text(edited(SMALL, {"vehicle.parameters": {"WPNAV_JERK": 0}}))
     result = run(plan, "--out", out, "--save", save)
     assert result.exit_code == 2
-    assert "vehicle.parameters.WPNAV_JERK: 0" in result.stderr
+    assert "vehicle.parameters: WPNAV_JERK: 0" in result.stderr
     assert not save.exists()
     plan.write_text(edited(SMALL, {"mission.max_items": 4}))
     result = run(plan, "--out", out, "--save", save)
@@ -223,7 +246,11 @@ def test_no_mutation_gives_a_traceback_or_a_partial_file(
     if result.exit_code == 0:
         json.loads(result.stdout)
         assert read_mission(out).items
-        assert sorted(p.name for p in folder.iterdir()) == ["m.waypoints", "plan.yaml"]
+        written = sorted(p.name for p in folder.iterdir())
+        assert written in (
+            ["m.param", "m.waypoints", "plan.yaml"],
+            ["m.params", "m.waypoints", "plan.yaml"],
+        )
     else:
         assert result.stdout == ""
         assert result.stderr

@@ -10,22 +10,23 @@ from faao_mav.cli.summary import Result, as_dict, as_text
 from faao_mav.faao.bound import Bound
 from faao_mav.faao.optimize import optimize
 from faao_mav.faao.pricing import MutualInformation, saturation
-from faao_mav.mission import assemble, plan_route
+from faao_mav.mission import convert
+from faao_mav.mission.prediction import predict_delivery
 
 
 @pytest.fixture(scope="module")
 def result(small_plan: MakePlan) -> Result:
     plan = small_plan({"radio.fading": "none", "name": "over the hill"})
     solution = optimize(plan)
-    route = plan_route(solution.t, solution.w, plan)
+    conversion = convert(solution)
     return Result(
         solution=replace(solution, starts={"straight": 1.25, "bs-user": 1.5, "user": 1.0}),
         information=MutualInformation(1.9, 1.8, 0.001),
         fresh=None,
         saturation=saturation(solution),
         bound=Bound(2 * solution.rates.R_avg, exact=False),
-        mission=assemble(route, plan),
-        route=route,
+        conversion=conversion,
+        prediction=predict_delivery(solution, conversion),
         seconds_optimize=1.0,
         seconds_total=2.0,
         written=(),
@@ -42,7 +43,16 @@ def test_it_says_what_was_found(result: Result) -> None:
     assert "within 50 % of the best that any route can do" in text
     assert "(numerical)" in text
     assert "converged after" in text
+    assert f"{result.prediction.rates.R_avg:.4f} bit/s/Hz, " in text
+    assert "m rms from the plan at equal times" in text
+    assert "the mission is timed for WPNAV_SPEED 2000, " in text
     assert "nothing: give --out" in text
+
+
+def test_a_vehicle_that_keeps_its_parameters_is_told_of_none(result: Result) -> None:
+    kept = replace(result, conversion=replace(result.conversion, parameters={}))
+    assert "parameters" not in as_text(kept)
+    assert as_dict(kept)["mission"]["parameters"] == {}
 
 
 def test_a_run_that_did_not_converge_says_so(result: Result) -> None:
@@ -56,7 +66,16 @@ def test_numbers_for_programs_are_the_solutions(result: Result) -> None:
     data = as_dict(result)
     assert data["average_rate"] == result.solution.rates.R_avg
     assert data["upper_bound"] == 2 * result.solution.rates.R_avg
+    conversion, prediction = result.conversion, result.prediction
+    assert data["mission"]["items"] == len(conversion.mission.items)
+    assert data["mission"]["parameters"] == conversion.parameters
+    route = conversion.schedule.route
+    relay = route.positions[route.first : route.last + 1]
     assert data["mission"]["distance"] == pytest.approx(
-        np.linalg.norm(np.diff(result.route.positions, axis=0), axis=1).sum()
+        np.linalg.norm(np.diff(relay, axis=0), axis=1).sum()
     )
+    predicted = data["predicted"]
+    assert predicted["average_rate"] == min(predicted["rate_bs_uav"], predicted["rate_uav_user"])
+    assert predicted["duration"] == data["mission"]["duration"] == prediction.duration
+    assert predicted["rms_position_error"] == prediction.rms_position_error
     assert data["seconds"] == {"optimize": 1.0, "total": 2.0}

@@ -67,20 +67,22 @@ def _run(
     from faao_mav.faao.problem import build_problem
     from faao_mav.faao.solution import save_solution
     from faao_mav.mission.convert import convert
+    from faao_mav.mission.flight import copter_model
     from faao_mav.mission.formats import check_suffix, render_mission
     from faao_mav.mission.parameter_file import parameter_path, render_parameters
     from faao_mav.mission.precoder_table import precoder_table
     from faao_mav.mission.prediction import predict_delivery
     from faao_mav.mission.recommend import candidates
+    from faao_mav.mission.vehicle import vehicle_of
     from faao_mav.plan import read_plan
 
     started = time.perf_counter()
     read = read_plan(plan_file, method=method)
-    vehicles = candidates(read)  # a useless parameter is refused before the work, not after it
+    copter_model(vehicle_of(read))  # a useless parameter is refused before the work, not after it
     tuned = None
     if out is not None:
         check_suffix(out)
-        tuned = parameter_path(out, read.vehicle.autopilot) if any(vehicles) else None
+        tuned = parameter_path(out, read.vehicle.autopilot) if any(candidates(read)) else None
     if save is not None and save.suffix != ".npz":
         raise InputError(f"--save {save}: give a name that ends in .npz")
     targets = [path for path in (out, tuned, save, precoders) if path is not None]

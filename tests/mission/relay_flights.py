@@ -7,7 +7,8 @@ import numpy as np
 from hypothesis import settings
 
 from faao_mav.arrays import Real
-from faao_mav.mission import Mission, assemble, plan_route
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import Command, Frame, Mission, assemble, plan_route
 from faao_mav.plan import (
     BaseStation,
     Flight,
@@ -82,3 +83,36 @@ def dash_hover_dash(hover: float = 40.0, step: float = 0.2) -> Trajectory:
 def mission_of(t: Real, w: Real, plan: Plan) -> Mission:
     """Return the mission that flies a bare trajectory."""
     return assemble(plan_route(t, w, plan), plan)
+
+
+def items_of(mission: Mission, plan: Plan) -> tuple[Real, list[float], list[float]]:
+    """Return positions, speeds and holds of the route that the mission's items make."""
+    assert [item.command for item in mission.items[:2]].count(Command.NAV_TAKEOFF) == int(
+        plan.mission.takeoff
+    )
+    begin = 1 if plan.mission.takeoff else 0
+    speed, before, points, speeds, holds = np.nan, None, [], [], []
+    for item in mission.items[begin:-1]:
+        if item.command == Command.DO_CHANGE_SPEED:
+            assert item.frame == Frame.MISSION
+            assert item.params[0::2] == (1.0, -1.0)
+            assert before != Command.DO_CHANGE_SPEED
+            assert item.params[1] != speed
+            speed = item.params[1]
+        elif item.command == Command.NAV_DELAY:
+            assert item.frame == Frame.MISSION
+            assert before == Command.NAV_WAYPOINT
+            holds[-1] += item.params[0]
+        else:
+            assert item.command == Command.NAV_WAYPOINT
+            assert item.frame == Frame.GLOBAL_RELATIVE_ALT
+            assert item.z == plan.flight.altitude
+            points.append(item)
+            speeds.append(speed)
+            holds.append(item.params[0])
+        before = item.command
+    assert before in (Command.NAV_WAYPOINT, Command.NAV_DELAY)
+    assert speeds[0] == plan.vehicle.max_speed
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    positions = frame.to_local([p.x for p in points], [p.y for p in points])
+    return positions, speeds[1:], holds

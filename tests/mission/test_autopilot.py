@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from relay_flights import plan_with
 
-from faao_mav.errors import PlanError
+from faao_mav.errors import InputError
 from faao_mav.mission.autopilot import ArduCopterLegs, Px4Legs, legs_of
+from faao_mav.mission.vehicle import vehicle_of
 
 
 def test_measured_lengths_of_arducopter_legs():
@@ -40,9 +41,10 @@ def test_a_px4_leg_is_one_in_which_it_can_stop():
     ],
 )
 def test_parameters_of_either_generation(autopilot, parameters, legs):
-    assert legs_of(plan_with(autopilot=autopilot, parameters=parameters)) == legs
+    plan = plan_with(autopilot=autopilot, parameters=parameters)
+    assert legs_of(vehicle_of(plan)) == legs
 
 
 def test_an_unusable_parameter_is_named():
-    with pytest.raises(PlanError, match=r"plan: vehicle\.parameters\.WPNAV_JERK: 0; give"):
-        legs_of(plan_with(parameters={"WPNAV_JERK": 0.0}))
+    with pytest.raises(InputError, match=r"plan: vehicle\.parameters\.WPNAV_JERK: 0; give"):
+        legs_of(vehicle_of(plan_with(parameters={"WPNAV_JERK": 0.0})))
