@@ -1,0 +1,28 @@
+"""The ArduCopter model against flights of a real ArduCopter in its simulator."""
+
+import pytest
+from flights_arducopter import FITTED, HELD_OUT, row
+from recorded import Row, together
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[Row]:
+    return [row(name) for name in (*FITTED, *HELD_OUT)]
+
+
+def test_every_flight_over_plain_waypoints_is_compared() -> None:
+    assert len(FITTED) + len(HELD_OUT) == 15
+
+
+def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
+    for flight in rows:
+        assert flight.arrival_rms <= (0.3 if flight.use == "fitted" else 0.5), flight
+        assert flight.position_rms <= 2.0, flight
+        assert flight.path_error <= 2.0, flight
+
+
+@pytest.mark.parametrize("use", ["fitted", "held out"])
+def test_flights_together(rows: list[Row], use: str) -> None:
+    arrival, position = together(rows, use)
+    assert arrival <= 0.2
+    assert position <= 1.2
