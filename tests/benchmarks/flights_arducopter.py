@@ -2,7 +2,7 @@
 
     python tests/benchmarks/flights_arducopter.py
 
-The lags of the model are fitted to ten flights over plain waypoints. Three more are held out: no
+The lags of the model are fitted to twelve flights over plain waypoints. Three more are held out: no
 constant was fitted to them, but their errors were seen while the model was built, so they are no
 blind test.
 """
