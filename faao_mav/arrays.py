@@ -8,3 +8,4 @@ from numpy.typing import NDArray
 Real: TypeAlias = NDArray[np.float64]
 Complex: TypeAlias = NDArray[np.complex128]
 Integers: TypeAlias = NDArray[np.int_]
+Flags: TypeAlias = NDArray[np.bool_]

@@ -21,7 +21,9 @@ FLOORS = {
     "faao": 3,
     "mission": 4,
     "mavlink": 5,
-    "cli": 6,
+    "report": 6,
+    "study": 7,
+    "cli": 8,
 }
 
 
@@ -71,6 +73,9 @@ def test_every_public_name_can_be_had() -> None:
         ("import faao_mav.mavlink.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
         ("import faao_mav.cli.upload, faao_mav.cli.download", {"numpy", "pymavlink"}),
         ("import faao_mav.cli.autopilot", {"numpy", "pymavlink"}),
+        ("import faao_mav.cli.study", {"numpy", "joblib", "matplotlib"}),
+        ("import faao_mav.study", {"scipy", "cvxpy", "joblib", "matplotlib", "pyproj"}),
+        ("import faao_mav.report", {"scipy", "cvxpy", "matplotlib"}),
         ("import faao_mav.mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
     ],
 )  # fmt: skip

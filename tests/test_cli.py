@@ -55,7 +55,7 @@ def test_the_parameters_that_the_mission_is_timed_for(plan: Path, tmp_path: Path
     parameters = read_parameters(tmp_path / "m.param")
     assert parameters == data["mission"]["parameters"]
     assert parameters["WPNAV_SPEED"] == 2000
-    assert parameters["WPNAV_ACCEL"] >= 500
+    assert parameters["WPNAV_ACCEL"] == pytest.approx(100 * parameters["WP_ACC"])
     plan.write_text(edited(SMALL, {"mission.parameters": "keep"}))
     (tmp_path / "m.param").unlink()
     data = json.loads(run(plan, "--out", tmp_path / "m.waypoints", "--json").stdout)
@@ -90,7 +90,7 @@ def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -
     assert data["saturated"] is False
     assert data["mission"]["items"] == len(read_mission(tmp_path / "m.txt").items)
     assert data["mission"]["duration"] == data["predicted"]["duration"]
-    assert data["mission"]["duration"] == pytest.approx(10, abs=1)
+    assert 9 < data["mission"]["duration"] < 14  # more than ArduCopter can do in 10 s
     assert data["mission"]["distance"] > 70
     predicted = data["predicted"]
     assert predicted["average_rate"] == pytest.approx(data["average_rate"], rel=0.05)
@@ -169,7 +169,7 @@ def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
     plan.write_text(edited(SMALL, {"vehicle.parameters": {"WPNAV_JERK": 0}}))
     result = run(plan, "--out", out, "--save", save)
     assert result.exit_code == 2
-    assert "vehicle.parameters: WPNAV_JERK: 0" in result.stderr
+    assert "vehicle.parameters.WPNAV_JERK: 0" in result.stderr
     assert not save.exists()
     plan.write_text(edited(SMALL, {"mission.max_items": 4}))
     result = run(plan, "--out", out, "--save", save)

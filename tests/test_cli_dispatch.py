@@ -47,7 +47,7 @@ def test_a_plan_may_have_any_name(in_folder: Path) -> None:
 def test_help_tells_how_to_plan_and_every_command() -> None:
     shown = run("--help").stdout
     assert "faao-mission PLAN.yaml --out MISSION" in shown
-    for command in ("validate", "upload", "download", "convert", "autopilot"):
+    for command in ("validate", "upload", "download", "convert", "autopilot", "study"):
         assert f"\n  {command} " in shown
     assert run("-h").stdout == shown
     assert "--method" in run("plan.yaml", "--help").stdout
@@ -58,7 +58,7 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     ("word", "part"),
     [
         ("convertt", "convertt: no command and no file of this name; did you mean convert?"),
-        ("zzz", "zzz: no command and no file of this name; commands: plan, validate, upload"),
+        ("zzz", "zzz: no command and no file of this name; commands: plan, validate, "),
     ],
 )
 def test_a_mistyped_command_is_told_from_a_plan(word: str, part: str) -> None:

@@ -43,9 +43,6 @@ def test_it_says_what_was_found(result: Result) -> None:
     assert "within 50 % of the best that any route can do" in text
     assert "(numerical)" in text
     assert "converged after" in text
-    assert f"{result.prediction.rates.R_avg:.4f} bit/s/Hz, " in text
-    assert "m rms from the plan at equal times" in text
-    assert "the mission is timed for WPNAV_SPEED 2000, " in text
     assert "nothing: give --out" in text
 
 
@@ -79,3 +76,11 @@ def test_numbers_for_programs_are_the_solutions(result: Result) -> None:
     assert predicted["duration"] == data["mission"]["duration"] == prediction.duration
     assert predicted["rms_position_error"] == prediction.rms_position_error
     assert data["seconds"] == {"optimize": 1.0, "total": 2.0}
+
+
+def test_it_says_how_the_mission_will_fly_and_what_it_needs(result: Result) -> None:
+    text = as_text(result)
+    assert f"predicted    {result.prediction.rates.R_avg:.4f} bit/s/Hz" in text
+    assert f"{result.prediction.rms_position_error:.1f} m rms from the plan" in text
+    for name, value in result.conversion.parameters.items():
+        assert f"{name} {value:g}" in text

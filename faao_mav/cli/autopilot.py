@@ -2,11 +2,13 @@
 
 import math
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.options import SigningKey, reported
+from faao_mav.cli.options import SigningKey
+from faao_mav.cli.outcome import exit_status
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.mock import MockAutopilot
     from faao_mav.mavlink.protocol import MissionType
     from faao_mav.mission.item import Home
+    from faao_mav.mission.vehicle import Autopilot
 
 _REST = 0.5  # s without a change, after which a list is told
 
@@ -35,6 +38,10 @@ def autopilot(
     home: Annotated[
         str, typer.Option(metavar="LAT,LON,ALT", help="Where it stands: degrees, m AMSL.")
     ] = "-35.363262,149.165237,584",
+    parameters: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Its parameters: it flies by them; without: defaults."),
+    ] = None,
     speedup: Annotated[
         float, typer.Option(min=0.01, metavar="X", help="Fly X times as fast as predicted.")
     ] = 1.0,
@@ -59,19 +66,27 @@ def autopilot(
 
     It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
     """
-    with reported():
+    with exit_status():
         from faao_mav.mavlink.codec import read_key
         from faao_mav.mavlink.faults import Faults
         from faao_mav.mavlink.mock import MockAutopilot, manners_of
         from faao_mav.mavlink.protocol import Address
         from faao_mav.mavlink.runner import predicted, serve
         from faao_mav.mavlink.transport import open_transport
+        from faao_mav.mission.flight import flight_model
+        from faao_mav.mission.parameter_file import read_parameters
+        from faao_mav.mission.vehicle import Vehicle
 
+        values = {} if parameters is None else read_parameters(parameters)
+        flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"
+        vehicle = Vehicle(flown_by, parameters=values, source=str(parameters or "parameters"))
+        flight_model(vehicle)  # useless parameters are refused here, not in flight
         mock = MockAutopilot(
             manners_of(kind),
             address=Address(system, 1),
             home=read_home(home),
-            fly=predicted("ardupilot" if kind == "ardupilot" else "px4"),
+            fly=predicted(vehicle),
+            parameters=values,
             speedup=speedup,
             boot=boot,
         )

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from faao_mav.cli.options import Component, Log, SigningKey, System, Wait, reported
+from faao_mav.cli.options import Component, Log, SigningKey, System, Wait
+from faao_mav.cli.outcome import exit_status
 
 
 def download(
@@ -30,7 +31,7 @@ def download(
     Exit status: 0 done; 1 there is no such vehicle, or a list did not come whole; 2 unusable
     arguments.
     """
-    with reported():
+    with exit_status():
         from faao_mav.cli.transfer_progress import transfer_progress
         from faao_mav.files import check_writable, write_whole
         from faao_mav.mavlink.client import download as run

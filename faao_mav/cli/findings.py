@@ -1,8 +1,7 @@
 """What a validation found, and the rules, for people and for programs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +9,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from faao_mav.mission.flight.track import Track
-from faao_mav.mission.validate import Finding, Level, Rule
+from faao_mav.cli.finding_lines import count_of, grouped, items_of, line_of, message_of
+from faao_mav.mission.check import Check
+from faao_mav.mission.validate import Level, Rule
 from faao_mav.mission.vehicle import Vehicle
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
-_MAX_ITEMS_SHOWN = 8
 _NAMES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
@@ -23,35 +22,31 @@ _NAMES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 class Verdict:
     """A validation of the mission in the file `source`.
 
-    `chosen_by` says what told the autopilot and the kind of vehicle; `unpredicted` why there is
-    no `track`.
+    `chosen_by` says what told the autopilot and the kind of vehicle.
     """
 
     source: Path
     items: int
     vehicle: Vehicle
     chosen_by: str
-    track: Track | None
-    unpredicted: str
-    findings: tuple[Finding, ...]
-
-    def count(self, level: Level) -> int:
-        """Return how many findings are of `level`."""
-        return sum(finding.level is level for finding in self.findings)
+    check: Check
 
 
 def as_dict(verdict: Verdict) -> dict[str, Any]:
-    """Return the JSON object of `--json`; `duration` in seconds."""
+    """Return the JSON object of `--json`; seconds, metres, bit/s/Hz."""
+    check = verdict.check
     return {
         "mission": str(verdict.source),
         "items": verdict.items,
         "autopilot": verdict.vehicle.autopilot,
         "type": verdict.vehicle.kind,
-        "predicted": {"duration": float(verdict.track.t[-1])} if verdict.track else None,
-        "errors": verdict.count(Level.ERROR),
-        "warnings": verdict.count(Level.WARNING),
-        "notes": verdict.count(Level.NOTE),
-        "findings": [asdict(finding) for finding in verdict.findings],
+        "parameters": verdict.vehicle.source if verdict.vehicle.parameters else None,
+        "predicted": {"duration": float(check.track.t[-1])} if check.track else None,
+        "link": asdict(check.link) | {"share": check.link.share} if check.link else None,
+        "errors": len(check.of(Level.ERROR)),
+        "warnings": len(check.of(Level.WARNING)),
+        "notes": len(check.of(Level.NOTE)),
+        "findings": [asdict(finding) for finding in check.findings],
     }
 
 
@@ -75,29 +70,22 @@ def rules_as_dict(rules: Sequence[Rule]) -> dict[str, Any]:
 def show(verdict: Verdict, console: Console) -> None:
     """Print what was found: a table on a terminal, else one line a finding."""
     _line(console, _head(verdict))
-    if verdict.findings and console.is_terminal:
+    findings = verdict.check.findings
+    if findings and console.is_terminal:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for column in ("item", "rule", "what is the case, and what to do"):
             table.add_column(column, justify="right" if column == "item" else "left")
-        for group in _groups(verdict.findings):
+        for group in grouped(findings):
             colour = _COLOURS[group[0].level]
             table.add_row(
-                _items(group),
+                items_of(group),
                 f"[{colour}]{group[0].level}[/]\n{group[0].rule}",
-                f"{escape(_message(group))}\n[green]{escape(group[0].action)}[/]",
+                f"{escape(message_of(group))}\n[green]{escape(group[0].action)}[/]",
             )
         console.print(table)
     else:
-        for group in _groups(verdict.findings):
-            finding = group[0]
-            numbers = _items(group)
-            plural = "" if numbers.isdigit() else "s"
-            where = f"item{plural} {numbers}: " if finding.item is not None else ""
-            _line(
-                console,
-                f"{finding.level}: {where}{_message(group)} [{finding.rule}]\n"
-                f"    to do: {finding.action}",
-            )
+        for group in grouped(findings):
+            _line(console, f"{line_of(group)}\n    to do: {group[0].action}")
     _line(console, _tail(verdict))
 
 
@@ -126,47 +114,21 @@ def _head(verdict: Verdict) -> str:
         f"{vehicle.kind} ({verdict.chosen_by}); parameters: "
         f"{vehicle.source if vehicle.parameters else 'defaults'}"
     ]
-    if verdict.track is None:
-        lines.append(f"flight not predicted: {verdict.unpredicted}")
+    check = verdict.check
+    if check.track is None:
+        lines.append(f"flight not predicted: {check.unpredicted}")
     else:
-        lines.append(f"predicted flight: {verdict.track.t[-1]:.0f} s")
+        lines.append(f"predicted flight: {check.track.t[-1]:.0f} s")
+    if check.link is not None:
+        lines.append(
+            f"predicted link: {check.link.predicted_rate:.4f} bit/s/Hz, "
+            f"{100 * check.link.share:.2f} % of the plan's {check.link.planned_rate:.4f}"
+        )
     return "\n".join(lines)
 
 
 def _tail(verdict: Verdict) -> str:
-    counts = [
-        f"{verdict.count(level)} {level}{'' if verdict.count(level) == 1 else 's'}"
-        for level in Level
-    ]
-    return ", ".join(counts)
-
-
-def _groups(findings: Sequence[Finding]) -> Iterator[list[Finding]]:
-    """Yield the findings with those of one rule together, in the order of the first of each."""
-    order = {finding.rule: n for n, finding in reversed(list(enumerate(findings)))}
-    for _, group in groupby(sorted(findings, key=lambda f: order[f.rule]), lambda f: f.rule):
-        yield list(group)
-
-
-def _message(group: list[Finding]) -> str:
-    if len(group) == 1:
-        return group[0].message
-    return f"{group[0].message} (and {len(group) - 1} more like it)"
-
-
-def _items(group: list[Finding]) -> str:
-    """Return the items' numbers, runs as `4-9`; nothing where it is about no item."""
-    numbers = sorted({finding.item for finding in group if finding.item is not None})
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    shown = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
-    if len(shown) > _MAX_ITEMS_SHOWN:
-        shown = [*shown[:_MAX_ITEMS_SHOWN], "..."]
-    return ", ".join(shown)
+    return ", ".join(count_of(verdict.check.findings, level) for level in Level)
 
 
 def _whom(rule: Rule) -> str:

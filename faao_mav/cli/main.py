@@ -11,6 +11,7 @@ from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.convert import convert
 from faao_mav.cli.download import download
 from faao_mav.cli.plan import plan
+from faao_mav.cli.study import study
 from faao_mav.cli.upload import upload
 from faao_mav.cli.validate import validate
 
@@ -53,6 +54,7 @@ app.command("upload")(upload)
 app.command("download")(download)
 app.command("convert")(convert)
 app.command("autopilot")(autopilot)
+app.command("study")(study)
 
 
 def _version(asked: bool) -> None:

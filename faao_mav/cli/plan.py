@@ -3,14 +3,19 @@
 import json
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.options import AllowArmed, System
+from faao_mav.cli.outcome import exit_status, note
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_whole
+
+if TYPE_CHECKING:
+    from faao_mav.cli.summary import Result
 
 
 def plan(
@@ -30,6 +35,20 @@ def plan(
         Path | None,
         typer.Option(metavar="TABLE.csv", help="Write the precoders by time and position."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Write a page about the flight."),
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the flight: .png, .svg or .pdf."),
+    ] = None,
+    upload: Annotated[
+        str | None,
+        typer.Option(metavar="CONNECTION", help="Upload the mission to a vehicle, and verify it."),
+    ] = None,
+    system: System = None,
+    allow_armed: AllowArmed = False,
     method: Annotated[
         str | None,
         typer.Option(metavar="M", help="Replace optimizer.method: direct or algorithm1."),
@@ -44,54 +63,89 @@ def plan(
 ) -> None:
     """Optimise a radio-relay flight and write it as a MAVLink mission.
 
-    Exit status: 0 done; 1 there is no such flight or mission; 2 unusable arguments or input.
+    The mission is validated, with the parameters that it is timed for. One with errors is
+    written, to be looked at, but not uploaded.
+
+    Exit status: 0 done; 1 there is no such flight or mission, validation found errors, or it is
+    not known to be on the vehicle; 2 unusable arguments or input.
     """
     with exit_status():
-        _run(plan_file, out, save, precoders, method, bound, as_json, quiet)
+        result = _solve(
+            plan_file, out, save, precoders, report, figure, upload, method, bound, quiet
+        )
+        sound = _sound(result)
+        failure = None
+        if upload is not None and sound:
+            shown = sys.stderr.isatty() and not quiet
+            result, failure = _uploaded(result, upload, system, allow_armed, shown)
+        _show(result, as_json, quiet)
+        if failure is not None:
+            raise failure
+        if not sound or (result.upload is not None and not result.upload.verified):
+            raise typer.Exit(1)
 
 
-def _run(
+def _solve(
     plan_file: Path,
     out: Path | None,
     save: Path | None,
     precoders: Path | None,
+    report: Path | None,
+    figure: Path | None,
+    upload: str | None,
     method: str | None,
     bound: bool,
-    as_json: bool,
     quiet: bool,
-) -> None:
+) -> "Result":
+    from faao_mav.cli import report as reports
     from faao_mav.cli.progress import progress
-    from faao_mav.cli.summary import Result, as_dict, as_text
+    from faao_mav.cli.summary import Result
     from faao_mav.faao.optimize import optimize
     from faao_mav.faao.pricing import fresh_rates, price, saturation
     from faao_mav.faao.problem import build_problem
+    from faao_mav.faao.progress import Progress
     from faao_mav.faao.solution import save_solution
+    from faao_mav.mission.autopilot import legs_of
+    from faao_mav.mission.check import check
     from faao_mav.mission.convert import convert
+    from faao_mav.mission.drawing import draw_mission
     from faao_mav.mission.flight import copter_model
     from faao_mav.mission.formats import check_suffix, render_mission
     from faao_mav.mission.parameter_file import parameter_path, render_parameters
     from faao_mav.mission.precoder_table import precoder_table
     from faao_mav.mission.prediction import predict_delivery
     from faao_mav.mission.recommend import candidates
+    from faao_mav.mission.validate import Limits
     from faao_mav.mission.vehicle import vehicle_of
     from faao_mav.plan import read_plan
 
     started = time.perf_counter()
     read = read_plan(plan_file, method=method)
-    copter_model(vehicle_of(read))  # a useless parameter is refused before the work, not after it
+    own = vehicle_of(read)
+    legs_of(own)  # a useless parameter is refused before the work, not after it
+    copter_model(own)
+    vehicles = candidates(read)
     tuned = None
     if out is not None:
         check_suffix(out)
-        tuned = parameter_path(out, read.vehicle.autopilot) if any(candidates(read)) else None
+        tuned = parameter_path(out, read.vehicle.autopilot) if any(vehicles) else None
     if save is not None and save.suffix != ".npz":
         raise InputError(f"--save {save}: give a name that ends in .npz")
-    targets = [path for path in (out, tuned, save, precoders) if path is not None]
+    reports.check_names(report, figure)
+    if upload is not None:
+        from faao_mav.mavlink.transport import parse_connection
+
+        parse_connection(upload)
+    files = (out, tuned, save, precoders, report, figure)
+    targets = [path for path in files if path is not None]
     for path in targets:
         check_writable(path)
     with progress(shown=sys.stderr.isatty() and not quiet) as observe:
         optimizing = time.perf_counter()
         solution = optimize(read, observe=observe)
         optimized = time.perf_counter() - optimizing
+        if observe is not None:
+            observe(Progress(1, 1, "the mission's timing", solution.rates.R_avg))
         try:
             conversion = convert(solution)
         except FaaoError:
@@ -103,14 +157,25 @@ def _run(
             save_solution(solution, save, conversion.schedule.track())
         if precoders is not None:
             write_whole(precoders, precoder_table(solution).encode())
-        if tuned is not None:
+        if out is not None and tuned is not None:
             text = render_parameters(
-                conversion.parameters, read.vehicle.autopilot, header=f"for {out}"
+                conversion.parameters, read.vehicle.autopilot, header=f"for {out.name}"
             )
             write_whole(tuned, text.encode())
         if out is not None:
-            rendered = render_mission(conversion.mission, out, conversion.vehicle)
+            rendered = (
+                draw_mission(solution, conversion)
+                if out.suffix.lower() == ".kml"
+                else render_mission(conversion.mission, out, conversion.vehicle)
+            )
             write_whole(out, rendered.encode())
+        checked = check(
+            conversion.mission,
+            conversion.vehicle,
+            limits=Limits(max_speed=read.vehicle.max_speed),
+            solution=solution,
+        )
+        reports.write(report, figure, solution, conversion, prediction, checked.findings)
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None
@@ -118,7 +183,7 @@ def _run(
             from faao_mav.faao.bound import upper_bound
 
             ceiling = upper_bound(build_problem(read), solution.rates.R_avg)
-    result = Result(
+    return Result(
         solution=solution,
         information=information,
         fresh=fresh,
@@ -126,10 +191,49 @@ def _run(
         bound=ceiling,
         conversion=conversion,
         prediction=prediction,
+        findings=checked.findings,
         seconds_optimize=optimized,
         seconds_total=time.perf_counter() - started,
         written=tuple(targets),
     )
+
+
+def _sound(result: "Result") -> bool:
+    """Say the errors that validation found, and whether there are none."""
+    from faao_mav.cli.finding_lines import grouped, line_of
+    from faao_mav.mission.validate.finding import Level
+
+    errors = [finding for finding in result.findings if finding.level is Level.ERROR]
+    for group in grouped(errors):
+        note(f"{line_of(group)}; {group[0].action}")
+    if errors:
+        note("the mission does not pass validation; do not fly it")
+    return not errors
+
+
+def _uploaded(
+    result: "Result", connection: str, system: int | None, allow_armed: bool, shown: bool
+) -> "tuple[Result, FaaoError | None]":
+    """Return `result` with what became of its upload, and the error that prevented it."""
+    from faao_mav.cli.transfer_progress import transfer_progress
+    from faao_mav.mavlink.client import upload
+
+    mission = result.conversion.mission
+    with transfer_progress(shown=shown) as observe:
+        try:
+            report = upload(
+                mission, connection, system=system, allow_armed=allow_armed, observe=observe
+            )
+        except FaaoError as error:
+            return result, error
+    if not report.verified:
+        note("the mission is not verified; do not fly it")
+    return replace(result, upload=report), None
+
+
+def _show(result: "Result", as_json: bool, quiet: bool) -> None:
+    from faao_mav.cli.summary import as_dict, as_text
+
     if as_json:
         typer.echo(json.dumps(as_dict(result), allow_nan=False))
     elif not quiet:

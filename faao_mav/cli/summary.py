@@ -1,19 +1,25 @@
 """The result of the main job, for people and for programs."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from faao_mav.cli.finding_lines import count_of, grouped, line_of
 from faao_mav.faao.bound import Bound
 from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.faao.solution import Solution
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.prediction import Prediction
+from faao_mav.mission.validate.finding import Finding, Level
+
+if TYPE_CHECKING:
+    from faao_mav.mavlink.client import UploadReport
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Everything that the main job found out."""
+    """Everything that the main job found out; without an `upload` none was asked for, or tried."""
 
     solution: Solution
     information: MutualInformation
@@ -25,6 +31,8 @@ class Result:
     seconds_optimize: float
     seconds_total: float
     written: tuple[Path, ...]
+    findings: tuple[Finding, ...] = ()
+    upload: "UploadReport | None" = None
 
 
 def as_dict(result: Result) -> dict[str, Any]:
@@ -69,6 +77,8 @@ def as_dict(result: Result) -> dict[str, Any]:
             "max_position_error": result.prediction.max_position_error,
             "rms_position_error": result.prediction.rms_position_error,
         },
+        "validation": [asdict(finding) for finding in result.findings],
+        "upload": _upload_as_dict(result.upload),
     }
 
 
@@ -119,13 +129,39 @@ def as_text(result: Result) -> str:
         f"             {flown.rms_position_error:.1f} m rms from the plan at equal times, "
         f"{flown.max_position_error:.1f} m at most; {flown.max_path_error:.1f} m from its path",
     ]
+    lines += _checked(result.findings)
     if result.conversion.parameters:
         wanted = ", ".join(f"{name} {v:g}" for name, v in result.conversion.parameters.items())
         lines.append(f"parameters   the mission is timed for {wanted}: load them first")
     lines += [f"written      {path}" for path in result.written]
     if not result.written:
         lines.append("written      nothing: give --out MISSION.waypoints")
+    if result.upload is not None:
+        from faao_mav.cli import upload
+
+        lines.append(upload.as_text(result.upload))
     return "\n".join(lines)
+
+
+def _checked(findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield the lines of a validation: notes are counted, the rest is told."""
+    told = [finding for finding in findings if finding.level is not Level.NOTE]
+    notes = f"{count_of(findings, Level.NOTE)}"
+    if not told:
+        yield f"checked      no errors or warnings, {notes}"
+        return
+    counts = (count_of(findings, level) for level in (Level.ERROR, Level.WARNING))
+    yield f"checked      {', '.join(counts)}, {notes}"
+    for group in grouped(told):
+        yield f"             {line_of(group)}"
+
+
+def _upload_as_dict(report: "UploadReport | None") -> dict[str, Any] | None:
+    if report is None:
+        return None
+    from faao_mav.cli import upload
+
+    return upload.as_dict(report)
 
 
 def _count(number: int, noun: str) -> str:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.options import AsJson, Component, Log, SigningKey, System, Wait, reported
+from faao_mav.cli.options import AllowArmed, AsJson, Component, Log, SigningKey, System, Wait
+from faao_mav.cli.outcome import exit_status
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
@@ -27,9 +28,7 @@ def upload(
     as_json: AsJson = False,
     system: System = None,
     component: Component = None,
-    allow_armed: Annotated[
-        bool, typer.Option("--allow-armed", help="Replace the mission of an armed vehicle too.")
-    ] = False,
+    allow_armed: AllowArmed = False,
     log: Log = None,
     timeout: Wait = 10.0,
     signing_key: SigningKey = None,
@@ -39,7 +38,7 @@ def upload(
     Exit status: 0 it is on the vehicle, whole and equal; 1 it is not, or that is not known; 2
     unusable arguments or input.
     """
-    with reported():
+    with exit_status():
         from faao_mav.cli.transfer_progress import transfer_progress
         from faao_mav.mavlink.client import upload as run
         from faao_mav.mission.formats import read_mission

@@ -1,18 +1,19 @@
 """`faao-mission validate MISSION`: whether it will be accepted, can be flown, delivers the link."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from faao_mav.cli.outcome import exit_status
-from faao_mav.errors import FaaoError, InputError
+from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mission.flight.track import Track
+    from faao_mav.cli.findings import Verdict
+    from faao_mav.faao.solution import Solution
     from faao_mav.mission.formats import MissionFile
-    from faao_mav.mission.item import Mission
     from faao_mav.mission.vehicle import Vehicle
     from faao_mav.plan import Plan
 
@@ -23,7 +24,19 @@ def validate(
     ] = None,
     plan_file: Annotated[
         Path | None,
-        typer.Option("--plan", metavar="PLAN.yaml", help="The plan: its vehicle and its limits."),
+        typer.Option(
+            "--plan",
+            metavar="PLAN.yaml",
+            help="The plan: its vehicle, its limits, and the link that it is to deliver.",
+        ),
+    ] = None,
+    solution_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--solution",
+            metavar="RESULT.npz",
+            help="Instead of --plan: what --save wrote, with the plan in it, already solved.",
+        ),
     ] = None,
     autopilot: Annotated[str | None, typer.Option(metavar="A", help="ardupilot or px4.")] = None,
     kind: Annotated[
@@ -31,7 +44,11 @@ def validate(
     ] = None,
     parameters: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.param", help="The vehicle's parameters; without: defaults."),
+        typer.Option(
+            metavar="FILE.param",
+            help="The vehicle's parameters; without: those of the file of parameters beside "
+            "MISSION, if there is one.",
+        ),
     ] = None,
     max_duration: Annotated[
         float | None, typer.Option(metavar="S", help="The longest flight, seconds.")
@@ -51,21 +68,31 @@ def validate(
     """Check a mission before anyone walks to the field.
 
     Says whether the autopilot will take it, whether the aircraft can fly it as it is written,
-    and how near it comes to the fence. Item numbers are those of the file's rows, where row 0
+    how near it comes to the fence, and with a plan what of its link the flight delivers, by its
+    prediction. Item numbers are those of the file's rows, where row 0
     is home, and of QGroundControl.
 
     Exit status: 0 nothing is wrong; 1 errors, with --strict also warnings; 2 unusable arguments
     or a file that cannot be read.
     """
     with exit_status():
+        from faao_mav.mission.validate.finding import Level
+
         if rules:
             _list_rules(as_json)
             return
         if mission_file is None:
             raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
-        limits = (max_duration, max_distance, max_altitude)
-        failed = _run(mission_file, plan_file, autopilot, kind, parameters, limits, strict, as_json)
-        if failed:
+        if plan_file is not None and solution_file is not None:
+            raise InputError("--plan and --solution: give one; the solution has its plan in it")
+        verdict = _judge(
+            mission_file,
+            (plan_file, solution_file),
+            (autopilot, kind, parameters),
+            (max_duration, max_distance, max_altitude),
+        )
+        _show(verdict, as_json)
+        if verdict.check.of(Level.ERROR) or (strict and verdict.check.of(Level.WARNING)):
             raise typer.Exit(1)
 
 
@@ -81,24 +108,18 @@ def _list_rules(as_json: bool) -> None:
         show_rules(RULES, Console())
 
 
-def _run(
+def _judge(
     mission_file: Path,
-    plan_file: Path | None,
-    autopilot: str | None,
-    kind: str | None,
-    parameters: Path | None,
+    plans: tuple[Path | None, Path | None],
+    asked: tuple[str | None, str | None, Path | None],
     given: tuple[float | None, float | None, float | None],
-    strict: bool,
-    as_json: bool,
-) -> bool:
-    from rich.console import Console
-
-    from faao_mav.cli.findings import Verdict, as_dict, show
+) -> "Verdict":
+    from faao_mav.cli.findings import Verdict
+    from faao_mav.mission.check import check
     from faao_mav.mission.formats import read_mission_file
-    from faao_mav.mission.validate import Level, Limits, validate
-    from faao_mav.plan import read_plan
+    from faao_mav.mission.validate import Limits
 
-    plan = read_plan(plan_file) if plan_file is not None else None
+    plan, solution = _planned(*plans)
     max_duration, max_distance, max_altitude = given
     limits = Limits(
         max_duration,
@@ -107,28 +128,55 @@ def _run(
         max_speed=plan.vehicle.max_speed if plan else None,
     )
     file = read_mission_file(mission_file)
-    vehicle, chosen_by = _vehicle(file, plan, autopilot, kind, parameters)
-    track, unpredicted = _track(file.mission, vehicle)
-    findings = validate(file.mission, vehicle, track=track, limits=limits)
-    verdict = Verdict(
-        mission_file, len(file.mission.items), vehicle, chosen_by, track, unpredicted, findings
-    )
+    vehicle, chosen_by = _vehicle(mission_file, file, plan, *asked)
+    found = check(file.mission, vehicle, limits=limits, solution=solution)
+    return Verdict(mission_file, len(file.mission.items), vehicle, chosen_by, found)
+
+
+def _show(verdict: "Verdict", as_json: bool) -> None:
+    from rich.console import Console
+
+    from faao_mav.cli.findings import as_dict, show
+
     if as_json:
         typer.echo(json.dumps(as_dict(verdict), allow_nan=False))
     else:
         show(verdict, Console())
-    return bool(verdict.count(Level.ERROR) or (strict and verdict.count(Level.WARNING)))
+
+
+def _planned(
+    plan_file: Path | None, solution_file: Path | None
+) -> "tuple[Plan | None, Solution | None]":
+    """Return the plan and what its flight is to be; a plan alone is solved for that."""
+    if solution_file is not None:
+        from faao_mav.faao.solution import load_solution
+
+        solution = load_solution(solution_file)
+        return solution.plan, solution
+    if plan_file is None:
+        return None, None
+    from faao_mav.cli.progress import progress
+    from faao_mav.faao.optimize import optimize
+    from faao_mav.plan import read_plan
+
+    plan = read_plan(plan_file)
+    with progress(shown=sys.stderr.isatty()) as observe:
+        return plan, optimize(plan, observe=observe)
 
 
 def _vehicle(
+    mission_file: Path,
     file: "MissionFile",
     plan: "Plan | None",
     autopilot: str | None,
     kind: str | None,
     parameters: Path | None,
 ) -> tuple["Vehicle", str]:
-    """Return the vehicle, and what told which: arguments, then the plan, then the mission."""
-    from faao_mav.mission.parameter_file import read_parameters
+    """Return the vehicle, and what told which: arguments, then the plan, then the mission.
+
+    Its parameters are those asked for, else those beside the mission, over the plan's own.
+    """
+    from faao_mav.mission.parameter_file import parameter_path, read_parameters
     from faao_mav.mission.vehicle import Autopilot, Kind, Vehicle, vehicle_of
 
     base, chosen_by = Vehicle(), "by default; --autopilot and --type say otherwise"
@@ -147,23 +195,16 @@ def _vehicle(
     values, source = base.parameters, base.source
     if autopilot is not None and autopilot != base.autopilot:
         values = {}  # of another autopilot
+    whose: Autopilot = autopilot or base.autopilot  # type: ignore[assignment]  # checked above
+    beside = parameter_path(mission_file, whose)
     if parameters is not None:
         values, source = read_parameters(parameters), str(parameters)
+    elif beside.is_file():
+        values, source = {**values, **read_parameters(beside)}, f"{beside}, beside the mission"
     vehicle = Vehicle(
-        autopilot or base.autopilot,  # type: ignore[arg-type]  # checked above
+        whose,
         kind or base.kind,  # type: ignore[arg-type]
         values,
         source,
     )
     return vehicle, chosen_by
-
-
-def _track(mission: "Mission", vehicle: "Vehicle") -> tuple["Track | None", str]:
-    """Return the predicted flight, or None and why there is none."""
-    from faao_mav.mission.flight.predict import predict
-
-    try:
-        track = predict(mission, vehicle)
-    except FaaoError as error:
-        return None, str(error)
-    return (track, "") if len(track.t) else (None, "there is nothing to fly")

@@ -18,8 +18,8 @@ from faao_mav.mavlink.session import (
     explain,
     upload_parts,
 )
-from faao_mav.mavlink.storage import item_limit
 from faao_mav.mavlink.transfer import Peer, Script, Timeouts
+from faao_mav.mission.dialect import item_limit
 from faao_mav.mission.item import Mission
 from faao_mav.mission.vehicle import Vehicle
 
@@ -201,7 +201,7 @@ def _problems(
 ) -> tuple[str, ...]:
     limit = 0
     if peer.firmware != "generic":
-        limit = item_limit(Vehicle(peer.firmware, vehicle.kind))
+        limit = item_limit(Vehicle(peer.firmware, vehicle.kind)).sure
 
     def describe(item: int) -> str:
         if item < 0:

@@ -6,16 +6,17 @@ in mission files, where home is 0 and the first item 1: on PX4 they are one less
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from faao_mav.errors import InputError
 from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.protocol import FIRMWARE_NAMES, Firmware, MissionType
-from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.command import Frame
+from faao_mav.mission.dialect import as_received, as_sent
 from faao_mav.mission.fence import Circle, Fence, Place, Polygon, RallyPoint
-from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.item import Mission, MissionItem
 
-DO_JUMP: Final = 177
 FENCE_RETURN_POINT: Final = 5000
 POLYGON: Final = {True: 5001, False: 5002}
 CIRCLE: Final = {True: 5003, False: 5004}
@@ -44,9 +45,7 @@ def rows_of(mission: Mission, mission_type: MissionType, firmware: Firmware) -> 
     elif mission_type is MissionType.RALLY:
         items = rally_items(mission.rally)
     else:
-        items = wire_items(mission.items, firmware)
-        if firmware == "ardupilot":
-            items = (_home_item(mission.home), *items)
+        items = as_sent(mission, home_row=firmware == "ardupilot")
     first = 0 if mission_type is MissionType.MISSION else None
     return tuple(
         row_of(_settled(item, index, firmware), index, current=index == first)
@@ -69,11 +68,6 @@ def item_of(row: Row) -> MissionItem:
     )
 
 
-def wire_items(items: Sequence[MissionItem], firmware: Firmware) -> tuple[MissionItem, ...]:
-    """Return `items` with the targets of DO_JUMP as `firmware` counts them."""
-    return _with_jumps_moved(items, 0 if firmware == "ardupilot" else -1)
-
-
 def mission_of(
     rows: Sequence[Row],
     fence: Sequence[Row],
@@ -84,15 +78,9 @@ def mission_of(
 
     Raises `InputError` for a fence that is none.
     """
-    items = [item_of(row) for row in rows]
-    home = None
-    if firmware == "ardupilot" and items:
-        first = items.pop(0)
-        if first.x or first.y or first.z:
-            home = Home(first.x, first.y, first.z)
-    moved = _with_jumps_moved(items, 0 if firmware == "ardupilot" else 1)
+    flown = as_received([item_of(row) for row in rows], home_row=firmware == "ardupilot")
     points = tuple(RallyPoint(item.x, item.y, item.z) for item in map(item_of, rally))
-    return Mission(moved, home, _fence_of([item_of(row) for row in fence]), points)
+    return replace(flown, fence=_fence_of([item_of(row) for row in fence]), rally=points)
 
 
 def fence_items(fence: Fence) -> tuple[MissionItem, ...]:
@@ -145,26 +133,6 @@ def _fence_of(items: Sequence[MissionItem]) -> Fence:
             "its items say"
         )
     return Fence(tuple(polygons), tuple(circles), breach_return)
-
-
-def _with_jumps_moved(items: Sequence[MissionItem], shift: int) -> tuple[MissionItem, ...]:
-    return tuple(
-        MissionItem(
-            item.command,
-            item.frame,
-            (item.params[0] + shift, *item.params[1:]),
-            *(item.x, item.y, item.z),
-            item.autocontinue,
-        )
-        if item.command == DO_JUMP
-        else item
-        for item in items
-    )
-
-
-def _home_item(home: Home | None) -> MissionItem:
-    place = (home.latitude, home.longitude, home.altitude) if home else (0.0, 0.0, 0.0)
-    return _place_item(Command.NAV_WAYPOINT, Frame.GLOBAL, 0.0, *place)
 
 
 def _place_item(

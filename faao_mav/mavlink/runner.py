@@ -13,7 +13,7 @@ from faao_mav.mavlink.mock import Fly, MockAutopilot
 from faao_mav.mavlink.transport import Transport, open_transport
 from faao_mav.mission.flight import Track
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Autopilot, Vehicle
+from faao_mav.mission.vehicle import Vehicle
 
 _PATIENCE = 0.1  # s between two looks at whether to stop
 
@@ -117,12 +117,12 @@ def running(
         thread.join()
 
 
-def predicted(autopilot: Autopilot) -> Fly:
-    """Return how a copter with `autopilot` flies missions, by the flight prediction."""
+def predicted(vehicle: Vehicle) -> Fly:
+    """Return how `vehicle` flies missions, by the flight prediction with its parameters."""
 
     def fly(mission: Mission) -> Track:
         from faao_mav.mission.flight.predict import predict  # most uses of a mock never fly
 
-        return predict(mission, Vehicle(autopilot))
+        return predict(mission, vehicle)
 
     return fly

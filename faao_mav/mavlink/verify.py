@@ -8,7 +8,8 @@ from typing import Literal, TypeAlias
 from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.protocol import Firmware, MissionType
 from faao_mav.mavlink.rows import coordinate_scale, item_of
-from faao_mav.mavlink.storage import as_stored, kept_by
+from faao_mav.mavlink.storage import as_stored
+from faao_mav.mission.dialect import storage_known
 from faao_mav.mission.item import MissionItem
 from faao_mav.mission.vehicle import Kind, Vehicle
 
@@ -87,7 +88,7 @@ def _compare_rows(
     if firmware != "generic":
         vehicle = Vehicle(firmware, kind)
         stored = as_stored(sent, vehicle)
-        unknown = firmware == "ardupilot" and kept_by(sent.command, vehicle) is None
+        unknown = part is MissionType.MISSION and not storage_known(sent.command, vehicle)
     differences = []
     for (field, was), is_, kept in zip(
         _fields(sent).items(), _fields(found).values(), _fields(stored).values(), strict=True

@@ -6,6 +6,7 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.recommend import FASTEST
 from faao_mav.mission.route import Route
 
 if TYPE_CHECKING:
@@ -45,8 +46,8 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
         here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
         items.append(_at(Command.NAV_TAKEOFF, here, altitude))
-    items.append(_change_speed(plan.vehicle.max_speed))
-    commanded = plan.vehicle.max_speed
+    commanded = min(plan.vehicle.max_speed, FASTEST)
+    items.append(_change_speed(commanded))
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
         if speed != commanded:
@@ -57,7 +58,9 @@ def assemble(route: Route, plan: "Plan") -> Mission:
             hold = max(hold, SETTLING_HOLD)
         if plan.vehicle.autopilot == "px4":  # keeps fractions
             hold, delay = hold + delay, 0.0
-        items.append(_waypoint(place, altitude, hold, float(route.radii[k])))
+        items.append(
+            _waypoint(place, altitude, hold, float(route.radii[k]), spline=bool(route.splines[k]))
+        )
         if delay > 0:
             items.append(MissionItem(Command.NAV_DELAY, Frame.MISSION, (delay, -1.0, -1.0, -1.0)))
     items.append(_finish(plan, places[-1]))
@@ -83,11 +86,12 @@ def _finish(plan: "Plan", place: tuple[float, float]) -> MissionItem:
 
 
 def _waypoint(
-    place: tuple[float, float], altitude: float, hold: float, radius: float
+    place: tuple[float, float], altitude: float, hold: float, radius: float, *, spline: bool
 ) -> MissionItem:
+    command = Command.NAV_SPLINE_WAYPOINT if spline else Command.NAV_WAYPOINT
     frame = Frame.GLOBAL_RELATIVE_ALT
     params = (hold, radius, 0.0, 0.0)
-    return MissionItem(Command.NAV_WAYPOINT, frame, params, *place, float(altitude))
+    return MissionItem(command, frame, params, *place, float(altitude))
 
 
 def _at(command: Command, place: tuple[float, float], altitude: float) -> MissionItem:

@@ -34,6 +34,8 @@ class ArduCopterLegs:
 
     whole_seconds: ClassVar[bool] = True
     """Whether holds lose their fractions."""
+    least: ClassVar[float] = 0.0
+    """Shorter legs, m, are not flown: both their ends count as reached at once."""
 
     acceleration: float = 2.5
     jerk: float = 1.0
@@ -65,6 +67,7 @@ class Px4Legs:
     """How PX4 flies a leg between plain waypoints: a in m/s², j in m/s³."""
 
     whole_seconds: ClassVar[bool] = False
+    least: ClassVar[float] = 3.0  # NAV_ACC_RAD is 2 m
 
     acceleration: float = 3.0
     jerk: float = 4.0

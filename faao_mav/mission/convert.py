@@ -9,7 +9,7 @@ from faao_mav.mission.autopilot import legs_of
 from faao_mav.mission.flight import copter_model
 from faao_mav.mission.item import Mission
 from faao_mav.mission.outline import plan_route
-from faao_mav.mission.recommend import candidates
+from faao_mav.mission.recommend import FASTEST, candidates
 from faao_mav.mission.run_in import with_run_in
 from faao_mav.mission.schedule import Schedule, Scheduler
 from faao_mav.mission.vehicle import Vehicle, vehicle_of
@@ -17,7 +17,13 @@ from faao_mav.mission.vehicle import Vehicle, vehicle_of
 if TYPE_CHECKING:
     from faao_mav.faao.solution import Solution
 
-_GOOD = 1.2
+_SPLINE_SPACING, _SPLINE_TIME = 15.0, 3.0
+"""Metres, and seconds of flight, between spline waypoints at least."""
+
+_ASTRAY = 5.0
+"""Metres of rms error that one metre beyond the path tolerance weighs."""
+
+_GOOD = 1.5
 """Metres of rms error at equal times that no better parameters are sought for."""
 
 
@@ -42,25 +48,39 @@ def convert(solution: "Solution") -> Conversion:
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     plan, t, w = solution.plan, solution.t, solution.w
-    top = plan.vehicle.max_speed
-    given, outline = vehicle_of(plan), plan_route(t, w, plan)
+    top = min(plan.vehicle.max_speed, FASTEST)
+    given, outlines = vehicle_of(plan), [plan_route(t, w, plan)]
+    if plan.mission.parameters == "keep" and given.autopilot == "ardupilot":
+        spacing = max(_SPLINE_SPACING, _SPLINE_TIME * top)
+        outlines.append(plan_route(t, w, plan, spline_spacing=spacing))
     tried = []
     for parameters in candidates(plan):
         vehicle = replace(given, parameters={**given.parameters, **parameters})
         legs = legs_of(vehicle)
         scheduler = Scheduler(t, w, copter_model(vehicle), legs, top)
-        first = scheduler.first(with_run_in(outline, t, w, legs, top))
-        tried.append((first, scheduler, vehicle, parameters))
+        for route in outlines:
+            first = scheduler.first(with_run_in(route, t, w, legs, top))
+            tried.append((first, scheduler, vehicle, parameters))
     tried.sort(key=lambda trial: trial[0].rms)
     best: Conversion | None = None
+    cost: float | None = None
+    limit = plan.mission.path_tolerance
     for first, scheduler, vehicle, parameters in tried:
         schedule = scheduler.refined(first)
-        if best is None or schedule.rms < best.schedule.rms:
+        schedule_cost = _cost(schedule, limit)
+        if cost is None or schedule_cost < cost:
+            cost = schedule_cost
             best = Conversion(assemble(schedule.route, plan), schedule, vehicle, parameters)
-        if best.schedule.rms <= _GOOD:
+        if cost <= _GOOD:
             break
     assert best is not None
     return best
+
+
+def _cost(schedule: Schedule, limit: float) -> float:
+    """Return the rms error, m, with what the path error exceeds `limit` by, heavily."""
+    found = schedule.deviation
+    return found.rms + _ASTRAY * max(0.0, found.path - limit)
 
 
 def to_mission(solution: "Solution") -> Mission:

@@ -1,6 +1,7 @@
 """The first legs for a trajectory: hovers become holds, the rest few legs at mean speeds."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,9 @@ _SAME_POINT = 1e-3
 """Ends closer than this are one waypoint, m."""
 
 
-def plan_route(t: ArrayLike, w: ArrayLike, plan: "Plan") -> Route:
+def plan_route(
+    t: ArrayLike, w: ArrayLike, plan: "Plan", *, spline_spacing: float | None = None
+) -> Route:
     """Return waypoints, holds and speeds that follow the trajectory.
 
     The polyline through the waypoints passes every sample of `w` within
@@ -40,7 +43,8 @@ def plan_route(t: ArrayLike, w: ArrayLike, plan: "Plan") -> Route:
     `plan.vehicle.max_speed`. Ramps are not allowed for yet: `schedule` does that.
 
     `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
-    positions at those times, metres. Raises `InputError` if they are not.
+    positions at those times, metres. With `spline_spacing` (m) all points after the first are
+    spline waypoints, that far apart. Raises `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
     tolerance = plan.mission.path_tolerance
@@ -50,10 +54,24 @@ def plan_route(t: ArrayLike, w: ArrayLike, plan: "Plan") -> Route:
         stretch = slice(start.last, stop.first + 1)
         path = positions[stretch].copy()
         path[0], path[-1] = start.position, stop.position
-        inner = simplify(path, _LEG_SHARE * tolerance)
+        if spline_spacing is None:
+            inner = simplify(path, _LEG_SHARE * tolerance)
+        else:
+            inner = _spaced(path, spline_spacing)
         waypoints += [Stop(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
-    return _timed(times, waypoints, plan.vehicle.max_speed)
+    route = _timed(times, waypoints, plan.vehicle.max_speed)
+    if spline_spacing is None:
+        return route
+    return replace(route, splines=np.arange(len(waypoints)) > 0)
+
+
+def _spaced(path: Real, spacing: float) -> list[int]:
+    """Return the indices between first and last that are about `spacing` (m) apart."""
+    way = np.concatenate([[0.0], np.cumsum(lengths(np.diff(path, axis=0)))])
+    parts = max(1, round(float(way[-1]) / spacing))
+    found = np.searchsorted(way, np.linspace(0.0, way[-1], parts + 1)[1:-1])
+    return [int(k) for k in np.unique(found) if 0 < k < len(path) - 1]
 
 
 def _checked(t: ArrayLike, w: ArrayLike) -> tuple[Real, Real]:
@@ -129,8 +147,9 @@ def _timed(t: Real, waypoints: list[Stop], max_speed: float) -> Route:
         if k < len(length):
             clock += length[k] / speeds[k]
     still = np.zeros(len(waypoints))
+    plain = np.zeros(len(waypoints), dtype=bool)
     last = len(waypoints) - 1
-    return Route(positions, arrivals, departures, speeds, holds, still, still, 0, last)
+    return Route(positions, arrivals, departures, speeds, holds, still, still, plain, 0, last)
 
 
 def _speed(speed: float, max_speed: float) -> float:

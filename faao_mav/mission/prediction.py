@@ -8,6 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.faao.solution import Rates, Solution
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.delivery import delivered, nearest_slots
+from faao_mav.mission.deviation import deviation
 from faao_mav.mission.vector import lengths
 
 
@@ -40,16 +41,24 @@ class Prediction:
 def predict_delivery(solution: Solution, conversion: Conversion) -> Prediction:
     """Price the channel of `solution` along the flight that its mission is predicted to make."""
     schedule = conversion.schedule
-    w = schedule.positions(solution.t)
-    I_U, I_G = delivered(solution, w)
-    near_U, near_G = delivered(solution, w, nearest_slots(solution, w))
-    apart = schedule.deviation
-    near = solution.plan.mission.path_tolerance
-    t, end = schedule.flown.t - schedule.clock.start(schedule.flown), solution.w[-1]
-    late = _settled(t, schedule.flown.position[:, :2], end, near)
-    late -= _settled(solution.t, solution.w, end, near)
+    t = schedule.flown.t - schedule.clock.start(schedule.flown)
+    return price_flight(solution, t, schedule.flown.position[:, :2])
+
+
+def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
+    """Price the channel of `solution` along a flight that is at `w` (k, 2) m at times `t` (k,) s.
+
+    The times are the plan's: 0 when its first slot begins. They increase.
+    """
+    at = np.stack([np.interp(solution.t, t, x) for x in w.T], axis=-1)
+    within = (t >= solution.t[0]) & (t <= solution.t[-1])
+    apart = deviation(solution.w, at, w[within] if within.any() else at)
+    I_U, I_G = delivered(solution, at)
+    near_U, near_G = delivered(solution, at, nearest_slots(solution, at))
+    near, end = solution.plan.mission.path_tolerance, solution.w[-1]
+    late = _settled(t, w, end, near) - _settled(solution.t, solution.w, end, near)
     return Prediction(
-        w=w,
+        w=at,
         I_U=I_U,
         I_G=I_G,
         by_position=Rates(float(np.mean(near_U)), float(np.mean(near_G))),

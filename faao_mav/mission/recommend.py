@@ -23,6 +23,9 @@ _CURVED = {"ardupilot": 4.0, "px4": 5.0}
 _RANGE = {"ardupilot": (0.5, 5.0), "px4": (2.0, 15.0)}
 """m/s²: what the autopilots accept."""
 
+FASTEST = 20.0
+"""The greatest speed that both autopilots can be told, m/s."""
+
 _JERK = {"ardupilot": 10.0, "px4": 20.0}
 
 
@@ -44,7 +47,7 @@ def candidates(plan: "Plan") -> tuple[Mapping[str, float], ...]:
 
 
 def _ardupilot(plan: "Plan", acceleration: float) -> dict[str, float]:
-    speed, jerk = plan.vehicle.max_speed, _JERK["ardupilot"]
+    speed, jerk = min(plan.vehicle.max_speed, FASTEST), _JERK["ardupilot"]
     return {
         "WPNAV_SPEED": round(100 * speed),
         "WPNAV_ACCEL": round(100 * acceleration),
@@ -57,7 +60,7 @@ def _ardupilot(plan: "Plan", acceleration: float) -> dict[str, float]:
 
 def _px4(plan: "Plan", acceleration: float) -> dict[str, float]:
     return {
-        "MPC_XY_CRUISE": plan.vehicle.max_speed,
+        "MPC_XY_CRUISE": min(plan.vehicle.max_speed, FASTEST),
         "MPC_ACC_HOR": acceleration,
         "MPC_JERK_AUTO": _JERK["px4"],
         "MPC_XY_ERR_MAX": 10.0,

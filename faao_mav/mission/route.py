@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.mission.vector import lengths
 
 
@@ -16,7 +16,9 @@ class Route:
     say when the plan reaches and leaves each waypoint; they differ at hovers. `speeds` (m - 1,),
     m/s, are commanded, one for each leg; `holds` (m,), whole seconds, how long the aircraft waits
     at each waypoint, and `delays` (m,), s, how much longer, less than one; `radii` (m,), m, the
-    acceptance radii, 0 for the autopilot's own.
+    acceptance radii, 0 for the autopilot's own; `splines` (m,) tells which are spline waypoints.
+
+    The aircraft sets out `lead` seconds before the plan does.
 
     The relay route goes from waypoint `first`, w_I, to waypoint `last`, w_F: one before it is
     flown to be at speed there, one after it to be still at speed there.
@@ -29,8 +31,10 @@ class Route:
     holds: Real
     delays: Real
     radii: Real
+    splines: Flags
     first: int
     last: int
+    lead: float = 0.0
 
     @property
     def leg_lengths(self) -> Real:

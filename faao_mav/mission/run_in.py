@@ -23,8 +23,7 @@ def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) ->
     """
     if len(route.positions) < 2:
         return route
-    into = (w[1] - w[0]) / (t[1] - t[0])
-    out = (w[-1] - w[-2]) / (t[-1] - t[-2])
+    into, out = _end_velocities(t, w)
     if _speed(into) > MOVING and route.departures[0] == route.arrivals[0]:
         lead, lasting = _lead(into, legs, max_speed)
         route = replace(
@@ -40,6 +39,19 @@ def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) ->
             route, end, route.positions[-1] + lead, route.departures[-1] + lasting, _speed(out)
         )
     return route
+
+
+def _end_velocities(t: Real, w: Real) -> tuple[Real, Real]:
+    """Return the velocities (2,), m/s, at which the plan begins and ends.
+
+    Of second order: the mean over the first slot is not 0 for a plan that speeds up from rest.
+    """
+    if len(t) < 3:
+        between = (w[-1] - w[0]) / (t[-1] - t[0])
+        return between, between
+    first = np.gradient(w[:3], t[:3], axis=0, edge_order=2)[0]
+    last = np.gradient(w[-3:], t[-3:], axis=0, edge_order=2)[-1]
+    return first, last
 
 
 def _speed(velocity: Real) -> float:
@@ -64,4 +76,5 @@ def _with(route: Route, at: int, position: Real, time: float, speed: float) -> R
         holds=np.insert(route.holds, at, 0.0),
         delays=np.insert(route.delays, at, 0.0),
         radii=np.insert(route.radii, at, 0.0),
+        splines=np.insert(route.splines, at, False),
     )

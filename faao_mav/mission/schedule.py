@@ -32,7 +32,7 @@ _SETTLING = 3.0
 """A hold at w_F at least while speeds are fitted, s: the aircraft comes to rest there."""
 
 _ROUNDS = 5
-_WORTHWHILE = 0.95
+_WORTHWHILE = 0.98
 """A round of splits has to bring the rms error below this share of what it was."""
 
 _ALIKE = (0.1, 0.03)
@@ -106,15 +106,16 @@ class Scheduler:
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""
         best, top = first, self.max_speed
+        splines = bool(first.route.splines.any())
         if best.rms > ALLOWED:  # corners cost time that only speed makes up for
             top *= _FASTER
             best = self._fitted(best.route, top)
-        for _ in range(_ROUNDS):
+        for _ in range(0 if splines else _ROUNDS):
             finer = self._finer(best, top)
             if finer is None:
                 break
             best = finer
-        return self._rounded(self._shared(best, top), top)
+        return self._rounded(best if splines else self._shared(best, top), top)
 
     def _flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`."""
@@ -128,28 +129,36 @@ class Scheduler:
             speeds=route.speeds,
             holds=route.holds,
             delays=route.delays,
-            splines=np.zeros(len(route.positions), dtype=bool),
+            splines=route.splines,
             radii=route.radii,
         )
         leaving = route.first == 0
         at = route.departures if leaving else route.arrivals
-        clock = Clock(self.t - self.t[0], self.w, route.first, at[route.first] - self.t[0], leaving)
+        clock = Clock(
+            t=self.t - self.t[0],
+            w=self.w,
+            point=route.first,
+            at=at[route.first] - self.t[0],
+            leaving=leaving,
+            lead=route.lead,
+        )
         return Schedule(route, path, self.model.fly(path), clock)
 
     def _fitted(self, route: Route, top: float, groups: Integers | None = None) -> Schedule:
         first = self._flight(route)
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
-        speeds, waits = fit(
+        free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
+        speeds, waits, lead = fit(
             self.model,
             first.path,
             first.clock,
-            groups=np.arange(len(route.speeds)) if groups is None else groups,
+            groups=_own_speeds(route) if groups is None else groups,
             free=free,
             min_speed=SLOWEST,
             max_speed=top,
         )
-        return self._flight(self._waiting(replace(route, speeds=speeds), waits))
+        return self._flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
 
     def _waiting(self, route: Route, waits: Real) -> Route:
         """Return `route` with `waits` (m,), s, as holds, and as delays what holds cannot say."""
@@ -199,7 +208,8 @@ class Scheduler:
         )
         for end, lasting in ends:
             length = lengths(self.w[inside] - end)
-            result &= length >= self.legs.shortest_leg(length / lasting)
+            shortest = self.legs.shortest_leg(length / lasting)
+            result &= length >= np.maximum(shortest, self.legs.least)
         return result
 
     def _shared(self, found: Schedule, top: float) -> Schedule:
@@ -219,7 +229,8 @@ class Scheduler:
         top = np.floor(top * 10**_SPEED_DIGITS) / 10**_SPEED_DIGITS or top
         waits = np.round(route.holds + route.delays, _HOLD_DIGITS)
         speeds = np.minimum(np.round(route.speeds, _SPEED_DIGITS), top)
-        sent = self._flight(self._waiting(replace(route, speeds=speeds), waits))
+        lead = round(route.lead, _HOLD_DIGITS)
+        sent = self._flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
         if route.last < len(waits) - 1:
             return sent
         # the relay is needed to the end of the plan's last slot
@@ -227,6 +238,13 @@ class Scheduler:
         early = lasting + sent.clock.start(sent.flown) - sent.flown.arrivals[-1]
         waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
         return self._flight(self._waiting(sent.route, waits))
+
+
+def _own_speeds(route: Route) -> Integers:
+    """Number the legs that have a speed of their own: each, or each run of splines."""
+    changes = ~route.splines[1:-1] | (route.holds + route.delays > 0)[1:-1]
+    groups: Integers = np.concatenate([[0], np.cumsum(changes)]).astype(int)
+    return groups[: len(route.speeds)]
 
 
 def _groups(speeds: Real, alike: float) -> Integers:
@@ -253,5 +271,6 @@ def _split(route: Route, times: list[float], t: Real, w: Real) -> Route:
         holds=np.insert(route.holds, at, still),
         delays=np.insert(route.delays, at, still),
         radii=np.insert(route.radii, at, still),
+        splines=np.insert(route.splines, at, False),
         last=route.last + len(times),
     )

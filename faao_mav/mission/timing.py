@@ -7,7 +7,7 @@ cost little more than one. So all differences are flown at once, and then all da
 early in the flight shows in everything that follows: later legs and holds make up for earlier ones.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from faao_mav.mission.flight import CopterModel, FlightPath, Flown
 
 SPEED_STEP, HOLD_STEP = 0.02, 0.05
 """Finite differences, m/s and s: above the predictions' noise, below what the physics bends."""
+
+MOST_LEAD = 2.0
+"""Seconds that the aircraft may set out before the plan, at most."""
 
 SHORTEST_HOLD = 1.0
 """A hold at least, s: an autopilot that is not told to wait flies through."""
@@ -31,6 +34,9 @@ _ENOUGH = 0.05
 _LAST, _LAST_WEIGHT = 4.0, 3.5
 """The last seconds of the flight weigh more: they decide when it is over."""
 
+_NO_CRAWL = 0.5
+"""Legs are not slowed below this, m/s, unless the plan creeps."""
+
 _LEASH = 0.05
 """Metres that a speed's departure from the plan's mean by 1 m/s weighs: keeps idle speeds put."""
 
@@ -39,8 +45,9 @@ _LEASH = 0.05
 class Clock:
     """The plan's times and positions, and when the flight's clock meets the plan's.
 
-    The plan's `t` (n,) s and `w` (n, 2) m. The plan reads `at` when the aircraft leaves point
-    `point` of its path (`leaving`), or passes it.
+    The plan's `t` (n,) s and `w` (n, 2) m. The plan reads `at` when the aircraft passes point
+    `point` of its path, or, `lead` seconds after that, when it leaves it (`leaving`): an aircraft
+    that starts from a hover takes longer to move than a plan does.
     """
 
     t: Real
@@ -48,11 +55,12 @@ class Clock:
     point: int
     at: float
     leaving: bool
+    lead: float = 0.0
 
     def start(self, flown: Flown) -> float:
         """Return the time of `flown` at which the plan's clock reads 0."""
         met = flown.departures if self.leaving else flown.arrivals
-        return float(met[self.point]) - self.at
+        return float(met[self.point]) + self.lead - self.at
 
     def positions(self, flown: Flown, t: Real) -> Real:
         """Return where the aircraft is at the plan's times `t` (k,), (k, 2)."""
@@ -69,28 +77,31 @@ def fit(
     free: NDArray[np.bool_],
     min_speed: float,
     max_speed: float,
-) -> tuple[Real, Real]:
-    """Return the speeds (m - 1,) and the waits at the points (m,) that fit best.
+) -> tuple[Real, Real, float]:
+    """Return the speeds (m - 1,), the waits at the points (m,) and the lead, s, that fit best.
 
     Legs with the same number in `groups` (m - 1,), counted from 0, share a speed. Speeds stay
     within `min_speed` and `max_speed` (m/s), the waits at the points `free` (m,) at or above
-    `SHORTEST_HOLD`; the others stay as they are.
+    `SHORTEST_HOLD`; the others stay as they are. The lead is within `MOST_LEAD`, 0 for a flight
+    that begins at speed.
     """
     waits = path.holds + path.delays
     if len(path.speeds) == 0:
-        return path.speeds, waits
+        return path.speeds, waits, 0.0
     chosen = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
     t, w = clock.t[chosen], clock.w[chosen]
     count = int(groups.max()) + 1
-    low = np.concatenate([np.full(count, min_speed), np.full(free.sum(), SHORTEST_HOLD)])
-    high = np.concatenate([np.full(count, max_speed), np.full(free.sum(), np.inf)])
-    steps = np.concatenate([np.full(count, SPEED_STEP), np.full(free.sum(), HOLD_STEP)])
     means = np.bincount(groups, path.speeds) / np.bincount(groups)
-    begin = np.clip(np.concatenate([means, waits[free]]), low, high)
+    held_count, most = int(free.sum()), MOST_LEAD if clock.leaving else 0.0
+    least = np.maximum(min_speed, np.minimum(_NO_CRAWL, means))
+    low = np.concatenate([least, np.full(held_count, SHORTEST_HOLD), [0.0]])
+    high = np.concatenate([np.full(count, max_speed), np.full(held_count, np.inf), [most]])
+    steps = np.repeat([SPEED_STEP, HOLD_STEP], [count, held_count + 1])
+    begin = np.clip(np.concatenate([means, waits[free], [clock.lead]]), low, high)
 
     def flown(x: Real) -> tuple[Real, Real]:
         held = np.tile(waits, (len(x), 1))
-        held[:, free] = x[:, count:]
+        held[:, free] = x[:, count:-1]
         return x[:, :count][:, groups], held
 
     weights = np.where(t > t[-1] - _LAST, _LAST_WEIGHT, 1.0)[:, None] / np.sqrt(len(t))
@@ -98,7 +109,10 @@ def fit(
     def errors(x: Real) -> Real:
         """Return the residuals (B, r) of the variants x (B, k)."""
         many = model.fly_many(path, *flown(x), _STEP)
-        apart = [((clock.positions(one, t) - w) * weights).ravel() for one in many]
+        apart = [
+            ((replace(clock, lead=lead).positions(one, t) - w) * weights).ravel()
+            for one, lead in zip(many, x[:, -1], strict=True)
+        ]
         leash = _LEASH * (x[:, :count] - begin[:count])
         return np.hstack([np.stack(apart), leash / np.sqrt(count)])
 
@@ -116,7 +130,7 @@ def fit(
         if squares[best] > (1 - _ENOUGH) * before:
             break
     speeds, held = flown(x[None])
-    return speeds[0], held[0]
+    return speeds[0], held[0], float(x[-1])
 
 
 def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real) -> Real:

@@ -59,18 +59,18 @@ def _nearest(key: str, model: type[BaseModel] | None, schema: type[BaseModel]) -
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]}?"
-    elsewhere = [path for path in _paths(schema) if path.rsplit(".", 1)[-1] == key]
+    elsewhere = [path for path in paths(schema) if path.rsplit(".", 1)[-1] == key]
     if elsewhere:
         return f"it belongs at {' or '.join(elsewhere)}"
     return f"known here: {', '.join(known)}"
 
 
-def _paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+def paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     """Every key path below `model`."""
     for name, field in model.model_fields.items():
         yield prefix + name
         for child in _models(field.annotation):
-            yield from _paths(child, f"{prefix}{name}.")
+            yield from paths(child, f"{prefix}{name}.")
 
 
 def _walk(

@@ -23,6 +23,10 @@ Inputs: TypeAlias = Literal["alphabet", "gaussian"]
 Start: TypeAlias = Literal["straight", "bs", "user", "bs-user", "user-bs"]
 OnFinish: TypeAlias = Literal["rtl", "land", "hover"]
 MissionParameters: TypeAlias = Literal["recommend", "keep"]
+StudyScheme: TypeAlias = Literal[
+    "faao", "algorithm1", "mmse", "mrt", "zf", "waterfilling", "gaussian"
+]
+StudyFigure: TypeAlias = Literal["rate", "trajectories"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +145,19 @@ class MissionOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class Study:
+    """What `faao-mission study` makes of a plan: values by dotted key, schemes, seeds, a figure.
+
+    The main job takes no notice of it.
+    """
+
+    vary: Mapping[str, tuple[object, ...]]
+    schemes: tuple[StudyScheme, ...]
+    seeds: int
+    figure: StudyFigure
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """A validated plan; `text` is the YAML that it was read from, `source` the name of its file."""
 
@@ -150,6 +167,7 @@ class Plan:
     radio: Radio
     optimizer: Optimizer
     mission: MissionOptions
+    study: Study | None = None
     name: str = ""
     text: str = ""
     source: str = "plan"

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import model, schema
+from faao_mav.plan.keys import unknown_key
 from faao_mav.plan.messages import describe, quote
 from faao_mav.plan.reach import reach, shortest_duration
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, load_yaml
@@ -99,6 +100,7 @@ class _Reader:
                 **dict(tree.optimizer) | {"starts": tuple(tree.optimizer.starts)}
             ),
             mission=model.MissionOptions(**dict(tree.mission)),
+            study=self.study(),
             name=tree.name,
             text=self.text,
             source=self.source,
@@ -187,6 +189,20 @@ class _Reader:
             csi=section.csi,
             seed=section.seed,
             causal=section.causal,
+        )
+
+    def study(self) -> model.Study | None:
+        section = self.tree.study
+        if section is None:
+            return None
+        for key in section.vary:
+            if problem := unknown_key(key):
+                raise self.fail(f"study.vary.{key}", problem)
+        return model.Study(
+            vary={key: tuple(values) for key, values in section.vary.items()},
+            schemes=tuple(section.schemes),
+            seeds=section.seeds,
+            figure=section.figure,
         )
 
     def check_speeds(self, flight: model.Flight, vehicle: model.Vehicle) -> None:

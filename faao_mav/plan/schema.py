@@ -21,6 +21,8 @@ from faao_mav.plan.model import (
     OnFinish,
     PrecoderScheme,
     Start,
+    StudyFigure,
+    StudyScheme,
     Vector,
     VehicleType,
 )
@@ -278,6 +280,21 @@ class MissionSection(Section):
     parameters: MissionParameters = Field("recommend", description="recommend or keep")
 
 
+class StudySection(Section):
+    """`study`."""
+
+    vary: dict[str, Annotated[list[Any], Field(min_length=1, description="a list of values")]] = (
+        Field(default_factory=dict, description="lists of values by dotted key")
+    )
+    schemes: list[StudyScheme] = Field(
+        ["faao"],
+        min_length=1,
+        description="a list of faao, algorithm1, mmse, mrt, zf, waterfilling and gaussian",
+    )
+    seeds: int = Field(1, ge=1, le=10_000, description="a whole number, 1 to 10000")
+    figure: StudyFigure = Field("rate", description="rate or trajectories")
+
+
 class PlanSection(Section):
     """The whole file."""
 
@@ -289,6 +306,7 @@ class PlanSection(Section):
     optimizer: OptimizerSection = OptimizerSection()
     fence: FenceSection | None = None
     mission: MissionSection = MissionSection()
+    study: StudySection | None = None
 
 
 NOT_YET: tuple[tuple[str, object, str], ...] = (

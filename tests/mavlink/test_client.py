@@ -116,7 +116,7 @@ def test_no_space_says_the_limit_and_the_count(port):
     with running(mock_of("ardupilot"), f"udpin:127.0.0.1:{port}"):
         report = upload(a_mission(700), f"udpout:127.0.0.1:{port}", system=1)
     (problem,) = report.problems
-    assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 655" in problem
+    assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 650" in problem
     assert "The vehicle says: Only 655 items are supported" in problem
 
 

@@ -41,8 +41,7 @@ def test_a_px4_leg_is_one_in_which_it_can_stop():
     ],
 )
 def test_parameters_of_either_generation(autopilot, parameters, legs):
-    plan = plan_with(autopilot=autopilot, parameters=parameters)
-    assert legs_of(vehicle_of(plan)) == legs
+    assert legs_of(vehicle_of(plan_with(autopilot=autopilot, parameters=parameters))) == legs
 
 
 def test_an_unusable_parameter_is_named():

@@ -169,6 +169,7 @@ def test_px4_drops_param3_of_a_waypoint_and_keeps_fractions_and_nan():
     assert math.isnan(param4)
     assert as_stored(item, PX4).z == pytest.approx(100.129, abs=1e-5)
     assert as_stored(waypoint(0.0, 0.0, 0.0, -90.0), PX4).params[3] == 270
+    assert as_stored(waypoint(0.0, 0.0, 0.0, -1e-9), PX4).params[3] == 0
 
 
 def test_px4_takes_an_altitude_that_is_not_set():

@@ -186,13 +186,14 @@ def test_a_terminal_gets_tables(broken: Path) -> None:
     from rich.console import Console
 
     from faao_mav.cli.findings import Verdict, show, show_rules
+    from faao_mav.mission.check import Check
     from faao_mav.mission.formats import read_mission
     from faao_mav.mission.validate import validate as findings_of
 
     content = read_mission(broken)
     found = findings_of(content, Vehicle())
     console = Console(force_terminal=True, width=100, record=True, file=sys.stderr)
-    show(Verdict(broken, 3, Vehicle(), "asked", LEVEL, "", found), console)
+    show(Verdict(broken, 3, Vehicle(), "asked", Check(LEVEL, "", None, found)), console)
     show_rules(RULES, console)
     shown = console.export_text()
     assert "refused-on-upload" in shown

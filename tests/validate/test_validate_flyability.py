@@ -31,9 +31,9 @@ CASES = [
     ),
     (
         "speed-not-reached",
-        Given(flown(speed(8), *row(2, 16.3)), PX4),
+        Given(flown(speed(8), *row(8, 16.3)), PX4),
         3,
-        Given(flown(speed(8), *row(2, 16.5)), PX4),
+        Given(flown(speed(8), *row(8, 16.5)), PX4),
     ),
     (
         "speed-not-reached",
@@ -51,6 +51,12 @@ CASES = [
     ("crawl", Given(flown(speed(8), *row(9, 5)), PX4), 3, Given(flown(speed(8), *row(9, 20)), PX4)),
     (
         "speed-above-limit",
+        Given(flown(speed(8.9), at(0, 99, 30)), limits=Limits(max_speed=8)),
+        3,
+        Given(flown(speed(8.7), at(0, 99, 30)), limits=Limits(max_speed=8)),
+    ),
+    (
+        "speed-headroom",
         Given(flown(speed(8.1), at(0, 99, 30)), limits=Limits(max_speed=8)),
         3,
         Given(flown(speed(8), at(0, 99, 30)), limits=Limits(max_speed=8)),

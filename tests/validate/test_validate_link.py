@@ -33,6 +33,24 @@ CASES = [
         None,
         Given(flown(), link=replace(LINK, path_error=2.0)),
     ),
+    (
+        "link-late",
+        Given(flown(), link=replace(LINK, predicted_duration=126.1)),
+        None,
+        Given(flown(), link=replace(LINK, predicted_duration=125.9)),
+    ),
+    (
+        "link-late",
+        Given(flown(), link=replace(LINK, planned_duration=20, predicted_duration=23.1)),
+        None,
+        Given(flown(), link=replace(LINK, planned_duration=20, predicted_duration=22.9)),
+    ),
+    (
+        "link-altitude",
+        Given(flown(), link=replace(LINK, altitude_error=2.1)),
+        None,
+        Given(flown(), link=replace(LINK, altitude_error=1.9)),
+    ),
     ("link-timing", Given(flown(), link=LINK), None, Given(flown())),
 ]
 

@@ -1,6 +1,6 @@
 """The mock autopilot: a vehicle without sockets or clock."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from typing import TypeAlias
 
@@ -70,6 +70,7 @@ class MockAutopilot:
     It boots for `boot` seconds, in which it refuses lists. Armed and set to the mission it flies
     what it holds, `speedup` times as fast as predicted, reports its position `rate` times a
     second, and disarms where the flight ends on the ground. Heartbeats are `beat` seconds apart.
+    `parameters` are told beside its defaults; what they do to the flight is up to `fly`.
     """
 
     outcome: None = None
@@ -82,6 +83,7 @@ class MockAutopilot:
         address: Address = Address(1, 1),  # noqa: B008
         home: Home = Home(-35.363262, 149.165237, 584.0),  # noqa: B008
         fly: Fly | None = None,
+        parameters: Mapping[str, float] | None = None,
         speedup: float = 1.0,
         rate: float = 4.0,
         beat: float = 1.0,
@@ -92,7 +94,7 @@ class MockAutopilot:
         autopilot: Family = "ardupilot" if self.manners.kind == "ardupilot" else "px4"
         self._modes = Modes(autopilot)
         self.lists = Lists(Vehicle(autopilot), home)
-        self.parameters = Parameters(autopilot)
+        self.parameters = Parameters(autopilot, parameters)
         self._server: ArduPilotServer | Px4Server = (
             ArduPilotServer(self.lists, self.manners, self._is_ready, self._is_flying)
             if autopilot == "ardupilot"

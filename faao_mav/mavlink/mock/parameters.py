@@ -1,5 +1,7 @@
 """The parameters that ground stations ask a mock autopilot for, and its answers."""
 
+from collections.abc import Mapping
+
 from faao_mav.mavlink.messages import (
     Message,
     ParamRequestList,
@@ -37,10 +39,10 @@ _DEFAULTS: dict[Firmware, dict[str, float]] = {
 
 
 class Parameters:
-    """A few parameters by name; all are single-precision numbers."""
+    """A few parameters by name, and those that were given; all are single-precision numbers."""
 
-    def __init__(self, firmware: Firmware) -> None:
-        self.values = dict(_DEFAULTS.get(firmware, {}))
+    def __init__(self, firmware: Firmware, given: Mapping[str, float] | None = None) -> None:
+        self.values = _DEFAULTS.get(firmware, {}) | dict(given or {})
 
     def on(self, message: ParamRequestList | ParamRequestRead | ParamSet) -> list[Message]:
         """Return the answer to a request; unknown names get none."""

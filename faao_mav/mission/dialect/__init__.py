@@ -27,6 +27,7 @@ __all__ = [
     "home_item",
     "item_limit",
     "speed_change",
+    "storage_known",
 ]
 
 
@@ -49,6 +50,15 @@ def as_stored(item: "MissionItem", vehicle: "Vehicle") -> "MissionItem":
     of 1e-7. What the autopilot has no room for is gone.
     """
     return dialect_of(vehicle).stored(item)
+
+
+def storage_known(command: int, vehicle: "Vehicle") -> bool:
+    """Say whether it is known what the autopilot keeps of `command`.
+
+    Of the others `as_stored` takes everything to be kept.
+    """
+    known = dialect_of(vehicle).known
+    return known is None or command in known
 
 
 def item_limit(vehicle: "Vehicle") -> Limit:

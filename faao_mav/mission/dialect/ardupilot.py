@@ -167,7 +167,7 @@ def _stored(item: MissionItem, known: dict[int, Codecs]) -> MissionItem:
         centimetres = int(np.float32(item.z) * np.float32(100))
         altitude = float(np.float32(centimetres) * np.float32(0.01))
         return replace(result, frame=frame, x=degrees(item.x), y=degrees(item.y), z=altitude)
-    if codecs is not None:
+    if codecs is not None or item.frame == Frame.MISSION:
         return replace(result, frame=Frame.GLOBAL, x=0.0, y=0.0, z=0.0)
     return replace(result, frame=Frame.GLOBAL)
 
@@ -199,6 +199,7 @@ ARDUCOPTER = Dialect(
     refusal=lambda item: _refusal(item, _COMMON | _COPTER, "ArduCopter"),
     stored=lambda item: _stored(item, _COMMON | _COPTER),
     speed_change=_copter_speed,
+    known=frozenset(_COMMON | _COPTER),
 )
 ARDUPLANE = Dialect(
     name="ArduPlane",
@@ -210,4 +211,5 @@ ARDUPLANE = Dialect(
     refusal=lambda item: _refusal(item, _COMMON | _PLANE, "ArduPlane"),
     stored=lambda item: _stored(item, _COMMON | _PLANE),
     speed_change=_plane_speed,
+    known=frozenset(_COMMON | _PLANE),
 )

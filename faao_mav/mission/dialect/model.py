@@ -43,7 +43,7 @@ class Dialect:
     what is sent, `jumps` the DO_JUMPs among it. `atomic`: a refused upload leaves the old mission
     as it was. `splines`: NAV_SPLINE_WAYPOINT is flown. `refusal(item)` says why an item is refused
     on upload, `stored(item)` what reading back an accepted one gives, `speed_change(item)` what a
-    DO_CHANGE_SPEED does.
+    DO_CHANGE_SPEED does. `known` are the commands of which it is known what is stored, None: all.
     """
 
     name: str
@@ -55,6 +55,7 @@ class Dialect:
     refusal: Callable[[MissionItem], str | None]
     stored: Callable[[MissionItem], MissionItem]
     speed_change: Callable[[MissionItem], SpeedChange | None]
+    known: frozenset[int] | None = None
 
 
 def dropped(_: float) -> float:

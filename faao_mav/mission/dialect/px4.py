@@ -23,8 +23,9 @@ from faao_mav.mission.item import MissionItem
 
 
 def _heading(value: float) -> float:
-    """Degrees from 0 to 360; NaN, no heading, stays."""
-    return float(np.float32(value) % np.float32(360))
+    """Degrees from 0 to below 360; NaN, no heading, stays."""
+    turned = float(np.float32(value) % np.float32(360))
+    return 0.0 if turned == 360 else turned  # just below 0 rounds up
 
 
 def _fourth(codec: Codec) -> Codecs:

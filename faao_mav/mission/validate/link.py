@@ -18,6 +18,12 @@ LEAST_SHARE = 0.95
 GOOD_SHARE = 0.995
 """Of the planned rate; below it something can be won back."""
 
+LATE, LATE_SHARE = 3.0, 0.05
+"""Seconds, and share of the planned duration: both exceeded, the plan is not kept."""
+
+ALTITUDE_ERROR = 2.0
+"""Metres; from 100 m up that is a tenth of a decibel."""
+
 _SOURCE = "the plan, and the rate along the predicted flight"
 
 
@@ -39,8 +45,9 @@ class LinkCheck:
 
     Rates in bit/s/Hz, averaged over the flight; durations in s; `rms_position_error` and
     `max_position_error` m between planned and predicted position at equal times; `path_error` m
-    between planned and predicted path, `path_tolerance` m what the plan allows of it; `worst` the
-    stretch that loses most, None if none does.
+    between planned and predicted path, `path_tolerance` m what the plan allows of it;
+    `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
+    None if none does.
     """
 
     planned_rate: float
@@ -51,6 +58,7 @@ class LinkCheck:
     max_position_error: float
     path_error: float
     path_tolerance: float
+    altitude_error: float = 0.0
     worst: Stretch | None = None
 
     @property
@@ -112,6 +120,44 @@ def _path(case: "Case") -> Iterator[Issue]:
             f"mission.path_tolerance is {link.path_tolerance:g} m",
             "use shorter legs or slower corners, or raise mission.path_tolerance if that is "
             "acceptable",
+        )
+
+
+@RULES.add(
+    "link-late",
+    Level.WARNING,
+    f"the predicted flight ends later than planned by more than {100 * LATE_SHARE:g} % and "
+    f"{LATE:g} s: what the plan has at its end is not done in its time",
+    _SOURCE,
+)
+def _late(case: "Case") -> Iterator[Issue]:
+    link = case.link
+    if link is not None:
+        late = link.predicted_duration - link.planned_duration
+        if late > max(LATE, LATE_SHARE * link.planned_duration):
+            yield Issue(
+                None,
+                f"predicted {link.predicted_duration:.1f} s of flight, {late:.1f} s more than "
+                f"planned; position at equal times {link.rms_position_error:.1f} m rms",
+                "load the parameters that the mission was made for, or make it anew for this "
+                "vehicle's",
+            )
+
+
+@RULES.add(
+    "link-altitude",
+    Level.WARNING,
+    f"the predicted flight is more than {ALTITUDE_ERROR:g} m above or below the planned altitude",
+    _SOURCE,
+)
+def _altitude(case: "Case") -> Iterator[Issue]:
+    link = case.link
+    if link is not None and link.altitude_error > ALTITUDE_ERROR:
+        yield Issue(
+            None,
+            f"the predicted flight is up to {link.altitude_error:.0f} m above or below the plan's "
+            "flight.altitude; the rate is that of the planned altitude",
+            "set the items' altitude to flight.altitude, or plan for theirs",
         )
 
 

@@ -19,15 +19,24 @@ RULES = Rules()
 REACHED_SHARE = 0.8
 """Of the commanded speed; a leg that stays below it is reported."""
 
+TIME_LOST = 2.0
+"""Seconds that a run of such legs loses at least: in less, corners are taken and speeds changed."""
+
+HEADROOM = 1.1
+"""Of the vehicle's max_speed: more is an error; up to it speed makes up for corners."""
+
 CRAWL_SHARE = 0.5
 """Of the commanded speed; a row of legs below it is a crawl."""
 
 CRAWL_LEGS = 5
 """Legs in a row that make a crawl."""
 
+_LIMIT = "the plan's vehicle.max_speed"
 _MEASURED = "flight models measured on ArduCopter 4.7 and PX4 1.16.1; the predicted flight"
 _SHORTEST = 1.0
 """Legs shorter than this, m, are corrections, not legs to speed up on."""
+
+_SLOWEST = 0.1  # m/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +53,14 @@ class _Run:
         return len(self.legs) >= CRAWL_LEGS and sum(self.reached) < CRAWL_SHARE * commanded
 
     @property
+    def time_lost(self) -> float:
+        """Seconds at least that the run takes longer than at the commanded speeds."""
+        return sum(
+            leg.length * (1 / max(reached, _SLOWEST) - 1 / leg.speed)
+            for leg, reached in zip(self.legs, self.reached, strict=True)
+        )
+
+    @property
     def last(self) -> int:
         """The number of the last item."""
         return number(self.legs[-1].index)
@@ -57,13 +74,15 @@ class _Run:
 @RULES.add(
     "speed-not-reached",
     Level.WARNING,
-    f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed",
+    f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed and lose "
+    f"{TIME_LOST:g} s or more by it; with a plan its own clock is compared instead",
     _MEASURED,
     kind="copter",
 )
 def _not_reached(case: Case) -> Iterator[Issue]:
     for run in _slow_runs(case):
-        if run.crawls:
+        # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
+        if run.crawls or run.time_lost < TIME_LOST or case.link is not None:
             continue
         first, low, high = run.legs[0], min(run.reached), max(run.reached)
         if len(run.legs) == 1:
@@ -168,21 +187,46 @@ def reachable_speed(model: Legs, lengths: Real) -> Real:
 @RULES.add(
     "speed-above-limit",
     Level.ERROR,
-    "faster than the vehicle's max_speed",
-    "the plan's vehicle.max_speed",
+    f"faster than the vehicle's max_speed by more than {100 * (HEADROOM - 1):.0f} %",
+    _LIMIT,
 )
 def _above_limit(case: Case) -> Iterator[Issue]:
     limit = case.limits.max_speed
-    if limit is None:
-        return
-    before = None
-    for leg in (leg for leg in case.legs if leg.length >= _SHORTEST):
-        if leg.speed > limit and leg.speed != before:
+    if limit is not None:
+        for index, speed in _faster_than(HEADROOM * limit, case):
             yield Issue(
-                leg.index,
-                f"{leg.speed:g} m/s from here on; the vehicle's max_speed is {limit:g} m/s",
+                index,
+                f"{speed:g} m/s from here on; the vehicle's max_speed is {limit:g} m/s",
                 f"put a DO_CHANGE_SPEED of {limit:g} m/s or less before this item",
             )
+
+
+@RULES.add(
+    "speed-headroom",
+    Level.NOTE,
+    f"faster than the vehicle's max_speed by up to {100 * (HEADROOM - 1):.0f} %",
+    _LIMIT,
+)
+def _headroom(case: Case) -> Iterator[Issue]:
+    limit = case.limits.max_speed
+    if limit is None:
+        return
+    above = [found for found in _faster_than(limit, case) if found[1] <= HEADROOM * limit]
+    if above:
+        index, speed = max(above, key=lambda found: found[1])
+        yield Issue(
+            index,
+            f"up to {speed:g} m/s is commanded; the vehicle's max_speed is {limit:g} m/s",
+            "nothing, if the vehicle may; else plan with a lower vehicle.max_speed",
+        )
+
+
+def _faster_than(speed: float, case: Case) -> Iterator[tuple[int, float]]:
+    """Yield the index of each leg on which a speed above `speed` begins, and that speed, m/s."""
+    before = None
+    for leg in (leg for leg in case.legs if leg.length >= _SHORTEST):
+        if leg.speed > speed and leg.speed != before:
+            yield leg.index, leg.speed
         before = leg.speed
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.mission.flight.arducopter.leg import Leg, changed_leg, plain_leg
 from faao_mav.mission.flight.arducopter.ramp import Ramp, top_speed
+from faao_mav.mission.flight.arducopter.section import Section, sections
 from faao_mav.mission.flight.parameters import Parameter, limits_of
 from faao_mav.mission.flight.path import FlightPath, Flown
 from faao_mav.mission.vehicle import Vehicle
@@ -25,6 +27,9 @@ HOLD_LAG, HOLD_LAG_PER_RISE = 0.05, 0.12
 
 CHANGE_LAG = 0.08
 """What a change of speed by 1 m/s or more costs beyond its ramps, s."""
+
+SPLINE_TURN, SPLINE_START = 0.11, 0.8
+"""Runs of splines: the share of speed lost per radian of turn at a point; a start's cost, s."""
 
 REVERSAL, OVERLOAD = 1.0, 1.4
 LEAN_ACCELERATION = 9.81 * math.tan(math.radians(30))
@@ -43,7 +48,7 @@ _PARAMETERS = {
 
 @dataclass(frozen=True, slots=True)
 class ArduCopter:
-    """How ArduCopter flies plain waypoints in AUTO, without wind.
+    """How ArduCopter flies plain and spline waypoints in AUTO, without wind.
 
     Every leg is planned as if it began and ended at rest, with jerk-limited ramps (`ramp`,
     `leg`). At a corner the next leg begins before this one ends, and the aircraft is where the
@@ -95,9 +100,10 @@ class ArduCopter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Flight:
-    """Legs with the times (m - 1, B) at which they begin."""
+    """Sections with their legs and the times (B,) at which these begin."""
 
     points: Real
+    parts: list[Section]
     legs: list[Leg]
     begins: list[Real]
     arrivals: Real
@@ -105,78 +111,96 @@ class _Flight:
 
     @classmethod
     def along(cls, model: ArduCopter, path: FlightPath, speeds: Real, waits: Real) -> "_Flight":
-        ways = np.diff(path.points, axis=0)
-        lengths = np.sqrt(np.sum(ways**2, axis=1))
         stops = np.any(waits > 0, axis=0)
         stops[[0, -1]] = True
-        limits = [_along(model, way, length) for way, length in zip(ways, lengths, strict=True)]
+        parts = list(sections(path.points, path.splines, stops))
         lag = HOLD_LAG + HOLD_LAG_PER_RISE * model.acceleration / model.jerk
         arrivals, departures = np.zeros_like(waits), np.zeros_like(waits)
         departures[:, 0] = waits[:, 0]
         begin = departures[:, 0] + START_LAG
         before = model.cruise_speed if math.isnan(path.before) else path.before
+        commanded = np.full(len(speeds), before)
         legs, begins, tau = [], [], 0 * begin
-        for k, length in enumerate(lengths):
-            share, acceleration = limits[k]
-            speed = np.minimum(speeds[:, k], share)
-            if (waits[:, k] > 0).any():
-                leg = plain_leg(length, speed, acceleration, model.jerk)
+        for part, after in zip_longest(parts, parts[1:]):
+            share, acceleration = _along(model, part)
+            old, new = commanded, _commanded(part, speeds)
+            commanded = new
+            if (waits[:, part.first] > 0).any() or part.spline:
+                new = np.minimum(new, share)
+                leg = plain_leg(part.length, new, acceleration, model.jerk)
             else:
-                old = np.minimum(speeds[:, k - 1] if k else before, share)
-                leg = changed_leg(length, old, speed, tau / 2, acceleration, model.jerk)
+                old, new = np.minimum(old, share), np.minimum(new, share)
+                leg = changed_leg(part.length, old, new, tau / 2, acceleration, model.jerk)
+            if part.spline and stops[part.first]:
+                begin = begin + SPLINE_START
             legs.append(leg)
             begins.append(begin)
             end = begin + leg.duration
-            if stops[k + 1]:
-                arrivals[:, k + 1] = end + STOP_LAG
-                departures[:, k + 1] = arrivals[:, k + 1] + waits[:, k + 1]
-                begin = departures[:, k + 1] + lag
+            k = part.last
+            if part.spline:
+                _pass(leg, begin, part, arrivals, departures)
+            if after is None or stops[k]:
+                arrivals[:, k] = end + STOP_LAG
+                departures[:, k] = arrivals[:, k] + waits[:, k]
+                begin = departures[:, k] + lag
             else:
                 # the next leg is planned before its own speed is commanded
-                room, up = limits[k + 1]
+                room, up = _along(model, after)
                 top = top_speed(
-                    np.full_like(speed, lengths[k + 1]),
-                    np.minimum(speeds[:, k], room),
-                    up,
-                    model.jerk,
+                    np.full_like(new, after.length), np.minimum(commanded, room), up, model.jerk
                 )
                 ramp = Ramp.between(0 * top, top, up, model.jerk)
-                half = _half_turn(ways[k], ways[k + 1])
+                half = _half_turn(part.direction(part.way[-1]), after.direction(after.way[0]))
                 cut = model.radius / (2 * max(half, 1e-9))
                 tau = np.minimum(
                     np.minimum(ramp.duration, leg.last.duration),
                     2 * ramp.time_to(np.full_like(top, cut)),
                 )
                 begin = end - tau + _loss(half, max(acceleration, up))
-                begin = begin + CHANGE_LAG * np.minimum(
-                    1.0, np.abs(speeds[:, k + 1] - speeds[:, k])
-                )
-                arrivals[:, k + 1] = departures[:, k + 1] = end - tau / 2 + PASS_LAG
-        return cls(path.points, legs, begins, arrivals, departures)
+                change = np.abs(_commanded(after, speeds) - commanded)
+                begin = begin + CHANGE_LAG * np.minimum(1.0, change)
+                arrivals[:, k] = departures[:, k] = end - tau / 2 + PASS_LAG
+        return cls(path.points, parts, legs, begins, arrivals, departures)
 
     def sampled(self, t: Real) -> tuple[Real, Real]:
         """Return positions and velocities (B, k, 3) at the times `t` (k,)."""
         count = len(self.arrivals)
         position = np.tile(self.points[0], (count, len(t), 1)).astype(float)
         velocity = np.zeros_like(position)
-        for k, (leg, begin) in enumerate(zip(self.legs, self.begins, strict=True)):
-            way = self.points[k + 1] - self.points[k]
+        for part, leg, begin in zip(self.parts, self.legs, self.begins, strict=True):
             if leg.length == 0:
                 continue
             first = int(np.searchsorted(t, begin.min()))
             last = int(np.searchsorted(t, (begin + leg.duration).max()))
             along, speed = leg.at(t[first:last] - begin[:, None])
-            position[:, first:last] += along[..., None] / leg.length * way
-            velocity[:, first:last] += speed[..., None] / leg.length * way
-            position[:, last:] += way
+            position[:, first:last] += part.at(along) - part.curve[0]
+            velocity[:, first:last] += speed[..., None] * part.direction(along)
+            position[:, last:] += part.curve[-1] - part.curve[0]
         return position, velocity
 
 
-def _along(model: ArduCopter, way: Real, length: float) -> tuple[float, float]:
-    """Return the limits of speed (m/s) and acceleration (m/s²) along a leg that may climb."""
-    if length == 0:
+def _commanded(part: Section, speeds: Real) -> Real:
+    """Return the speed (B,) flown on a section; a run of splines has the mean of its speeds."""
+    mean: Real = speeds[:, part.first : part.last].mean(axis=1)
+    return (1 - SPLINE_TURN * part.turn) * mean if part.spline else mean
+
+
+def _pass(leg: Leg, begin: Real, part: Section, arrivals: Real, departures: Real) -> None:
+    """Fill in when the points within a run of splines are passed."""
+    t = leg.duration[:, None] * np.linspace(0.0, 1.0, 20 * len(part.passed) + 1)
+    ways = leg.at(t)[0]
+    for k in range(len(begin)):
+        passed = begin[k] + np.interp(part.passed[:-1], ways[k], t[k])
+        inner = slice(part.first + 1, part.last)
+        arrivals[k, inner] = departures[k, inner] = passed + PASS_LAG
+
+
+def _along(model: ArduCopter, part: Section) -> tuple[float, float]:
+    """Return the limits of speed (m/s) and acceleration (m/s²) along a section that may climb."""
+    if part.length == 0:
         return np.inf, model.acceleration
-    level, up = float(np.hypot(way[0], way[1])) / length, float(way[2]) / length
+    up = float(part.curve[-1, 2] - part.curve[0, 2]) / part.length
+    level = math.sqrt(max(0.0, 1 - up**2))
     vertical = model.climb_speed if up > 0 else model.descent_speed
     speed = vertical / abs(up) if up else np.inf
     acceleration = min(
@@ -197,7 +221,6 @@ def _loss(half_turn: float, acceleration: float) -> float:
 
 
 def _half_turn(before: Real, after: Real) -> float:
-    """Return sin(theta / 2) of the turn between two legs."""
-    sizes = float(np.linalg.norm(before) * np.linalg.norm(after))
-    cosine = float(before @ after) / sizes if sizes else 1.0
+    """Return sin(theta / 2) of the turn between two directions; 0 if one has no length."""
+    cosine = float(before @ after) if before.any() and after.any() else 1.0
     return math.sqrt(max(0.0, (1 - cosine) / 2))

@@ -1,0 +1,21 @@
+"""What a report is made of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from faao_mav.faao.solution import Solution
+from faao_mav.mission.convert import Conversion
+from faao_mav.mission.prediction import Prediction
+from faao_mav.mission.validate.finding import Finding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReportData:
+    """The parts that there are; each adds its sections, `findings` of None was not checked."""
+
+    solution: Solution | None = None
+    conversion: Conversion | None = None
+    prediction: Prediction | None = None
+    findings: Sequence[Finding] | None = None
+    title: str = ""
+    """Without one, the name of the plan."""

@@ -1,0 +1,160 @@
+"""One flight as one HTML page that needs nothing but itself."""
+
+import html
+import platform
+from collections.abc import Iterator, Sequence
+from importlib.metadata import version
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from faao_mav.mission.validate.finding import Finding
+from faao_mav.report.data import ReportData
+from faao_mav.report.inline_svg import inline_svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from faao_mav.faao.solution import Solution
+
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+_PARTS = ("faao-mav", "numpy", "scipy", "matplotlib")
+
+
+def render_report(data: ReportData) -> str:
+    """Return the page: whole, offline, for light, dark, phone and paper.
+
+    A part of `data` that is not there leaves its sections out. The same data gives the same text.
+    """
+    plan = data.solution.plan if data.solution is not None else None
+    title = html.escape(data.title or (plan.name if plan else "") or "Relay flight")
+    style = files("faao_mav.report").joinpath("page.css").read_text(encoding="utf-8")
+    sections = "\n".join(_sections(data))
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
+<title>{title}</title>
+<style>
+{style}</style>
+</head>
+<body>
+<h1>{title}</h1>
+<main>
+{sections}
+</main>
+<footer>{html.escape(_versions())}</footer>
+</body>
+</html>
+"""
+
+
+def _sections(data: ReportData) -> Iterator[str]:
+    facts = list(_facts(data))
+    if facts:
+        listed = "".join(
+            f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(value)}</dd></div>"
+            for name, value in facts
+        )
+        yield _section("Result", f"<dl>{listed}</dl>", "wide")
+    if data.findings is not None:
+        yield _section("Findings", _findings(data.findings), "wide")
+    if data.solution is not None:
+        yield from _drawn(data, data.solution)
+        plan = f"<pre>{html.escape(data.solution.plan.text)}</pre>"
+        yield _section("Plan", plan, "wide text")
+
+
+def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
+    """What a reader looks for first."""
+    solution, prediction = data.solution, data.prediction
+    if solution is not None:
+        rates = solution.rates
+        yield "planned rate", f"{rates.R_avg:.4f} bit/s/Hz"
+        yield "base station to UAV", f"{rates.R_U:.4f} bit/s/Hz"
+        yield "UAV to user", f"{rates.R_G:.4f} bit/s/Hz"
+        yield "optimiser", f"{'converged' if solution.converged else 'NOT CONVERGED'}"
+    if prediction is not None:
+        yield "predicted rate", f"{prediction.rates.R_avg:.4f} bit/s/Hz"
+        yield "predicted duration", f"{prediction.duration:.1f} s"
+        yield "predicted from plan, rms", f"{prediction.rms_position_error:.1f} m"
+    if data.conversion is not None:
+        yield "mission items", str(len(data.conversion.mission.items))
+        yield "relay route", f"{data.conversion.schedule.route.distance:.0f} m"
+        for name, value in data.conversion.parameters.items():
+            yield f"set first: {name}", f"{value:g}"
+
+
+def _findings(findings: Sequence[Finding]) -> str:
+    if not findings:
+        return "<p>None: nothing speaks against the mission.</p>"
+    items = []
+    for finding in findings:
+        where = "" if finding.item is None else f" (item {finding.item})"
+        text = html.escape(f"{finding.message}{where} [{finding.rule}]")
+        todo = f"<br>{html.escape(finding.action)}" if finding.action else ""
+        level = html.escape(finding.level)
+        items.append(f'<li class="{level}"><b>{level}</b>: {text}{todo}</li>')
+    return f"<ul>{''.join(items)}</ul>"
+
+
+def _drawn(data: ReportData, solution: "Solution") -> Iterator[str]:
+    """Yield the sections that are figures."""
+    from faao_mav.report import figures
+
+    vehicle, conversion, prediction = solution.plan.vehicle, data.conversion, data.prediction
+    start, end = solution.plan.flight.start, solution.plan.flight.end
+    yield _figure(
+        "route",
+        "Route",
+        figures.route(solution, conversion),
+        f"Map of the route from {_place(start)} to {_place(end)}, east and north in metres, "
+        "coloured by speed, with both stations"
+        + (", numbered waypoints and the predicted track" if conversion else ""),
+    )
+    yield _figure(
+        "motion",
+        "Motion",
+        figures.motion(solution, conversion),
+        f"Speed over time, limit {vehicle.max_speed:g} m/s, and acceleration over time, limit "
+        f"{vehicle.max_acceleration:g} m/s²",
+    )
+    yield _figure(
+        "rates",
+        "Link",
+        figures.rates(solution, prediction),
+        "Rates of both links over time, planned"
+        + (" and along the predicted flight" if prediction else ""),
+    )
+    yield _figure(
+        "power",
+        "Precoders",
+        figures.precoder_power(solution),
+        "Power on each stream over time, base station and UAV, strongest stream first",
+    )
+    yield _figure(
+        "convergence",
+        "Convergence",
+        figures.convergence(solution),
+        f"Rate after each iteration, from {solution.history[0]:.4f} to {solution.history[-1]:.4f} "
+        f"bit/s/Hz; ended: {solution.ending}",
+    )
+
+
+def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:
+    return _section(heading, inline_svg(figure, name, title) + f"<p>{html.escape(title)}.</p>")
+
+
+def _section(heading: str, content: str, kind: str = "") -> str:
+    marked = f' class="{kind}"' if kind else ""
+    return f"<section{marked}>\n<h2>{heading}</h2>\n{content}\n</section>"
+
+
+def _place(position: tuple[float, float]) -> str:
+    return f"({position[0]:g}, {position[1]:g})"
+
+
+def _versions() -> str:
+    parts = [f"{name} {version(name)}" for name in _PARTS]
+    return ", ".join([*parts, f"Python {platform.python_version()}"])

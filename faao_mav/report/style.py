@@ -1,0 +1,118 @@
+"""How figures look: colours, sizes, and the same bytes for the same figure.
+
+Figures are matplotlib's, made without pyplot: there is no global state and no window.
+"""
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from faao_mav.errors import InputError
+from faao_mav.files import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
+SERIES = ("#1769aa", "#c2500a", "#16825d", "#9a3d9c", "#8a6d00", "#c03352", "#54606e")
+"""Colours in fixed order, apart for the colour-blind and on both papers."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+FORMATS = (".png", ".svg", ".pdf")
+
+_SETTINGS: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "faao-mav",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "axes.facecolor": PAPER,
+    "axes.titlesize": 10.0,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "legend.framealpha": 0.8,
+    "legend.facecolor": PAPER,
+    "legend.edgecolor": "none",
+    "figure.facecolor": PAPER,
+    "lines.linewidth": 1.6,
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw and save within this: matplotlib's settings are its global state."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_SETTINGS)
+        yield
+
+
+def new_figure(width: float = 5.4, height: float = 3.4) -> "Figure":
+    """Return an empty figure of so many inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def label(axes: "Axes", title: str, x: str, y: str) -> None:
+    """Name a plot and its axes."""
+    axes.set_title(_plain(title))
+    axes.set_xlabel(_plain(x))
+    axes.set_ylabel(_plain(y))
+
+
+def _plain(text: str) -> str:
+    """Keep matplotlib from reading formulas into a plan's names."""
+    return text.replace("$", r"\$")
+
+
+def mark_stations(axes: "Axes", places: Sequence[tuple[str, tuple[float, float], str]]) -> None:
+    """Mark (name, [east, north], marker) with their names beside them."""
+    for name, (east, north), marker in places:
+        axes.plot([east], [north], marker, color=INK, markersize=7, zorder=5)
+        axes.annotate(
+            name,
+            (east, north),
+            xytext=(7, 7),
+            textcoords="offset points",
+            zorder=6,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+        )
+
+
+def check_figure_path(path: Path, option: str) -> None:
+    """Raise `InputError` unless `path` ends in a format that figures can be saved in."""
+    if path.suffix not in FORMATS:
+        raise InputError(f"{option} {path}: give a name that ends in {', '.join(FORMATS)}")
+
+
+def render(figure: "Figure", suffix: str) -> bytes:
+    """Return `figure` as .png, .svg or .pdf; the same figure gives the same bytes."""
+    buffer = io.BytesIO()
+    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    with styled():
+        figure.savefig(buffer, format=suffix.removeprefix("."), dpi=160, metadata=dates.get(suffix))
+    return buffer.getvalue()
+
+
+def save_figure(figure: "Figure", path: Path) -> None:
+    """Write `figure` to `path`, whole or not at all, in the format of its ending."""
+    check_figure_path(path, "figure")
+    write_whole(path, render(figure, path.suffix))

@@ -1,0 +1,149 @@
+"""The figures of a study: rates along what is varied, and routes on a map."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from faao_mav.errors import InputError
+from faao_mav.plan import Plan
+from faao_mav.report.style import MARKERS, SERIES, label, mark_stations, new_figure, styled
+from faao_mav.study.compare import spreads
+from faao_mav.study.rows import Row
+from faao_mav.study.sweep import OVERRIDES, Value
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_AXES = {
+    "power_dbm": "power W of both stations, dBm",
+    "flight.duration": "duration T, s",
+    "flight.altitude": "height H, m",
+    "radio.rician_factor": "Rician factor K",
+}
+_SHORT = {"power_dbm": ("W", " dBm"), "flight.duration": ("T", " s"), "radio.modulation": ("", "")}
+_SCHEMES = {
+    "faao": "FAAO",
+    "algorithm1": "FAAO, Algorithm 1",
+    "mmse": "MMSE",
+    "mrt": "MRT",
+    "zf": "ZF",
+    "waterfilling": "water-filling",
+    "gaussian": "designed for Gaussian inputs",
+}
+_LOOKS = {name: k for k, name in enumerate(("faao", "gaussian", "mrt", "mmse", "zf"))}
+
+
+def can_draw(rows: Sequence[Row], kind: str) -> bool:
+    """Tell whether there is something to draw: results, and for rates an axis of numbers."""
+    if all(row.R_avg is None for row in rows):
+        return False
+    return kind == "trajectories" or _axis(rows) is not None
+
+
+def study_figure(rows: Sequence[Row], plan: Plan, kind: str) -> "Figure":
+    """Return the figure `kind` of `rows`, `rate` or `trajectories`.
+
+    Raises `InputError` where `can_draw` says no.
+    """
+    if not can_draw(rows, kind):
+        raise InputError("nothing to draw: no result, or no key varied over two numbers or more")
+    with styled():
+        return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan)
+
+
+def _axis(rows: Sequence[Row]) -> str | None:
+    """Return the varied key with the most numbers, at least two."""
+    counts = {}
+    for key in rows[0].values:
+        values = [row.values[key] for row in rows]
+        if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
+            counts[key] = len(set(values))
+    best = max(counts, key=lambda key: counts[key], default=None)
+    return best if best is not None and counts[best] > 1 else None
+
+
+def _rates(rows: Sequence[Row], plan: Plan) -> "Figure":
+    """Draw R_avg over the axis: a line for each scheme, a panel for each of the other values."""
+    axis = _axis(rows)
+    assert axis is not None
+    others = [key for key in rows[0].values if key != axis]
+    panels: dict[str, list[Row]] = {}
+    for row in rows:
+        panels.setdefault(_named({key: row.values[key] for key in others}), []).append(row)
+    across = min(len(panels), 3)
+    down = -(-len(panels) // across)
+    width = 5.4 if across == 1 else 3.3 * across
+    figure = new_figure(width, 0.5 + (3.4 if across == 1 else 2.9) * down)
+    grid = figure.subplots(down, across, squeeze=False, sharex=True)
+    plots = list(grid.flat)
+    for plot, (name, inside) in zip(plots, panels.items(), strict=False):
+        _lines(plot, inside, axis)
+        title = name or plan.name or "rate by scheme"
+        label(plot, title, _AXES.get(axis, axis), "rate R_avg, bit/s/Hz")
+    for plot in plots[len(panels) :]:
+        plot.remove()
+    handles, labels = plots[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
+    return figure
+
+
+def _lines(plot: "Axes", rows: Sequence[Row], axis: str) -> None:
+    """Draw mean and spread over seeds."""
+    at = list(rows[0].values).index(axis)
+    found = spreads(rows)
+    for scheme in dict.fromkeys(row.scheme for row in rows):
+        points = sorted(
+            (values[at], spread)
+            for (values, name), spread in found.items()
+            if name == scheme and spread is not None
+        )
+        x = [float(value) for value, _ in points]
+        mean = [spread.mean for _, spread in points]
+        low = [spread.mean - spread.deviation for _, spread in points]
+        high = [spread.mean + spread.deviation for _, spread in points]
+        k = _LOOKS.get(scheme, len(_LOOKS) + list(OVERRIDES).index(scheme)) % len(SERIES)
+        plot.plot(x, mean, marker=MARKERS[k], markersize=4, color=SERIES[k], label=_SCHEMES[scheme])
+        plot.fill_between(x, low, high, color=SERIES[k], alpha=0.2, linewidth=0)
+    plot.set_ylim(bottom=0)
+
+
+def _routes(rows: Sequence[Row], plan: Plan) -> "Figure":
+    """Draw the routes on a map, a colour for each combination of values and scheme."""
+    figure = new_figure(5.4, 4.9)
+    plot = figure.subplots()
+    several = len({row.scheme for row in rows}) > 1
+    colours: dict[str, str] = {}
+    for row in rows:
+        if not row.route:
+            continue
+        name = _named(row.values)
+        if several or not name:
+            name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
+        east, north = zip(*row.route, strict=True)
+        new = name not in colours
+        colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
+        plot.plot(east, north, color=colour, label=name if new else None)
+    radio, flight = plan.radio, plan.flight
+    places = (
+        ("base station", radio.base_station.position, "s"),
+        ("user", radio.ground_user.position, "^"),
+        ("start", flight.start, "o"),
+        ("end", flight.end, "o"),
+    )
+    mark_stations(plot, places)
+    plot.set_aspect("equal", adjustable="datalim")
+    plot.margins(0.1)
+    label(plot, plan.name or "routes", "east, m", "north, m")
+    figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
+    return figure
+
+
+def _named(values: Mapping[str, Value]) -> str:
+    """Return values as a legend has them: `T = 10 s`."""
+    parts = []
+    for key, value in values.items():
+        text = value if isinstance(value, str) else json.dumps(value)
+        name, unit = _SHORT.get(key, (key.rsplit(".", 1)[-1], ""))
+        parts.append(f"{name} = {text}{unit}" if name else text)
+    return ", ".join(parts)

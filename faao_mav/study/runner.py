@@ -1,0 +1,98 @@
+"""All cases of a study over all cores, each kept as soon as it is done."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from faao_mav.errors import FaaoError, InputError
+from faao_mav.files import write_whole
+from faao_mav.study.rows import TABLE, Row, append_row, in_order, load_rows, table
+from faao_mav.study.sweep import Case
+
+
+def run_case(case: Case) -> Row:
+    """Return the row of `case`; whatever goes wrong becomes the row's error."""
+    from threadpoolctl import threadpool_limits
+
+    try:
+        with threadpool_limits(1):  # the cores are taken by other cases
+            return _solved(case)
+    except FaaoError as error:
+        reason = str(error)
+    except Exception as error:  # a fault in one case must not cost the others
+        reason = f"{type(error).__name__}: {error}"
+    return Row(case.key, dict(case.values), case.scheme, case.seed, error=reason)
+
+
+def _solved(case: Case) -> Row:
+    from faao_mav.faao.optimize import optimize
+    from faao_mav.faao.pricing import price
+    from faao_mav.plan import parse_plan
+
+    plan = parse_plan(case.text, case.source)
+    started = time.perf_counter()
+    solution = optimize(plan)
+    seconds = time.perf_counter() - started
+    rates = solution.rates
+    return Row(
+        key=case.key,
+        values=dict(case.values),
+        scheme=case.scheme,
+        seed=case.seed,
+        R_avg=rates.R_avg,
+        R_U=rates.R_U,
+        R_G=rates.R_G,
+        mutual_information=price(solution).average,
+        seconds=round(seconds, 3),
+        iterations=solution.iterations,
+        converged=solution.converged,
+        route=solution.w.round(3).tolist(),
+    )
+
+
+def run_study(
+    cases: Sequence[Case],
+    *,
+    jobs: int = -1,
+    directory: Path | None = None,
+    observe: Callable[[Row], None] | None = None,
+) -> tuple[Row, ...]:
+    """Return the rows of `cases` in their order.
+
+    `jobs` processes, -1 for one on each core. With a `directory` every row is kept there when it
+    is done, rows that are there already are not run again, and the table is written at the end.
+    `observe` is told each row, old ones first. Raises `InputError` for a directory of no use.
+    """
+    done = _prepare(directory) if directory is not None else {}
+    for row in in_order(cases, done):
+        if observe is not None:
+            observe(row)
+    for row in _rows([case for case in cases if case.key not in done], jobs):
+        if directory is not None:
+            append_row(row, directory)
+        done[row.key] = row
+        if observe is not None:
+            observe(row)
+    rows = in_order(cases, done)
+    if directory is not None:
+        write_whole(directory / TABLE, table(rows).encode())
+    return rows
+
+
+def _rows(cases: Sequence[Case], jobs: int) -> Iterator[Row]:
+    """Run `cases`; yield their rows as they finish."""
+    from joblib import Parallel, delayed, effective_n_jobs
+
+    if min(effective_n_jobs(jobs), len(cases)) <= 1:
+        yield from map(run_case, cases)
+        return
+    workers = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
+    yield from workers(delayed(run_case)(case) for case in cases)
+
+
+def _prepare(directory: Path) -> dict[str, Row]:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be made: {error.strerror or error}") from None
+    return load_rows(directory)

@@ -1,0 +1,161 @@
+"""What a study runs: the grid of values, schemes and seeds, as plans of their own."""
+
+import hashlib
+import itertools
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from importlib.metadata import version
+from typing import Any, TypeAlias, get_args
+
+import yaml
+
+from faao_mav.errors import InputError, PlanError
+from faao_mav.plan.keys import ALIASES, unknown_key
+from faao_mav.plan.model import StudyScheme
+from faao_mav.plan.yaml_text import load_yaml
+
+Value: TypeAlias = Any
+"""What YAML holds: a number, a word, a list."""
+
+MAX_ROWS = 100_000
+
+OVERRIDES: Mapping[str, Mapping[str, str]] = {
+    "algorithm1": {"method": "algorithm1", "precoder": "faao", "inputs": "alphabet"},
+    "gaussian": {"method": "direct", "precoder": "faao", "inputs": "gaussian"},
+} | {
+    name: {"method": "direct", "precoder": name, "inputs": "alphabet"}
+    for name in ("faao", "mmse", "mrt", "zf", "waterfilling")
+}
+"""`optimizer.*` of each scheme: all but `algorithm1` by the direct method, route included."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One row of a study before it has run.
+
+    `values` are the varied keys in order, `text` the plan with them, the scheme and the seed put
+    in; `key` is a hash of the scheme, of `text` and of the version of the program.
+    """
+
+    values: tuple[tuple[str, Value], ...]
+    scheme: str
+    seed: int
+    text: str
+    source: str = "plan"
+
+    @property
+    def key(self) -> str:
+        """The same for the same work, on any machine."""
+        content = "\0".join((version("faao-mav"), self.scheme, self.text))
+        return hashlib.sha256(content.encode()).hexdigest()[:20]
+
+
+def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
+    """Read `key=values`; see `parse_values`. Raises `InputError`."""
+    key, sign, values = text.partition("=")
+    if not sign:
+        raise InputError(f"--vary {text}: give key=start:stop:step or key=value,value")
+    key = key.strip()
+    if problem := unknown_key(key):
+        raise InputError(f"--vary {key}: {problem}")
+    return key, parse_values(values, f"--vary {key}")
+
+
+def parse_values(text: str, option: str) -> tuple[Value, ...]:
+    """Read `start:stop:step`, the end included, or `value,value,...` as YAML reads them.
+
+    `option` names the place in messages. Raises `InputError`.
+    """
+    try:
+        data = load_yaml(f"values: [{text}\n]", option)
+    except PlanError:
+        data = {}
+    if list(data) != ["values"] or not isinstance(data["values"], list) or not data["values"]:
+        raise InputError(f"{option}: {text!r} is neither start:stop:step nor value,value,...")
+    found: list[Value] = []
+    for value in data["values"]:
+        is_range = isinstance(value, str) and ":" in value
+        found += _range(value, option) if is_range else [value]
+        _check_count(len(found), option)
+    return tuple(found)
+
+
+def parse_schemes(text: str) -> tuple[str, ...]:
+    """Read `faao,mmse,...`. Raises `InputError`."""
+    schemes = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
+    known = get_args(StudyScheme)
+    for name in schemes:
+        if name not in known:
+            raise InputError(f"--schemes {name}: expected some of {','.join(known)}")
+    return schemes
+
+
+def _range(text: str, option: str) -> list[float]:
+    """Return the numbers of `start:stop:step` in decimal arithmetic: 0:1:0.1 has 11."""
+    expected = f"{option}: {text!r} is no range; give start:stop:step, as -40:0:5"
+    if not re.fullmatch(r"[^:]+:[^:]+:[^:]+", text):
+        raise InputError(expected)
+    try:
+        start, stop, step = (Decimal(part.strip()) for part in text.split(":"))
+    except InvalidOperation:
+        raise InputError(expected) from None
+    if not all(number.is_finite() for number in (start, stop, step)):
+        raise InputError(expected)
+    if step == 0 or (stop - start) / step < 0:
+        raise InputError(f"{option}: {text!r}: steps of {step} never come from {start} to {stop}")
+    ratio = (stop - start) / step
+    _check_count(ratio, option)
+    numbers = [start + k * step for k in range(math.floor(ratio) + 1)]
+    whole = all(part == part.to_integral_value() for part in (start, step))
+    return [int(number) if whole else float(number) for number in numbers]
+
+
+def _check_count(count: Decimal | int, what: str) -> None:
+    if count > MAX_ROWS:
+        raise InputError(f"{what}: {count:,.0f} rows; a study has at most {MAX_ROWS:,}")
+
+
+def make_cases(
+    text: str,
+    *,
+    vary: Mapping[str, Sequence[Value]],
+    schemes: Sequence[str] = ("faao",),
+    seeds: int = 1,
+    source: str = "plan",
+) -> tuple[Case, ...]:
+    """Return the grid of all values, schemes and seeds, in this order, the seeds fastest.
+
+    `text` is a sound plan, `source` names it. Seeds count up from its `radio.seed`. Raises
+    `InputError` for a grid of more than `MAX_ROWS`.
+    """
+    data = load_yaml(text, source)
+    data.pop("study", None)
+    _check_count(math.prod(map(len, vary.values())) * len(schemes) * seeds, source)
+    made = []
+    for values in itertools.product(*vary.values()):
+        pairs = tuple(zip(vary, values, strict=True))
+        changes = {path: value for key, value in pairs for path in ALIASES.get(key, (key,))}
+        first = changes.get("radio.seed", data["radio"].get("seed", 0))
+        for scheme, number in itertools.product(schemes, range(seeds)):
+            seed = first + number if isinstance(first, int) else 0
+            chosen = {f"optimizer.{name}": v for name, v in OVERRIDES[scheme].items()}
+            seeded = {"radio.seed": seed} if isinstance(first, int) else {}
+            # what is varied goes before what the scheme would have
+            changed = _changed(data, chosen | changes | seeded)
+            plan = yaml.safe_dump(changed, sort_keys=False)
+            made.append(Case(pairs, scheme, seed, plan, source))
+    return tuple(made)
+
+
+def _changed(data: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
+    """Return a copy of `data` with the values at dotted keys replaced."""
+    result = dict(data)
+    for path, value in changes.items():
+        head, _, rest = path.partition(".")
+        inside = result.get(head)
+        below = inside if isinstance(inside, dict) else {}
+        result[head] = _changed(below, {rest: value}) if rest else value
+    return result

@@ -1,0 +1,116 @@
+"""How well missions keep their plans: predicted flights of hover-to-hover relay plans.
+
+    python tests/benchmarks/missions.py [--px4] [--keep]
+
+One row for each plan: seconds of the conversion, items with home, rms and largest position error
+at equal times, path error (m), how much later than planned the flight is over (s), the delivered
+rate over the planned one. Everything printed is predicted; `flights.py` says how well predictions
+agree with recorded flights.
+"""
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from faao_mav.faao.optimize import optimize
+from faao_mav.mission.convert import convert
+from faao_mav.mission.prediction import predict_delivery
+from faao_mav.plan import Plan, parse_plan
+
+SAMPLE = Path(__file__).parents[2] / "missions" / "copter_relay.yaml"
+
+PLANS: dict[str, dict[str, Any]] = {
+    "copter_relay, 120 s, 8 m/s": {},
+    "short, 60 s, 6 m/s": {
+        "flight.duration": 60,
+        "vehicle.max_speed": 6,
+        "flight.start": [0, 200],
+        "flight.end": [200, 0],
+        "radio.ground_user.position": [200, 200],
+    },
+    "slow, 90 s, 4 m/s": {
+        "flight.duration": 90,
+        "vehicle.max_speed": 4,
+        "flight.start": [0, 150],
+        "flight.end": [150, 0],
+        "radio.ground_user.position": [250, 250],
+    },
+    "two hovers, 200 s, 9 m/s": {
+        "flight.duration": 200,
+        "vehicle.max_speed": 9,
+        "vehicle.max_acceleration": 2.0,
+    },
+    "two hovers, 300 s, 7 m/s": {
+        "flight.duration": 300,
+        "vehicle.max_speed": 7,
+        "radio.ground_user.position": [600, 500],
+        "flight.end": [500, 0],
+    },
+    "curved, 100 s, 7 m/s": {
+        "flight.duration": 100,
+        "vehicle.max_speed": 7,
+        "radio.ground_user.position": [350, 300],
+        "flight.altitude": 60,
+    },
+    "curved, 75 s, 8 m/s": {
+        "flight.duration": 75,
+        "flight.start": [-50, 250],
+        "flight.end": [250, -50],
+        "flight.altitude": 50,
+    },
+    "curved, 150 s, 8 m/s": {
+        "flight.duration": 150,
+        "flight.start": [-200, 350],
+        "flight.end": [350, -200],
+        "flight.altitude": 60,
+        "radio.ground_user.position": [400, 400],
+        "radio.relay.noise_dbm": -85,
+        "radio.ground_user.noise_dbm": -85,
+    },
+}
+
+
+def plan_of(changes: dict[str, Any], autopilot: str, parameters: str) -> Plan:
+    """Return the sample plan with the dotted keys of `changes` replaced."""
+    data = yaml.safe_load(SAMPLE.read_text())
+    changes = changes | {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        section = data
+        for key in parents:
+            section = section[key]
+        section[last] = value
+    return parse_plan(yaml.safe_dump(data))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--px4", action="store_true")
+    parser.add_argument("--keep", action="store_true", help="the autopilot's default parameters")
+    options = parser.parse_args()
+    autopilot = "px4" if options.px4 else "ardupilot"
+    parameters = "keep" if options.keep else "recommend"
+    print(f"{autopilot}, {parameters}")
+    print(f"{'plan':28}      s  items   rms    max   path    late    rate")
+    for name, changes in PLANS.items():
+        plan = plan_of(changes, autopilot, parameters)
+        solution = optimize(plan)
+        started = time.perf_counter()
+        conversion = convert(solution)
+        seconds = time.perf_counter() - started
+        found = predict_delivery(solution, conversion)
+        print(
+            f"{name:28} {seconds:6.2f} {len(conversion.mission.items) + 1:6d} "
+            f"{found.rms_position_error:5.2f} {found.max_position_error:6.2f} "
+            f"{found.max_path_error:6.2f} {found.duration - plan.flight.duration:+7.2f} "
+            f"{100 * found.rates.R_avg / solution.rates.R_avg:6.2f} %",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
