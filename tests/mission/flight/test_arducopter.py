@@ -98,7 +98,9 @@ def check_leg(leg: Leg, length: float, acceleration: float, jerk: float) -> None
     assert np.diff(way).min() >= -1e-12
     assert abs(np.diff(speed)).max() / t[1] <= acceleration * (1 + 1e-6)
     mean = (speed[1:] + speed[:-1]) / 2
-    np.testing.assert_allclose(np.diff(way), mean * t[1], atol=jerk * t[1] ** 3 / 10 + 1e-5 * length)
+    np.testing.assert_allclose(
+        np.diff(way), mean * t[1], atol=jerk * t[1] ** 3 / 10 + 1e-5 * length
+    )
 
 
 @given(lengths, speeds, accelerations, jerks)
