@@ -1,6 +1,7 @@
 """Plans and trajectories for the tests of missions."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -8,7 +9,15 @@ from hypothesis import settings
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission import Command, Frame, Mission, assemble, plan_route
+from faao_mav.mission import (
+    Command,
+    Conversion,
+    Frame,
+    Mission,
+    assemble,
+    convert,
+    plan_route,
+)
 from faao_mav.plan import (
     BaseStation,
     Flight,
@@ -38,6 +47,7 @@ def plan_with(
     on_finish: Any = "rtl",
     path_tolerance: float = 2.0,
     max_items: int = 600,
+    recommend: bool = False,
 ) -> Plan:
     """Return a plan; the radio and the flight's ends play no part in a mission."""
     return Plan(
@@ -53,7 +63,9 @@ def plan_with(
             *("bpsk", 1e-5, 3.0, "ula", "none", 1, "statistical", 0, False),
         ),
         optimizer=Optimizer("direct", "faao", "alphabet", ("straight",), 1e-4, 50),
-        mission=MissionOptions(takeoff, on_finish, path_tolerance, max_items, "keep"),
+        mission=MissionOptions(
+            takeoff, on_finish, path_tolerance, max_items, "recommend" if recommend else "keep"
+        ),
     )
 
 
@@ -78,6 +90,22 @@ def dash_hover_dash(hover: float = 40.0, step: float = 0.2) -> Trajectory:
     second = dash(0.0, 250.0, 8.0, 1.5, np.maximum(t - lasting - hover, 0.0))
     w = np.outer(first, [0.6, -0.8]) + np.outer(second, [0.8, 0.6]) + [0.0, 350.0]
     return t, w
+
+
+def converted(t: Real, w: Real, plan: Plan) -> Conversion:
+    """Return the conversion of a bare trajectory."""
+    return convert(SimpleNamespace(plan=plan, t=t, w=w))  # type: ignore[arg-type]
+
+
+def nearly_there(conversion: Conversion, w: Real, near: float = 2.0) -> float:
+    """Return how much later than planned the flight comes within `near` m of w_F for good, s."""
+    clock, flown = conversion.schedule.clock, conversion.schedule.flown
+
+    def settled(t: Real, positions: Real) -> float:
+        outside = np.flatnonzero(np.hypot(*(positions - w[-1]).T) > near)
+        return float(t[outside[-1] + 1]) if len(outside) else float(t[0])
+
+    return settled(flown.t - clock.start(flown), flown.position[:, :2]) - settled(clock.t, w)
 
 
 def mission_of(t: Real, w: Real, plan: Plan) -> Mission:
