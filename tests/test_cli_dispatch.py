@@ -47,7 +47,8 @@ def test_a_plan_may_have_any_name(in_folder: Path) -> None:
 def test_help_tells_how_to_plan_and_every_command() -> None:
     shown = run("--help").stdout
     assert "faao-mission PLAN.yaml --out MISSION" in shown
-    assert "\n  convert " in shown
+    for command in ("validate", "upload", "download", "convert", "autopilot", "study"):
+        assert f"\n  {command} " in shown
     assert run("-h").stdout == shown
     assert "--method" in run("plan.yaml", "--help").stdout
     assert "--method" in run("plan", "-h").stdout

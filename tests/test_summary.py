@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from conftest import MakePlan
 
@@ -9,7 +10,7 @@ from faao_mav.cli.summary import Result, as_dict, as_text
 from faao_mav.faao.bound import Bound
 from faao_mav.faao.optimize import optimize
 from faao_mav.faao.pricing import MutualInformation, saturation
-from faao_mav.mission.convert import convert
+from faao_mav.mission import convert
 from faao_mav.mission.prediction import predict_delivery
 
 
@@ -45,6 +46,12 @@ def test_it_says_what_was_found(result: Result) -> None:
     assert "nothing: give --out" in text
 
 
+def test_a_vehicle_that_keeps_its_parameters_is_told_of_none(result: Result) -> None:
+    kept = replace(result, conversion=replace(result.conversion, parameters={}))
+    assert "parameters" not in as_text(kept)
+    assert as_dict(kept)["mission"]["parameters"] == {}
+
+
 def test_a_run_that_did_not_converge_says_so(result: Result) -> None:
     stopped = replace(result.solution, converged=False, ending="stopped after 3 steps")
     text = as_text(replace(result, solution=stopped))
@@ -56,10 +63,18 @@ def test_numbers_for_programs_are_the_solutions(result: Result) -> None:
     data = as_dict(result)
     assert data["average_rate"] == result.solution.rates.R_avg
     assert data["upper_bound"] == 2 * result.solution.rates.R_avg
-    assert data["mission"]["distance"] == pytest.approx(result.conversion.schedule.route.distance)
-    assert data["mission"]["parameters"] == dict(result.conversion.parameters)
-    assert data["predicted"]["average_rate"] == result.prediction.rates.R_avg
-    assert data["predicted"]["rms_position_error"] == result.prediction.rms_position_error
+    conversion, prediction = result.conversion, result.prediction
+    assert data["mission"]["items"] == len(conversion.mission.items)
+    assert data["mission"]["parameters"] == conversion.parameters
+    route = conversion.schedule.route
+    relay = route.positions[route.first : route.last + 1]
+    assert data["mission"]["distance"] == pytest.approx(
+        np.linalg.norm(np.diff(relay, axis=0), axis=1).sum()
+    )
+    predicted = data["predicted"]
+    assert predicted["average_rate"] == min(predicted["rate_bs_uav"], predicted["rate_uav_user"])
+    assert predicted["duration"] == data["mission"]["duration"] == prediction.duration
+    assert predicted["rms_position_error"] == prediction.rms_position_error
     assert data["seconds"] == {"optimize": 1.0, "total": 2.0}
 
 

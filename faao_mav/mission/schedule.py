@@ -216,7 +216,7 @@ class Scheduler:
         """Return `found` with one speed for neighbouring legs wherever that hardly costs."""
         for alike in _ALIKE:
             groups = _groups(found.route.speeds, alike)
-            if groups[-1:] == len(groups) - 1:
+            if len(groups) == 0 or groups[-1] == len(groups) - 1:
                 continue
             tried = self._fitted(found.route, top, groups)
             if tried.rms <= max(_DEARER * found.rms, ALLOWED / 2):

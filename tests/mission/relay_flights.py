@@ -1,13 +1,23 @@
 """Plans and trajectories for the tests of missions."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 import numpy as np
 from hypothesis import settings
 
 from faao_mav.arrays import Real
-from faao_mav.mission import Mission, assemble, plan_route
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import (
+    Command,
+    Conversion,
+    Frame,
+    Mission,
+    assemble,
+    convert,
+    plan_route,
+)
 from faao_mav.plan import (
     BaseStation,
     Flight,
@@ -37,6 +47,7 @@ def plan_with(
     on_finish: Any = "rtl",
     path_tolerance: float = 2.0,
     max_items: int = 600,
+    recommend: bool = False,
 ) -> Plan:
     """Return a plan; the radio and the flight's ends play no part in a mission."""
     return Plan(
@@ -52,7 +63,9 @@ def plan_with(
             *("bpsk", 1e-5, 3.0, "ula", "none", 1, "statistical", 0, False),
         ),
         optimizer=Optimizer("direct", "faao", "alphabet", ("straight",), 1e-4, 50),
-        mission=MissionOptions(takeoff, on_finish, path_tolerance, max_items, "keep"),
+        mission=MissionOptions(
+            takeoff, on_finish, path_tolerance, max_items, "recommend" if recommend else "keep"
+        ),
     )
 
 
@@ -79,6 +92,55 @@ def dash_hover_dash(hover: float = 40.0, step: float = 0.2) -> Trajectory:
     return t, w
 
 
+def converted(t: Real, w: Real, plan: Plan) -> Conversion:
+    """Return the conversion of a bare trajectory."""
+    return convert(SimpleNamespace(plan=plan, t=t, w=w))  # type: ignore[arg-type]
+
+
+def nearly_there(conversion: Conversion, w: Real, near: float = 2.0) -> float:
+    """Return how much later than planned the flight comes within `near` m of w_F for good, s."""
+    clock, flown = conversion.schedule.clock, conversion.schedule.flown
+
+    def settled(t: Real, positions: Real) -> float:
+        outside = np.flatnonzero(np.hypot(*(positions - w[-1]).T) > near)
+        return float(t[outside[-1] + 1]) if len(outside) else float(t[0])
+
+    return settled(flown.t - clock.start(flown), flown.position[:, :2]) - settled(clock.t, w)
+
+
 def mission_of(t: Real, w: Real, plan: Plan) -> Mission:
     """Return the mission that flies a bare trajectory."""
     return assemble(plan_route(t, w, plan), plan)
+
+
+def items_of(mission: Mission, plan: Plan) -> tuple[Real, list[float], list[float]]:
+    """Return positions, speeds and holds of the route that the mission's items make."""
+    assert [item.command for item in mission.items[:2]].count(Command.NAV_TAKEOFF) == int(
+        plan.mission.takeoff
+    )
+    begin = 1 if plan.mission.takeoff else 0
+    speed, before, points, speeds, holds = np.nan, None, [], [], []
+    for item in mission.items[begin:-1]:
+        if item.command == Command.DO_CHANGE_SPEED:
+            assert item.frame == Frame.MISSION
+            assert item.params[0::2] == (1.0, -1.0)
+            assert before != Command.DO_CHANGE_SPEED
+            assert item.params[1] != speed
+            speed = item.params[1]
+        elif item.command == Command.NAV_DELAY:
+            assert item.frame == Frame.MISSION
+            assert before == Command.NAV_WAYPOINT
+            holds[-1] += item.params[0]
+        else:
+            assert item.command == Command.NAV_WAYPOINT
+            assert item.frame == Frame.GLOBAL_RELATIVE_ALT
+            assert item.z == plan.flight.altitude
+            points.append(item)
+            speeds.append(speed)
+            holds.append(item.params[0])
+        before = item.command
+    assert before in (Command.NAV_WAYPOINT, Command.NAV_DELAY)
+    assert speeds[0] == plan.vehicle.max_speed
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    positions = frame.to_local([p.x for p in points], [p.y for p in points])
+    return positions, speeds[1:], holds

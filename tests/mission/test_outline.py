@@ -1,14 +1,13 @@
-"""The first legs of a trajectory, and the items that a route becomes."""
+"""The first legs for a trajectory."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from relay_flights import STEADY, dash, dash_hover_dash, mission_of, plan_with
+from relay_flights import STEADY, dash, dash_hover_dash, items_of, plan_with
 
-from faao_mav.errors import InfeasibleError, InputError
-from faao_mav.geodesy import LocalFrame
-from faao_mav.mission import Command, Frame, Home, plan_route
+from faao_mav.errors import InputError
+from faao_mav.mission import assemble, plan_route
 from faao_mav.mission.hover import find_hovers
 from faao_mav.mission.vector import distances_to_segment, lengths
 
@@ -21,36 +20,15 @@ def path_error(w, waypoints):
     return np.min([distances_to_segment(w, a, b) for a, b in ends], axis=0).max()
 
 
-def flown(mission, plan):
-    """Positions, speeds and holds of the route that the mission's items make."""
-    points, speeds, holds, speed = [], [], [], None
-    for item in mission.items[1 if plan.mission.takeoff else 0 : -1]:
-        if item.command == Command.DO_CHANGE_SPEED:
-            assert item.frame == Frame.MISSION
-            assert item.params[0::2] == (1.0, -1.0)
-            assert item.params[1] != speed
-            speed = item.params[1]
-            continue
-        assert item.command == Command.NAV_WAYPOINT
-        assert item.frame == Frame.GLOBAL_RELATIVE_ALT
-        assert item.z == plan.flight.altitude
-        points.append(item)
-        speeds.append(speed)
-        holds.append(item.params[0])
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    positions = frame.to_local([p.x for p in points], [p.y for p in points])
-    return positions, speeds[1:], holds
-
-
 def nominal(route):
-    """Seconds at the commanded speeds, with the holds."""
-    return (route.leg_lengths / route.speeds).sum() + route.holds.sum()
+    """How long the route takes without ramps, s."""
+    return route.holds.sum() + (route.leg_lengths / route.speeds).sum()
 
 
 def check(t, w, plan):
     """What holds of every conversion; returns the route."""
     route = plan_route(t, w, plan)
-    positions, speeds, holds = flown(mission_of(t, w, plan), plan)
+    positions, speeds, holds = items_of(assemble(route, plan), plan)
     assert positions == pytest.approx(route.positions, abs=1e-3)
     assert path_error(w, positions) <= plan.mission.path_tolerance
     assert positions[0] == pytest.approx(w[0], abs=1e-3)
@@ -115,51 +93,15 @@ def test_any_polygon_keeps_to_its_path(points, tolerance):
     check(t, w, plan_with(path_tolerance=tolerance))
 
 
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-def test_dash_hover_dash(autopilot):
+def test_dash_hover_dash():
     t, w = dash_hover_dash(hover=40.0)
-    plan = plan_with(autopilot=autopilot)
-    route = check(t, w, plan)
+    route = check(t, w, plan_with())
     assert route.holds.sum() == pytest.approx(40, abs=1)
     assert np.count_nonzero(route.holds) == 1
     assert route.positions[np.argmax(route.holds)] == pytest.approx([150.0, 150.0], abs=0.05)
     assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1)
     assert route.distance == pytest.approx(500, abs=1)
-    assert len(route.positions) == 3
-
-
-def test_the_items_of_a_mission():
-    t, w = dash_hover_dash()
-    plan = plan_with()
-    mission = mission_of(t, w, plan)
-    assert mission.home == Home(-35.363262, 149.165237, 584.0)
-    takeoff, speed, way = mission.items[:3]
-    assert (takeoff.command, takeoff.frame, takeoff.z) == (22, 3, 100.0)
-    assert (takeoff.x, takeoff.y) == (-35.363262, 149.165237)
-    assert (speed.command, speed.frame, speed.params) == (178, 2, (1.0, 8.0, -1.0, 0.0))
-    assert (way.command, way.params) == (16, (6.0, 0.0, 0.0, 0.0))
-    assert mission.items[-1].command == Command.NAV_RETURN_TO_LAUNCH
-    assert mission.items[-1].frame == Frame.MISSION
-    assert all(item.x == round(item.x, 9) and item.y == round(item.y, 9) for item in mission.items)
-
-
-def test_a_take_off_is_left_out_on_request():
-    mission = mission_of(*dash_hover_dash(), plan_with(takeoff=False))
-    assert mission.items[0].command == Command.DO_CHANGE_SPEED
-    assert mission.items[1].command == Command.NAV_WAYPOINT
-
-
-@pytest.mark.parametrize(
-    ("on_finish", "command", "frame", "z"),
-    [("rtl", 20, 2, 0.0), ("land", 21, 3, 0.0), ("hover", 17, 3, 100.0)],
-)
-def test_endings(on_finish, command, frame, z):
-    t, w = dash_hover_dash()
-    last = mission_of(t, w, plan_with(on_finish=on_finish)).items[-1]
-    assert (last.command, last.frame, last.z) == (command, frame, z)
-    if on_finish != "rtl":
-        place = LocalFrame(-35.363262, 149.165237).to_local(last.x, last.y)
-        assert place == pytest.approx(w[-1], abs=1e-3)
+    assert route.positions == pytest.approx(np.array([w[0], [150.0, 150.0], w[-1]]), abs=0.05)
 
 
 def test_hovers_at_both_ends_are_holds():
@@ -208,14 +150,12 @@ def test_a_turn_back_on_the_same_line_is_seen():
     assert route.positions[:, 0].max() == pytest.approx(150, abs=2)
 
 
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-def test_a_circle_is_split_although_its_legs_are_short(autopilot):
+def test_a_circle_has_legs_of_one_length():
     t = np.linspace(0, 2 * np.pi * 30 / 6, 300)
     w = 30 * np.stack([np.cos(t / 5), np.sin(t / 5)], axis=1)
-    plan = plan_with(autopilot=autopilot, path_tolerance=1.0)
-    route = check(t, w, plan)
-    assert 8 <= len(route.positions) <= 24
-    assert route.leg_lengths.min() > 0.9 * plan.mission.path_tolerance
+    route = check(t, w, plan_with(path_tolerance=1.0))
+    assert 12 <= len(route.positions) <= 16  # 13 for chords within 0.9 m of a radius of 30 m
+    assert route.leg_lengths.max() < 1.2 * route.leg_lengths.min()
     assert nominal(route) == pytest.approx(t[-1], abs=1)
 
 
@@ -255,15 +195,6 @@ def test_a_speed_is_rounded_down_at_the_limit():
     assert route.speeds == pytest.approx([7.999], abs=1e-12)
     route = plan_route(t, np.outer(t, [1.0, 0.0]), plan_with(max_speed=0.0004))
     assert route.speeds == pytest.approx([0.0004])
-
-
-def test_too_many_items_are_counted():
-    t, w = dash_hover_dash()
-    rows = len(mission_of(t, w, plan_with()).items) + 1
-    mission_of(t, w, plan_with(max_items=rows))
-    expected = rf"needs {rows} items .*max_items is {rows - 1}; raise .*path_tolerance \(now 2 m\)"
-    with pytest.raises(InfeasibleError, match=expected):
-        mission_of(t, w, plan_with(max_items=rows - 1))
 
 
 @pytest.mark.parametrize(

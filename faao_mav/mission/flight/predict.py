@@ -29,6 +29,7 @@ LONGEST = 86_400.0
 _MOST_STEPS = 5000  # items flown, jumps included
 _REPEATS = 20  # of a jump that never ends
 _SAME_PLACE = 0.01  # m
+_SHORTEST = 1e-3  # s
 
 
 def predict(
@@ -99,10 +100,14 @@ def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
 
 @dataclass
 class _Stretch:
-    """Waypoints to be flown in one go; the first is where the aircraft rests."""
+    """Waypoints to be flown in one go; the first is where the aircraft rests.
+
+    `waits` are items that only make it wait at one of the points, with that point's number.
+    """
 
     points: list[Real]
     items: list[int]
+    waits: list[tuple[int, int]] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
     holds: list[float] = field(default_factory=lambda: [0.0])
     delays: list[float] = field(default_factory=lambda: [0.0])
@@ -166,7 +171,12 @@ class _Walk:
     def fly(self) -> None:
         """Fly the waypoints that are waiting."""
         stretch, self.stretch = self.stretch, None
-        if stretch is None or len(stretch.points) == 1:
+        if stretch is None:
+            return
+        if len(stretch.points) == 1:
+            self._go(stretch.items[0], self.place, stretch.delays[0])
+            for index, _ in stretch.waits:
+                self.reached[index] = self.clock
             return
         path = FlightPath(
             points=np.array(stretch.points),
@@ -177,9 +187,7 @@ class _Walk:
             delays=np.array(stretch.delays),
             before=stretch.speeds[0],
         )
-        lengths = np.sqrt(np.sum(np.diff(path.points, axis=0) ** 2, axis=1))
-        lasting = float(np.sum(lengths / np.maximum(path.speeds, 0.1)) + path.holds.sum())
-        self._check_clock(lasting)
+        self._check_clock(self._at_least(path))
         flown = self.model.fly(path, self.step)
         end = float(flown.departures[-1])
         kept = flown.t <= end
@@ -191,8 +199,19 @@ class _Walk:
         self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], items)
         for index, done in zip(stretch.items[1:], flown.departures[1:], strict=True):
             self.reached[index] = self.clock + done
+        for index, point in stretch.waits:
+            self.reached[index] = self.clock + flown.departures[point]
         self.clock += end
         self.place = flown.position[kept][-1]
+
+    def _at_least(self, path: FlightPath) -> float:
+        """Return how long `path` takes without ramps, s."""
+        ways = np.diff(path.points, axis=0)
+        speeds = np.where(path.speeds > 0, path.speeds, self._own_speed())
+        level, rise = np.hypot(ways[:, 0], ways[:, 1]) / speeds, ways[:, 2]
+        limit = np.where(rise > 0, self.vertical.climb_speed, self.vertical.descent_speed)
+        legs = np.maximum(level, np.abs(rise) / limit)
+        return float(legs.sum() + np.sum(path.holds + path.delays))
 
     def _take_off(self, index: int, item: MissionItem) -> None:
         self.fly()
@@ -221,7 +240,7 @@ class _Walk:
         stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
         if np.abs(goal - stretch.points[-1]).max() <= _SAME_PLACE:
             stretch.delays[-1] += math.floor(hold) if self._whole() else hold
-            self.reached[index] = self.clock
+            stretch.waits.append((index, len(stretch.points) - 1))
             return
         stretch.points.append(goal)
         stretch.items.append(index)
@@ -232,18 +251,16 @@ class _Walk:
         stretch.radii.append(radius)
 
     def _delay(self, index: int, seconds: float) -> None:
-        if self.stretch is not None:
-            self.stretch.delays[-1] += seconds
-        else:
-            self._go(index, self.place, seconds)
-        self.reached[index] = math.nan
+        stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
+        stretch.delays[-1] += seconds
+        stretch.waits.append((index, len(stretch.points) - 1))
 
     def _land(self, index: int, item: MissionItem) -> None:
-        goal = self._height_over(self.place, item, index)
+        here = self.stretch.points[-1] if self.stretch else self.place
+        goal = self._height_over(here, item, index)
         if (item.x or item.y) and not (math.isnan(item.x) or math.isnan(item.y)):
             goal[:2] = self.frame.to_local(item.x, item.y)
-        level = self.stretch.points[-1][2] if self.stretch else self.place[2]
-        self._towards(index, np.array([goal[0], goal[1], level]), 0.0)
+        self._towards(index, np.array([goal[0], goal[1], here[2]]), 0.0)
         self._descend(index)
 
     def _return(self, index: int) -> None:
@@ -266,7 +283,7 @@ class _Walk:
 
     def _go(self, index: int, goal: Real, lasting: float) -> None:
         """Move to `goal` at constant speed in `lasting` seconds."""
-        if lasting <= 0:
+        if lasting < _SHORTEST:
             return
         self._check_clock(lasting)
         t = np.linspace(0.0, lasting, max(2, math.ceil(lasting / self.step) + 1))

@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from flights_px4 import FITTED, HELD_OUT, Row, row, together
+from flights_px4 import rows as fly_all
 from paths import line, path_of
+from recorded import Row, together
 
 from faao_mav.mission.flight.px4 import Px4
 
 
 @pytest.fixture(scope="module")
 def rows() -> list[Row]:
-    return [row(name) for name in (*FITTED, *HELD_OUT)]
+    return fly_all()
 
 
 def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
@@ -20,9 +21,9 @@ def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
         assert flight.path_error <= 1.5, flight
 
 
-@pytest.mark.parametrize("fitted", [True, False])
-def test_flights_together(rows: list[Row], fitted: bool) -> None:
-    arrival, position = together(rows, fitted)
+@pytest.mark.parametrize("use", ["fitted", "held out"])
+def test_flights_together(rows: list[Row], use: str) -> None:
+    arrival, position = together(rows, use)
     assert arrival <= 0.35
     assert position <= 1.5
 

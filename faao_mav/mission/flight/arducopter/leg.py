@@ -77,7 +77,8 @@ def changed_leg(
     more = Ramp.between(before, top, acceleration, jerk)
     last = Ramp.between(top, 0 * top, acceleration, jerk)
     left = length - up.length - more.length - last.length
-    wait = np.where(top > before, np.minimum(SWITCH_LAG, left / before), 0.0)
+    moving = np.where(before > 0, before, 1.0)
+    wait = np.where(top > before, np.minimum(SWITCH_LAG, left / moving), 0.0)
     cruised = np.where(top > 0, (left - wait * before) / np.where(top > 0, top, 1.0), 0.0)
     return Leg(length, up, more, last, (wait, np.maximum(cruised, 0.0)))
 

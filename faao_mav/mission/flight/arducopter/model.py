@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import ClassVar
 
 import numpy as np
@@ -120,7 +121,7 @@ class _Flight:
         before = model.cruise_speed if math.isnan(path.before) else path.before
         commanded = np.full(len(speeds), before)
         legs, begins, tau = [], [], 0 * begin
-        for part, after in zip(parts, [*parts[1:], None], strict=True):
+        for part, after in zip_longest(parts, parts[1:]):
             share, acceleration = _along(model, part)
             old, new = commanded, _commanded(part, speeds)
             commanded = new
