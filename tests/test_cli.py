@@ -216,7 +216,13 @@ def mutations(draw: st.DrawFn) -> dict[str, Any]:
     paths += ["radio.relay.power_dbm", "radio.relay.antennas", "radio.modulation", "radio.fading",
               "radio.seed", "optimizer.precoder", "mission.on_finish", "mission.path_tolerance",
               "flight.start_velocity", "mission.max_items", "vehicle.parameters"]  # fmt: skip
-    return draw(st.dictionaries(st.sampled_from(paths), VALUES, min_size=1, max_size=3))
+    changes = draw(st.dictionaries(st.sampled_from(paths), VALUES, min_size=1, max_size=3))
+    # a section that is replaced has no keys to change
+    return {
+        path: value
+        for path, value in changes.items()
+        if not any(path.startswith(f"{other}.") for other in changes)
+    }
 
 
 @settings(max_examples=60)
