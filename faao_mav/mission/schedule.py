@@ -28,6 +28,12 @@ WAYPOINTS = 24
 _FASTER = 1.1
 """Of the greatest speed: commanded at most, where the aircraft would not keep up otherwise."""
 
+SETTLING_HOLD = 6.0
+"""The least hold at w_I, s.
+
+ArduCopter leaves late by up to 0.75 s after a hold of 1 s: it is still drifting.
+"""
+
 _SETTLING = 3.0
 """A hold at w_F at least while speeds are fitted, s: the aircraft comes to rest there."""
 
@@ -97,11 +103,11 @@ class Scheduler:
 
     def first(self, route: Route) -> Schedule:
         """Return `route` with the speeds and holds that fit best."""
+        waits = route.holds + route.delays
+        waits[0] = max(waits[0], SETTLING_HOLD)
         if route.last == len(route.holds) - 1:  # it ends at rest
-            waits = route.holds + route.delays
             waits[-1] = max(waits[-1], _SETTLING)
-            route = self._waiting(route, waits)
-        return self._fitted(route, self.max_speed)
+        return self._fitted(self._waiting(route, waits), self.max_speed)
 
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""

@@ -117,7 +117,7 @@ class _Flight:
         lag = HOLD_LAG + HOLD_LAG_PER_RISE * model.acceleration / model.jerk
         arrivals, departures = np.zeros_like(waits), np.zeros_like(waits)
         departures[:, 0] = waits[:, 0]
-        begin = departures[:, 0] + START_LAG
+        begin = departures[:, 0] + np.where(waits[:, 0] > 0, lag, START_LAG)
         before = model.cruise_speed if math.isnan(path.before) else path.before
         commanded = np.full(len(speeds), before)
         legs, begins, tau = [], [], 0 * begin
