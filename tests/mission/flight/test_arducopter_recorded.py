@@ -1,7 +1,7 @@
 """The ArduCopter model against flights of a real ArduCopter in its simulator."""
 
 import pytest
-from flights_arducopter import FITTED, HELD_OUT, row
+from flights_arducopter import FITTED, HELD_OUT, SPLINES, row
 from recorded import Row, together
 
 
@@ -18,6 +18,14 @@ def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
     for flight in rows:
         assert flight.arrival_rms <= (0.3 if flight.use == "fitted" else 0.5), flight
         assert flight.position_rms <= 2.0, flight
+        assert flight.path_error <= 2.0, flight
+
+
+def test_splines_are_predicted_more_roughly() -> None:
+    for name in SPLINES:
+        flight = row(name)
+        assert flight.arrival_rms <= 0.5, flight
+        assert flight.position_rms <= 2.5, flight
         assert flight.path_error <= 2.0, flight
 
 
