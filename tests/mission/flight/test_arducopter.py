@@ -275,6 +275,23 @@ def test_a_wider_radius_cuts_the_corner() -> None:
     assert nearest[1] == pytest.approx(2.0, abs=0.1)
 
 
+@settings(max_examples=30)
+@given(wandering(shortest=12.0), models)
+def test_splines_pass_their_points_and_stop_at_the_last(
+    path: FlightPath, model: ArduCopter
+) -> None:
+    splines = np.arange(len(path.points)) > 0
+    flown = model.fly(replace(path, splines=splines), 0.05)
+    assert (np.diff(flown.arrivals) > 0).all()
+    waits = np.floor(path.holds)
+    np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
+    np.testing.assert_allclose(flown.position[-1], path.points[-1], atol=1e-6)
+    for point in path.points:
+        assert np.linalg.norm(flown.position - point, axis=1).min() < 1.0
+    moved = np.linalg.norm(np.diff(flown.position, axis=0), axis=1) / 0.05
+    assert moved.max() <= path.speeds.max() + 0.01
+
+
 def test_limits_come_from_parameters_of_either_generation() -> None:
     older = {"WPNAV_ACCEL": 400, "WPNAV_JERK": 10, "WPNAV_SPEED_UP": 300, "WPNAV_SPEED": 700}
     newer = {"WP_ACC": 4, "WP_JERK": 10, "WP_SPD_UP": 3, "WP_SPD": 7}

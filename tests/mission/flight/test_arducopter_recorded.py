@@ -1,17 +1,36 @@
-"""The ArduCopter model against recorded flights."""
+"""The ArduCopter model against flights of a real ArduCopter in its simulator."""
 
-import flights
 import pytest
+from flights_arducopter import FITTED, HELD_OUT, SPLINES, row
+from recorded import Row, together
 
 
-@pytest.mark.parametrize("name", flights.NAMES)
-def test_recorded_flights_are_predicted(name: str) -> None:
-    found = flights.row(name)
-    most = {"fitted": 0.3, "held out": 0.5, "spline": 1.0}[found.kind]
-    assert found.arrivals <= most
-    assert found.position <= (2.5 if found.kind == "spline" else 2.0)
+@pytest.fixture(scope="module")
+def rows() -> list[Row]:
+    return [row(name) for name in (*FITTED, *HELD_OUT)]
 
 
-def test_all_recorded_flights_are_there() -> None:
-    assert len(flights.NAMES) == 18
-    assert set(flights.HELD_OUT) < set(flights.NAMES)
+def test_every_flight_over_plain_waypoints_is_compared() -> None:
+    assert len(FITTED) + len(HELD_OUT) == 15
+
+
+def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
+    for flight in rows:
+        assert flight.arrival_rms <= (0.3 if flight.use == "fitted" else 0.5), flight
+        assert flight.position_rms <= 2.0, flight
+        assert flight.path_error <= 2.0, flight
+
+
+def test_splines_are_predicted_more_roughly() -> None:
+    for name in SPLINES:
+        flight = row(name)
+        assert flight.arrival_rms <= 0.5, flight
+        assert flight.position_rms <= 2.5, flight
+        assert flight.path_error <= 2.0, flight
+
+
+@pytest.mark.parametrize("use", ["fitted", "held out"])
+def test_flights_together(rows: list[Row], use: str) -> None:
+    arrival, position = together(rows, use)
+    assert arrival <= 0.2
+    assert position <= 1.2
