@@ -12,12 +12,6 @@ from faao_mav.mission.route import Route
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
 
-SETTLING_HOLD = 6.0
-"""The least hold at w_I, s.
-
-ArduCopter leaves late by up to 0.75 s after a hold of 1 s: it is still drifting.
-"""
-
 _DECIMALS = 9  # of a degree: 0.1 mm
 
 
@@ -25,10 +19,10 @@ def assemble(route: Route, plan: "Plan") -> Mission:
     """Return the mission that flies `route` at `plan.flight.altitude` above the origin.
 
     Home is the plan's origin. The items: TAKEOFF there, if the plan asks for it; the way to w_I
-    at the vehicle's greatest speed, with a hold for the route's first hold or `SETTLING_HOLD`,
-    whichever is longer; for each leg its waypoint, before it a DO_CHANGE_SPEED where the speed
-    is another, after it a NAV_DELAY where the wait has a fraction that the autopilot would not
-    keep; and what `plan.mission.on_finish` says. Unused parameters are 0: ArduPilot refuses NaN.
+    at the vehicle's greatest speed; for each leg its waypoint, before it a DO_CHANGE_SPEED where
+    the speed is another, after it a NAV_DELAY where the wait has a fraction that the autopilot
+    would not keep; and what `plan.mission.on_finish` says. Unused parameters are 0: ArduPilot
+    refuses NaN.
 
     Raises `InfeasibleError` if home and items are more than `plan.mission.max_items`.
     """
@@ -54,8 +48,6 @@ def assemble(route: Route, plan: "Plan") -> Mission:
             items.append(_change_speed(speed))
             commanded = speed
         hold, delay = float(route.holds[k]), float(route.delays[k])
-        if k == 0:
-            hold = max(hold, SETTLING_HOLD)
         if plan.vehicle.autopilot == "px4":  # keeps fractions
             hold, delay = hold + delay, 0.0
         items.append(

@@ -28,8 +28,8 @@ WAYPOINTS = 24
 _FASTER = 1.1
 """Of the greatest speed: commanded at most, where the aircraft would not keep up otherwise."""
 
-SETTLING_HOLD = 6.0
-"""The least hold at w_I, s.
+_SETTLED = 6.0
+"""A hold at w_I at least, s.
 
 ArduCopter leaves late by up to 0.75 s after a hold of 1 s: it is still drifting.
 """
@@ -104,7 +104,7 @@ class Scheduler:
     def first(self, route: Route) -> Schedule:
         """Return `route` with the speeds and holds that fit best."""
         waits = route.holds + route.delays
-        waits[0] = max(waits[0], SETTLING_HOLD)
+        waits[0] = max(waits[0], _SETTLED)
         if route.last == len(route.holds) - 1:  # it ends at rest
             waits[-1] = max(waits[-1], _SETTLING)
         return self._fitted(self._waiting(route, waits), self.max_speed)

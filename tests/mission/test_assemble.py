@@ -20,7 +20,7 @@ def test_the_items_of_a_mission():
     assert (takeoff.command, takeoff.frame, takeoff.z) == (22, 3, 100.0)
     assert (takeoff.x, takeoff.y) == (-35.363262, 149.165237)
     assert (speed.command, speed.frame, speed.params) == (178, 2, (1.0, 8.0, -1.0, 0.0))
-    assert (way.command, way.params) == (16, (6.0, 0.0, 0.0, 0.0))
+    assert (way.command, way.params) == (16, (0.0, 0.0, 0.0, 0.0))
     assert mission.items[-1].command == Command.NAV_RETURN_TO_LAUNCH
     assert mission.items[-1].frame == Frame.MISSION
     assert all(item.x == round(item.x, 9) and item.y == round(item.y, 9) for item in mission.items)
@@ -83,12 +83,12 @@ def test_a_wait_of_a_fraction_is_what_the_autopilot_keeps(autopilot):
     holds = np.array([0.0, 39.0, 5.0])
     mission = assemble(replace(route, holds=holds, delays=delays), plan)
     _, _, waits = items_of(mission, plan)
-    assert waits == pytest.approx([6.0, 39.7, 5.0])
+    assert waits == pytest.approx([0.0, 39.7, 5.0])
     commands = [item.command for item in mission.items]
     assert (Command.NAV_DELAY in commands) == (autopilot == "ardupilot")
     own = [item.params[0] for item in mission.items if item.command == Command.NAV_WAYPOINT]
     if autopilot == "ardupilot":  # which would drop the fraction
-        assert own == [6.0, 39.0, 5.0]
+        assert own == [0.0, 39.0, 5.0]
         delay = mission.items[commands.index(Command.NAV_DELAY)]
         assert delay.params == pytest.approx((0.7, -1.0, -1.0, -1.0))
 
