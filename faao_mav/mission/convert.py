@@ -57,7 +57,7 @@ def convert(solution: "Solution") -> Conversion:
     for parameters in candidates(plan):
         vehicle = replace(given, parameters={**given.parameters, **parameters})
         legs = legs_of(vehicle)
-        scheduler = Scheduler(t, w, copter_model(vehicle), legs, top)
+        scheduler = Scheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top)
         for route in outlines:
             first = scheduler.first(with_run_in(route, t, w, legs, top))
             tried.append((first, scheduler, vehicle, parameters))

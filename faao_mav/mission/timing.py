@@ -2,9 +2,10 @@
 
 minimise sum_i |p(t_i) - w(t_i)|² over the speeds commanded for the legs and the holds at the
 hovers, p being the predicted flight. A Levenberg-Marquardt method with bounds on finite
-differences: the prediction has no gradients, but it is smooth, and many variants of one flight
-cost little more than one. So all differences are flown at once, and then all dampings. An error
-early in the flight shows in everything that follows: later legs and holds make up for earlier ones.
+differences: the prediction has no gradients, but it is smooth. All differences are flown at once,
+and then all dampings: roughly, which costs less, since both are compared with a flight that is
+known. What looks best is flown in full before it counts. An error early in the flight shows in
+everything that follows: later legs and holds make up for earlier ones.
 """
 
 from dataclasses import dataclass, replace
@@ -106,9 +107,9 @@ def fit(
 
     weights = np.where(t > t[-1] - _LAST, _LAST_WEIGHT, 1.0)[:, None] / np.sqrt(len(t))
 
-    def errors(x: Real) -> Real:
+    def errors(x: Real, *, rough: bool) -> Real:
         """Return the residuals (B, r) of the variants x (B, k)."""
-        many = model.fly_many(path, *flown(x), _STEP)
+        many = model.fly_many(path, *flown(x), _STEP, rough=rough)
         apart = [
             ((replace(clock, lead=lead).positions(one, t) - w) * weights).ravel()
             for one, lead in zip(many, x[:, -1], strict=True)
@@ -116,18 +117,19 @@ def fit(
         leash = _LEASH * (x[:, :count] - begin[:count])
         return np.hstack([np.stack(apart), leash / np.sqrt(count)])
 
-    x = begin
+    x, now = begin, errors(begin[None], rough=False)[0]
     for _ in range(_ITERATIONS):
         signed = np.where(x + steps > high, -steps, steps)
-        tried = errors(np.vstack([x, x + np.diag(signed)]))
-        now, slope = tried[0], ((tried[1:] - tried[0]) / signed[:, None]).T
+        tried = errors(np.vstack([x, x + np.diag(signed)]), rough=True)
+        slope = ((tried[1:] - tried[0]) / signed[:, None]).T
         ahead = _steps(x, slope, now, low, high)
-        squares = np.sum(errors(ahead) ** 2, axis=1)
-        best = int(np.argmin(squares))
-        before = float(now @ now)
-        if squares[best] < before:
-            x = ahead[best]
-        if squares[best] > (1 - _ENOUGH) * before:
+        guessed = now + errors(ahead, rough=True) - tried[0]
+        best = ahead[np.argmin(np.sum(guessed**2, axis=1))]
+        found = errors(best[None], rough=False)[0]
+        before, after = float(now @ now), float(found @ found)
+        if after < before:
+            x, now = best, found
+        if after > (1 - _ENOUGH) * before:
             break
     speeds, held = flown(x[None])
     return speeds[0], held[0], float(x[-1])

@@ -29,12 +29,14 @@ class Recorded:
     """A recorded flight: its path, and the track with t = 0 when the first leg became current.
 
     `left` (m,), s, is when each waypoint stopped being the current item, NaN for the last.
+    `before`, m/s, was commanded on the way to the first waypoint, NaN if nothing was.
     """
 
     path: FlightPath
     t: Real
     position: Real
     left: Real
+    before: float
 
 
 @dataclass(frozen=True)
@@ -76,10 +78,9 @@ def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
         holds=np.array(holds),
         splines=np.array(splines),
         radii=np.zeros(len(points)),
-        before=speeds[0],
     )
     horizontal = frame.to_local(column["lat"], column["lon"])
-    return Recorded(path, column["t_s"] - left[0], horizontal, left - left[0])
+    return Recorded(path, column["t_s"] - left[0], horizontal, left - left[0], speeds[0])
 
 
 def compared(name: str, use: str, recorded: Recorded, flown: Flown) -> Row:

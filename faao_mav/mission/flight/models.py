@@ -5,19 +5,22 @@ from faao_mav.mission.flight.path import CopterModel, FlightModel
 from faao_mav.mission.vehicle import Vehicle
 
 
-def copter_model(vehicle: Vehicle) -> CopterModel:
-    """Return the model of a multicopter; raises `InputError` for useless parameters."""
+def copter_model(vehicle: Vehicle, latitude: float | None = None) -> CopterModel:
+    """Return the model of a multicopter that flies at `latitude`, degrees.
+
+    Raises `InputError` for useless parameters.
+    """
     if vehicle.autopilot == "px4":
         from faao_mav.mission.flight.px4 import Px4
 
         return Px4.from_vehicle(vehicle)
-    return ArduCopter.from_vehicle(vehicle)
+    return ArduCopter.from_vehicle(vehicle, latitude)
 
 
-def flight_model(vehicle: Vehicle) -> FlightModel:
+def flight_model(vehicle: Vehicle, latitude: float | None = None) -> FlightModel:
     """Return the model of `vehicle` with its parameters; raises `InputError` for useless ones."""
     if vehicle.kind == "plane" and vehicle.autopilot == "ardupilot":
         from faao_mav.mission.flight.plane import ArduPlane
 
         return ArduPlane.from_vehicle(vehicle)
-    return copter_model(vehicle)
+    return copter_model(vehicle, latitude)

@@ -1,6 +1,5 @@
 """What a flight model is asked, and what it answers."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -20,8 +19,7 @@ class FlightPath:
     (m,), s, say how long the aircraft is told to wait at each point, as commanded: what the
     autopilot makes of fractions is the model's business. `delays` (m,), s, come on top: NAV_DELAY
     items after the point, which keep fractions. `splines` (m,) marks points that are spline
-    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own. `before`, m/s, is
-    the speed in force on arriving at the first point, NaN for the autopilot's own.
+    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own.
     """
 
     points: Real
@@ -30,7 +28,6 @@ class FlightPath:
     splines: NDArray[np.bool_]
     radii: Real
     delays: Real | float = 0.0
-    before: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,10 +63,17 @@ class CopterModel(FlightModel, Protocol):
     """A model that can be fitted to a plan."""
 
     def fly_many(
-        self, path: FlightPath, speeds: Real, waits: Real, step: float = 0.1
+        self,
+        path: FlightPath,
+        speeds: Real,
+        waits: Real,
+        step: float = 0.1,
+        *,
+        rough: bool = False,
     ) -> Sequence[Flown]:
         """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s.
 
-        Waits are exact, however holds and delays make them up.
+        Waits are exact, however holds and delays make them up. Of `rough` flights only the
+        differences between variants mean something: a model may leave out what they share.
         """
         ...

@@ -52,9 +52,10 @@ def predict(
         none = np.empty(0, dtype=int)
         return Track(np.empty(0), empty, empty, none, reached, frame or LocalFrame(0.0, 0.0))
     frame = frame or LocalFrame(*start)
-    walk = _Walk(mission, vehicle, frame, step, flight_model(vehicle), Vertical.of(vehicle))
+    model = flight_model(vehicle, frame.latitude)
+    walk = _Walk(mission, vehicle, frame, step, model, Vertical.of(vehicle))
     walk.place = np.append(frame.to_local(*start), 0.0)
-    walk.home = walk.place
+    walk.home = walk.goal = walk.place
     for index, item in _in_order(mission):
         walk.take(index, item)
         if walk.over:
@@ -126,6 +127,7 @@ class _Walk:
     model: FlightModel
     vertical: Vertical
     place: Real = field(default_factory=lambda: np.zeros(3))
+    goal: Real = field(default_factory=lambda: np.zeros(3))
     home: Real = field(default_factory=lambda: np.zeros(3))
     clock: float = 0.0
     speed: float = math.nan
@@ -185,7 +187,6 @@ class _Walk:
             splines=np.array(stretch.splines),
             radii=np.array(stretch.radii),
             delays=np.array(stretch.delays),
-            before=stretch.speeds[0],
         )
         self._check_clock(self._at_least(path))
         flown = self.model.fly(path, self.step)
@@ -202,7 +203,8 @@ class _Walk:
         for index, point in stretch.waits:
             self.reached[index] = self.clock + flown.departures[point]
         self.clock += end
-        self.place = flown.position[kept][-1]
+        self.place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
+        self.goal = path.points[-1]
 
     def _at_least(self, path: FlightPath) -> float:
         """Return how long `path` takes without ramps, s."""
@@ -276,7 +278,7 @@ class _Walk:
 
     def _descend(self, index: int) -> None:
         self.fly()
-        ground = np.array([self.place[0], self.place[1], 0.0])
+        ground = np.array([self.goal[0], self.goal[1], 0.0])
         self._go(index, ground, self.vertical.descend(float(self.place[2])))
         self.reached[index] = self.clock
         self.over = True
@@ -293,7 +295,7 @@ class _Walk:
         velocity[[0, -1]] = 0.0
         self._add(t, position, velocity, np.full(len(t), index))
         self.clock += lasting
-        self.place = goal
+        self.place = self.goal = goal
 
     def _add(self, t: Real, position: Real, velocity: Real, item: Real) -> None:
         first = 1 if self.parts else 0  # the instant that the last part ended with

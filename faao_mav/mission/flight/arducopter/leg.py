@@ -1,104 +1,169 @@
-"""One leg from rest to rest: ramp, cruise, and where its speed was changed a second of both."""
+"""A straight leg: how far along it the target is at which time."""
 
-from dataclasses import dataclass
+import math
+from bisect import bisect_right
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import accumulate
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
-from faao_mav.mission.flight.arducopter.ramp import JERK_LAG, Ramp, top_speed
+from faao_mav.mission.flight.arducopter.ramp import (
+    Limits,
+    Phase,
+    Ramp,
+    ramp_between,
+    ramp_from_rest,
+)
 
-SWITCH_LAG = 0.1
-"""What a speed command costs, s, between the ramp to the old speed and that to the new one."""
+State: TypeAlias = tuple[float, float, float]
+"""Distance along the leg, m; speed, m/s; acceleration, m/s²."""
 
-_BISECTIONS = 24
+_JERK_TIMES = 12
+"""A second ramp needs a cruise of so many jerk times: the autopilot's own rule of thumb."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True)
 class Leg:
-    """Ramps `first`, `second` and `last` with cruises of `waits` s after the first two; (B,)."""
+    """A leg of `length` metres: a ramp up, perhaps a second ramp, a cruise, a ramp down.
+
+    `times` and `states` are those at the beginning of every phase, and at the end.
+    """
 
     length: float
-    first: Ramp
-    second: Ramp
-    last: Ramp
-    waits: tuple[Real, Real]
+    limits: Limits
+    up: Ramp
+    down: Ramp
+    phases: tuple[Phase, ...] = field(repr=False)
+    times: tuple[float, ...] = field(repr=False)
+    states: tuple[State, ...] = field(repr=False)
 
     @property
-    def duration(self) -> Real:
-        """From start to stop, (B,) s."""
-        ramps = self.first.duration + self.second.duration + self.last.duration
-        return ramps + self.waits[0] + self.waits[1]
+    def duration(self) -> float:
+        """From the beginning to the end, s."""
+        return self.times[-1]
 
-    def at(self, t: Real) -> tuple[Real, Real]:
-        """Return way (m) and speed (m/s), each (B, k), at `t` (B, k) s after the start."""
-        way, speed = self.first.at(t)
-        begin = self.first.duration
-        for wait, ramp in zip(self.waits, (self.second, self.last), strict=True):
-            cruised = np.clip(t - begin[:, None], 0.0, wait[:, None])
-            begin = begin + wait
-            further, changed = ramp.at(t - begin[:, None])
-            way = way + ramp.v0[:, None] * cruised + further
-            speed = np.where(t > begin[:, None], changed, speed)
-            begin = begin + ramp.duration
-        return np.minimum(way, self.length), speed
+    @property
+    def final(self) -> float:
+        """The speed at the end, m/s."""
+        return self.down.low
+
+    @property
+    def braking(self) -> float:
+        """When the ramp down begins, s."""
+        return self.times[-1] - self.down.duration
+
+    @cached_property
+    def table(self) -> Real:
+        """The phases as rows (phases, 7): begin, s; w = pi / T; q = d / w²; c; s, v, a then."""
+        rows = [
+            (time, math.pi / span, d * (span / math.pi) ** 2, c, *state)
+            for time, (span, c, d), state in zip(self.times, self.phases, self.states, strict=False)
+        ]
+        return np.array(rows)
+
+    def at(self, time: float) -> State:
+        """Return where the target is `time` s, 0 to `duration`, after the beginning."""
+        k = min(bisect_right(self.times, time), len(self.phases)) - 1
+        span, c, d = self.phases[k]
+        s, v, a = self.states[k]
+        t = time - self.times[k]
+        if d == 0.0:
+            return s + t * (v + t * (a / 2 + t * c / 6)), v + t * (a + t * c / 2), a + t * c
+        w = math.pi / span
+        wave, q = math.sin(w * t) / w, d / w**2
+        return (
+            s + t * (v + t * (a / 2 + t * c / 6)) + q * (t - wave),
+            v + t * (a + t * c / 2) + q * (1 - math.cos(w * t)),
+            a + t * c + d * wave,
+        )
 
 
-def plain_leg(length: float, speed: Real, acceleration: float, jerk: float) -> Leg:
-    """Return the leg that is planned for `speed` (B,) from its start, m and m/s."""
-    top = top_speed(np.full_like(speed, length), speed, acceleration, jerk)
-    up, none = Ramp.between(0 * top, top, acceleration, jerk), np.zeros_like(top)
-    same = Ramp.between(top, top, acceleration, jerk)
-    down = Ramp.between(top, none, acceleration, jerk)
-    rest = length - up.length - down.length
-    cruise = np.where(top > 0, rest / np.where(top > 0, top, 1.0), 0.0)
-    return Leg(length, up, same, down, (none, np.maximum(cruise, 0.0)))
+def planned(length: float, limits: Limits, *, start: float = 0.0, end: float = 0.0) -> Leg:
+    """Return the leg that begins at the speed `start` and ends at `end`, m/s: 0 except at splines.
+
+    A ramp from rest that does not fit in half of the leg ends at a lower speed, which is the
+    highest for the other ramps as well; one of these that does not fit is left out.
+    """
+    up = ramp_from_rest(limits, length / 2)
+    if start > 0:
+        up = ramp_between(min(start, up.high), up.high, limits, length / 2)
+    return _assembled(length, limits, up, up.high, up.phases(), up.length, end)
 
 
-def changed_leg(
-    length: float, old: Real, new: Real, elapsed: Real, acceleration: float, jerk: float
+def at_speed(leg: Leg, speed: float, elapsed: float) -> Leg:
+    """Return how `leg` goes on when its speed limit becomes `speed` after `elapsed` s.
+
+    Before its beginning it is planned anew, on its ramp down nothing changes. Otherwise the ramp
+    up is finished, for a lower speed with as little steady acceleration as still possible; a
+    second ramp follows if the cruise is long enough for it.
+    """
+    if leg.limits.speed == speed or elapsed >= leg.braking:
+        return leg
+    limits = leg.limits.at(speed)
+    if elapsed <= 0:
+        return planned(leg.length, limits, end=leg.final)
+    up = leg.up
+    early = 2 * up.rise + up.kept
+    late = early + up.steady
+    if speed < up.high and up.steady > 0 and elapsed <= late:
+        slowest = up.high - up.peak * (late - max(elapsed, early))
+        up = ramp_from_rest(limits.at(max(speed, slowest)), leg.length / 2)
+    cruise = leg.length - up.length - ramp_from_rest(limits.at(up.high), leg.length / 2).length
+    phases, covered, reached = up.phases(), up.length, up.high
+    if (second := _second(up.high, limits, cruise)) is not None:
+        slower = second.low < up.high
+        phases += second.phases(down=slower)
+        covered += second.length
+        reached = second.low if slower else second.high
+    return _assembled(leg.length, limits, up, reached, phases, covered, leg.final)
+
+
+def _second(speed: float, limits: Limits, cruise: float) -> Ramp | None:
+    """The ramp between `speed` and the limit that the `cruise` metres have room for."""
+    change = abs(limits.speed - speed)
+    jerk_time = min((change * math.pi / (4 * limits.snap)) ** (1 / 3), limits.rise)
+    if change == 0.0 or speed * _JERK_TIMES * jerk_time >= cruise:
+        return None
+    if limits.speed < speed:
+        second = ramp_between(limits.speed, speed, limits, cruise / 2)
+        return replace(second, low=speed - (second.high - second.low), high=speed)
+    fastest = min(limits.speed, cruise / (_JERK_TIMES * jerk_time))
+    return ramp_between(speed, fastest, limits, cruise / 2)
+
+
+def _assembled(
+    length: float,
+    limits: Limits,
+    up: Ramp,
+    speed: float,
+    phases: list[Phase],
+    covered: float,
+    end: float,
 ) -> Leg:
-    """Return the leg planned for speed `old` on which `new` is commanded, (B,) m/s.
-
-    The command comes `elapsed` (B,) s after the start. Speeding up, the ramp to the old speed is
-    finished first, and another follows where there is room for it. Slowing down, the ramp up ends
-    as soon as its acceleration can be taken back, at A max(r, elapsed); the ramp down follows if
-    the cruise is long enough for it.
-    """
-    least = acceleration * np.maximum(acceleration / jerk + JERK_LAG, elapsed)
-    planned = np.minimum(old, np.maximum(new, least))
-    before = top_speed(np.full_like(new, length), planned, acceleration, jerk)
-    up = Ramp.between(0 * before, before, acceleration, jerk)
-    down = Ramp.between(before, 0 * before, acceleration, jerk)
-    cruise = length - up.length - down.length
-    slowing = Ramp.between(before, np.minimum(new, before), acceleration, jerk).length <= cruise
-    quicker = _fitting(before, np.maximum(new, before), cruise, acceleration, jerk)
-    top = np.where(new > old, quicker, np.where(slowing, np.minimum(new, before), before))
-    more = Ramp.between(before, top, acceleration, jerk)
-    last = Ramp.between(top, 0 * top, acceleration, jerk)
-    left = length - up.length - more.length - last.length
-    moving = np.where(before > 0, before, 1.0)
-    wait = np.where(top > before, np.minimum(SWITCH_LAG, left / moving), 0.0)
-    cruised = np.where(top > 0, (left - wait * before) / np.where(top > 0, top, 1.0), 0.0)
-    return Leg(length, up, more, last, (wait, np.maximum(cruised, 0.0)))
+    if end > 0:
+        down = ramp_between(min(end, speed), speed, limits, length / 2)
+        if down.high < speed:
+            down = ramp_between(speed, speed, limits, length / 2)
+    else:
+        down = ramp_from_rest(limits.at(speed), length / 2)
+    cruise = (length - covered - down.length) / speed
+    if cruise > 0:
+        phases.append((cruise, 0.0, 0.0))
+    phases += down.phases(down=True)
+    times = tuple(accumulate((phase[0] for phase in phases), initial=0.0))
+    return Leg(length, limits, up, down, tuple(phases), times, _states(phases, up.low))
 
 
-def _fitting(low: Real, high: Real, cruise: Real, acceleration: float, jerk: float) -> Real:
-    """Return the speed between two that a ramp up and one back reach within `cruise` (m).
-
-    ArduCopter adds a change of speed to the cruise that it has planned.
-    """
-
-    def fits(top: Real) -> NDArray[np.bool_]:
-        both: Real = 2 * Ramp.between(low, top, acceleration, jerk).length
-        return both <= cruise
-
-    whole = fits(high)
-    if whole.all():
-        return high
-    below, above = low, high
-    for _ in range(_BISECTIONS):
-        middle = (below + above) / 2
-        enough = fits(middle)
-        below, above = np.where(enough, middle, below), np.where(enough, above, middle)
-    return np.where(whole, high, below)
+def _states(phases: list[Phase], speed: float) -> tuple[State, ...]:
+    s, v, a = 0.0, speed, 0.0
+    states = [(s, v, a)]
+    for span, c, d in phases:
+        q = d * (span / math.pi) ** 2
+        s += span * (v + span * (a / 2 + span * c / 6) + q)
+        v += span * (a + span * c / 2) + 2 * q
+        a += span * c
+        states.append((s, v, a))
+    return tuple(states)

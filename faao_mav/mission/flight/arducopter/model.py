@@ -1,39 +1,25 @@
-"""ArduCopter in AUTO: legs, corners, holds."""
+"""ArduCopter as a flight model."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import zip_longest
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.mission.flight.arducopter.leg import Leg, changed_leg, plain_leg
-from faao_mav.mission.flight.arducopter.ramp import Ramp, top_speed
-from faao_mav.mission.flight.arducopter.section import Section, sections
+from faao_mav.errors import InputError
+from faao_mav.mission.flight.arducopter.course import Course, grid_of, table_of
+from faao_mav.mission.flight.arducopter.follow import Follower, pursue
+from faao_mav.mission.flight.arducopter.route import Bounds, Router
 from faao_mav.mission.flight.parameters import Parameter, limits_of
 from faao_mav.mission.flight.path import FlightPath, Flown
 from faao_mav.mission.vehicle import Vehicle
 
-START_LAG, STOP_LAG = 0.27, 0.15
-"""From leaving the first point to moving, from the end of a leg to being at its point, s."""
-
-PASS_LAG = 0.07
-"""From passing a point to the autopilot taking it as reached, s."""
-
-HOLD_LAG, HOLD_LAG_PER_RISE = 0.05, 0.12
-"""After a hold: s, and of A / J."""
-
-CHANGE_LAG = 0.08
-"""What a change of speed by 1 m/s or more costs beyond its ramps, s."""
-
-SPLINE_TURN, SPLINE_START = 0.11, 0.8
-"""Runs of splines: the share of speed lost per radian of turn at a point; a start's cost, s."""
-
-REVERSAL, OVERLOAD = 1.0, 1.4
-LEAN_ACCELERATION = 9.81 * math.tan(math.radians(30))
-"""At the default lean limit, m/s²."""
+_G = 9.80665
+_LEAST_INPUT_TIME = 0.1
+_DEGREE = 111_318.845
+"""Metres to a degree, north, and times the cosine of the latitude east, to the autopilot."""
 
 _PARAMETERS = {
     "cruise_speed": Parameter({"WP_SPD": 1.0, "WPNAV_SPEED": 0.01}, 0.1),
@@ -41,21 +27,36 @@ _PARAMETERS = {
     "descent_speed": Parameter({"WP_SPD_DN": 1.0, "WPNAV_SPEED_DN": 0.01}, 0.1),
     "acceleration": Parameter({"WP_ACC": 1.0, "WPNAV_ACCEL": 0.01}, 0.1),
     "climb_acceleration": Parameter({"WP_ACC_Z": 1.0, "WPNAV_ACCEL_Z": 0.01}, 0.1),
+    "corner_acceleration": Parameter({"WP_ACC_CNR": 1.0, "WPNAV_ACCEL_C": 0.01}, 0.0),
     "jerk": Parameter({"WP_JERK": 1.0, "WPNAV_JERK": 1.0}, 0.1),
     "radius": Parameter({"WP_RADIUS_M": 1.0, "WPNAV_RADIUS": 0.01}, 0.05),
+    "lean_angle": Parameter(
+        {"ATC_ANGLE_MAX": math.radians(1.0), "ANGLE_MAX": math.radians(0.01)}, math.radians(5.0)
+    ),
+    "input_time": Parameter({"ATC_INPUT_TC": 1.0}, 0.0),
+    "position_gain": Parameter({"PSC_NE_POS_P": 1.0, "PSC_POSXY_P": 1.0}, 0.1),
+    "velocity_gain": Parameter({"PSC_NE_VEL_P": 1.0, "PSC_VELXY_P": 1.0}, 0.1),
+    "velocity_integral": Parameter({"PSC_NE_VEL_I": 1.0, "PSC_VELXY_I": 1.0}, 0.0),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class ArduCopter:
-    """How ArduCopter flies plain and spline waypoints in AUTO, without wind.
+    """ArduCopter 4.1 and later in AUTO, without wind. SI units; the defaults are its own.
 
-    Every leg is planned as if it began and ended at rest, with jerk-limited ramps (`ramp`,
-    `leg`). At a corner the next leg begins before this one ends, and the aircraft is where the
-    sum of both is: by tau = min(D, 2 t(s)), D the ramp's duration and t(s) the time in which a
-    ramp from rest covers s = R / (2 sin(theta / 2)); the point counts as passed tau / 2 before
-    the end. Limits are SI: m, m/s, m/s², m/s³; the defaults are those of ArduCopter 4.7.
-    Fitted to recorded flights: `ramp.JERK_LAG`, `leg.SWITCH_LAG`, and the lags of this module.
+    What is flown: a target moves along jerk-limited legs, each planned from rest to rest, which
+    overlap at corners; its clock waits for an aircraft that falls behind; a position controller
+    with limited lean angle follows it. The aircraft therefore starts late, overshoots stops by up
+    to a metre, and comes to its full speed only seconds after its target. Acceptance radii of
+    waypoints are not stored by this autopilot, so `FlightPath.radii` do not count; holds are
+    whole seconds (fractions are dropped), delays are kept to the fraction.
+
+    `corner_acceleration` 0 stands for twice `acceleration`. `lean_angle` is in radians, the gains
+    are those of the horizontal position controller. `east_metre` and `north_metre` are its metres
+    per metre: it takes the Earth for a sphere. The last three describe the aircraft and are no
+    parameters of the autopilot: the time constant of leaning, s, and the drag per mass
+    `linear_drag` v + `quadratic_drag` v², m/s². They are fitted to flights of the autopilot's
+    simulated quadrotor.
     """
 
     calibrated: ClassVar[bool] = True
@@ -65,162 +66,147 @@ class ArduCopter:
     descent_speed: float = 1.5
     acceleration: float = 2.5
     climb_acceleration: float = 1.0
+    corner_acceleration: float = 0.0
     jerk: float = 1.0
     radius: float = 2.0
+    lean_angle: float = math.radians(30)
+    input_time: float = 0.15
+    position_gain: float = 1.0
+    velocity_gain: float = 2.0
+    velocity_integral: float = 1.0
+    east_metre: float = 1.0
+    north_metre: float = 1.0
+    lag: float = 0.17
+    linear_drag: float = 0.28
+    quadratic_drag: float = 0.026
 
     @classmethod
-    def from_vehicle(cls, vehicle: Vehicle) -> "ArduCopter":
+    def from_vehicle(cls, vehicle: Vehicle, latitude: float | None = None) -> "ArduCopter":
         """Return the model with the limits that `vehicle.parameters` set, of either generation.
 
+        With the `latitude` of the flight, degrees, it counts metres as the autopilot does.
         Raises `InputError` for a value that is too small to fly with or not finite.
         """
-        return cls(**limits_of(vehicle, _PARAMETERS))
+        model = cls(**limits_of(vehicle, _PARAMETERS))
+        return model if latitude is None else replace(model, **_metres(latitude))
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
 
-        Holds lose their fractions, delays keep them.
+        Raises `InputError` for speeds that are not positive, and for what is not finite.
         """
         waits = np.floor(path.holds) + path.delays
+        _check(path, waits, step)
         return self.fly_many(path, path.speeds[None], waits[None], step)[0]
 
     def fly_many(
-        self, path: FlightPath, speeds: Real, waits: Real, step: float = 0.1
+        self,
+        path: FlightPath,
+        speeds: Real,
+        waits: Real,
+        step: float = 0.1,
+        *,
+        rough: bool = False,
     ) -> Sequence[Flown]:
-        """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s."""
-        flight = _Flight.along(self, path, speeds, waits)
-        ends = flight.departures[:, -1]
-        t = step * np.arange(int(np.ceil(ends.max() / step)) + 2, dtype=np.float64)
-        position, velocity = flight.sampled(t)
-        return [
-            Flown(flight.arrivals[k], flight.departures[k], t, position[k], velocity[k])
-            for k in range(len(speeds))
-        ]
+        """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s.
+
+        A `rough` flight is that of the target, as if it never waited for the aircraft.
+        """
+        stopping = np.any(waits > 0, axis=0)
+        stopping[[0, -1]] = True
+        scale = np.array([self.east_metre, self.north_metre, 1.0])
+        router = Router(path.points * scale, path.splines, stopping, self._bounds())
+        fly = _target if rough else self._followed
+        flights = []
+        for speed, wait in zip(speeds.tolist(), waits.tolist(), strict=True):
+            flown = fly(router.course(speed, wait), step)
+            flights.append(
+                replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
+            )
+        return flights
+
+    def _followed(self, course: Course, step: float) -> Flown:
+        """Return the flight of the aircraft after its target."""
+        grid = grid_of(course)
+        target = course.motion(grid, 2)
+        pursuit = pursue(course, table_of(target), self._follower(), self.acceleration / self.jerk)
+        arrivals = np.interp(course.passed, pursuit.clock, pursuit.t)
+        departures = _stopped(course, arrivals, pursuit.arrivals)
+        motion = np.column_stack(
+            [
+                pursuit.position,
+                np.interp(pursuit.clock, grid, target[:, 2]),
+                pursuit.velocity,
+                pursuit.rate * np.interp(pursuit.clock, grid, target[:, 5]),
+            ]
+        )
+        t = _times(departures, step)
+        flown = np.column_stack([np.interp(t, pursuit.t, column) for column in motion.T])
+        return Flown(arrivals, departures, t, flown[:, :3], flown[:, 3:])
+
+    def _bounds(self) -> Bounds:
+        return Bounds(
+            up=self.climb_speed,
+            down=self.descent_speed,
+            acceleration=self.acceleration,
+            vertical=self.climb_acceleration,
+            corner=self.corner_acceleration or 2 * self.acceleration,
+            jerk=self.jerk,
+            rise=2 * max(self.input_time, _LEAST_INPUT_TIME),
+            radius=self.radius,
+        )
+
+    def _follower(self) -> Follower:
+        return Follower(
+            position=self.position_gain,
+            velocity=self.velocity_gain,
+            integral=self.velocity_integral,
+            lean=_G * math.tan(self.lean_angle),
+            lag=self.lag,
+            linear=self.linear_drag,
+            quadratic=self.quadratic_drag,
+        )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Flight:
-    """Sections with their legs and the times (B,) at which these begin."""
-
-    points: Real
-    parts: list[Section]
-    legs: list[Leg]
-    begins: list[Real]
-    arrivals: Real
-    departures: Real
-
-    @classmethod
-    def along(cls, model: ArduCopter, path: FlightPath, speeds: Real, waits: Real) -> "_Flight":
-        stops = np.any(waits > 0, axis=0)
-        stops[[0, -1]] = True
-        parts = list(sections(path.points, path.splines, stops))
-        lag = HOLD_LAG + HOLD_LAG_PER_RISE * model.acceleration / model.jerk
-        arrivals, departures = np.zeros_like(waits), np.zeros_like(waits)
-        departures[:, 0] = waits[:, 0]
-        begin = departures[:, 0] + np.where(waits[:, 0] > 0, lag, START_LAG)
-        before = model.cruise_speed if math.isnan(path.before) else path.before
-        commanded = np.full(len(speeds), before)
-        legs, begins, tau = [], [], 0 * begin
-        for part, after in zip_longest(parts, parts[1:]):
-            share, acceleration = _along(model, part)
-            old, new = commanded, _commanded(part, speeds)
-            commanded = new
-            if (waits[:, part.first] > 0).any() or part.spline:
-                new = np.minimum(new, share)
-                leg = plain_leg(part.length, new, acceleration, model.jerk)
-            else:
-                old, new = np.minimum(old, share), np.minimum(new, share)
-                leg = changed_leg(part.length, old, new, tau / 2, acceleration, model.jerk)
-            if part.spline and stops[part.first]:
-                begin = begin + SPLINE_START
-            legs.append(leg)
-            begins.append(begin)
-            end = begin + leg.duration
-            k = part.last
-            if part.spline:
-                _pass(leg, begin, part, arrivals, departures)
-            if after is None or stops[k]:
-                arrivals[:, k] = end + STOP_LAG
-                departures[:, k] = arrivals[:, k] + waits[:, k]
-                begin = departures[:, k] + lag
-            else:
-                # the next leg is planned before its own speed is commanded
-                room, up = _along(model, after)
-                top = top_speed(
-                    np.full_like(new, after.length), np.minimum(commanded, room), up, model.jerk
-                )
-                ramp = Ramp.between(0 * top, top, up, model.jerk)
-                half = _half_turn(part.direction(part.way[-1]), after.direction(after.way[0]))
-                cut = model.radius / (2 * max(half, 1e-9))
-                tau = np.minimum(
-                    np.minimum(ramp.duration, leg.last.duration),
-                    2 * ramp.time_to(np.full_like(top, cut)),
-                )
-                begin = end - tau + _loss(half, max(acceleration, up))
-                change = np.abs(_commanded(after, speeds) - commanded)
-                begin = begin + CHANGE_LAG * np.minimum(1.0, change)
-                arrivals[:, k] = departures[:, k] = end - tau / 2 + PASS_LAG
-        return cls(path.points, parts, legs, begins, arrivals, departures)
-
-    def sampled(self, t: Real) -> tuple[Real, Real]:
-        """Return positions and velocities (B, k, 3) at the times `t` (k,)."""
-        count = len(self.arrivals)
-        position = np.tile(self.points[0], (count, len(t), 1)).astype(float)
-        velocity = np.zeros_like(position)
-        for part, leg, begin in zip(self.parts, self.legs, self.begins, strict=True):
-            if leg.length == 0:
-                continue
-            first = int(np.searchsorted(t, begin.min()))
-            last = int(np.searchsorted(t, (begin + leg.duration).max()))
-            along, speed = leg.at(t[first:last] - begin[:, None])
-            position[:, first:last] += part.at(along) - part.curve[0]
-            velocity[:, first:last] += speed[..., None] * part.direction(along)
-            position[:, last:] += part.curve[-1] - part.curve[0]
-        return position, velocity
-
-
-def _commanded(part: Section, speeds: Real) -> Real:
-    """Return the speed (B,) flown on a section; a run of splines has the mean of its speeds."""
-    mean: Real = speeds[:, part.first : part.last].mean(axis=1)
-    return (1 - SPLINE_TURN * part.turn) * mean if part.spline else mean
-
-
-def _pass(leg: Leg, begin: Real, part: Section, arrivals: Real, departures: Real) -> None:
-    """Fill in when the points within a run of splines are passed."""
-    t = leg.duration[:, None] * np.linspace(0.0, 1.0, 20 * len(part.passed) + 1)
-    ways = leg.at(t)[0]
-    for k in range(len(begin)):
-        passed = begin[k] + np.interp(part.passed[:-1], ways[k], t[k])
-        inner = slice(part.first + 1, part.last)
-        arrivals[k, inner] = departures[k, inner] = passed + PASS_LAG
-
-
-def _along(model: ArduCopter, part: Section) -> tuple[float, float]:
-    """Return the limits of speed (m/s) and acceleration (m/s²) along a section that may climb."""
-    if part.length == 0:
-        return np.inf, model.acceleration
-    up = float(part.curve[-1, 2] - part.curve[0, 2]) / part.length
-    level = math.sqrt(max(0.0, 1 - up**2))
-    vertical = model.climb_speed if up > 0 else model.descent_speed
-    speed = vertical / abs(up) if up else np.inf
-    acceleration = min(
-        model.acceleration / level if level else np.inf,
-        model.climb_acceleration / abs(up) if up else np.inf,
+def _target(course: Course, step: float) -> Flown:
+    """Return the flight of the target, whose clock only stands still where it has to wait."""
+    times = [stop.time for stop in course.stops]
+    waited = np.cumsum([course.wait] + [stop.wait for stop in course.stops])
+    arrivals = course.passed + waited[np.searchsorted(times, course.passed)]
+    departures = _stopped(course, arrivals, waited[:-1] + times)
+    t = _times(departures, step)
+    knots = np.column_stack([times + waited[:-1], times + waited[1:]]).ravel()
+    clock = np.interp(
+        t, np.append([0.0, course.wait], knots), np.append([0.0, 0.0], np.repeat(times, 2))
     )
-    return speed, acceleration
+    motion = course.motion(clock, 1)
+    return Flown(arrivals, departures, t, motion[:, :3], motion[:, 3:])
 
 
-def _loss(half_turn: float, acceleration: float) -> float:
-    """Return what a corner costs beyond its geometry, s, at sin(theta / 2) = `half_turn`.
+def _stopped(course: Course, arrivals: Real, stops: Real) -> Real:
+    """Put the arrivals at `stops`, s, into `arrivals` (m,); return the departures (m,)."""
+    departures = arrivals.copy()
+    arrivals[0], departures[0] = 0.0, course.wait
+    for stop, arrival in zip(course.stops, stops.tolist(), strict=True):
+        arrivals[stop.point], departures[stop.point] = arrival, arrival + stop.wait
+    return departures
 
-    A turn back on itself costs REVERSAL / 2; and where the ramps of both legs together ask for
-    more than the lean limit gives, the aircraft falls behind and the autopilot waits for it.
-    """
-    asked = 2 * acceleration * half_turn / LEAN_ACCELERATION
-    return REVERSAL * max(0.0, half_turn**2 - 0.5) + OVERLOAD * math.sqrt(max(0.0, asked - 1))
+
+def _times(departures: Real, step: float) -> Real:
+    return step * np.arange(math.ceil(departures[-1] / step - 1e-9) + 1)
 
 
-def _half_turn(before: Real, after: Real) -> float:
-    """Return sin(theta / 2) of the turn between two directions; 0 if one has no length."""
-    cosine = float(before @ after) if before.any() and after.any() else 1.0
-    return math.sqrt(max(0.0, (1 - cosine) / 2))
+def _metres(latitude: float) -> dict[str, float]:
+    """The autopilot's metres per metre of WGS84 at `latitude` degrees."""
+    a, e2 = 6_378_137.0, 6.69437999014e-3
+    w = 1 - e2 * math.sin(math.radians(latitude)) ** 2
+    degree = math.pi / 180 * a / math.sqrt(w)
+    return {"east_metre": _DEGREE / degree, "north_metre": _DEGREE * w / (degree * (1 - e2))}
+
+
+def _check(path: FlightPath, waits: Real, step: float) -> None:
+    finite = all(np.all(np.isfinite(values)) for values in (path.points, path.speeds, waits))
+    if not (finite and np.all(path.speeds > 0) and np.all(waits >= 0) and step > 0):
+        raise InputError(
+            "flight path: expected finite points, speeds and steps above 0, and holds of 0 or more"
+        )

@@ -1,87 +1,160 @@
-"""Changes of speed within limits of acceleration and jerk, for many flights at once.
+"""Jerk-limited changes of speed: the ramps that legs are made of.
 
-The acceleration of a ramp is a trapezoid: it rises for r = a / J + t_j, stays at a, and falls for
-r. t_j is what ArduCopter takes beyond the ideal jerk-limited change, for the jerk itself has to
-be built up. A change dv that is large enough takes D = dv / A + r; a smaller one never reaches A:
-its peak a follows from a²/J + a t_j = dv, and D = 2 r.
+The jerk of a ramp rises and falls along half a cosine instead of stepping: in a phase of T seconds
+it is j(t) = c + d cos(pi t / T), with (c, d) = (J, -J)/2 for the rise to J, (J, J)/2 for the fall
+from it and (J, 0) while it is kept. A ramp has seven phases: the jerk rises, is kept and falls; the
+acceleration is steady; and the first three again with the opposite sign. It is symmetric about its
+middle, so its length is its mean speed times its duration.
 """
 
+import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
-import numpy as np
-
-from faao_mav.arrays import Real
-
-JERK_LAG = 0.30
-"""t_j, s: measured on ArduCopter 4.7."""
-
-_NEWTON = 8
-_TINY = 1e-12
+Phase: TypeAlias = tuple[float, float, float]
+"""(T, c, d): T seconds with the jerk c + d cos(pi t / T)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ramp:
-    """Speeds from `v0` to `v1`, m/s, with peak acceleration `a`, m/s², rise `r` and duration, s."""
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What bounds the motion along a leg: m/s, m/s², m/s³.
 
-    v0: Real
-    v1: Real
-    a: Real
-    r: Real
-    duration: Real
+    `rise` is t_j, s, in which the jerk goes from 0 to `jerk`: it stands for the time the aircraft
+    takes to lean.
+    """
 
-    @classmethod
-    def between(cls, v0: Real, v1: Real, acceleration: float, jerk: float) -> "Ramp":
-        """Return the quickest ramp; all arguments broadcast."""
-        change = np.abs(v1 - v0)
-        peak = jerk * (np.sqrt(JERK_LAG**2 + 4 * change / jerk) - JERK_LAG) / 2
-        a = np.minimum(peak, acceleration)
-        r = a / jerk + JERK_LAG
-        duration = np.where(peak >= acceleration, change / acceleration + r, 2 * r)
-        return cls(v0, v1, a, r, np.where(change > _TINY, duration, 0.0))
+    speed: float
+    acceleration: float
+    jerk: float
+    rise: float
 
     @property
-    def length(self) -> Real:
-        """The way that the ramp takes, m: the mean speed times the duration, by symmetry."""
-        return (self.v0 + self.v1) / 2 * self.duration
+    def snap(self) -> float:
+        """The largest rate of change of the jerk, pi J / (2 t_j), m/s⁴."""
+        return math.pi * self.jerk / (2 * self.rise)
 
-    def at(self, t: Real) -> tuple[Real, Real]:
-        """Return way (m) and speed (m/s) `t` seconds after the beginning; t (..., k).
-
-        Before it the way is 0, after it that of the whole ramp.
-        """
-        v0, a, r, duration = (x[..., None] for x in (self.v0, self.a, self.r, self.duration))
-        sign = np.where(self.v1 >= self.v0, 1.0, -1.0)[..., None]
-        t = np.clip(t, 0.0, duration)
-        rise = np.minimum(t, r)
-        flat = np.clip(t - r, 0.0, np.maximum(duration - 2 * r, 0.0))
-        fall = np.clip(t - (duration - r), 0.0, r)
-        first, second = a * r / 2, a * (r / 2 + np.maximum(duration - 2 * r, 0.0))
-        way = a * rise**3 / (6 * r) + (first + a * flat / 2) * flat
-        way += second * fall + a * fall**2 / 2 - a * fall**3 / (6 * r)
-        gain = a * rise**2 / (2 * r) + a * flat + a * fall - a * fall**2 / (2 * r)
-        return v0 * t + sign * way, v0 + sign * gain
-
-    def time_to(self, way: Real) -> Real:
-        """Return how long a ramp from rest takes for `way` (m), at most half its duration, s."""
-        a, r = self.a, np.maximum(self.r, _TINY)
-        rising = np.cbrt(6 * r * way / np.maximum(a, _TINY))
-        beyond = np.maximum(way - a * r**2 / 6, 0.0) / np.maximum(a, _TINY)
-        flat = r - r / 2 + np.sqrt(r**2 / 4 + 2 * beyond)
-        return np.minimum(np.where(rising <= r, rising, flat), self.duration / 2)
+    def at(self, speed: float) -> "Limits":
+        """Return these limits with another speed."""
+        return Limits(speed, self.acceleration, self.jerk, self.rise)
 
 
-def top_speed(length: Real, speed: Real, acceleration: float, jerk: float) -> Real:
-    """Return the speed, at most `speed`, that a leg of `length` (m) reaches from rest to rest.
+@dataclass(frozen=True, slots=True)
+class Ramp:
+    """A change from the speed `low` to `high` >= `low`, or its mirror image.
 
-    The leg has to hold both ramps: v D(v) <= length.
+    `jerk` is the largest jerk; `rise`, `kept` and `steady` are how long it takes to rise, is kept,
+    and how long the largest acceleration lasts, s.
     """
-    lag = acceleration / jerk + JERK_LAG
-    long = acceleration * (np.sqrt(lag**2 + 4 * length / acceleration) - lag) / 2
-    # 2 a (a / J + t_j)² = length for the peak a of ramps that do not reach the limit; from above
-    # this cubic is convex, and Newton's method falls on its root
-    a = np.cbrt(length * jerk**2 / 2)
-    for _ in range(_NEWTON):
-        r = a / jerk + JERK_LAG
-        a = a - (2 * a * r**2 - length) / (2 * r**2 + 4 * a * r / jerk)
-    short = a * (a / jerk + JERK_LAG)
-    return np.minimum(speed, np.where(long >= acceleration * lag, long, short))
+
+    low: float
+    high: float
+    jerk: float
+    rise: float
+    kept: float
+    steady: float
+
+    @property
+    def peak(self) -> float:
+        """The largest acceleration, m/s²."""
+        return self.jerk * (self.rise + self.kept)
+
+    @property
+    def duration(self) -> float:
+        """D = dv/a + a/J + t_j, s."""
+        return 4 * self.rise + 2 * self.kept + self.steady
+
+    @property
+    def length(self) -> float:
+        """(v0 + v1)/2 D, m."""
+        return (self.low + self.high) / 2 * self.duration
+
+    def phases(self, *, down: bool = False) -> list[Phase]:
+        """Return the phases that last, from `low` to `high`, or from `high` to `low`."""
+        jerk = -self.jerk if down else self.jerk
+        half = jerk / 2
+        phases = [
+            (self.rise, half, -half), (self.kept, jerk, 0.0), (self.rise, half, half),
+            (self.steady, 0.0, 0.0),
+            (self.rise, -half, half), (self.kept, -jerk, 0.0), (self.rise, -half, -half),
+        ]  # fmt: skip
+        return [phase for phase in phases if phase[0] > 0]
+
+
+def ramp_from_rest(limits: Limits, room: float) -> Ramp:
+    """Return the ramp from rest to the highest speed that `limits` and `room` metres allow.
+
+    With the full jerk and the peak acceleration a, v = a (a/J + t_j + steady) over v/2 D. Where
+    less is enough the snap s stays and t_j shrinks: a = 2 s t_j²/pi, v = 2 a t_j, 2 v t_j metres.
+    """
+    A, J, rise, snap = limits.acceleration, limits.jerk, limits.rise, limits.snap
+    shorter = min(
+        (room * math.pi / (8 * snap)) ** 0.25,
+        (limits.speed * math.pi / (4 * snap)) ** (1 / 3),
+        math.sqrt(A * math.pi / (2 * snap)),
+    )
+    if shorter < rise:
+        rise, J = shorter, 2 * snap * shorter / math.pi
+        A = J * rise
+    speed = min(limits.speed, _reached(A, J, rise, room))
+    return _ramp(0.0, speed, A, J, rise)
+
+
+def ramp_between(low: float, high: float, limits: Limits, room: float) -> Ramp:
+    """Return the ramp from `low` > 0 up to `high`, or to what `room` metres allow.
+
+    t_j is kept: a change too small for the full jerk has a smaller one. Without room for any the
+    ramp takes no time.
+    """
+    A, rise = limits.acceleration, limits.rise
+    J = min(limits.jerk, A / rise)
+    change = high - low
+    if change <= 0 or 4 * rise * low >= room:
+        return Ramp(low, low, 0.0, 0.0, 0.0, 0.0)
+    if (low + change / 2) * _duration(change, A, J, rise) > room:
+        least, most = 0.0, change
+        for _ in range(50):
+            change = (least + most) / 2
+            if (low + change / 2) * _duration(change, A, J, rise) > room:
+                most = change
+            else:
+                least = change
+        change = least
+    return _ramp(low, low + change, A, J, rise)
+
+
+def _ramp(low: float, high: float, A: float, J: float, rise: float) -> Ramp:
+    change = high - low
+    if change <= 2 * J * rise**2:
+        return Ramp(low, high, change / (2 * rise**2), rise, 0.0, 0.0)
+    peak = min(A, _peak(change, J, rise))
+    steady = max(0.0, change / peak - peak / J - rise)
+    return Ramp(low, high, J, rise, max(0.0, peak / J - rise), steady)
+
+
+def _peak(change: float, J: float, rise: float) -> float:
+    """The acceleration a with a²/J + a t_j = change: a ramp without a steady phase."""
+    return J * (math.sqrt(rise**2 + 4 * change / J) - rise) / 2
+
+
+def _duration(change: float, A: float, J: float, rise: float) -> float:
+    if change <= 2 * J * rise**2:
+        return 4 * rise
+    a = min(A, _peak(change, J, rise))
+    return change / a + a / J + rise
+
+
+def _reached(A: float, J: float, rise: float, room: float) -> float:
+    """The speed reached from rest in `room` metres, with t_j and at most A."""
+    b = A / J + rise
+    speed = A * (math.sqrt(b**2 + 8 * room / A) - b) / 2
+    if speed >= A * b:
+        return speed
+    # a (a/J + t_j)² = room is convex and rising in a: Newton's steps come down from A
+    a = A
+    for _ in range(30):
+        q = a / J + rise
+        step = (a * q * q - room) / (q * (q + 2 * a / J))
+        a -= step
+        if abs(step) <= 1e-13 * A:
+            break
+    return a * (a / J + rise)

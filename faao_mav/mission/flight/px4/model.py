@@ -77,9 +77,15 @@ class Px4:
         return self.fly_many(path, path.speeds[None], (path.holds + path.delays)[None], step)[0]
 
     def fly_many(
-        self, path: FlightPath, speeds: ArrayLike, waits: ArrayLike, step: float = 0.1
+        self,
+        path: FlightPath,
+        speeds: ArrayLike,
+        waits: ArrayLike,
+        step: float = 0.1,
+        *,
+        rough: bool = False,  # noqa: ARG002
     ) -> Sequence[Flown]:
-        """Return the flights of `fly_batch` one by one."""
+        """Return the flights of `fly_batch` one by one; `rough` ones are the same."""
         many = self.fly_batch(path, speeds, waits, step)
         return [
             Flown(many.arrivals[k], many.departures[k], many.t, many.position[k], many.velocity[k])

@@ -1,0 +1,125 @@
+"""Spline legs: cubic Hermite curves flown as fast as their bends allow."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Real
+
+_SCALE = 4.0
+"""The tangents at both ends together are at most so many times as long as the chord."""
+
+_SPACING = 0.5
+"""Metres between the points at which a curve is evaluated, about."""
+
+
+@dataclass(frozen=True, slots=True)
+class SplineLimits:
+    """Speeds across the ground, up and down, m/s, and accelerations across and up or down, m/s².
+
+    A spline uses half of either acceleration along the curve and half across it.
+    """
+
+    horizontal: float
+    up: float
+    down: float
+    acceleration: float
+    vertical: float
+
+    def speed(self, directions: Real) -> Real:
+        """Return the largest speeds (k,) along the unit vectors `directions` (k, 3)."""
+        rising = directions[:, 2] >= 0
+        return _within(directions, self.horizontal, np.where(rising, self.up, self.down))
+
+    def halved(self, directions: Real) -> Real:
+        """Return half of the largest accelerations (k,) along unit vectors (k, 3)."""
+        return _within(directions, self.acceleration, self.vertical) / 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """Points (k, 3) of a spline leg, m, with unit tangents (k, 3), and what bounds the speed there.
+
+    `curvature` (k, 3) is the vector d tangent / d length, 1/m; `lengths` (k - 1,) are those between
+    the points, m.
+    """
+
+    points: Real
+    tangents: Real
+    curvature: Real
+    lengths: Real
+
+    def allowed(self, limits: SplineLimits) -> Real:
+        """Return the speeds (k,), m/s, at which v² |curvature| is half the acceleration."""
+        bend = np.maximum(np.linalg.norm(self.curvature, axis=1), 1e-12)
+        bent: Real = np.sqrt(limits.halved(self.curvature / bend[:, None]) / bend)
+        return np.minimum(limits.speed(self.tangents), bent)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurvedLeg:
+    """A flown spline leg: when (k,), s from its beginning, the target passes the curve's points."""
+
+    curve: Curve
+    times: Real
+    speeds: Real
+
+    @property
+    def duration(self) -> float:
+        """From the beginning to the end, s."""
+        return float(self.times[-1])
+
+    @property
+    def final(self) -> float:
+        """The speed at the end, m/s."""
+        return float(self.speeds[-1])
+
+
+def hermite(origin: Real, destination: Real, leaving: Real, arriving: Real) -> Curve:
+    """Return the cubic from `origin` to `destination` (3,) with these tangents at the ends."""
+    chord = float(np.linalg.norm(destination - origin))
+    tangents = float(np.linalg.norm(leaving) + np.linalg.norm(arriving))
+    scale = min(1.0, _SCALE * chord / tangents) if tangents > 0 else 1.0
+    leaving, arriving = scale * leaving, scale * arriving
+    step = destination - origin
+    quadratic = 3 * step - 2 * leaving - arriving
+    cubic = leaving + arriving - 2 * step
+    x = np.linspace(0.0, 1.0, 1 + int(np.clip(np.ceil(chord / _SPACING), 16, 200)))[:, None]
+    points = origin + x * (leaving + x * (quadratic + x * cubic))
+    # the derivatives vanish at an end at rest: the direction is that of the next order there
+    inside = np.clip(x, 1e-6, 1 - 1e-6)
+    first = leaving + inside * (2 * quadratic + 3 * inside * cubic)
+    second = 2 * quadratic + 6 * inside * cubic
+    speed = np.linalg.norm(first, axis=1)[:, None]
+    cusp = speed < 1e-9 * chord
+    first, speed = np.where(cusp, step, first), np.where(cusp, chord, speed)
+    unit = first / speed
+    across = second - unit * np.sum(second * unit, axis=1)[:, None]
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return Curve(points, unit, across / speed**2, lengths)
+
+
+def flown(curve: Curve, limits: SplineLimits, start: float, end: float) -> CurvedLeg:
+    """Return how the target moves along `curve` from the speed `start` to at most `end`, m/s.
+
+    At every point it is at most as fast as the bend allows and as it could brake, over the
+    straight line to the end, to `end`; its speed changes by half the acceleration at most.
+    """
+    slope = limits.halved(curve.tangents)
+    left = np.linalg.norm(curve.points[-1] - curve.points, axis=1)
+    wanted = np.minimum(curve.allowed(limits) ** 2, 2 * slope * left + end**2)
+    squares = [start**2]
+    for aim, change in zip(
+        wanted[1:].tolist(), (2 * slope[1:] * curve.lengths).tolist(), strict=True
+    ):
+        now = squares[-1]
+        squares.append(min(max(aim, now - change), now + change))
+    speeds = np.sqrt(np.maximum(squares, 0.0))
+    spans = 2 * curve.lengths / np.maximum(speeds[1:] + speeds[:-1], 1e-3)
+    return CurvedLeg(curve, np.concatenate([[0.0], np.cumsum(spans)]), speeds)
+
+
+def _within(directions: Real, across: float, vertical: Real | float) -> Real:
+    ground = np.hypot(directions[:, 0], directions[:, 1])
+    up = np.abs(directions[:, 2])
+    return np.minimum(across / np.maximum(ground, 1e-12), vertical / np.maximum(up, 1e-12))
