@@ -1,14 +1,14 @@
 """From a trajectory to the mission whose predicted flight keeps it, in space and time."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from faao_mav.mission.assemble import assemble
-from faao_mav.mission.autopilot import legs_of
+from faao_mav.mission.autopilot import Legs, legs_of
 from faao_mav.mission.flight import copter_model
 from faao_mav.mission.item import Mission
-from faao_mav.mission.outline import plan_route
+from faao_mav.mission.outline import Splines, plan_route
 from faao_mav.mission.recommend import FASTEST, candidates
 from faao_mav.mission.run_in import with_run_in
 from faao_mav.mission.schedule import Schedule, Scheduler
@@ -17,14 +17,14 @@ from faao_mav.mission.vehicle import Vehicle, vehicle_of
 if TYPE_CHECKING:
     from faao_mav.faao.solution import Solution
 
-_SPLINE_SPACING, _SPLINE_TIME = 15.0, 3.0
+_SPLINE_SPACING, _SPLINE_TIMES = 10.0, (2.0, 3.0)
 """Metres, and seconds of flight, between spline waypoints at least."""
 
-_ASTRAY = 5.0
-"""Metres of rms error that one metre beyond the path tolerance weighs."""
+_BRAKING = 1.1
+"""Of v²/a: splines use half of the acceleration."""
 
 _GOOD = 1.5
-"""Metres of rms error at equal times that no better parameters are sought for."""
+"""Metres of error that no better parameters are sought for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,44 +43,51 @@ class Conversion:
 def convert(solution: "Solution") -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
-    The sets of parameters that `recommend` proposes are compared by the rms error at equal times
-    on the first legs, and refined in that order until one is good.
+    The sets of parameters that `recommend` proposes are compared by the error of the first legs,
+    and refined in that order until one is good. ArduPilot with its own parameters may also fly
+    splines, everywhere or where legs are too short for their speed.
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     plan, t, w = solution.plan, solution.t, solution.w
     top = min(plan.vehicle.max_speed, FASTEST)
-    given, outlines = vehicle_of(plan), [plan_route(t, w, plan)]
+    given = vehicle_of(plan)
+    outlines = [plan_route(t, w, plan)]
     if plan.mission.parameters == "keep" and given.autopilot == "ardupilot":
-        spacing = max(_SPLINE_SPACING, _SPLINE_TIME * top)
-        outlines.append(plan_route(t, w, plan, spline_spacing=spacing))
+        outlines += [plan_route(t, w, plan, splines=s) for s in _splines(legs_of(given), top)]
     tried = []
     for parameters in candidates(plan):
         vehicle = replace(given, parameters={**given.parameters, **parameters})
         legs = legs_of(vehicle)
-        scheduler = Scheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top)
+        scheduler = Scheduler(
+            t,
+            w,
+            copter_model(vehicle, plan.origin.latitude),
+            legs,
+            top,
+            plan.mission.path_tolerance,
+        )
         for route in outlines:
             first = scheduler.first(with_run_in(route, t, w, legs, top))
             tried.append((first, scheduler, vehicle, parameters))
-    tried.sort(key=lambda trial: trial[0].rms)
+    tried.sort(key=lambda trial: trial[0].error)
     best: Conversion | None = None
-    cost: float | None = None
-    limit = plan.mission.path_tolerance
     for first, scheduler, vehicle, parameters in tried:
         schedule = scheduler.refined(first)
-        schedule_cost = _cost(schedule, limit)
-        if cost is None or schedule_cost < cost:
-            cost = schedule_cost
+        if best is None or schedule.cost < best.schedule.cost:
             best = Conversion(assemble(schedule.route, plan), schedule, vehicle, parameters)
-        if cost <= _GOOD:
+        if best.schedule.cost <= _GOOD:
             break
     assert best is not None
     return best
 
 
-def _cost(schedule: Schedule, limit: float) -> float:
-    """Return the rms error, m, with what the path error exceeds `limit` by, heavily."""
-    found = schedule.deviation
-    return found.rms + _ASTRAY * max(0.0, found.path - limit)
+def _splines(straight: Legs, speed: float) -> Iterator[Splines]:
+    """Yield what may be splines on a flight at `speed` m/s: all, or some."""
+    braking = _BRAKING * speed**2 / straight.acceleration
+    for seconds in _SPLINE_TIMES:
+        spacing = max(_SPLINE_SPACING, seconds * speed)
+        yield Splines(spacing, braking)
+        yield Splines(spacing, braking, straight)
 
 
 def to_mission(solution: "Solution") -> Mission:

@@ -50,4 +50,20 @@ def astray(points: Real, path: Real) -> Real:
     return result
 
 
+def settled(t: Real, w: Real, end: Real, near: float, due: float) -> float:
+    """Return when a flight at `w` (k, 2) m at `t` (k,) s comes within `near` m of `end` for good.
+
+    One that goes on past `end` does so when it last comes near before it is closest. It may have
+    been there before: at `due`, s, it is expected there, and a metre nearer is worth two seconds.
+    """
+    apart = lengths(w - end)
+    arrived = int(np.argmin(apart + np.abs(t - due) / 2))
+    outside = np.flatnonzero(apart[:arrived] > near)
+    if len(outside) == 0:
+        return float(t[0])
+    k = int(outside[-1])
+    share = (apart[k] - near) / (apart[k] - apart[k + 1])
+    return float(t[k] + max(0.0, min(1.0, share)) * (t[k + 1] - t[k]))
+
+
 _CELLS = 500_000  # pairs of point and leg held at once

@@ -1,7 +1,7 @@
 """The first legs for a trajectory: hovers become holds, the rest few legs at mean speeds."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
+from faao_mav.mission.autopilot import Legs
 from faao_mav.mission.hover import SLOWEST, Stop, find_hovers
 from faao_mav.mission.route import Route
 from faao_mav.mission.simplify import simplify
@@ -27,12 +28,32 @@ _MERGE_SHARE = 0.05
 _HOVER_RADIUS = 1.0
 """A hover's radius at most, m, however lax the path tolerance."""
 
+_FINE = 1.0
+"""Metres between the points at which bends are measured."""
+
+_TURN = 0.3
+"""Radians between two spline waypoints at most, unless they would be too close."""
+
+_SPARSER = 2.0
+
 _SAME_POINT = 1e-3
 """Ends closer than this are one waypoint, m."""
 
 
+@dataclass(frozen=True, slots=True)
+class Splines:
+    """Spline waypoints `spacing` m apart, where `straight` legs would be too short if given.
+
+    The last before a stop is at least `braking` m before it: autopilots brake on the last leg.
+    """
+
+    spacing: float
+    braking: float = 0.0
+    straight: Legs | None = None
+
+
 def plan_route(
-    t: ArrayLike, w: ArrayLike, plan: "Plan", *, spline_spacing: float | None = None
+    t: ArrayLike, w: ArrayLike, plan: "Plan", *, splines: Splines | None = None
 ) -> Route:
     """Return waypoints, holds and speeds that follow the trajectory.
 
@@ -43,35 +64,85 @@ def plan_route(
     `plan.vehicle.max_speed`. Ramps are not allowed for yet: `schedule` does that.
 
     `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
-    positions at those times, metres. With `spline_spacing` (m) all points after the first are
-    spline waypoints, that far apart. Raises `InputError` for what is no trajectory.
+    positions at those times, metres. With `splines` what they say is spline waypoints. Raises
+    `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
     tolerance = plan.mission.path_tolerance
     stops = _stops(times, positions, tolerance)
-    waypoints = [stops[0]]
+    waypoints, curved = [stops[0]], [False]
     for start, stop in pairwise(stops):
         stretch = slice(start.last, stop.first + 1)
         path = positions[stretch].copy()
         path[0], path[-1] = start.position, stop.position
-        if spline_spacing is None:
-            inner = simplify(path, _LEG_SHARE * tolerance)
-        else:
-            inner = _spaced(path, spline_spacing)
+        inner = simplify(path, _LEG_SHARE * tolerance)
+        marked = [False] * (len(inner) + 1)
+        if splines is not None:
+            inner, marked = _with_splines(times[stretch], path, inner, splines)
         waypoints += [Stop(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
+        curved += marked
     route = _timed(times, waypoints, plan.vehicle.max_speed)
-    if spline_spacing is None:
-        return route
-    return replace(route, splines=np.arange(len(waypoints)) > 0)
+    return replace(route, splines=np.array(curved))
 
 
-def _spaced(path: Real, spacing: float) -> list[int]:
-    """Return the indices between first and last that are about `spacing` (m) apart."""
+def _with_splines(
+    t: Real, path: Real, inner: list[int], splines: Splines
+) -> tuple[list[int], list[bool]]:
+    """Return indices of waypoints, and for each and the end whether it is a spline's.
+
+    Runs of legs between the points `inner` that are to be splines get points of their own.
+    """
+    ends = [0, *inner, len(path) - 1]
+    bent = np.ones(len(inner) + 1, dtype=bool)
+    if splines.straight is not None:
+        length = lengths(np.diff(path[ends], axis=0))
+        bent = length < splines.straight.shortest_leg(length / np.diff(t[ends]))
+        bent &= len(bent) > 1
+    points: list[int] = []
+    marked: list[bool] = []
+    first = 0
+    for k, is_bent in enumerate(bent):
+        runs_on = is_bent and k + 1 < len(bent) and bent[k + 1]
+        if runs_on:
+            continue
+        between = path[ends[first] : ends[k + 1] + 1]
+        braking = splines.braking if k + 1 == len(bent) else 0.0
+        spaced = _spaced(between, splines.spacing, braking) if is_bent else []
+        added = [ends[first] + i for i in spaced]
+        points += [*added, ends[k + 1]]
+        marked += [bool(is_bent)] * (len(added) + 1)
+        first = k + 1
+    return points[:-1], marked
+
+
+def _spaced(path: Real, spacing: float, last: float) -> list[int]:
+    """Return the indices between first and last of points that are `spacing` m apart in bends.
+
+    On straight parts they are up to `_SPARSER` times as far apart. The last point is at least
+    `last` m from the end, if there is one then.
+    """
     way = np.concatenate([[0.0], np.cumsum(lengths(np.diff(path, axis=0)))])
-    parts = max(1, round(float(way[-1]) / spacing))
-    found = np.searchsorted(way, np.linspace(0.0, way[-1], parts + 1)[1:-1])
+    end = float(way[-1]) - max(0.0, last - spacing)
+    if end <= 2 * _FINE:
+        return []
+    fine = np.linspace(0.0, end, math.ceil(end / _FINE) + 1)
+    x, y = (np.interp(fine, way, axis) for axis in path.T)
+    heading = np.unwrap(np.arctan2(*(np.gradient(_smooth(axis, spacing / 4)) for axis in (y, x))))
+    bend = np.abs(np.gradient(heading)) / _FINE
+    per_metre = np.clip(bend / _TURN, 1 / (_SPARSER * spacing), 1 / spacing)
+    count = np.cumsum(_smooth(per_metre, spacing)) * _FINE
+    parts = max(1, round(float(count[-1])))
+    wanted = np.interp(np.linspace(count[0], count[-1], parts + 1)[1:-1], count, fine)
+    found = np.searchsorted(way, wanted)
     return [int(k) for k in np.unique(found) if 0 < k < len(path) - 1]
+
+
+def _smooth(values: Real, reach: float) -> Real:
+    """Return the means of `values`, `_FINE` m apart, over `reach` m to both sides."""
+    half = min(round(reach / _FINE), (len(values) - 1) // 2)
+    padded = np.pad(values, half, mode="edge")
+    return np.convolve(padded, np.full(2 * half + 1, 1 / (2 * half + 1)), mode="valid")
 
 
 def _checked(t: ArrayLike, w: ArrayLike) -> tuple[Real, Real]:

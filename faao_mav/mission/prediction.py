@@ -8,8 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.faao.solution import Rates, Solution
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.delivery import delivered, nearest_slots
-from faao_mav.mission.deviation import deviation
-from faao_mav.mission.vector import lengths
+from faao_mav.mission.deviation import deviation, settled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,13 +51,14 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     """
     at = np.stack([np.interp(solution.t, t, x) for x in w.T], axis=-1)
     near, end = solution.plan.mission.path_tolerance, solution.w[-1]
-    arrived = _settled(t, w, end, near)
+    due = float(solution.t[-1])
+    arrived = settled(t, w, end, near, due)
     # a path flown late is the same path: it counts up to w_F
     within = (t >= solution.t[0]) & (t <= max(float(solution.t[-1]), arrived))
     apart = deviation(solution.w, at, w[within] if within.any() else at)
     I_U, I_G = delivered(solution, at)
     near_U, near_G = delivered(solution, at, nearest_slots(solution, at))
-    late = arrived - _settled(solution.t, solution.w, end, near)
+    late = arrived - settled(solution.t, solution.w, end, near, due)
     return Prediction(
         w=at,
         I_U=I_U,
@@ -69,15 +69,3 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
         max_position_error=apart.max,
         rms_position_error=apart.rms,
     )
-
-
-def _settled(t: Real, w: Real, end: Real, near: float) -> float:
-    """Return the time from which the aircraft stays within `near` of `end` until it leaves it."""
-    apart = lengths(w - end)
-    arrived = int(np.argmin(apart))  # a flight that goes on comes closest once
-    outside = np.flatnonzero(apart[:arrived] > near)
-    if len(outside) == 0:
-        return float(t[0])
-    k = int(outside[-1])
-    share = (apart[k] - near) / (apart[k] - apart[k + 1])
-    return float(t[k] + max(0.0, min(1.0, share)) * (t[k + 1] - t[k]))

@@ -16,7 +16,7 @@ from faao_mav.mission.deviation import Deviation, deviation
 from faao_mav.mission.flight import CopterModel, FlightPath, Flown
 from faao_mav.mission.hover import SLOWEST
 from faao_mav.mission.route import Route
-from faao_mav.mission.timing import SHORTEST_HOLD, Clock, fit
+from faao_mav.mission.timing import ON_TIME, SHORTEST_HOLD, Clock, fit
 from faao_mav.mission.vector import lengths
 
 ALLOWED = 0.8
@@ -39,10 +39,19 @@ _SETTLING = 3.0
 
 _ROUNDS = 5
 _WORTHWHILE = 0.98
-"""A round of splits has to bring the rms error below this share of what it was."""
+"""A round of splits has to bring the error below this share of what it was."""
 
 _ALIKE = (0.1, 0.03)
 """Speeds of neighbouring legs that differ by less, relatively, are tried as one."""
+
+_SPLINE_RUN = 3
+"""Splines that have one speed while it is sought."""
+
+_MOVED = 0.8
+"""Of what the aircraft strays."""
+
+_ASTRAY = 5.0
+"""Metres of error that one metre beyond the path tolerance weighs."""
 
 _DEARER = 1.05
 _SPEED_DIGITS, _HOLD_DIGITS = 2, 1
@@ -78,6 +87,16 @@ class Schedule:
         return float(np.sqrt(np.mean(lengths(self.positions(self.clock.t) - self.clock.w) ** 2)))
 
     @property
+    def error(self) -> float:
+        """That with what being late or early at the end weighs, m."""
+        return float(np.hypot(self.rms, ON_TIME * self.clock.late(self.flown)))
+
+    @property
+    def cost(self) -> float:
+        """That with what straying from the path too far weighs, m."""
+        return self.error + _ASTRAY * max(0.0, self.deviation.path - self.clock.near)
+
+    @property
     def deviation(self) -> Deviation:
         """How far that is from the plan."""
         t, w = self.clock.t, self.clock.w
@@ -92,7 +111,8 @@ class Scheduler:
 
     `t` (n,) s and `w` (n, 2) m are the plan; `legs` says how short a leg may be for its speed,
     and how wide its acceptance radius; no speed is above `max_speed`, m/s, unless the aircraft
-    would not keep up: then by at most a tenth.
+    would not keep up: then by at most a tenth. The flight is over when the aircraft is within
+    `tolerance` m of w_F.
     """
 
     t: Real
@@ -100,6 +120,7 @@ class Scheduler:
     model: CopterModel
     legs: Legs
     max_speed: float
+    tolerance: float
 
     def first(self, route: Route) -> Schedule:
         """Return `route` with the speeds and holds that fit best."""
@@ -112,16 +133,20 @@ class Scheduler:
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""
         best, top = first, self.max_speed
-        splines = bool(first.route.splines.any())
-        if best.rms > ALLOWED:  # corners cost time that only speed makes up for
+        if best.error > ALLOWED:  # corners cost time that only speed makes up for
             top *= _FASTER
             best = self._fitted(best.route, top)
-        for _ in range(0 if splines else _ROUNDS):
+        for _ in range(_ROUNDS):
             finer = self._finer(best, top)
             if finer is None:
                 break
             best = finer
-        return self._rounded(best if splines else self._shared(best, top), top)
+        for _ in range(_ROUNDS if best.route.splines.any() else 0):
+            moved = self._moved(best, top)
+            if moved.cost > _WORTHWHILE * best.cost:
+                break
+            best = moved
+        return self._rounded(self._shared(best, top), top)
 
     def _flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`."""
@@ -146,6 +171,7 @@ class Scheduler:
             point=route.first,
             at=at[route.first] - self.t[0],
             leaving=leaving,
+            near=self.tolerance,
             lead=route.lead,
         )
         return Schedule(route, path, self.model.fly(path), clock)
@@ -181,9 +207,24 @@ class Scheduler:
             if 0 < count <= len(times):
                 split = _split(found.route, sorted(times[:count]), self.t, self.w)
                 finer = self._fitted(split, top)
-                if finer.rms <= _WORTHWHILE * found.rms:
+                if finer.error <= _WORTHWHILE * found.error:
                     return finer
         return None
+
+    def _moved(self, found: Schedule, top: float) -> Schedule:
+        """Return `found` with spline waypoints moved by what the aircraft strays from them.
+
+        It swings wide in bends, for the autopilot does not tell it what turning takes.
+        """
+        route = found.route
+        points = np.flatnonzero(route.splines & (route.holds == 0))
+        points = points[points < route.last]
+        planned = np.column_stack([np.interp(route.arrivals[points], self.t, x) for x in self.w.T])
+        flown = found.flown.position[:, :2]
+        nearest = np.array([flown[np.argmin(lengths(flown - place))] for place in planned])
+        positions = route.positions.copy()
+        positions[points] -= _MOVED * (nearest.reshape(-1, 2) - planned)
+        return self._fitted(replace(route, positions=positions), top)
 
     def _splits(self, found: Schedule) -> list[float]:
         """Return the plan's times at which legs that are off by too much are best split.
@@ -195,6 +236,8 @@ class Scheduler:
         room = WAYPOINTS - len(route.positions)
         worst = []
         for k in range(route.first, route.last):
+            if route.splines[k + 1]:
+                continue
             inside = np.flatnonzero(
                 (self.t > route.departures[k]) & (self.t < route.arrivals[k + 1])
             )
@@ -225,7 +268,7 @@ class Scheduler:
             if len(groups) == 0 or groups[-1] == len(groups) - 1:
                 continue
             tried = self._fitted(found.route, top, groups)
-            if tried.rms <= max(_DEARER * found.rms, ALLOWED / 2):
+            if tried.error <= max(_DEARER * found.error, ALLOWED / 2):
                 return tried
         return found
 
@@ -247,10 +290,14 @@ class Scheduler:
 
 
 def _own_speeds(route: Route) -> Integers:
-    """Number the legs that have a speed of their own: each, or each run of splines."""
-    changes = ~route.splines[1:-1] | (route.holds + route.delays > 0)[1:-1]
-    groups: Integers = np.concatenate([[0], np.cumsum(changes)]).astype(int)
-    return groups[: len(route.speeds)]
+    """Number the legs that have a speed of their own: each, or a few splines that go on."""
+    groups = np.zeros(len(route.speeds), dtype=int)
+    run = 1
+    for k in range(1, len(groups)):
+        goes_on = route.splines[k] and route.splines[k + 1] and not route.holds[k]
+        run = run + 1 if goes_on and run < _SPLINE_RUN else 1
+        groups[k] = groups[k - 1] + (run == 1)
+    return groups
 
 
 def _groups(speeds: Real, alike: float) -> Integers:

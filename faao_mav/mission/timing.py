@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.mission.deviation import settled
 from faao_mav.mission.flight import CopterModel, FlightPath, Flown
 
 SPEED_STEP, HOLD_STEP = 0.02, 0.05
@@ -35,6 +36,9 @@ _ENOUGH = 0.05
 _LAST, _LAST_WEIGHT = 4.0, 3.5
 """The last seconds of the flight weigh more: they decide when it is over."""
 
+ON_TIME, _LATEST = 2.0, 5.0
+"""Metres of rms error that a second too early or too late at the end weighs, up to so many."""
+
 _NO_CRAWL = 0.5
 """Legs are not slowed below this, m/s, unless the plan creeps."""
 
@@ -48,7 +52,8 @@ class Clock:
 
     The plan's `t` (n,) s and `w` (n, 2) m. The plan reads `at` when the aircraft passes point
     `point` of its path, or, `lead` seconds after that, when it leaves it (`leaving`): an aircraft
-    that starts from a hover takes longer to move than a plan does.
+    that starts from a hover takes longer to move than a plan does. The flight is over when it is
+    within `near` m of the plan's end.
     """
 
     t: Real
@@ -56,12 +61,19 @@ class Clock:
     point: int
     at: float
     leaving: bool
+    near: float
     lead: float = 0.0
 
     def start(self, flown: Flown) -> float:
         """Return the time of `flown` at which the plan's clock reads 0."""
         met = flown.departures if self.leaving else flown.arrivals
         return float(met[self.point]) + self.lead - self.at
+
+    def late(self, flown: Flown) -> float:
+        """Return by how much later than planned `flown` is over, s."""
+        end, due, t = self.w[-1], float(self.t[-1]), flown.t - self.start(flown)
+        over = settled(t, flown.position[:, :2], end, self.near, due)
+        return over - settled(self.t, self.w, end, self.near, due)
 
     def positions(self, flown: Flown, t: Real) -> Real:
         """Return where the aircraft is at the plan's times `t` (k,), (k, 2)."""
@@ -84,7 +96,7 @@ def fit(
     Legs with the same number in `groups` (m - 1,), counted from 0, share a speed. Speeds stay
     within `min_speed` and `max_speed` (m/s), the waits at the points `free` (m,) at or above
     `SHORTEST_HOLD`; the others stay as they are. The lead is within `MOST_LEAD`, 0 for a flight
-    that begins at speed.
+    that begins at speed. Being late or early at the end counts as well: `ON_TIME`.
     """
     waits = path.holds + path.delays
     if len(path.speeds) == 0:
@@ -109,11 +121,13 @@ def fit(
 
     def errors(x: Real, *, rough: bool) -> Real:
         """Return the residuals (B, r) of the variants x (B, k)."""
-        many = model.fly_many(path, *flown(x), _STEP, rough=rough)
-        apart = [
-            ((replace(clock, lead=lead).positions(one, t) - w) * weights).ravel()
-            for one, lead in zip(many, x[:, -1], strict=True)
-        ]
+        apart = []
+        for one, lead in zip(
+            model.fly_many(path, *flown(x), _STEP, rough=rough), x[:, -1], strict=True
+        ):
+            led = replace(clock, lead=lead)
+            late = ON_TIME * np.clip(led.late(one), -_LATEST, _LATEST)
+            apart.append(np.append((led.positions(one, t) - w) * weights, late))
         leash = _LEASH * (x[:, :count] - begin[:count])
         return np.hstack([np.stack(apart), leash / np.sqrt(count)])
 

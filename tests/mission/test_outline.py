@@ -8,7 +8,9 @@ from relay_flights import STEADY, dash, dash_hover_dash, items_of, plan_with
 
 from faao_mav.errors import InputError
 from faao_mav.mission import assemble, plan_route
+from faao_mav.mission.autopilot import ArduCopterLegs
 from faao_mav.mission.hover import find_hovers
+from faao_mav.mission.outline import Splines
 from faao_mav.mission.vector import distances_to_segment, lengths
 
 STEP = 0.2
@@ -219,3 +221,50 @@ def test_hovers_stay_in_their_radius():
     for hover in hovers:
         assert lengths(w[hover.first : hover.last + 1] - hover.position).max() <= 1.0
         assert t[hover.last] - t[hover.first] >= 3
+
+
+def bent_at_45_degrees():
+    """300 m east, a bend of 50 m radius, 300 m north-east; at 6 m/s throughout."""
+    s = np.arange(0.0, 640.0, 1.0)
+    turn = np.clip((s - 300) / 50, 0, np.pi / 4)
+    x = np.cumsum(np.cos(turn))
+    y = np.cumsum(np.sin(turn))
+    return s / 6, np.stack([x, y], axis=-1)
+
+
+def test_splines_everywhere_are_closer_in_bends():
+    t, w = bent_at_45_degrees()
+    route = plan_route(t, w, plan_with(), splines=Splines(15.0, 40.0))
+    assert route.splines.tolist() == [False] + [True] * (len(route.positions) - 1)
+    middle = (route.positions[1:, 0] + route.positions[:-1, 0]) / 2
+    in_bend = (middle > 300) & (middle < 336)
+    assert route.leg_lengths[in_bend].max() < route.leg_lengths[middle < 200].min()
+    assert route.leg_lengths[in_bend].min() > 10
+    assert route.leg_lengths[-1] >= 40
+    assert path_error(w, route.positions) < 1
+
+
+def test_splines_only_where_legs_are_too_short():
+    t, w = bent_at_45_degrees()
+    route = plan_route(t, w, plan_with(), splines=Splines(15.0, 40.0, ArduCopterLegs()))
+    assert route.splines.any()
+    assert not route.splines.all()
+    straight = ~route.splines[1:]
+    assert route.leg_lengths[straight].min() > 200
+    curved = route.positions[route.splines]
+    assert curved[:, 0].min() > 280
+    assert curved[:, 0].max() < 360
+
+
+@given(trajectories(), st.floats(5, 60), st.floats(0, 100), st.booleans())
+@STEADY
+def test_any_flight_can_have_splines(trajectory, spacing, braking, everywhere):
+    t, w = trajectory
+    straight = None if everywhere else ArduCopterLegs()
+    route = plan_route(t, w, plan_with(), splines=Splines(spacing, braking, straight))
+    assert len(route.splines) == len(route.positions)
+    assert not route.splines[0]
+    assert route.positions[0] == pytest.approx(w[0])
+    assert route.positions[-1] == pytest.approx(w[-1])
+    assert (route.arrivals[1:] > route.departures[:-1]).all()
+    assert everywhere <= route.splines[1:].all()

@@ -21,6 +21,7 @@ from faao_mav.mission import Command, Conversion, assemble, plan_route
 from faao_mav.mission.autopilot import legs_of
 from faao_mav.mission.flight import copter_model
 from faao_mav.mission.flight.predict import predict
+from faao_mav.mission.outline import Splines
 from faao_mav.mission.schedule import Scheduler
 from faao_mav.mission.vehicle import vehicle_of
 
@@ -196,21 +197,36 @@ def test_the_whole_mission_flies_the_schedule(flight):
     assert apart.max() < 2.0  # 0.2 s: the mission leaves w_I from a hold, the schedule from rest
 
 
-def test_a_run_of_splines_has_one_speed_and_no_delay():
+def test_a_flight_over_splines_keeps_the_plan_and_never_delays_after_one():
     t, w = eight()
     plan = plan_with()
     vehicle = vehicle_of(plan)
-    scheduler = Scheduler(t, w, copter_model(vehicle), legs_of(vehicle), plan.vehicle.max_speed)
-    outline = plan_route(t, w, plan, spline_spacing=24.0)
-    schedule = scheduler.refined(scheduler.first(outline))
+    scheduler = Scheduler(t, w, copter_model(vehicle), legs_of(vehicle), 8.0, 2.0)
+    outline = plan_route(t, w, plan, splines=Splines(15.0, 12.0))
+    first = scheduler.first(outline)
+    schedule = scheduler.refined(first)
     route = schedule.route
     assert route.splines.tolist() == [False] + [True] * (len(route.positions) - 1)
-    assert np.median(route.leg_lengths) == pytest.approx(24, abs=4)
-    assert len(set(route.speeds)) == 1
-    assert schedule.rms < 6  # the plan slows down at both ends, the run does not
-    commands = [item.command for item in assemble(route, plan).items]
+    assert schedule.deviation.rms < 3
+    assert schedule.deviation.path < min(2.2, first.deviation.path - 0.3)
+    items = assemble(route, plan).items
+    commands = [item.command for item in items]
     assert commands.count(Command.NAV_SPLINE_WAYPOINT) == len(route.positions) - 1
     assert Command.NAV_DELAY not in commands
+
+
+def test_own_parameters_take_splines_through_a_bend():
+    t = np.arange(0.0, 75.0, STEP)
+    s = dash(0.0, 520.0, 8.0, 1.5, t)
+    bend = np.clip((s - 200) / 50, 0, np.pi / 2)
+    on = np.maximum(s - 200 - 25 * np.pi, 0)
+    w = np.stack([np.minimum(s, 200) + 50 * np.sin(bend), 50 * (1 - np.cos(bend)) + on], axis=-1)
+    own, good = (converted(t, w, plan_with(recommend=recommend)) for recommend in (False, True))
+    assert own.schedule.route.splines.any()
+    assert not good.schedule.route.splines.any()
+    for found in (own.schedule.deviation, good.schedule.deviation):
+        assert found.rms < 2
+        assert found.path < 2
 
 
 def test_a_flight_that_stays_is_one_hold():

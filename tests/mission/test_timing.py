@@ -36,7 +36,7 @@ def plan_of(path: FlightPath, *, ahead: float = 0.0) -> Clock:
     flown = MODEL.fly(path)
     t = np.arange(0.0, flown.departures[-1] - ahead, 0.2)
     w = np.stack([np.interp(t + ahead, flown.t, x) for x in flown.position.T[:2]], axis=-1)
-    return Clock(t=t, w=w, point=0, at=0.0, leaving=True)
+    return Clock(t=t, w=w, point=0, at=0.0, leaving=True, near=2.0)
 
 
 def fitted(
@@ -97,6 +97,15 @@ def test_setting_out_before_the_plan_is_found() -> None:
     assert fitted(far, path_with(SPEEDS, WAITS))[2] <= MOST_LEAD
 
 
+def test_how_late_a_flight_is_over() -> None:
+    path = path_with(SPEEDS, WAITS)
+    clock, flown = plan_of(path), MODEL.fly(path)
+    assert clock.late(flown) == pytest.approx(0, abs=0.01)
+    assert replace(clock, lead=0.7).late(flown) == pytest.approx(-0.7, abs=0.01)
+    longer = MODEL.fly(path_with(SPEEDS, WAITS + np.array([0, 0, 3, 0, 0])))
+    assert clock.late(longer) == pytest.approx(3, abs=0.05)
+
+
 def test_a_flight_that_begins_at_speed_has_no_lead() -> None:
     path = path_with(SPEEDS, WAITS)
     flown = MODEL.fly(path)
@@ -134,7 +143,7 @@ def test_one_point_has_nothing_to_fit() -> None:
     speeds, waits, lead = fit(
         MODEL,
         path,
-        Clock(np.arange(5.0), np.zeros((5, 2)), 0, 0.0, True),
+        Clock(np.arange(5.0), np.zeros((5, 2)), 0, 0.0, True, 2.0),
         groups=np.zeros(0, dtype=int),
         free=np.array([False]),
         min_speed=0.1,
