@@ -29,7 +29,7 @@ SHORTEST_HOLD = 1.0
 _STEP = 0.25  # of the predicted flight, s
 _SAMPLES = 400
 _ITERATIONS = 12
-_DAMPINGS = 10.0 ** np.arange(-4, 4)
+_DAMPINGS = 10.0 ** np.array([-4, -2, -1, 0, 2])
 _ENOUGH = 0.05
 """Share by which an iteration has to lessen the sum of squares."""
 

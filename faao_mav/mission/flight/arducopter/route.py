@@ -88,6 +88,7 @@ class Router:
         self._corner = CornerLimits(bounds.radius, bounds.corner, bounds.vertical)
         # flights that differ in a few speeds have most of their legs in common
         self._known: dict[tuple[int, float, float | None, float, float], _Step] = {}
+        self._from_rest: dict[tuple[int, float], Leg] = {}
 
     def course(self, speeds: Sequence[float], waits: Sequence[float]) -> Course:
         """Return the course at `speeds` (m - 1,), m/s, with `waits` (m,), s, at the stops."""
@@ -116,14 +117,14 @@ class Router:
         """Leg k at `speed`: if it was planned at another speed it has begun `elapsed` s ago."""
         leg: Leg | CurvedLeg | None = None
         if planned_at is not None:
-            begun = self._straight(k, planned_at)
+            begun = self._begun(k, planned_at)
             leg = at_speed(begun, self._bounds.along(self._directions[k], speed).speed, elapsed)
         elif self._lengths[k] > _POINT:
             leg = self._planned(k, speed, entry)
         if leg is None or self._stopping[k + 1]:
             return _Step(leg)
         if isinstance(leg, Leg) and self._is_straight(k + 1):
-            following = self._straight(k + 1, speed)
+            following = self._begun(k + 1, speed)
             u, w = self._directions[k], self._directions[k + 1]
             return _Step(leg, half_overlap(leg, u, following, w, self._corner), overlaps=True)
         return _Step(leg, entry=leg.final)
@@ -138,6 +139,12 @@ class Router:
             return self._straight(k, speed, entry)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
         return flown(curve, self._bounds.spline(speed), entry, end)
+
+    def _begun(self, k: int, speed: float) -> Leg:
+        """Return the straight leg k that begins at rest, as the one before it ends."""
+        if (leg := self._from_rest.get((k, speed))) is None:
+            leg = self._from_rest[k, speed] = self._straight(k, speed)
+        return leg
 
     def _straight(self, k: int, speed: float, entry: float = 0.0) -> Leg:
         limits = self._bounds.along(self._directions[k], speed)
