@@ -42,7 +42,8 @@ class Leg:
 
     `target` m and `height` m are the end, `along` and `onward` the unit directions of this leg and
     the next (0 where there is none), `speed` m/s the command, `radius` m the acceptance radius;
-    `exit_speed` and `exit_climb` m/s bound how fast the end is passed.
+    `exit_speed` and `exit_climb` m/s bound how fast the end is passed; farther than `braking` m
+    from it the command holds whatever comes next.
     """
 
     target: Complex
@@ -53,6 +54,7 @@ class Leg:
     radius: Real
     exit_speed: Real
     exit_climb: Real
+    braking: Real
 
     def of(self, index: NDArray[np.int_]) -> "Leg":
         """Return for each variant (row) its leg `index` (B,)."""
@@ -69,6 +71,11 @@ def stopping_speed(jerk: float, acceleration: Real | float, distance: Real, fina
     return np.maximum(
         (np.sqrt(b * b + 8 * acceleration * distance + 4 * final * final) - b) / 2, final
     )
+
+
+def stopping_distance(jerk: float, acceleration: float, speed: Real) -> Real:
+    """Return from how far, m, `stopping_speed` to rest is `speed`: d = v (v + b) / 2 a."""
+    return speed * (speed + 4 * acceleration * acceleration / jerk) / (2 * acceleration)
 
 
 def legs(limits: Limits, points: Real, radii: Real, speeds: Real, holds: Real) -> Leg:
@@ -96,6 +103,7 @@ def legs(limits: Limits, points: Real, radii: Real, speeds: Real, holds: Real) -
         radius=np.broadcast_to(radii[1:], shape),
         exit_speed=np.where(passable, np.minimum(ahead, speeds), 0.0),
         exit_climb=np.where(holds[:, 1:] <= 0, _exit_climbs(limits, lengths, rises), 0.0),
+        braking=stopping_distance(limits.jerk, limits.acceleration, speeds),
     )
 
 
@@ -118,28 +126,28 @@ def _half_turn(cosine: Real) -> Real:
 
 
 def velocity_setpoint(
-    limits: Limits, leg: Leg, place: Complex, velocity: Complex, remembered: Real
+    limits: Limits, leg: Leg, place: Complex, velocity: Complex, heading: Complex, remembered: Real
 ) -> tuple[Complex, Real]:
     """Return the velocity asked for, (n, B) m/s, and the speed to remember for turns, (B,) m/s.
 
     `place` (n, B) m and `velocity` (n, B) m/s are the trajectory's: row 0 is horizontal, complex,
-    row 1 vertical, real; n = 1 in level flight. The speed is the least of the command, what can
-    be slowed to the passing speed at the target in time, and in a turn what was allowed before it;
-    the passing speed is sqrt(g a R cot(θ/2)), g = MPC_XY_TRAJ_P, at most the leg's `exit_speed`.
-    The direction is to the target, in a turn to a point of the leg max(R, 5 m) away.
+    row 1 vertical, real; n = 1 in level flight. `heading` (B,) is the direction of row 0, 0 at
+    rest. The speed is the least of the command, what can be slowed to the passing speed at the
+    target in time, and in a turn what was allowed before it. The direction is to the target, in a
+    turn to a point of the leg max(R, 5 m) away.
     """
     offset = leg.target - place[0]
     distance = np.abs(offset) + _TINY
-    straight = offset / distance
-    cosine = (straight * leg.onward.conj()).real
-    corner = limits.corner_gain * limits.acceleration * leg.radius * _half_turn(cosine)
-    passing = np.minimum(np.sqrt(corner), leg.exit_speed)
-    slowing = stopping_speed(limits.jerk, limits.acceleration, distance, passing)
-    allowed = np.minimum(leg.speed, slowing)
-    turning = _turning(leg, straight, distance, velocity[0])
-    speed = allowed + turning * (np.minimum(remembered, allowed) - allowed)
-    remembered = allowed + turning * (remembered - allowed)
-    direction = straight + turning * (_along_leg(leg, offset, straight) - straight)
+    direction = offset / distance
+    speed = allowed = _allowed(limits, leg, direction, distance)
+    cosine = (heading * direction.conj()).real
+    if cosine.min() >= _ALIGNED + _BLEND:
+        remembered = allowed
+    else:
+        turning = _turning(leg, cosine, distance, velocity[0])
+        speed = allowed + turning * (np.minimum(remembered, allowed) - allowed)
+        remembered = allowed + turning * (remembered - allowed)
+        direction = direction + turning * (_along_leg(leg, offset, direction) - direction)
     if len(place) == 1:
         return (direction * speed)[None], remembered
     rise = leg.height - place[1].real
@@ -153,12 +161,27 @@ def velocity_setpoint(
     return np.stack([direction * speed, np.sign(rise) * vertical]), remembered
 
 
-def _turning(leg: Leg, straight: Complex, distance: Real, velocity: Complex) -> Real:
-    """Return 1 where the trajectory turns towards its target, 0 where it does not, (B,)."""
-    speed = np.abs(velocity)
-    cosine = (velocity * straight.conj()).real / (speed + _TINY)
+def _allowed(limits: Limits, leg: Leg, direction: Complex, distance: Real) -> Real:
+    """Return the speed (B,) from which the target `distance` away is passed slowly enough.
+
+    The passing speed is sqrt(g a R cot(θ/2)), g = MPC_XY_TRAJ_P, at most the leg's `exit_speed`.
+    """
+    if (distance - leg.braking).min() > 0:
+        return leg.speed
+    cosine = (direction * leg.onward.conj()).real
+    corner = limits.corner_gain * limits.acceleration * leg.radius * _half_turn(cosine)
+    passing = np.minimum(np.sqrt(corner), leg.exit_speed)
+    slowing = stopping_speed(limits.jerk, limits.acceleration, distance, passing)
+    return np.minimum(leg.speed, slowing)
+
+
+def _turning(leg: Leg, cosine: Real, distance: Real, velocity: Complex) -> Real:
+    """Return 1 where the trajectory turns towards its target, 0 where it does not, (B,).
+
+    `cosine` is that of the angle between the two.
+    """
     astray = _ramp((_ALIGNED + _BLEND - cosine) / (2 * _BLEND))
-    moving = _ramp((speed - 0.1) / 0.2)
+    moving = _ramp((np.abs(velocity) - 0.1) / 0.2)
     outside = _ramp((distance - leg.radius) / 0.2 + 0.5)
     return astray * moving * outside
 

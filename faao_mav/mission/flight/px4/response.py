@@ -19,47 +19,52 @@ DRAG = 0.1
 """Air drag over mass, 1/s. Fitted."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
-_TRAJECTORY = 4
-"""First of the trajectory's position, velocity, acceleration; their rates of change follow."""
+TRAJECTORY, CHANGES, STATES = 4, 7, 10
+"""First of the trajectory's position, velocity, acceleration; of their changes; how many in all."""
 
-STATES = 10
 _TERMS = 12
+_TINY = 1e-9
 
 
 class Response:
     """A cascaded position and velocity controller about an aircraft with lag and drag.
 
     State columns are `STATES` long: the aircraft's position, velocity, thrust over mass and
-    velocity integral; the trajectory's position, velocity and acceleration; and the rates at which
-    those change over the step. Horizontal columns are complex, vertical ones real: altitude is
+    velocity integral; the trajectory's position, velocity and acceleration; and by how much those
+    change over the step, evenly. Horizontal columns are complex, vertical ones real: altitude is
     taken to be held as tightly as position. The system is linear, so a step of `step` seconds is
     one product; shorter ones sum the exponential's series.
     """
 
     def __init__(self, step: float) -> None:
         self._step = step
-        self._system, self._transition = _matrices(step)
+        self._transition, self._series = _matrices(step)
 
     def advance(self, state: Complex, dt: Real) -> Complex:
-        """Return `state` (STATES, ...) after `dt` (...) seconds, each at most the step."""
+        """Return `state` (STATES, n, B) after `dt` (B,) seconds, each at most the step."""
         after = (self._transition @ state.reshape(STATES, -1)).reshape(state.shape)
-        short = dt < self._step
-        if short.any():
-            term = state[:, short]
-            part = term.copy()
-            for k in range(1, _TERMS):
-                term = self._system @ term * (dt[short] / k)
-                part += term
-            after[:, short] = part
+        if dt.min() < self._step:
+            short = dt < self._step
+            after[..., short] = self._shorter(state[..., short], dt[short])
         return after
+
+    def _shorter(self, state: Complex, dt: Real) -> Complex:
+        state[CHANGES:] /= np.maximum(dt, _TINY)
+        terms = (self._series @ state.reshape(STATES, -1)).reshape(_TERMS, *state.shape)
+        powers = dt ** np.arange(_TERMS)[:, None]
+        result: Complex = (terms * powers[:, None, None]).sum(axis=0)
+        return result
 
 
 @lru_cache(maxsize=8)
 def _matrices(step: float) -> tuple[Complex, Complex]:
-    """Return the system matrix A and exp(A step)."""
+    """Return what a step multiplies, and the terms of exp(A t) about the system matrix A.
+
+    The terms (_TERMS * STATES, STATES) are A^k / k!; there, the last states are rates of change.
+    """
     rows = np.eye(STATES)
     proportional, integral, derivative = VELOCITY_GAINS
-    position, velocity, acceleration = rows[_TRAJECTORY : _TRAJECTORY + 3]
+    position, velocity, acceleration = rows[TRAJECTORY:CHANGES]
     error = POSITION_GAIN * (position - rows[_POSITION]) + velocity - rows[_VELOCITY]
     motion = rows[_THRUST] - DRAG * rows[_VELOCITY]
     demand = acceleration + proportional * error + rows[_INTEGRAL] - derivative * motion
@@ -68,9 +73,10 @@ def _matrices(step: float) -> tuple[Complex, Complex]:
     system[_VELOCITY] = motion
     system[_THRUST] = (demand - rows[_THRUST]) / ATTITUDE_LAG
     system[_INTEGRAL] = integral * error
-    system[_TRAJECTORY : _TRAJECTORY + 3] = rows[_TRAJECTORY + 3 :]
-    term = transition = np.eye(STATES)
+    system[TRAJECTORY:CHANGES] = rows[CHANGES:]
+    terms = [np.eye(STATES)]
     for k in range(1, 2 * _TERMS):
-        term = system @ term * (step / k)
-        transition = transition + term
-    return system.astype(np.complex128), transition.astype(np.complex128)
+        terms.append(system @ terms[-1] / k)
+    transition = sum(term * step**k for k, term in enumerate(terms))
+    transition[:, CHANGES:] /= step
+    return transition.astype(np.complex128), np.vstack(terms[:_TERMS]).astype(np.complex128)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.mission.flight.px4.guidance import Limits, legs, velocity_setpoint
-from faao_mav.mission.flight.px4.response import STATES, Response
+from faao_mav.mission.flight.px4.response import CHANGES, STATES, TRAJECTORY, Response
 from faao_mav.mission.flight.px4.smoothing import follow
 
 STEP = 0.1
@@ -75,15 +75,14 @@ class _Flight:
         self._response = Response(STEP)
         rows = 1 if np.ptp(points[:, 2]) == 0 else 2
         start = np.array([complex(*points[0, :2]), complex(points[0, 2])])[:rows, None]
-        self._place: Complex = np.repeat(start, count, axis=1)
-        self._velocity = np.zeros_like(self._place)
-        self._acceleration = np.zeros_like(self._place)
-        self._state = np.zeros((STATES, rows, count), dtype=np.complex128)
-        self._state[0] = self._place
+        self._state: Complex = np.zeros((STATES, rows, count), dtype=np.complex128)
+        self._state[0] = self._state[TRAJECTORY] = start
         self._remembered = np.zeros(count)
         self._index = np.zeros(count, dtype=np.int_)
         self._leg = self._legs.of(self._index)
         self._due = np.full(count, np.inf)
+        self._waiting = False
+        self._whole_step = np.full(count, STEP)
         self._ended = np.zeros(count, dtype=np.bool_)
         self._arrivals = np.zeros((count, len(points)))
         self._departures = np.zeros((count, len(points)))
@@ -105,64 +104,64 @@ class _Flight:
 
     def step(self) -> None:
         """Go on by at most `STEP` seconds; a variant that leaves a waypoint does so at the end."""
-        dt = np.minimum(STEP, self._due - self._time)
-        idle = self._standing()
-        if idle.any():
-            dt = np.where(idle, 0.0, dt)
         before, far = self._state, self._far
+        dt = self._steps() if self._waiting else self._whole_step
         self._move(dt)
-        self._time = np.where(idle, self._due, self._time + dt)
+        self._time = self._time + dt
+        self._far = self._distances()
+        if self._far[0].min() <= 0:
+            reached = (self._far <= 0).all(axis=0) & np.isinf(self._due) & ~self._ended
+            if reached.any():
+                self._reach(np.flatnonzero(reached), dt, before, far)
+        if self._waiting:
+            leaving = self._due - self._time < _TINY
+            if leaving.any():
+                self._leave(np.flatnonzero(leaving))
         self._times.append(self._time)
         self._motions.append(self._state[:2])
-        self._far = self._distances()
-        reached = (self._far <= 0).all(axis=0) & np.isinf(self._due) & ~self._ended
-        if reached.any():
-            self._reach(np.flatnonzero(reached), dt, before, far)
-        leaving = self._due - self._time < _TINY
-        if leaving.any():
-            self._leave(np.flatnonzero(leaving))
 
     def _move(self, dt: Real) -> None:
-        midway = self._place + self._velocity * (dt / 2)
+        state = self._state
+        place, velocity, acceleration = state[TRAJECTORY:CHANGES]
+        heading = velocity[0] / (np.abs(velocity[0]) + _TINY)
         setpoint, self._remembered = velocity_setpoint(
-            self._limits, self._leg, midway, self._velocity, self._remembered
+            self._limits,
+            self._leg,
+            place + velocity * (dt / 2),
+            velocity,
+            heading,
+            self._remembered,
         )
-        clock = dt * self._pace()
-        shift, velocity, acceleration = follow(
-            self._velocity,
-            self._acceleration,
+        shift, after, acceleration_after = follow(
+            velocity,
+            acceleration,
             setpoint,
             self._acceleration_limits(setpoint),
             self._limits.jerk,
-            clock,
+            dt * self._pace(heading),
         )
-        rate = 1 / np.maximum(dt, _TINY)
-        state = self._state.copy()
-        state[4], state[5], state[6] = self._place, self._velocity, self._acceleration
-        state[7] = shift * rate
-        state[8] = (velocity - self._velocity) * rate
-        state[9] = (acceleration - self._acceleration) * rate
-        self._state = self._response.advance(state, np.broadcast_to(dt, shift.shape))
-        self._place = self._place + shift
-        self._velocity, self._acceleration = velocity, acceleration
+        state[CHANGES] = shift
+        np.subtract(after, velocity, out=state[CHANGES + 1])
+        np.subtract(acceleration_after, acceleration, out=state[CHANGES + 2])
+        self._state = self._response.advance(state, dt)
 
-    def _pace(self) -> Real:
+    def _pace(self, heading: Complex) -> Real:
         """Return how fast the trajectory's clock runs, (B,): 1 less the lag's share of the limit.
 
         Being ahead does not count; the estimate's wander makes that a gradual affair.
         """
-        lag = self._place[0] - self._state[0, 0]
-        heading = self._velocity[0]
-        ahead = (lag * heading.conj()).real / (np.abs(heading) + _TINY)
-        size = np.sqrt((lag * lag.conj()).real + WANDER * WANDER)
-        behind: Real = size * (1 + ahead / np.sqrt(ahead * ahead + WANDER * WANDER)) / 2
+        lag = self._state[TRAJECTORY, 0] - self._state[0, 0]
+        ahead = (lag * heading.conj()).real
+        size = np.hypot(np.abs(lag), WANDER)
+        behind: Real = size * (1 + ahead / np.hypot(ahead, WANDER)) / 2
         return 1 - np.minimum(behind / self._error_limit, 1.0)
 
-    def _acceleration_limits(self, setpoint: Complex) -> Real:
+    def _acceleration_limits(self, setpoint: Complex) -> Real | float:
+        if len(setpoint) == 1:
+            return self._limits.acceleration
         limits = np.full(setpoint.shape, self._limits.acceleration)
-        if len(setpoint) > 1:
-            up, down = self._limits.climb_acceleration, self._limits.descent_acceleration
-            limits[1] = np.where(setpoint[1].real > 0, up, down)
+        up, down = self._limits.climb_acceleration, self._limits.descent_acceleration
+        limits[1] = np.where(setpoint[1].real > 0, up, down)
         return limits
 
     def _distances(self) -> Real:
@@ -174,13 +173,12 @@ class _Flight:
         height = np.abs(place[1].real - self._leg.height) - self._limits.height_radius
         return np.stack([across, height])
 
-    def _standing(self) -> NDArray[np.bool_]:
-        """Return which variants only wait for a hold to end."""
-        waiting: NDArray[np.bool_] = np.isfinite(self._due)
-        if waiting.any():
-            motion = np.abs(self._velocity) + np.abs(self._state[1])
-            waiting = waiting & (motion < _SETTLED).all(axis=0)
-        return waiting
+    def _steps(self) -> Real:
+        """Return how far each variant goes, (B,) s; those that stand skip to the end of a hold."""
+        motion = np.abs(self._state[TRAJECTORY + 1]) + np.abs(self._state[1])
+        standing = np.isfinite(self._due) & (motion < _SETTLED).all(axis=0)
+        self._time = np.where(standing, self._due, self._time)
+        return np.minimum(STEP, self._due - self._time)
 
     def _reach(self, which: NDArray[np.int_], dt: Real, before: Complex, far: Real) -> None:
         """Note arrivals at the moment within the last step at which the target was accepted."""
@@ -196,10 +194,12 @@ class _Flight:
         point = self._index[which] + 1
         self._arrivals[which, point] = arrival
         self._due[which] = arrival + SWITCH_DELAY + self._holds[which, point]
+        self._waiting = True
 
     def _leave(self, which: NDArray[np.int_]) -> None:
         self._departures[which, self._index[which] + 1] = self._due[which]
         self._due[which] = np.inf
+        self._waiting = bool(np.isfinite(self._due).any())
         ended = self._index[which] == self._last
         self._ended[which[ended]] = True
         self._index[which[~ended]] += 1
