@@ -1,10 +1,11 @@
 """How the aircraft follows the smoothed trajectory."""
 
 from functools import lru_cache
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 
 POSITION_GAIN = 0.95
 """MPC_XY_P, 1/s."""
@@ -19,64 +20,96 @@ DRAG = 0.1
 """Air drag over mass, 1/s. Fitted."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
-TRAJECTORY, CHANGES, STATES = 4, 7, 10
+_TRAJECTORY, _CHANGES, _STATES = 4, 7, 10
 """First of the trajectory's position, velocity, acceleration; of their changes; how many in all."""
 
 _TERMS = 12
-_TINY = 1e-9
+
+Number = TypeVar("Number", float, complex)
+
+Motion: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number]
+"""The aircraft's position, velocity, thrust over mass and velocity integral; the trajectory's
+position, velocity and acceleration. Horizontal motion is complex, vertical motion real: altitude is
+taken to be held as tightly as position."""
+
+Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+Step: TypeAlias = tuple[Row, Row, Row, Row]
+"""What the aircraft's four states become, as factors of the lag of its position, its other states,
+the trajectory's velocity and acceleration, and the changes of the trajectory's three states."""
 
 
-class Response:
-    """A cascaded position and velocity controller about an aircraft with lag and drag.
+def advance(
+    step: Step, motion: Motion[Number], shift: Number, velocity: Number, acceleration: Number
+) -> Motion[Number]:
+    """Return `motion` after a step that takes the trajectory to the new velocity, and by `shift`.
 
-    State columns are `STATES` long: the aircraft's position, velocity, thrust over mass and
-    velocity integral; the trajectory's position, velocity and acceleration; and by how much those
-    change over the step, evenly. Horizontal columns are complex, vertical ones real: altitude is
-    taken to be held as tightly as position. The system is linear, so a step of `step` seconds is
-    one product; shorter ones sum the exponential's series.
+    A cascaded position and velocity controller about an aircraft with lag and drag: a linear
+    system, which the trajectory drives by changing evenly over the step.
     """
+    a, b, c, d, place, f, g = motion
+    a -= place
+    i, j = velocity - f, acceleration - g
+    p, v, t, n = step
+    return (
+        place
+        + (p[0] * a + p[1] * b + p[2] * c + p[3] * d + p[4] * f + p[5] * g)
+        + (p[6] * shift + p[7] * i + p[8] * j),
+        v[0] * a
+        + v[1] * b
+        + v[2] * c
+        + v[3] * d
+        + v[4] * f
+        + v[5] * g
+        + (v[6] * shift + v[7] * i + v[8] * j),
+        t[0] * a
+        + t[1] * b
+        + t[2] * c
+        + t[3] * d
+        + t[4] * f
+        + t[5] * g
+        + (t[6] * shift + t[7] * i + t[8] * j),
+        n[0] * a
+        + n[1] * b
+        + n[2] * c
+        + n[3] * d
+        + n[4] * f
+        + n[5] * g
+        + (n[6] * shift + n[7] * i + n[8] * j),
+        place + shift,
+        velocity,
+        acceleration,
+    )
 
-    def __init__(self, step: float) -> None:
-        self._step = step
-        self._transition, self._series = _matrices(step)
 
-    def advance(self, state: Complex, dt: Real) -> Complex:
-        """Return `state` (STATES, n, B) after `dt` (B,) seconds, each at most the step."""
-        after = (self._transition @ state.reshape(STATES, -1)).reshape(state.shape)
-        if dt.min() < self._step:
-            short = dt < self._step
-            after[..., short] = self._shorter(state[..., short], dt[short])
-        return after
-
-    def _shorter(self, state: Complex, dt: Real) -> Complex:
-        state[CHANGES:] /= np.maximum(dt, _TINY)
-        terms = (self._series @ state.reshape(STATES, -1)).reshape(_TERMS, *state.shape)
-        powers = dt ** np.arange(_TERMS)[:, None]
-        result: Complex = (terms * powers[:, None, None]).sum(axis=0)
-        return result
+@lru_cache(maxsize=16)
+def step_of(dt: float) -> Step:
+    """Return the step of `dt` s: rows of exp(A dt), by its series."""
+    powers = dt ** np.arange(_TERMS)
+    p, v, t, n = np.tensordot(powers, _series(), 1).tolist()
+    return tuple(p), tuple(v), tuple(t), tuple(n)
 
 
-@lru_cache(maxsize=8)
-def _matrices(step: float) -> tuple[Complex, Complex]:
-    """Return what a step multiplies, and the terms of exp(A t) about the system matrix A.
+@lru_cache(maxsize=1)
+def _series() -> Real:
+    """Return the terms A^k / k! as far as `Step` needs them, (_TERMS, 4, 9).
 
-    The terms (_TERMS * STATES, STATES) are A^k / k!; there, the last states are rates of change.
+    Changes are rates times dt: their columns are one power of dt ahead.
     """
-    rows = np.eye(STATES)
+    rows = np.eye(_STATES)
     proportional, integral, derivative = VELOCITY_GAINS
-    position, velocity, acceleration = rows[TRAJECTORY:CHANGES]
+    position, velocity, acceleration = rows[_TRAJECTORY:_CHANGES]
     error = POSITION_GAIN * (position - rows[_POSITION]) + velocity - rows[_VELOCITY]
     motion = rows[_THRUST] - DRAG * rows[_VELOCITY]
     demand = acceleration + proportional * error + rows[_INTEGRAL] - derivative * motion
-    system = np.zeros((STATES, STATES))
+    system = np.zeros((_STATES, _STATES))
     system[_POSITION] = rows[_VELOCITY]
     system[_VELOCITY] = motion
     system[_THRUST] = (demand - rows[_THRUST]) / ATTITUDE_LAG
     system[_INTEGRAL] = integral * error
-    system[TRAJECTORY:CHANGES] = rows[CHANGES:]
-    terms = [np.eye(STATES)]
-    for k in range(1, 2 * _TERMS):
+    system[_TRAJECTORY:_CHANGES] = rows[_CHANGES:]
+    terms = [rows]
+    for k in range(1, _TERMS + 1):
         terms.append(system @ terms[-1] / k)
-    transition = sum(term * step**k for k, term in enumerate(terms))
-    transition[:, CHANGES:] /= step
-    return transition.astype(np.complex128), np.vstack(terms[:_TERMS]).astype(np.complex128)
+    series = np.stack(terms)[:, :_TRAJECTORY]
+    series[:-1, :, _CHANGES:] = series[1:, :, _CHANGES:]
+    return np.delete(series[:-1], _TRAJECTORY, axis=2)
