@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import sqrt
 
 from faao_mav.arrays import Real
@@ -91,8 +92,8 @@ def legs(
     """
     places = [complex(east, north) for east, north, _ in points.tolist()]
     heights = points[:, 2].tolist()
-    moves = [end - start for start, end in zip(places, places[1:], strict=False)] + [0j]
-    rises = [end - start for start, end in zip(heights, heights[1:], strict=False)] + [0.0]
+    moves = [end - start for start, end in pairwise(places)] + [0j]
+    rises = [end - start for start, end in pairwise(heights)] + [0.0]
     along = [move / abs(move) if abs(move) > _TINY else 0j for move in moves]
     result = []
     for k, speed in enumerate(speeds):

@@ -1,6 +1,8 @@
 """How the aircraft follows the smoothed trajectory."""
 
+from collections.abc import Sequence
 from functools import lru_cache
+from operator import mul
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -23,6 +25,9 @@ _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
 _TRAJECTORY, _CHANGES, _STATES = 4, 7, 10
 """First of the trajectory's position, velocity, acceleration; of their changes; how many in all."""
 
+_CAUSES = [_POSITION, _VELOCITY, _THRUST, _INTEGRAL, 5, 7, 6, 8, 9]
+"""The states that a `Step` looks at: the position's lag says all of the two positions."""
+
 _TERMS = 12
 
 Number = TypeVar("Number", float, complex)
@@ -32,10 +37,9 @@ Motion: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number
 position, velocity and acceleration. Horizontal motion is complex, vertical motion real: altitude is
 taken to be held as tightly as position."""
 
-Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
-Step: TypeAlias = tuple[Row, Row, Row, Row]
-"""What the aircraft's four states become, as factors of the lag of its position, its other states,
-the trajectory's velocity and acceleration, and the changes of the trajectory's three states."""
+Step: TypeAlias = tuple[Sequence[float], Sequence[float], Sequence[float], Sequence[float]]
+"""What the aircraft's four states become, as factors of: the lag of its position; its other states;
+the trajectory's velocity, displacement and acceleration, changes of velocity and acceleration."""
 
 
 def advance(
@@ -46,35 +50,16 @@ def advance(
     A cascaded position and velocity controller about an aircraft with lag and drag: a linear
     system, which the trajectory drives by changing evenly over the step.
     """
-    a, b, c, d, place, f, g = motion
-    a -= place
-    i, j = velocity - f, acceleration - g
+    position, speed, thrust, integral, place, wanted, push = motion
+    causes = [position - place, speed, thrust, integral, wanted, shift]
+    if push or acceleration or velocity != wanted:  # seldom: most of a flight is at one velocity
+        causes += [push, velocity - wanted, acceleration - push]
     p, v, t, n = step
     return (
-        place
-        + (p[0] * a + p[1] * b + p[2] * c + p[3] * d + p[4] * f + p[5] * g)
-        + (p[6] * shift + p[7] * i + p[8] * j),
-        v[0] * a
-        + v[1] * b
-        + v[2] * c
-        + v[3] * d
-        + v[4] * f
-        + v[5] * g
-        + (v[6] * shift + v[7] * i + v[8] * j),
-        t[0] * a
-        + t[1] * b
-        + t[2] * c
-        + t[3] * d
-        + t[4] * f
-        + t[5] * g
-        + (t[6] * shift + t[7] * i + t[8] * j),
-        n[0] * a
-        + n[1] * b
-        + n[2] * c
-        + n[3] * d
-        + n[4] * f
-        + n[5] * g
-        + (n[6] * shift + n[7] * i + n[8] * j),
+        place + sum(map(mul, p, causes)),
+        sum(map(mul, v, causes)),
+        sum(map(mul, t, causes)),
+        sum(map(mul, n, causes)),
         place + shift,
         velocity,
         acceleration,
@@ -86,7 +71,7 @@ def step_of(dt: float) -> Step:
     """Return the step of `dt` s: rows of exp(A dt), by its series."""
     powers = dt ** np.arange(_TERMS)
     p, v, t, n = np.tensordot(powers, _series(), 1).tolist()
-    return tuple(p), tuple(v), tuple(t), tuple(n)
+    return p, v, t, n
 
 
 @lru_cache(maxsize=1)
@@ -112,4 +97,4 @@ def _series() -> Real:
         terms.append(system @ terms[-1] / k)
     series = np.stack(terms)[:, :_TRAJECTORY]
     series[:-1, :, _CHANGES:] = series[1:, :, _CHANGES:]
-    return np.delete(series[:-1], _TRAJECTORY, axis=2)
+    return series[:-1, :, _CAUSES]

@@ -22,7 +22,7 @@ START_LAG = 0.12
 _SETTLED = 2e-3
 """Slower than this, m/s, a holding aircraft is taken to stand."""
 
-_ALIKE = 1e-4
+_ALIKE = 3e-4
 """States that differ by less, m, m/s, m/s², are taken to be the same."""
 
 _TINY = 1e-9
@@ -68,15 +68,15 @@ class Simulation:
         self._limits, self._points, self._radii = limits, points, radii.tolist()
         self._known: dict[Leg, list[tuple[State, Stretch]]] = {}
 
-    def fly(self, speeds: Sequence[Real], holds: Sequence[Real], beyond: float) -> list[Log]:
+    def fly(self, speeds: Real, holds: Real, beyond: float) -> list[Log]:
         """Fly every variant until the last one has ended, and on for `beyond` seconds.
 
-        `speeds` are (m - 1,) each, `holds` (m,).
+        `speeds` are (B, m - 1), `holds` (B, m).
         """
-        starts = [float(hold[0] + SWITCH_DELAY if hold[0] > 0 else 0.0) for hold in holds]
+        starts = np.where(holds[:, 0] > 0, holds[:, 0] + SWITCH_DELAY, 0.0).tolist()
         routes = [
-            legs(self._limits, self._points, self._radii, speed.tolist(), hold.tolist())
-            for speed, hold in zip(speeds, holds, strict=True)
+            legs(self._limits, self._points, self._radii, speed, hold)
+            for speed, hold in zip(speeds.tolist(), holds.tolist(), strict=True)
         ]
         flights = [self._flight(route) for route in routes]
         ends = [
@@ -156,7 +156,7 @@ def _stay(limits: Limits, leg: Leg, state: State, duration: float) -> Stretch:
     """Go on for `duration` s after the last waypoint is done."""
     times: list[float] = [0.0]
     states = [state]
-    while times[-1] < duration and not _stands(state):
+    while times[-1] < duration:
         state = moved(limits, leg, state, STEP)
         times.append(times[-1] + STEP)
         states.append(state)

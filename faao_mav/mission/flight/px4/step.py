@@ -75,7 +75,8 @@ def _pursued(
         error = max(error, abs(upwards.setpoint - upwards.velocity))
         push = max(push, abs(upwards.acceleration))
     if soon_there(error, push, limits.jerk, dt):
-        return setpoint, 0j, (upwards.setpoint if upwards else 0.0, 0.0)
+        after = setpoint if error > _TINY else velocity
+        return after, 0j, (upwards.setpoint if upwards else 0.0, 0.0)
     most = limits.acceleration
     axes = [
         Axis(velocity.real, acceleration.real, setpoint.real, most),
