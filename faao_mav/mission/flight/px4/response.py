@@ -1,8 +1,6 @@
 """How the aircraft follows the smoothed trajectory."""
 
-from collections.abc import Sequence
 from functools import lru_cache
-from operator import mul
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -37,7 +35,8 @@ Motion: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number
 position, velocity and acceleration. Horizontal motion is complex, vertical motion real: altitude is
 taken to be held as tightly as position."""
 
-Step: TypeAlias = tuple[Sequence[float], Sequence[float], Sequence[float], Sequence[float]]
+Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+Step: TypeAlias = tuple[Row, Row, Row, Row]
 """What the aircraft's four states become, as factors of: the lag of its position; its other states;
 the trajectory's velocity, displacement and acceleration, changes of velocity and acceleration."""
 
@@ -50,33 +49,40 @@ def advance(
     A cascaded position and velocity controller about an aircraft with lag and drag: a linear
     system, which the trajectory drives by changing evenly over the step.
     """
-    position, speed, thrust, integral, place, wanted, push = motion
-    causes = [position - place, speed, thrust, integral, wanted, shift]
-    if push or acceleration or velocity != wanted:  # seldom: most of a flight is at one velocity
-        causes += [push, velocity - wanted, acceleration - push]
+    position, a, b, c, place, d, push = motion
+    lag = position - place
     p, v, t, n = step
-    return (
-        place + sum(map(mul, p, causes)),
-        sum(map(mul, v, causes)),
-        sum(map(mul, t, causes)),
-        sum(map(mul, n, causes)),
-        place + shift,
-        velocity,
-        acceleration,
-    )
+    ahead = _sum(p, lag, a, b, c, d, shift)
+    speed = _sum(v, lag, a, b, c, d, shift)
+    thrust = _sum(t, lag, a, b, c, d, shift)
+    integral = _sum(n, lag, a, b, c, d, shift)
+    if push or acceleration or velocity != d:  # seldom: most of a flight is at one velocity
+        rise, jolt = velocity - d, acceleration - push
+        ahead += p[6] * push + p[7] * rise + p[8] * jolt
+        speed += v[6] * push + v[7] * rise + v[8] * jolt
+        thrust += t[6] * push + t[7] * rise + t[8] * jolt
+        integral += n[6] * push + n[7] * rise + n[8] * jolt
+    return place + ahead, speed, thrust, integral, place + shift, velocity, acceleration
+
+
+def _sum(
+    row: Row, lag: Number, a: Number, b: Number, c: Number, d: Number, shift: Number
+) -> Number:
+    of_lag, of_a, of_b, of_c, of_d, of_shift, _, _, _ = row
+    return of_lag * lag + of_a * a + of_b * b + of_c * c + of_d * d + of_shift * shift
 
 
 @lru_cache(maxsize=16)
 def step_of(dt: float) -> Step:
     """Return the step of `dt` s: rows of exp(A dt), by its series."""
     powers = dt ** np.arange(_TERMS)
-    p, v, t, n = np.tensordot(powers, _series(), 1).tolist()
-    return p, v, t, n
+    rows = (powers @ _series()).reshape(4, -1).tolist()
+    return tuple(tuple(row) for row in rows)  # type: ignore[return-value]
 
 
 @lru_cache(maxsize=1)
 def _series() -> Real:
-    """Return the terms A^k / k! as far as `Step` needs them, (_TERMS, 4, 9).
+    """Return the terms A^k / k! as far as `Step` needs them, (_TERMS, 4 * 9).
 
     Changes are rates times dt: their columns are one power of dt ahead.
     """
@@ -97,4 +103,4 @@ def _series() -> Real:
         terms.append(system @ terms[-1] / k)
     series = np.stack(terms)[:, :_TRAJECTORY]
     series[:-1, :, _CHANGES:] = series[1:, :, _CHANGES:]
-    return series[:-1, :, _CAUSES]
+    return series[:-1, :, _CAUSES].reshape(_TERMS, -1)

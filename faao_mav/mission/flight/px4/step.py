@@ -48,7 +48,7 @@ def moved(limits: Limits, leg: Leg, state: State, dt: float) -> State:
         distance, halfway = abs(leg.target - midway), height + rate * (dt / 2)
         speed, ascent = climb_setpoint(limits, leg, distance, halfway, speed)
         most = limits.climb_acceleration if ascent > 0 else limits.descent_acceleration
-        upwards = Axis(rate, lift, ascent, most)
+        upwards = (rate, lift, ascent, most)
         after, push, up = _pursued(limits, level, direction * speed, upwards, clock)
         climb = advance(step, climb, _shift(rate, lift, *up, clock), *up)
     shift = _shift(velocity, acceleration, after, push, clock)
@@ -71,16 +71,16 @@ def _pursued(
     """Return horizontal velocity and acceleration after `dt` s, and the two upwards, if any."""
     _, _, _, _, _, velocity, acceleration = level
     error, push = abs(setpoint - velocity), abs(acceleration)
+    ascent = 0.0
     if upwards is not None:
-        error = max(error, abs(upwards.setpoint - upwards.velocity))
-        push = max(push, abs(upwards.acceleration))
+        rate, lift, ascent, _ = upwards
+        error, push = max(error, abs(ascent - rate)), max(push, abs(lift))
     if soon_there(error, push, limits.jerk, dt):
-        after = setpoint if error > _TINY else velocity
-        return after, 0j, (upwards.setpoint if upwards else 0.0, 0.0)
+        return setpoint if error > _TINY else velocity, 0j, (ascent, 0.0)
     most = limits.acceleration
     axes = [
-        Axis(velocity.real, acceleration.real, setpoint.real, most),
-        Axis(velocity.imag, acceleration.imag, setpoint.imag, most),
+        (velocity.real, acceleration.real, setpoint.real, most),
+        (velocity.imag, acceleration.imag, setpoint.imag, most),
     ]
     if upwards is not None:
         axes.append(upwards)
