@@ -129,6 +129,20 @@ def ends(model: Px4, path: FlightPath, speeds: Real) -> Real:
     return np.array([flown.arrivals[-1] for flown in many])
 
 
+@pytest.mark.parametrize("model", [Px4(), SUITED])
+def test_long_legs_are_flown_at_one_speed(model: Px4) -> None:
+    lengths = np.array([600, 1100, 2300, 4700])
+    flights = [model.fly(line(length, 1)) for length in lengths]
+    arrivals = np.array([flown.arrivals[1] for flown in flights])
+    middle = (flights[-1].t > 100) & (flights[-1].t < 500)
+    np.testing.assert_allclose(
+        np.diff(arrivals), np.diff(lengths) / flights[-1].velocity[middle, 0].mean(), rtol=1e-4
+    )
+    moved = np.diff(flights[-1].position[:, 0])
+    mean = (flights[-1].velocity[1:, 0] + flights[-1].velocity[:-1, 0]) / 2
+    np.testing.assert_allclose(moved, mean * 0.1, atol=0.01)
+
+
 def test_fractions_of_holds_count() -> None:
     path = path_of([0, 60, 60 + 60j])
     holds = np.zeros((4, 3))

@@ -23,7 +23,13 @@ _SETTLED = 2e-3
 """Slower than this, m/s, a holding aircraft is taken to stand."""
 
 _ALIKE = 3e-4
-"""States that differ by less, m, m/s, m/s², are taken to be the same."""
+"""States that differ by less, m, m/s, m/s², are taken to be the same.
+
+Variants of a flight take some 20 s to move alike again; ten times less would take 10 s more.
+"""
+
+_STEADY = 1e-5
+"""A velocity off by less, m/s, stays as it is along a leg: a few mm in minutes."""
 
 _TINY = 1e-9
 
@@ -143,6 +149,11 @@ def _fly(limits: Limits, leg: Leg, state: State) -> Stretch:
             dt = min(STEP, due - time)
             state = moved(limits, leg, state, dt)
             time += dt
+            if due == inf and (steps := _steady_steps(leg, before, state)) > 0:
+                times.append(time)
+                states.append(state)
+                state = _carried_on(before, state, steps)
+                time += steps * STEP
         times.append(time)
         states.append(state)
         near = _distances(limits, leg, state)
@@ -150,6 +161,30 @@ def _fly(limits: Limits, leg: Leg, state: State) -> Stretch:
             arrival = time - dt * (1 - _share(leg, before, dt, far, near))
             due = arrival + SWITCH_DELAY + max(leg.hold, 0.0)
     return Stretch(arrival, due, np.array(times), _motion(states), state)
+
+
+def _steady_steps(leg: Leg, before: State, state: State) -> int:
+    """Return how many more steps towards the target will change nothing but places.
+
+    None unless a level flight has settled, and none close to the target.
+    """
+    _, was, _, _, origin, wanted, _ = before.level
+    position, velocity, _, _, place, wants, push = state.level
+    if push or wants != wanted or state.climb is not None or abs(velocity - was) > _STEADY / 10:
+        return 0
+    shift = place - origin
+    if abs(velocity - shift / STEP) > _STEADY or abs(shift) < _STEADY:
+        return 0
+    way = min(abs(leg.target - position), abs(leg.target - place)) - max(leg.braking, leg.radius)
+    return int(way / abs(shift)) - 1
+
+
+def _carried_on(before: State, state: State, steps: int) -> State:
+    """Return `state` after `steps` like the one that led to it."""
+    position, velocity, thrust, integral, place, wanted, push = state.level
+    way = steps * (place - before.level[4])
+    level = (position + way, velocity, thrust, integral, place + way, wanted, push)
+    return State(level, state.climb, state.remembered)
 
 
 def _stay(limits: Limits, leg: Leg, state: State, duration: float) -> Stretch:
