@@ -135,9 +135,8 @@ def test_long_legs_are_flown_at_one_speed(model: Px4) -> None:
     flights = [model.fly(line(length, 1)) for length in lengths]
     arrivals = np.array([flown.arrivals[1] for flown in flights])
     middle = (flights[-1].t > 100) & (flights[-1].t < 500)
-    np.testing.assert_allclose(
-        np.diff(arrivals), np.diff(lengths) / flights[-1].velocity[middle, 0].mean(), rtol=1e-4
-    )
+    taken = np.diff(lengths) / flights[-1].velocity[middle, 0].mean()
+    np.testing.assert_allclose(np.diff(arrivals), taken, atol=0.03)
     moved = np.diff(flights[-1].position[:, 0])
     mean = (flights[-1].velocity[1:, 0] + flights[-1].velocity[:-1, 0]) / 2
     np.testing.assert_allclose(moved, mean * 0.1, atol=0.01)
