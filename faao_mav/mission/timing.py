@@ -101,13 +101,13 @@ def fit(
     waits = path.holds + path.delays
     if len(path.speeds) == 0:
         return path.speeds, waits, 0.0
-    chosen = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
-    t, w = clock.t[chosen], clock.w[chosen]
+    samples = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
+    t, w = clock.t[samples], clock.w[samples]
     count = int(groups.max()) + 1
     means = np.bincount(groups, path.speeds) / np.bincount(groups)
     held_count, most = int(free.sum()), MOST_LEAD if clock.leaving else 0.0
-    least = np.maximum(min_speed, np.minimum(_NO_CRAWL, means))
-    low = np.concatenate([least, np.full(held_count, SHORTEST_HOLD), [0.0]])
+    slowest = np.maximum(min_speed, np.minimum(_NO_CRAWL, means))
+    low = np.concatenate([slowest, np.full(held_count, SHORTEST_HOLD), [0.0]])
     high = np.concatenate([np.full(count, max_speed), np.full(held_count, np.inf), [most]])
     steps = np.repeat([SPEED_STEP, HOLD_STEP], [count, held_count + 1])
     begin = np.clip(np.concatenate([means, waits[free], [clock.lead]]), low, high)
@@ -132,13 +132,16 @@ def fit(
         return np.hstack([np.stack(apart), leash / np.sqrt(count)])
 
     x, now = begin, errors(begin[None], rough=False)[0]
+    dampings = _DAMPINGS
     for _ in range(_ITERATIONS):
         signed = np.where(x + steps > high, -steps, steps)
         tried = errors(np.vstack([x, x + np.diag(signed)]), rough=True)
         slope = ((tried[1:] - tried[0]) / signed[:, None]).T
-        ahead = _steps(x, slope, now, low, high)
+        ahead = _steps(x, slope, now, low, high, dampings)
         guessed = now + errors(ahead, rough=True) - tried[0]
-        best = ahead[np.argmin(np.sum(guessed**2, axis=1))]
+        least = int(np.argmin(np.sum(guessed**2, axis=1)))
+        best, chosen = ahead[least], np.flatnonzero(_DAMPINGS == dampings[least])[0]
+        dampings = _DAMPINGS[max(0, chosen - 1) : chosen + 2]
         found = errors(best[None], rough=False)[0]
         before, after = float(now @ now), float(found @ found)
         if after < before:
@@ -149,7 +152,7 @@ def fit(
     return speeds[0], held[0], float(x[-1])
 
 
-def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real) -> Real:
+def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real, dampings: Real) -> Real:
     """Return where the damped Gauss-Newton steps lead, (dampings, k), within the bounds."""
     gradient = slope.T @ error
     stuck = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
@@ -158,6 +161,6 @@ def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real) -> Real:
     diagonal = np.diag(square) + 1e-12
     steps = [
         np.linalg.solve(square + np.diag(damping * diagonal + 1e-9), -slope.T @ error)
-        for damping in _DAMPINGS
+        for damping in dampings
     ]
     return np.clip(x + np.array(steps), low, high)

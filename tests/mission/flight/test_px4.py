@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from paths import line, path_of, wandering
 
+from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.mission.flight.path import FlightPath
 from faao_mav.mission.flight.px4 import Px4
@@ -57,13 +58,36 @@ def test_variants_side_by_side_fly_as_they_do_alone(
     rng = np.random.default_rng(seed)
     speeds = path.speeds * rng.uniform(0.6, 1.4, (3, len(path.speeds)))
     holds = path.holds * rng.uniform(0.5, 2, (3, len(path.holds)))
-    many = model.fly_batch(path, speeds, holds)
-    for k in range(3):
-        alone = model.fly(replace(path, speeds=speeds[k], holds=holds[k]))
-        np.testing.assert_allclose(many.arrivals[k], alone.arrivals, atol=1e-6)
-        np.testing.assert_allclose(many.departures[k], alone.departures, atol=1e-6)
+    assert_as_alone(model, path, speeds, holds)
+
+
+@settings(max_examples=10)
+@given(wandering(), models)
+def test_variants_that_share_most_of_a_flight_fly_as_they_do_alone(
+    path: FlightPath, model: Px4
+) -> None:
+    legs, points = len(path.speeds), len(path.holds)
+    speeds = path.speeds + 0.3 * np.eye(legs + points + 1, legs)
+    holds = path.holds + 0.7 * np.eye(legs + points + 1, points, -legs)
+    assert_as_alone(model, path, speeds, holds)
+
+
+def assert_as_alone(model: Px4, path: FlightPath, speeds: Real, holds: Real) -> None:
+    many = model.fly_many(path, speeds, holds)
+    for flown, speed, hold in zip(many, speeds, holds, strict=True):
+        alone = model.fly(replace(path, speeds=speed, holds=hold))
+        np.testing.assert_allclose(flown.arrivals, alone.arrivals, atol=1e-3)
+        np.testing.assert_allclose(flown.departures, alone.departures, atol=1e-3)
         shared = len(alone.t) - 1
-        np.testing.assert_allclose(many.position[k, :shared], alone.position[:shared], atol=1e-6)
+        np.testing.assert_allclose(flown.position[:shared], alone.position[:shared], atol=3e-3)
+
+
+def test_variants_fly_on_until_the_last_has_ended() -> None:
+    path = line(50, 3)
+    slow, fast = Px4().fly_many(path, np.array([[2.0] * 3, [8.0] * 3]), np.zeros((2, 4)))
+    assert fast.departures[-1] < slow.departures[-1] <= fast.t[-1]
+    np.testing.assert_array_equal(fast.t, slow.t)
+    np.testing.assert_allclose(fast.position[-1], [150, 0, 30], atol=0.01)
 
 
 @settings(max_examples=15)
@@ -77,8 +101,7 @@ def test_a_faster_leg_is_never_later(lengths: list[float], data: st.DataObject, 
     leg = data.draw(st.integers(0, len(lengths) - 1))
     speeds = np.tile(path.speeds, (12, 1))
     speeds[:, leg] = np.linspace(2, 9, 12)
-    arrivals = model.fly_batch(path, speeds, np.tile(path.holds, (12, 1))).arrivals[:, -1]
-    assert (np.diff(arrivals) <= 2e-3).all()
+    assert (np.diff(ends(model, path, speeds)) <= 2e-3).all()
 
 
 @pytest.mark.parametrize("model", [Px4(), SUITED])
@@ -95,17 +118,36 @@ def test_arrivals_are_smooth_in_speeds(model: Px4, leg: int) -> None:
     speeds = np.tile(path.speeds, (41, 1))
     change = np.linspace(-0.02, 0.02, 41)
     speeds[:, leg] += change
-    arrivals = model.fly_batch(path, speeds, np.tile(path.holds, (41, 1))).arrivals[:, -1]
+    arrivals = ends(model, path, speeds)
     noise = arrivals - np.polyval(np.polyfit(change, arrivals, 3), change)
     assert abs(noise).max() < 1e-3
+
+
+def ends(model: Px4, path: FlightPath, speeds: Real) -> Real:
+    """Return when the last point is reached with each of `speeds` (B, m - 1)."""
+    many = model.fly_many(path, speeds, np.tile(path.holds, (len(speeds), 1)))
+    return np.array([flown.arrivals[-1] for flown in many])
+
+
+@pytest.mark.parametrize("model", [Px4(), SUITED])
+def test_long_legs_are_flown_at_one_speed(model: Px4) -> None:
+    lengths = np.array([600, 1100, 2300, 4700])
+    flights = [model.fly(line(length, 1)) for length in lengths]
+    arrivals = np.array([flown.arrivals[1] for flown in flights])
+    middle = (flights[-1].t > 100) & (flights[-1].t < 500)
+    taken = np.diff(lengths) / flights[-1].velocity[middle, 0].mean()
+    np.testing.assert_allclose(np.diff(arrivals), taken, atol=0.03)
+    moved = np.diff(flights[-1].position[:, 0])
+    mean = (flights[-1].velocity[1:, 0] + flights[-1].velocity[:-1, 0]) / 2
+    np.testing.assert_allclose(moved, mean * 0.1, atol=0.01)
 
 
 def test_fractions_of_holds_count() -> None:
     path = path_of([0, 60, 60 + 60j])
     holds = np.zeros((4, 3))
     holds[:, 1] = [0.4, 5.0, 5.3, 12.5]
-    flown = Px4().fly_batch(path, np.tile(path.speeds, (4, 1)), holds)
-    waited = flown.departures[:, 1] - flown.arrivals[:, 1]
+    many = Px4().fly_many(path, np.tile(path.speeds, (4, 1)), holds)
+    waited = [flown.departures[1] - flown.arrivals[1] for flown in many]
     np.testing.assert_allclose(waited, holds[:, 1] + 0.1, atol=1e-9)
 
 

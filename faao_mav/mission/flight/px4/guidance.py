@@ -1,11 +1,11 @@
 """The velocity that PX4 asks for on its way along a leg."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 
 _ALIGNED = 0.98
 """Cosine of the angle to the target from which an aircraft no longer counts as turning."""
@@ -24,7 +24,10 @@ _TINY = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What bounds a trajectory: m/s² and m/s³, horizontally, upwards and downwards."""
+    """What bounds a trajectory: m/s² and m/s³, horizontally, upwards and downwards.
+
+    `error` m is how far behind the aircraft may be for the trajectory's clock to stop.
+    """
 
     acceleration: float
     jerk: float
@@ -34,143 +37,176 @@ class Limits:
     descent_acceleration: float
     descent_speed: float
     height_radius: float
+    error: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Leg:
-    """Legs, one per element: horizontal places and directions are complex, east + i north.
+    """A leg: horizontal places and directions are complex, east + i north.
 
     `target` m and `height` m are the end, `along` and `onward` the unit directions of this leg and
-    the next (0 where there is none), `speed` m/s the command, `radius` m the acceptance radius;
-    `exit_speed` and `exit_climb` m/s bound how fast the end is passed.
+    the next (0 where there is none), `speed` m/s the command, `radius` m the acceptance radius,
+    `hold` s how long to wait at the end; `exit_speed` and `exit_climb` m/s bound how fast the end
+    is passed; farther than `braking` m from it the command holds whatever comes next.
     """
 
-    target: Complex
-    height: Real
-    along: Complex
-    onward: Complex
-    speed: Real
-    radius: Real
-    exit_speed: Real
-    exit_climb: Real
-
-    def of(self, index: NDArray[np.int_]) -> "Leg":
-        """Return for each variant (row) its leg `index` (B,)."""
-        rows = np.arange(len(index))
-        return Leg(*(getattr(self, field.name)[rows, index] for field in fields(self)))
+    target: complex
+    height: float
+    along: complex
+    onward: complex
+    speed: float
+    radius: float
+    hold: float
+    exit_speed: float
+    exit_climb: float
+    braking: float
 
 
-def stopping_speed(jerk: float, acceleration: Real | float, distance: Real, final: Real) -> Real:
+def stopping_speed(jerk: float, acceleration: float, distance: float, final: float) -> float:
     """Return the speed from which PX4 trusts itself to reach `final` m/s within `distance` m.
 
     v = (-b + sqrt(b² + 8 a d + 4 v_f²)) / 2 with b = 4 a² / j, at least v_f.
     """
     b = 4 * acceleration * acceleration / jerk
-    return np.maximum(
-        (np.sqrt(b * b + 8 * acceleration * distance + 4 * final * final) - b) / 2, final
-    )
+    speed = (sqrt(b * b + 8 * acceleration * distance + 4 * final * final) - b) / 2
+    return max(speed, final)
 
 
-def legs(limits: Limits, points: Real, radii: Real, speeds: Real, holds: Real) -> Leg:
-    """Return the legs between `points` (m, 3), each field (B, m - 1).
+def _stopping_distance(jerk: float, acceleration: float, speed: float) -> float:
+    """Return from how far, m, `stopping_speed` to rest is `speed`: d = v (v + b) / 2 a."""
+    return speed * (speed + 4 * acceleration * acceleration / jerk) / (2 * acceleration)
 
-    `radii` are (m,), `speeds` (B, m - 1), `holds` (B, m). Only the waypoint after the target is
+
+def legs(
+    limits: Limits,
+    points: Real,
+    radii: Sequence[float],
+    speeds: Sequence[float],
+    holds: Sequence[float],
+) -> list[Leg]:
+    """Return the legs between `points` (m, 3), m - 1 of them.
+
+    `radii` are (m,), `speeds` (m - 1,), `holds` (m,). Only the waypoint after the target is
     looked at: the aircraft must be able to stop there, and it stops at the target if there is
     none, if it is told to hold, or if the next waypoint lies within the acceptance radius.
     """
-    places = points[:, 0] + 1j * points[:, 1]
-    moves, rises = np.diff(places), np.diff(points[:, 2])
-    lengths = np.abs(moves)
-    along = moves / np.where(lengths > _TINY, lengths, 1.0)
-    following = np.append(lengths[1:], 0.0)
-    passable = (following > 1e-3) & (following >= radii[1:]) & (holds[:, 1:] <= 0)
-    zero = np.zeros_like(following)
-    ahead = stopping_speed(limits.jerk, limits.acceleration, following, zero)
-    shape = speeds.shape
-    return Leg(
-        target=np.broadcast_to(places[1:], shape),
-        height=np.broadcast_to(points[1:, 2], shape),
-        along=np.broadcast_to(along, shape),
-        onward=np.broadcast_to(np.append(along[1:], 0.0), shape),
-        speed=speeds,
-        radius=np.broadcast_to(radii[1:], shape),
-        exit_speed=np.where(passable, np.minimum(ahead, speeds), 0.0),
-        exit_climb=np.where(holds[:, 1:] <= 0, _exit_climbs(limits, lengths, rises), 0.0),
-    )
+    places = [complex(east, north) for east, north, _ in points.tolist()]
+    heights = points[:, 2].tolist()
+    moves = [end - start for start, end in pairwise(places)] + [0j]
+    rises = [end - start for start, end in pairwise(heights)] + [0.0]
+    along = [move / abs(move) if abs(move) > _TINY else 0j for move in moves]
+    result = []
+    for k, speed in enumerate(speeds):
+        following, hold = abs(moves[k + 1]), holds[k + 1]
+        ahead = stopping_speed(limits.jerk, limits.acceleration, following, 0.0)
+        passable = following > 1e-3 and following >= radii[k + 1] and hold <= 0
+        slopes = complex(abs(moves[k]), rises[k]), complex(following, rises[k + 1])
+        result.append(
+            Leg(
+                target=places[k + 1],
+                height=heights[k + 1],
+                along=along[k],
+                onward=along[k + 1],
+                speed=speed,
+                radius=radii[k + 1],
+                hold=hold,
+                exit_speed=min(ahead, speed) if passable else 0.0,
+                exit_climb=_exit_climb(limits, *slopes) if hold <= 0 else 0.0,
+                braking=_stopping_distance(limits.jerk, limits.acceleration, speed),
+            )
+        )
+    return result
 
 
-def _exit_climbs(limits: Limits, lengths: Real, rises: Real) -> Real:
-    """Return the vertical speeds (m - 1,) at which each leg's end may be passed, m/s."""
-    slopes = lengths + 1j * rises
-    onward = np.append(slopes[1:], 0.0)
-    scale = np.abs(slopes) * np.abs(onward)
-    cosine = (slopes * onward.conj()).real / np.where(scale > _TINY, scale, 1.0)
-    acceleration = np.where(rises > 0, limits.climb_acceleration, limits.descent_acceleration)
-    speed = np.sqrt(acceleration * limits.height_radius * _half_turn(cosine))
-    steep = (np.abs(onward.imag) > 1e-3) & (scale > _TINY)
-    return np.where(steep, speed, 0.0)
+def _exit_climb(limits: Limits, slope: complex, onward: complex) -> float:
+    """Return the vertical speed at which the end of a leg may be passed, m/s.
 
-
-def _half_turn(cosine: Real) -> Real:
-    """Return cot(θ/2) for the cosine of the turn θ between two legs."""
-    sharp, straight = np.maximum(1 + cosine, 0.0), np.maximum(1 - cosine, 1e-9)
-    return np.sqrt(sharp / straight)
-
-
-def velocity_setpoint(
-    limits: Limits, leg: Leg, place: Complex, velocity: Complex, remembered: Real
-) -> tuple[Complex, Real]:
-    """Return the velocity asked for, (n, B) m/s, and the speed to remember for turns, (B,) m/s.
-
-    `place` (n, B) m and `velocity` (n, B) m/s are the trajectory's: row 0 is horizontal, complex,
-    row 1 vertical, real; n = 1 in level flight. The speed is the least of the command, what can
-    be slowed to the passing speed at the target in time, and in a turn what was allowed before it;
-    the passing speed is sqrt(g a R cot(θ/2)), g = MPC_XY_TRAJ_P, at most the leg's `exit_speed`.
-    The direction is to the target, in a turn to a point of the leg max(R, 5 m) away.
+    `slope` and `onward` are this leg and the next, m: along the ground + i upwards.
     """
-    offset = leg.target - place[0]
-    distance = np.abs(offset) + _TINY
-    straight = offset / distance
-    cosine = (straight * leg.onward.conj()).real
-    corner = limits.corner_gain * limits.acceleration * leg.radius * _half_turn(cosine)
-    passing = np.minimum(np.sqrt(corner), leg.exit_speed)
-    slowing = stopping_speed(limits.jerk, limits.acceleration, distance, passing)
-    allowed = np.minimum(leg.speed, slowing)
-    turning = _turning(leg, straight, distance, velocity[0])
-    speed = allowed + turning * (np.minimum(remembered, allowed) - allowed)
-    remembered = allowed + turning * (remembered - allowed)
-    direction = straight + turning * (_along_leg(leg, offset, straight) - straight)
-    if len(place) == 1:
-        return (direction * speed)[None], remembered
-    rise = leg.height - place[1].real
-    climb = np.where(rise > 0, limits.climb_speed, limits.descent_speed)
-    acceleration = np.where(rise > 0, limits.climb_acceleration, limits.descent_acceleration)
-    height = np.abs(rise) + _TINY
-    exit_climb = np.minimum(leg.exit_climb, climb)
-    climb = np.minimum(climb, stopping_speed(limits.jerk, acceleration, height, exit_climb))
-    vertical = np.minimum(climb, np.maximum(speed, _SLOW) * height / distance)
-    speed = np.minimum(speed, np.maximum(climb, _SLOW) * distance / height)
-    return np.stack([direction * speed, np.sign(rise) * vertical]), remembered
+    scale = abs(slope) * abs(onward)
+    if abs(onward.imag) <= 1e-3 or scale <= _TINY:
+        return 0.0
+    cosine = (slope * onward.conjugate()).real / scale
+    acceleration = limits.climb_acceleration if slope.imag > 0 else limits.descent_acceleration
+    return sqrt(acceleration * limits.height_radius * _half_turn(cosine))
 
 
-def _turning(leg: Leg, straight: Complex, distance: Real, velocity: Complex) -> Real:
-    """Return 1 where the trajectory turns towards its target, 0 where it does not, (B,)."""
-    speed = np.abs(velocity)
-    cosine = (velocity * straight.conj()).real / (speed + _TINY)
+def _half_turn(cosine: float) -> float:
+    """Return cot(θ/2) for the cosine of the turn θ between two legs."""
+    return sqrt(max(1 + cosine, 0.0) / max(1 - cosine, 1e-9))
+
+
+def level_setpoint(
+    limits: Limits, leg: Leg, place: complex, velocity: complex, remembered: float
+) -> tuple[complex, float, float]:
+    """Return the unit direction and the speed, m/s, asked for, and the speed to remember for turns.
+
+    `place` m and `velocity` m/s are the trajectory's. The speed is the least of the command, what
+    can be slowed to the passing speed at the target in time, and in a turn what was allowed before
+    it. The direction is to the target, in a turn to a point of the leg max(R, 5 m) away.
+    """
+    offset = leg.target - place
+    distance = abs(offset) + _TINY
+    direction = offset / distance
+    allowed = leg.speed
+    if distance < leg.braking:
+        allowed = min(allowed, _slowing(limits, leg, direction, distance))
+    speed = abs(velocity)
+    cosine = (velocity * direction.conjugate()).real / (speed + _TINY)
+    if cosine >= _ALIGNED + _BLEND:
+        return direction, allowed, allowed
     astray = _ramp((_ALIGNED + _BLEND - cosine) / (2 * _BLEND))
     moving = _ramp((speed - 0.1) / 0.2)
     outside = _ramp((distance - leg.radius) / 0.2 + 0.5)
-    return astray * moving * outside
+    turning = astray * moving * outside
+    return (
+        direction + turning * (_along_leg(leg, offset, direction) - direction),
+        allowed + turning * (min(remembered, allowed) - allowed),
+        allowed + turning * (remembered - allowed),
+    )
 
 
-def _ramp(share: Real) -> Real:
-    return np.minimum(np.maximum(share, 0.0), 1.0)  # np.clip takes three times as long
+def _slowing(limits: Limits, leg: Leg, direction: complex, distance: float) -> float:
+    """Return the speed from which the target `distance` away is passed slowly enough.
+
+    The passing speed is sqrt(g a R cot(θ/2)), g = MPC_XY_TRAJ_P, at most the leg's `exit_speed`.
+    """
+    cosine = (direction * leg.onward.conjugate()).real
+    corner = limits.corner_gain * limits.acceleration * leg.radius * _half_turn(cosine)
+    passing = min(sqrt(corner), leg.exit_speed)
+    return stopping_speed(limits.jerk, limits.acceleration, distance, passing)
 
 
-def _along_leg(leg: Leg, offset: Complex, straight: Complex) -> Complex:
-    """Return the unit direction (B,) to the leg's point that is max(R, 5 m) away."""
-    rest = offset * leg.along.conj()
-    reach = np.maximum(leg.radius, _LOOKAHEAD)
-    ahead = np.sqrt(np.maximum(reach * reach - rest.imag * rest.imag, 0.0))
-    aim = ahead + 1j * rest.imag
-    return np.where(rest.real > 0, aim * leg.along / (np.abs(aim) + _TINY), straight)
+def _ramp(share: float) -> float:
+    return min(max(share, 0.0), 1.0)
+
+
+def _along_leg(leg: Leg, offset: complex, straight: complex) -> complex:
+    """Return the unit direction to the leg's point that is max(R, 5 m) away."""
+    rest = offset * leg.along.conjugate()
+    if rest.real <= 0:
+        return straight
+    reach = max(leg.radius, _LOOKAHEAD)
+    aim = complex(sqrt(max(reach * reach - rest.imag * rest.imag, 0.0)), rest.imag)
+    return aim * leg.along / (abs(aim) + _TINY)
+
+
+def climb_setpoint(
+    limits: Limits, leg: Leg, distance: float, height: float, speed: float
+) -> tuple[float, float]:
+    """Return the horizontal speed and the vertical velocity asked for, m/s.
+
+    The target is `distance` m away, `speed` m/s is asked for without regard to climbing. The slower
+    of the two directions holds up the other, for a straight line to the target.
+    """
+    rise = leg.height - height
+    up = rise > 0
+    fastest = limits.climb_speed if up else limits.descent_speed
+    acceleration = limits.climb_acceleration if up else limits.descent_acceleration
+    left = abs(rise) + _TINY
+    distance += _TINY
+    slowing = stopping_speed(limits.jerk, acceleration, left, min(leg.exit_climb, fastest))
+    climb = min(fastest, slowing)
+    vertical = min(climb, max(speed, _SLOW) * left / distance)
+    speed = min(speed, max(climb, _SLOW) * distance / left)
+    return speed, vertical if up else -vertical

@@ -12,7 +12,7 @@ from faao_mav.mission.flight.parameters import Parameter, limits_of
 from faao_mav.mission.flight.path import FlightPath, Flown
 from faao_mav.mission.flight.px4.guidance import Limits
 from faao_mav.mission.flight.px4.sampling import grid, sampled
-from faao_mav.mission.flight.px4.simulation import SWITCH_DELAY, Variants, simulate
+from faao_mav.mission.flight.px4.simulation import SWITCH_DELAY, Simulation
 from faao_mav.mission.vehicle import Vehicle
 
 _PARAMETERS = {
@@ -39,7 +39,7 @@ class Px4:
     within jerk and acceleration, a clock that runs slower while the aircraft lags behind, a
     cascaded controller and an aircraft with lag and drag; see the modules of this package for the
     equations. Four constants are fitted to recorded flights (`response.ATTITUDE_LAG`,
-    `response.DRAG`, `simulation.WANDER`, `simulation.START_LAG`), the rest is PX4's. Limits are SI:
+    `response.DRAG`, `step.WANDER`, `simulation.START_LAG`), the rest is PX4's. Limits are SI:
     m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
     """
 
@@ -85,33 +85,20 @@ class Px4:
         *,
         rough: bool = False,  # noqa: ARG002
     ) -> Sequence[Flown]:
-        """Return the flights of `fly_batch` one by one; `rough` ones are the same."""
-        many = self.fly_batch(path, speeds, waits, step)
-        return [
-            Flown(many.arrivals[k], many.departures[k], many.t, many.position[k], many.velocity[k])
-            for k in range(len(many.arrivals))
-        ]
+        """Fly variants of `path` with other `speeds` (B, m - 1), m/s, and `waits` (B, m), s.
 
-    def fly_batch(
-        self, path: FlightPath, speeds: ArrayLike, holds: ArrayLike, step: float = 0.1
-    ) -> Flown:
-        """Fly variants of `path` with other `speeds` (B, m - 1), m/s, and `holds` (B, m), s.
-
-        The answer's arrays, all but `t`, have a leading axis of B; `t` reaches the latest end.
-        Results are smooth in speeds and holds to about 1e-3 s, so finite differences of 0.01 m/s
-        and more work. Variants side by side cost far less than one after the other.
+        All reach the latest end. Results are smooth in speeds and waits to about 1e-3 s, so finite
+        differences of 0.01 m/s and more work. Variants that differ little cost far less together
+        than one by one: see `Simulation`.
         """
-        speed, hold = (
-            np.atleast_2d(np.asarray(speeds, float)),
-            np.atleast_2d(np.asarray(holds, float)),
-        )
+        speed = np.atleast_2d(np.asarray(speeds, float))
+        hold = np.atleast_2d(np.asarray(waits, float))
         speed = np.minimum(np.where(speed > 0, speed, self.cruise_speed), self.max_speed)
         if len(path.points) == 1:
-            return _standing(path.points[0], hold, step)
+            return _standing(path.points[0], hold[:, 0], step)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
-        variants = Variants(path.points, radii, speed, hold)
-        log = simulate(self._limits(), self.error_limit, variants, beyond=step)
-        return sampled(log, path.points[0, 2], step)
+        logs = Simulation(self._limits(), path.points, radii).fly(speed, hold, beyond=step)
+        return sampled(logs, path.points[0, 2], step)
 
     def _limits(self) -> Limits:
         return Limits(
@@ -123,12 +110,13 @@ class Px4:
             self.descent_acceleration,
             self.descent_speed,
             self.height_radius,
+            self.error_limit,
         )
 
 
-def _standing(point: Real, holds: Real, step: float) -> Flown:
-    """Return what becomes of a path of one point (3,): `holds` (B, 1) s there."""
+def _standing(point: Real, holds: Real, step: float) -> list[Flown]:
+    """Return what becomes of a path of one point (3,): `holds` (B,) s there."""
     ends = np.where(holds > 0, holds + SWITCH_DELAY, 0.0)
     t = grid(float(ends.max()), step)
-    position = np.tile(point, (len(holds), len(t), 1))
-    return Flown(np.zeros_like(ends), ends, t, position, np.zeros_like(position))
+    position = np.tile(point, (len(t), 1))
+    return [Flown(np.zeros(1), end, t, position, np.zeros_like(position)) for end in ends[:, None]]

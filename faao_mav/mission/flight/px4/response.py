@@ -1,10 +1,11 @@
 """How the aircraft follows the smoothed trajectory."""
 
 from functools import lru_cache
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 
 POSITION_GAIN = 0.95
 """MPC_XY_P, 1/s."""
@@ -19,58 +20,87 @@ DRAG = 0.1
 """Air drag over mass, 1/s. Fitted."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
-_TRAJECTORY = 4
-"""First of the trajectory's position, velocity, acceleration; their rates of change follow."""
+_TRAJECTORY, _CHANGES, _STATES = 4, 7, 10
+"""First of the trajectory's position, velocity, acceleration; of their changes; how many in all."""
 
-STATES = 10
+_CAUSES = [_POSITION, _VELOCITY, _THRUST, _INTEGRAL, 5, 7, 6, 8, 9]
+"""The states that a `Step` looks at: the position's lag says all of the two positions."""
+
 _TERMS = 12
 
+Number = TypeVar("Number", float, complex)
 
-class Response:
-    """A cascaded position and velocity controller about an aircraft with lag and drag.
+Motion: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number]
+"""The aircraft's position, velocity, thrust over mass and velocity integral; the trajectory's
+position, velocity and acceleration. Horizontal motion is complex, vertical motion real: altitude is
+taken to be held as tightly as position."""
 
-    State columns are `STATES` long: the aircraft's position, velocity, thrust over mass and
-    velocity integral; the trajectory's position, velocity and acceleration; and the rates at which
-    those change over the step. Horizontal columns are complex, vertical ones real: altitude is
-    taken to be held as tightly as position. The system is linear, so a step of `step` seconds is
-    one product; shorter ones sum the exponential's series.
+Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+Step: TypeAlias = tuple[Row, Row, Row, Row]
+"""What the aircraft's four states become, as factors of: the lag of its position; its other states;
+the trajectory's velocity, displacement and acceleration, changes of velocity and acceleration."""
+
+
+def advance(
+    step: Step, motion: Motion[Number], shift: Number, velocity: Number, acceleration: Number
+) -> Motion[Number]:
+    """Return `motion` after a step that takes the trajectory to the new velocity, and by `shift`.
+
+    A cascaded position and velocity controller about an aircraft with lag and drag: a linear
+    system, which the trajectory drives by changing evenly over the step.
     """
-
-    def __init__(self, step: float) -> None:
-        self._step = step
-        self._system, self._transition = _matrices(step)
-
-    def advance(self, state: Complex, dt: Real) -> Complex:
-        """Return `state` (STATES, ...) after `dt` (...) seconds, each at most the step."""
-        after = (self._transition @ state.reshape(STATES, -1)).reshape(state.shape)
-        short = dt < self._step
-        if short.any():
-            term = state[:, short]
-            part = term.copy()
-            for k in range(1, _TERMS):
-                term = self._system @ term * (dt[short] / k)
-                part += term
-            after[:, short] = part
-        return after
+    position, a, b, c, place, d, push = motion
+    lag = position - place
+    p, v, t, n = step
+    ahead = _sum(p, lag, a, b, c, d, shift)
+    speed = _sum(v, lag, a, b, c, d, shift)
+    thrust = _sum(t, lag, a, b, c, d, shift)
+    integral = _sum(n, lag, a, b, c, d, shift)
+    if push or acceleration or velocity != d:  # seldom: most of a flight is at one velocity
+        rise, jolt = velocity - d, acceleration - push
+        ahead += p[6] * push + p[7] * rise + p[8] * jolt
+        speed += v[6] * push + v[7] * rise + v[8] * jolt
+        thrust += t[6] * push + t[7] * rise + t[8] * jolt
+        integral += n[6] * push + n[7] * rise + n[8] * jolt
+    return place + ahead, speed, thrust, integral, place + shift, velocity, acceleration
 
 
-@lru_cache(maxsize=8)
-def _matrices(step: float) -> tuple[Complex, Complex]:
-    """Return the system matrix A and exp(A step)."""
-    rows = np.eye(STATES)
+def _sum(
+    row: Row, lag: Number, a: Number, b: Number, c: Number, d: Number, shift: Number
+) -> Number:
+    of_lag, of_a, of_b, of_c, of_d, of_shift, _, _, _ = row
+    return of_lag * lag + of_a * a + of_b * b + of_c * c + of_d * d + of_shift * shift
+
+
+@lru_cache(maxsize=16)
+def step_of(dt: float) -> Step:
+    """Return the step of `dt` s: rows of exp(A dt), by its series."""
+    powers = dt ** np.arange(_TERMS)
+    rows = (powers @ _series()).reshape(4, -1).tolist()
+    return tuple(tuple(row) for row in rows)  # type: ignore[return-value]
+
+
+@lru_cache(maxsize=1)
+def _series() -> Real:
+    """Return the terms A^k / k! as far as `Step` needs them, (_TERMS, 4 * 9).
+
+    Changes are rates times dt: their columns are one power of dt ahead.
+    """
+    rows = np.eye(_STATES)
     proportional, integral, derivative = VELOCITY_GAINS
-    position, velocity, acceleration = rows[_TRAJECTORY : _TRAJECTORY + 3]
+    position, velocity, acceleration = rows[_TRAJECTORY:_CHANGES]
     error = POSITION_GAIN * (position - rows[_POSITION]) + velocity - rows[_VELOCITY]
     motion = rows[_THRUST] - DRAG * rows[_VELOCITY]
     demand = acceleration + proportional * error + rows[_INTEGRAL] - derivative * motion
-    system = np.zeros((STATES, STATES))
+    system = np.zeros((_STATES, _STATES))
     system[_POSITION] = rows[_VELOCITY]
     system[_VELOCITY] = motion
     system[_THRUST] = (demand - rows[_THRUST]) / ATTITUDE_LAG
     system[_INTEGRAL] = integral * error
-    system[_TRAJECTORY : _TRAJECTORY + 3] = rows[_TRAJECTORY + 3 :]
-    term = transition = np.eye(STATES)
-    for k in range(1, 2 * _TERMS):
-        term = system @ term * (step / k)
-        transition = transition + term
-    return system.astype(np.complex128), transition.astype(np.complex128)
+    system[_TRAJECTORY:_CHANGES] = rows[_CHANGES:]
+    terms = [rows]
+    for k in range(1, _TERMS + 1):
+        terms.append(system @ terms[-1] / k)
+    series = np.stack(terms)[:, :_TRAJECTORY]
+    series[:-1, :, _CHANGES:] = series[1:, :, _CHANGES:]
+    return series[:-1, :, _CAUSES].reshape(_TERMS, -1)

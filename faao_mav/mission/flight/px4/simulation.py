@@ -1,14 +1,14 @@
-"""Flying several variants of one path side by side."""
+"""Flying variants of one path, leg by leg."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from faao_mav.arrays import Complex, Real
-from faao_mav.mission.flight.px4.guidance import Limits, legs, velocity_setpoint
-from faao_mav.mission.flight.px4.response import STATES, Response
-from faao_mav.mission.flight.px4.smoothing import follow
+from faao_mav.arrays import Real
+from faao_mav.mission.flight.px4.guidance import Leg, Limits, legs
+from faao_mav.mission.flight.px4.step import State, at_rest, moved
 
 STEP = 0.1
 """Longest step of the simulation, s: what was calibrated."""
@@ -19,197 +19,227 @@ SWITCH_DELAY = 0.1
 START_LAG = 0.12
 """From the first leg becoming current to the trajectory moving, s. Fitted."""
 
-WANDER = 0.08
-"""How far the position estimate strays from the trajectory all the time, m. Fitted."""
-
 _SETTLED = 2e-3
 """Slower than this, m/s, a holding aircraft is taken to stand."""
+
+_ALIKE = 3e-4
+"""States that differ by less, m, m/s, m/s², are taken to be the same.
+
+Variants of a flight take some 20 s to move alike again; ten times less would take 10 s more.
+"""
+
+_STEADY = 1e-5
+"""A velocity off by less, m/s, stays as it is along a leg: a few mm in minutes."""
 
 _TINY = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Variants:
-    """`points` (m, 3), m >= 2, and `radii` (m,) of a path; `speeds` (B, m - 1), `holds` (B, m)."""
+class Stretch:
+    """A leg as it is flown: `arrival` and `departure` at its end, s, and its `end`.
 
-    points: Real
-    radii: Real
-    speeds: Real
-    holds: Real
+    `time` (k,) s and `motion` (k, 2, n), position m and velocity m/s, are at the end of each step;
+    n is 3 with east, north, up or 2 on level paths. Times count from the leg's start.
+    """
+
+    arrival: float
+    departure: float
+    time: Real
+    motion: Real
+    end: State
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Log:
-    """`arrivals`, `departures` (B, m) s; at each step time (k, B) and motion (k, n, B).
+    """A flight: `arrivals`, `departures` (m,) s, and after each step time (k,) s and `motion`.
 
-    Steps are not uniform: they end when a waypoint is left.
+    `motion` (k, 2, n) is as in `Stretch`. Steps are not uniform: they end when a waypoint is left.
     """
 
     arrivals: Real
     departures: Real
     time: Real
-    position: Complex
-    velocity: Complex
+    motion: Real
 
 
-def simulate(limits: Limits, error_limit: float, variants: Variants, beyond: float) -> Log:
-    """Fly every variant until the last one has ended, and on for `beyond` seconds.
+class Simulation:
+    """Flights of variants of the path through `points` (m, 3), m >= 2, with `radii` (m,).
 
-    `error_limit` is MPC_XY_ERR_MAX, m: the trajectory's clock runs slower by the share of it that
-    the aircraft lags behind.
+    A leg that is entered as it was before, with the same command, is flown as it was before. So
+    variants that differ by one speed or hold are flown from there only, and until they move as if
+    it had not changed.
     """
-    flight = _Flight(limits, error_limit, variants)
-    while not flight.over(beyond):
-        flight.step()
-    return flight.log()
 
+    def __init__(self, limits: Limits, points: Real, radii: Real) -> None:
+        self._limits, self._points, self._radii = limits, points, radii.tolist()
+        self._known: dict[Leg, list[tuple[State, Stretch]]] = {}
 
-class _Flight:
-    """All variants under way; arrays are (B,), motion (n, B) with n = 2 if the path climbs."""
+    def fly(self, speeds: Real, holds: Real, beyond: float) -> list[Log]:
+        """Fly every variant until the last one has ended, and on for `beyond` seconds.
 
-    def __init__(self, limits: Limits, error_limit: float, variants: Variants) -> None:
-        points, holds = variants.points, variants.holds
-        count, self._last = len(holds), len(points) - 2
-        self._limits, self._error_limit, self._holds = limits, error_limit, holds
-        self._legs = legs(limits, points, variants.radii, variants.speeds, holds)
-        self._response = Response(STEP)
-        rows = 1 if np.ptp(points[:, 2]) == 0 else 2
-        start = np.array([complex(*points[0, :2]), complex(points[0, 2])])[:rows, None]
-        self._place: Complex = np.repeat(start, count, axis=1)
-        self._velocity = np.zeros_like(self._place)
-        self._acceleration = np.zeros_like(self._place)
-        self._state = np.zeros((STATES, rows, count), dtype=np.complex128)
-        self._state[0] = self._place
-        self._remembered = np.zeros(count)
-        self._index = np.zeros(count, dtype=np.int_)
-        self._leg = self._legs.of(self._index)
-        self._due = np.full(count, np.inf)
-        self._ended = np.zeros(count, dtype=np.bool_)
-        self._arrivals = np.zeros((count, len(points)))
-        self._departures = np.zeros((count, len(points)))
-        self._departures[:, 0] = np.where(holds[:, 0] > 0, holds[:, 0] + SWITCH_DELAY, 0.0)
-        self._time = self._departures[:, 0] + START_LAG
-        self._far = self._distances()
-        self._times, self._motions = [self._time], [self._state[:2]]
-
-    def over(self, beyond: float) -> bool:
-        if not self._ended.all():
-            return False
-        return bool(self._time.min() >= self._departures[:, -1].max() + beyond)
-
-    def log(self) -> Log:
-        motion = np.stack(self._motions)
-        return Log(
-            self._arrivals, self._departures, np.stack(self._times), motion[:, 0], motion[:, 1]
-        )
-
-    def step(self) -> None:
-        """Go on by at most `STEP` seconds; a variant that leaves a waypoint does so at the end."""
-        dt = np.minimum(STEP, self._due - self._time)
-        idle = self._standing()
-        if idle.any():
-            dt = np.where(idle, 0.0, dt)
-        before, far = self._state, self._far
-        self._move(dt)
-        self._time = np.where(idle, self._due, self._time + dt)
-        self._times.append(self._time)
-        self._motions.append(self._state[:2])
-        self._far = self._distances()
-        reached = (self._far <= 0).all(axis=0) & np.isinf(self._due) & ~self._ended
-        if reached.any():
-            self._reach(np.flatnonzero(reached), dt, before, far)
-        leaving = self._due - self._time < _TINY
-        if leaving.any():
-            self._leave(np.flatnonzero(leaving))
-
-    def _move(self, dt: Real) -> None:
-        midway = self._place + self._velocity * (dt / 2)
-        setpoint, self._remembered = velocity_setpoint(
-            self._limits, self._leg, midway, self._velocity, self._remembered
-        )
-        clock = dt * self._pace()
-        shift, velocity, acceleration = follow(
-            self._velocity,
-            self._acceleration,
-            setpoint,
-            self._acceleration_limits(setpoint),
-            self._limits.jerk,
-            clock,
-        )
-        rate = 1 / np.maximum(dt, _TINY)
-        state = self._state.copy()
-        state[4], state[5], state[6] = self._place, self._velocity, self._acceleration
-        state[7] = shift * rate
-        state[8] = (velocity - self._velocity) * rate
-        state[9] = (acceleration - self._acceleration) * rate
-        self._state = self._response.advance(state, np.broadcast_to(dt, shift.shape))
-        self._place = self._place + shift
-        self._velocity, self._acceleration = velocity, acceleration
-
-    def _pace(self) -> Real:
-        """Return how fast the trajectory's clock runs, (B,): 1 less the lag's share of the limit.
-
-        Being ahead does not count; the estimate's wander makes that a gradual affair.
+        `speeds` are (B, m - 1), `holds` (B, m).
         """
-        lag = self._place[0] - self._state[0, 0]
-        heading = self._velocity[0]
-        ahead = (lag * heading.conj()).real / (np.abs(heading) + _TINY)
-        size = np.sqrt((lag * lag.conj()).real + WANDER * WANDER)
-        behind: Real = size * (1 + ahead / np.sqrt(ahead * ahead + WANDER * WANDER)) / 2
-        return 1 - np.minimum(behind / self._error_limit, 1.0)
+        starts = np.where(holds[:, 0] > 0, holds[:, 0] + SWITCH_DELAY, 0.0).tolist()
+        routes = [
+            legs(self._limits, self._points, self._radii, speed, hold)
+            for speed, hold in zip(speeds.tolist(), holds.tolist(), strict=True)
+        ]
+        flights = [self._flight(route) for route in routes]
+        ends = [
+            start + START_LAG + sum(stretch.departure for stretch in flight)
+            for start, flight in zip(starts, flights, strict=True)
+        ]
+        last = max(ends) + beyond
+        logs = []
+        for start, route, flight, end in zip(starts, routes, flights, ends, strict=True):
+            after = _stay(self._limits, route[-1], flight[-1].end, last - end)
+            logs.append(self._log(start, [*flight, after]))
+        return logs
 
-    def _acceleration_limits(self, setpoint: Complex) -> Real:
-        limits = np.full(setpoint.shape, self._limits.acceleration)
-        if len(setpoint) > 1:
-            up, down = self._limits.climb_acceleration, self._limits.descent_acceleration
-            limits[1] = np.where(setpoint[1].real > 0, up, down)
-        return limits
+    def _start(self) -> State:
+        east, north, up = self._points[0].tolist()
+        return at_rest(complex(east, north), up if np.ptp(self._points[:, 2]) > 0 else None)
 
-    def _distances(self) -> Real:
-        """Return how far each variant is from accepting its target, (n, B) m: 0 and less is in."""
-        place = self._state[0]
-        across: Real = np.abs(place[0] - self._leg.target) - self._leg.radius
-        if len(place) == 1:
-            return across[None]
-        height = np.abs(place[1].real - self._leg.height) - self._limits.height_radius
-        return np.stack([across, height])
+    def _flight(self, route: list[Leg]) -> list[Stretch]:
+        state, result = self._start(), []
+        for leg in route:
+            flown = self._known.setdefault(leg, [])
+            stretch = next((after for before, after in flown if _alike(before, state)), None)
+            if stretch is None:
+                stretch = _fly(self._limits, leg, state)
+                flown.append((state, stretch))
+            result.append(stretch)
+            state = stretch.end
+        return result
 
-    def _standing(self) -> NDArray[np.bool_]:
-        """Return which variants only wait for a hold to end."""
-        waiting: NDArray[np.bool_] = np.isfinite(self._due)
-        if waiting.any():
-            motion = np.abs(self._velocity) + np.abs(self._state[1])
-            waiting = waiting & (motion < _SETTLED).all(axis=0)
-        return waiting
-
-    def _reach(self, which: NDArray[np.int_], dt: Real, before: Complex, far: Real) -> None:
-        """Note arrivals at the moment within the last step at which the target was accepted."""
-        near = self._far[:, which]
-        approach = far[:, which]
-        share = np.where(approach > 0, approach / np.maximum(approach - near, _TINY), 0.0)
-        offset = before[0, 0, which] - self._leg.target[which]
-        closing = (offset.conj() * before[1, 0, which]).real / np.maximum(np.abs(offset), _TINY)
-        share[0] = np.where(
-            approach[0] > 0, _crossing(approach[0], closing * dt[which], near[0]), 0.0
+    def _log(self, start: float, stretches: list[Stretch]) -> Log:
+        moving = start + START_LAG
+        begun = moving + np.cumsum([0.0] + [stretch.departure for stretch in stretches[:-1]])
+        arrivals = [stretch.arrival for stretch in stretches[:-1]]
+        times = [at + stretch.time for at, stretch in zip(begun, stretches, strict=True)]
+        return Log(
+            np.concatenate([[0.0], begun[:-1] + arrivals]),
+            np.concatenate([[start], begun[1:]]),
+            np.concatenate([[moving], *times]),
+            np.concatenate([_motion([self._start()]), *(each.motion for each in stretches)]),
         )
-        arrival = self._time[which] - dt[which] * (1 - share.max(axis=0))
-        point = self._index[which] + 1
-        self._arrivals[which, point] = arrival
-        self._due[which] = arrival + SWITCH_DELAY + self._holds[which, point]
-
-    def _leave(self, which: NDArray[np.int_]) -> None:
-        self._departures[which, self._index[which] + 1] = self._due[which]
-        self._due[which] = np.inf
-        ended = self._index[which] == self._last
-        self._ended[which[ended]] = True
-        self._index[which[~ended]] += 1
-        self._leg = self._legs.of(self._index)
-        self._far = self._distances()
 
 
-def _crossing(start: Real, slope: Real, end: Real) -> Real:
+def _alike(one: State, other: State) -> bool:
+    if abs(one.remembered - other.remembered) > _ALIKE:
+        return False
+    if one.climb is not None and other.climb is not None:
+        pairs = zip(one.level + one.climb, other.level + other.climb, strict=True)
+    else:
+        pairs = zip(one.level, other.level, strict=True)
+    return all(abs(mine - yours) <= _ALIKE for mine, yours in pairs)
+
+
+def _fly(limits: Limits, leg: Leg, state: State) -> Stretch:
+    """Fly along `leg` until its end is left."""
+    times: list[float] = []
+    states: list[State] = []
+    time, due, arrival = 0.0, inf, inf
+    near = _distances(limits, leg, state)
+    while due - time >= _TINY:
+        before, far = state, near
+        if due < inf and _stands(state):
+            time = due
+        else:
+            dt = min(STEP, due - time)
+            state = moved(limits, leg, state, dt)
+            time += dt
+            if due == inf and (steps := _steady_steps(leg, before, state)) > 0:
+                times.append(time)
+                states.append(state)
+                state = _carried_on(before, state, steps)
+                time += steps * STEP
+        times.append(time)
+        states.append(state)
+        near = _distances(limits, leg, state)
+        if due == inf and max(near) <= 0:
+            arrival = time - dt * (1 - _share(leg, before, dt, far, near))
+            due = arrival + SWITCH_DELAY + max(leg.hold, 0.0)
+    return Stretch(arrival, due, np.array(times), _motion(states), state)
+
+
+def _steady_steps(leg: Leg, before: State, state: State) -> int:
+    """Return how many more steps towards the target will change nothing but places.
+
+    None unless a level flight has settled, and none close to the target.
+    """
+    _, was, _, _, origin, wanted, _ = before.level
+    position, velocity, _, _, place, wants, push = state.level
+    if push or wants != wanted or state.climb is not None or abs(velocity - was) > _STEADY / 10:
+        return 0
+    shift = place - origin
+    if abs(velocity - shift / STEP) > _STEADY or abs(shift) < _STEADY:
+        return 0
+    way = min(abs(leg.target - position), abs(leg.target - place)) - max(leg.braking, leg.radius)
+    return int(way / abs(shift)) - 1
+
+
+def _carried_on(before: State, state: State, steps: int) -> State:
+    """Return `state` after `steps` like the one that led to it."""
+    position, velocity, thrust, integral, place, wanted, push = state.level
+    way = steps * (place - before.level[4])
+    level = (position + way, velocity, thrust, integral, place + way, wanted, push)
+    return State(level, state.climb, state.remembered)
+
+
+def _stay(limits: Limits, leg: Leg, state: State, duration: float) -> Stretch:
+    """Go on for `duration` s after the last waypoint is done."""
+    times: list[float] = [0.0]
+    states = [state]
+    while times[-1] < duration:
+        state = moved(limits, leg, state, STEP)
+        times.append(times[-1] + STEP)
+        states.append(state)
+    return Stretch(inf, inf, np.array(times), _motion(states), state)
+
+
+def _stands(state: State) -> bool:
+    """Tell whether the aircraft and its trajectory have come to rest."""
+    _, velocity, _, _, _, wanted, _ = state.level
+    if abs(velocity) + abs(wanted) >= _SETTLED:
+        return False
+    return state.climb is None or abs(state.climb[1]) + abs(state.climb[5]) < _SETTLED
+
+
+def _distances(limits: Limits, leg: Leg, state: State) -> tuple[float, ...]:
+    """Return how far the aircraft is from being accepted at the target, m: 0 and less is in."""
+    across = abs(state.level[0] - leg.target) - leg.radius
+    if state.climb is None:
+        return (across,)
+    return across, abs(state.climb[0] - leg.height) - limits.height_radius
+
+
+def _share(
+    leg: Leg, before: State, dt: float, far: tuple[float, ...], near: tuple[float, ...]
+) -> float:
+    """Return the share of the step of `dt` s after which the target was accepted."""
+    shares = [
+        start / max(start - end, _TINY) if start > 0 else 0.0
+        for start, end in zip(far, near, strict=True)
+    ]
+    if far[0] > 0:
+        offset = before.level[0] - leg.target
+        closing = (offset.conjugate() * before.level[1]).real / max(abs(offset), _TINY)
+        shares[0] = _crossing(far[0], closing * dt, near[0])
+    return max(shares)
+
+
+def _crossing(start: float, slope: float, end: float) -> float:
     """Return where in [0, 1] the parabola through `start` > 0 with `slope` to `end` <= 0 is 0."""
     bend = end - start - slope
-    root = np.sqrt(np.maximum(slope * slope - 4 * bend * start, 0.0))
-    share: Real = np.clip(2 * start / np.maximum(root - slope, _TINY), 0.0, 1.0)
-    return share
+    root = sqrt(max(slope * slope - 4 * bend * start, 0.0))
+    return min(max(2 * start / max(root - slope, _TINY), 0.0), 1.0)
+
+
+def _motion(states: Sequence[State]) -> Real:
+    """Return positions and velocities as in `Stretch`."""
+    level = np.array([state.level[:2] for state in states])
+    axes = [level.real, level.imag]
+    if states[0].climb is not None:
+        axes.append(np.array([state.climb[:2] for state in states if state.climb is not None]))
+    return np.stack(axes, axis=-1)
