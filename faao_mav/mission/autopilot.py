@@ -22,7 +22,9 @@ _ARDUPILOT_JERK: tuple[Name, ...] = (("WP_JERK", 1.0), ("WPNAV_JERK", 1.0))
 _PX4_ACCELERATION: tuple[Name, ...] = (("MPC_ACC_HOR", 1.0),)
 _PX4_JERK: tuple[Name, ...] = (("MPC_JERK_AUTO", 1.0),)
 
-_WIDEST_RADIUS, _RADIUS_SHARE = 4.0, 0.35
+_NARROW_RADIUS, _RADIUS_SHARE = 4.0, 0.45
+_CUT = 1.5
+"""Metres of a corner that a wide radius may cost."""
 
 _JERK_LAG = 0.30
 """ArduCopter's t_j: what a ramp takes beyond the ideal jerk-limited one, s."""
@@ -57,9 +59,9 @@ class ArduCopterLegs:
         """
         return speed * self.ramp_duration(speed)
 
-    def radii(self, room: Real) -> Real:
-        """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `room`."""
-        return np.zeros_like(room)
+    def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
+        """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
+        return np.zeros_like(turn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +83,15 @@ class Px4Legs:
         b = 4 * self.acceleration**2 / self.jerk
         return speed * (speed + b) / (2 * self.acceleration)
 
-    def radii(self, room: Real) -> Real:
+    def radii(self, room: Real, turn: Real) -> Real:
         """Return acceptance radii, m, for waypoints whose shorter leg is `room` (n,), m.
 
-        A wider one costs less speed in a corner; one as long as its leg would count at once.
+        A wider one costs less speed in a corner, of sqrt(a r tan(alpha / 2)) at the inner angle
+        alpha, but cuts it: by r tan(turn / 4) about, `turn` (n,) in radians. One as long as its
+        leg would count at once.
         """
-        return np.minimum(_WIDEST_RADIUS, _RADIUS_SHARE * room)
+        cut = _CUT / np.maximum(np.tan(turn / 4), 1e-9)
+        return np.minimum(np.maximum(_NARROW_RADIUS, cut), _RADIUS_SHARE * room)
 
 
 Legs: TypeAlias = ArduCopterLegs | Px4Legs

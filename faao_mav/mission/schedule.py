@@ -47,11 +47,14 @@ _ALIKE = (0.1, 0.03)
 _SPLINE_RUN = 3
 """Splines that have one speed while it is sought."""
 
+_EVERY = 0.4
+"""Seconds between samples of the predicted flight that still show its path."""
+
 _MOVED = 0.8
 """Of what the aircraft strays."""
 
-_ASTRAY = 5.0
-"""Metres of error that one metre beyond the path tolerance weighs."""
+_ASTRAY, _SURELY = 8.0, 0.95
+"""Metres of error that one metre beyond so much of the path tolerance weighs."""
 
 _DEARER = 1.05
 _SPEED_DIGITS, _HOLD_DIGITS = 2, 1
@@ -94,15 +97,20 @@ class Schedule:
     @property
     def cost(self) -> float:
         """That with what straying from the path too far weighs, m."""
-        return self.error + _ASTRAY * max(0.0, self.deviation.path - self.clock.near)
+        return self.error + _ASTRAY * max(0.0, self.deviation.path - _SURELY * self.clock.near)
 
     @property
     def deviation(self) -> Deviation:
         """How far that is from the plan."""
         t, w = self.clock.t, self.clock.w
         start = self.clock.start(self.flown)
-        within = (self.flown.t >= start) & (self.flown.t <= start + t[-1])
-        return deviation(w, self.positions(t), self.flown.position[within, :2])
+        # a path flown late is the same path
+        over = start + t[-1] + max(0.0, self.clock.late(self.flown))
+        flown = np.arange(start, over, _EVERY)
+        path = np.stack(
+            [np.interp([*flown, over], self.flown.t, x) for x in self.flown.position.T[:2]], axis=-1
+        )
+        return deviation(w, self.positions(t), path)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +149,9 @@ class Scheduler:
             if finer is None:
                 break
             best = finer
-        for _ in range(_ROUNDS if best.route.splines.any() else 0):
+        for _ in range(_ROUNDS):
+            if best.deviation.path <= self.tolerance and not best.route.splines.any():
+                break
             moved = self._moved(best, top)
             if moved.cost > _WORTHWHILE * best.cost:
                 break
@@ -153,7 +163,7 @@ class Scheduler:
         stops = route.holds + route.delays > 0
         stops[[0, -1]] = True
         reach = np.concatenate([[np.inf], route.leg_lengths, [np.inf]])
-        radii = self.legs.radii(np.minimum(reach[:-1], reach[1:]))
+        radii = self.legs.radii(np.minimum(reach[:-1], reach[1:]), _turns(route.positions))
         route = replace(route, radii=np.where(stops, 0.0, np.round(radii, 1)))
         path = FlightPath(
             points=np.column_stack([route.positions, np.zeros(len(route.positions))]),
@@ -207,18 +217,19 @@ class Scheduler:
             if 0 < count <= len(times):
                 split = _split(found.route, sorted(times[:count]), self.t, self.w)
                 finer = self._fitted(split, top)
-                if finer.error <= _WORTHWHILE * found.error:
+                if finer.cost <= _WORTHWHILE * found.cost:
                     return finer
         return None
 
     def _moved(self, found: Schedule, top: float) -> Schedule:
-        """Return `found` with spline waypoints moved by what the aircraft strays from them.
+        """Return `found` with waypoints moved by what the aircraft strays from them.
 
-        It swings wide in bends, for the autopilot does not tell it what turning takes.
+        ArduPilot's swings wide in splines, for it is not told what turning takes; PX4's cuts
+        corners with wide acceptance radii.
         """
         route = found.route
-        points = np.flatnonzero(route.splines & (route.holds == 0))
-        points = points[points < route.last]
+        points = np.flatnonzero((route.splines | (route.radii > 0)) & (route.holds == 0))
+        points = points[(points > route.first) & (points < route.last)]
         planned = np.column_stack([np.interp(route.arrivals[points], self.t, x) for x in self.w.T])
         flown = found.flown.position[:, :2]
         nearest = np.array([flown[np.argmin(lengths(flown - place))] for place in planned])
@@ -268,7 +279,7 @@ class Scheduler:
             if len(groups) == 0 or groups[-1] == len(groups) - 1:
                 continue
             tried = self._fitted(found.route, top, groups)
-            if tried.error <= max(_DEARER * found.error, ALLOWED / 2):
+            if tried.cost <= max(_DEARER * found.cost, ALLOWED / 2):
                 return tried
         return found
 
@@ -287,6 +298,13 @@ class Scheduler:
         early = lasting + sent.clock.start(sent.flown) - sent.flown.arrivals[-1]
         waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
         return self._flight(self._waiting(sent.route, waits))
+
+
+def _turns(positions: Real) -> Real:
+    """Return by how much the way turns at each of `positions` (m, 2), rad; 0 at both ends."""
+    headings = np.arctan2(*np.diff(positions, axis=0).T[::-1])
+    turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
+    return np.concatenate([[0.0], turns, [0.0]])[: len(positions)]
 
 
 def _own_speeds(route: Route) -> Integers:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from faao_mav.arrays import Integers, Real
 from faao_mav.mission.deviation import settled
 from faao_mav.mission.flight import CopterModel, FlightPath, Flown
+from faao_mav.mission.vector import lengths
 
 SPEED_STEP, HOLD_STEP = 0.02, 0.05
 """Finite differences, m/s and s: above the predictions' noise, below what the physics bends."""
@@ -36,8 +37,11 @@ _ENOUGH = 0.05
 _LAST, _LAST_WEIGHT = 4.0, 3.5
 """The last seconds of the flight weigh more: they decide when it is over."""
 
-ON_TIME, _LATEST = 2.0, 5.0
+ON_TIME, _LATEST = 3.0, 5.0
 """Metres of rms error that a second too early or too late at the end weighs, up to so many."""
+
+_SOON = 3.0
+"""Seconds in which an aircraft passes a waypoint that counts as reached."""
 
 _NO_CRAWL = 0.5
 """Legs are not slowed below this, m/s, unless the plan creeps."""
@@ -66,8 +70,9 @@ class Clock:
 
     def start(self, flown: Flown) -> float:
         """Return the time of `flown` at which the plan's clock reads 0."""
-        met = flown.departures if self.leaving else flown.arrivals
-        return float(met[self.point]) + self.lead - self.at
+        if self.leaving:
+            return float(flown.departures[self.point]) + self.lead - self.at
+        return _passing(flown, self.w[0], float(flown.arrivals[self.point])) - self.at
 
     def late(self, flown: Flown) -> float:
         """Return by how much later than planned `flown` is over, s."""
@@ -140,7 +145,7 @@ def fit(
         ahead = _steps(x, slope, now, low, high, dampings)
         guessed = now + errors(ahead, rough=True) - tried[0]
         least = int(np.argmin(np.sum(guessed**2, axis=1)))
-        best, chosen = ahead[least], np.flatnonzero(_DAMPINGS == dampings[least])[0]
+        best, chosen = ahead[least], np.flatnonzero(dampings[least] == _DAMPINGS)[0]
         dampings = _DAMPINGS[max(0, chosen - 1) : chosen + 2]
         found = errors(best[None], rough=False)[0]
         before, after = float(now @ now), float(found @ found)
@@ -150,6 +155,20 @@ def fit(
             break
     speeds, held = flown(x[None])
     return speeds[0], held[0], float(x[-1])
+
+
+def _passing(flown: Flown, place: Real, about: float) -> float:
+    """Return when `flown` is closest to `place` (2,), s, at `about` or soon after.
+
+    An autopilot takes a waypoint as reached where it is within a radius of it.
+    """
+    first, last = np.searchsorted(flown.t, [about - _SOON, about + _SOON])
+    t, w = flown.t[first:last], flown.position[first:last, :2]
+    steps = np.diff(w, axis=0)
+    along = np.sum((place - w[:-1]) * steps, axis=1)
+    share = np.clip(along / np.maximum(np.sum(steps**2, axis=1), 1e-9), 0.0, 1.0)
+    k = int(np.argmin(lengths(w[:-1] + share[:, None] * steps - place)))
+    return float(t[k] + share[k] * (t[k + 1] - t[k]))
 
 
 def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real, dampings: Real) -> Real:
