@@ -23,7 +23,7 @@ _PX4_ACCELERATION: tuple[Name, ...] = (("MPC_ACC_HOR", 1.0),)
 _PX4_JERK: tuple[Name, ...] = (("MPC_JERK_AUTO", 1.0),)
 
 _NARROW_RADIUS, _RADIUS_SHARE = 4.0, 0.45
-_CUT = 1.5
+_CUT = 1.3
 """Metres of a corner that a wide radius may cost."""
 
 _JERK_LAG = 0.30

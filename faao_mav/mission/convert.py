@@ -10,6 +10,7 @@ from faao_mav.mission.flight import copter_model
 from faao_mav.mission.item import Mission
 from faao_mav.mission.outline import Splines, plan_route
 from faao_mav.mission.recommend import FASTEST, candidates
+from faao_mav.mission.route import Route
 from faao_mav.mission.run_in import with_run_in
 from faao_mav.mission.schedule import Schedule, Scheduler
 from faao_mav.mission.vehicle import Vehicle, vehicle_of
@@ -44,41 +45,58 @@ def convert(solution: "Solution") -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
     The sets of parameters that `recommend` proposes are compared by the error of the first legs,
-    and refined in that order until one is good. ArduPilot with its own parameters may also fly
-    splines, everywhere or where legs are too short for their speed.
+    and refined in that order until one is good. If none is, ArduPilot may fly splines with the
+    liveliest: everywhere, or where legs are too short for their speed.
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     plan, t, w = solution.plan, solution.t, solution.w
     top = min(plan.vehicle.max_speed, FASTEST)
-    given = vehicle_of(plan)
-    outlines = [plan_route(t, w, plan)]
-    if plan.mission.parameters == "keep" and given.autopilot == "ardupilot":
-        outlines += [plan_route(t, w, plan, splines=s) for s in _splines(legs_of(given), top)]
-    tried = []
-    for parameters in candidates(plan):
+    trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
+    straight = plan_route(t, w, plan)
+    best = _best([trial.first(straight) for trial in trials])
+    if best[0].cost > _GOOD and plan.vehicle.autopilot == "ardupilot":
+        liveliest = trials[-1]
+        bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
+        found = _best([liveliest.first(route) for route in bent])
+        best = min(best, found, key=lambda each: each[0].cost)
+    schedule, trial = best
+    return Conversion(assemble(schedule.route, plan), schedule, trial.vehicle, trial.parameters)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    """A vehicle with one set of parameters, and what schedules its flights."""
+
+    parameters: Mapping[str, float]
+    vehicle: Vehicle
+    legs: Legs
+    scheduler: Scheduler
+
+    @classmethod
+    def of(cls, solution: "Solution", parameters: Mapping[str, float], top: float) -> "_Trial":
+        plan = solution.plan
+        given = vehicle_of(plan)
         vehicle = replace(given, parameters={**given.parameters, **parameters})
-        legs = legs_of(vehicle)
-        scheduler = Scheduler(
-            t,
-            w,
-            copter_model(vehicle, plan.origin.latitude),
-            legs,
-            top,
-            plan.mission.path_tolerance,
-        )
-        for route in outlines:
-            first = scheduler.first(with_run_in(route, t, w, legs, top))
-            tried.append((first, scheduler, vehicle, parameters))
-    tried.sort(key=lambda trial: trial[0].error)
-    best: Conversion | None = None
-    for first, scheduler, vehicle, parameters in tried:
-        schedule = scheduler.refined(first)
-        if best is None or schedule.cost < best.schedule.cost:
-            best = Conversion(assemble(schedule.route, plan), schedule, vehicle, parameters)
-        if best.schedule.cost <= _GOOD:
+        legs, model = legs_of(vehicle), copter_model(vehicle, plan.origin.latitude)
+        near = plan.mission.path_tolerance
+        scheduler = Scheduler(solution.t, solution.w, model, legs, top, near)
+        return cls(parameters, vehicle, legs, scheduler)
+
+    def first(self, route: Route) -> tuple[Schedule, "_Trial"]:
+        """Return `route` with the speeds and holds that fit best, not yet refined."""
+        planner = self.scheduler
+        begun = with_run_in(route, planner.t, planner.w, self.legs, planner.max_speed)
+        return planner.first(begun), self
+
+
+def _best(firsts: list[tuple[Schedule, _Trial]]) -> tuple[Schedule, _Trial]:
+    """Refine first schedules, the closest to the plan first, until one is good."""
+    found: list[tuple[Schedule, _Trial]] = []
+    for first, trial in sorted(firsts, key=lambda each: each[0].error):
+        found.append((trial.scheduler.refined(first), trial))
+        if found[-1][0].cost <= _GOOD:
             break
-    assert best is not None
-    return best
+    return min(found, key=lambda each: each[0].cost)
 
 
 def _splines(straight: Legs, speed: float) -> Iterator[Splines]:

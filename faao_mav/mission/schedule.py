@@ -38,6 +38,9 @@ _SETTLING = 3.0
 """A hold at w_F at least while speeds are fitted, s: the aircraft comes to rest there."""
 
 _ROUNDS = 5
+_ROOM = 0.85
+"""Of the planned speed at a split: what both legs have to have room for."""
+
 _WORTHWHILE = 0.98
 """A round of splits has to bring the error below this share of what it was."""
 
@@ -260,7 +263,12 @@ class Scheduler:
         return [time for _, time in worst[: max(room, 0)]]
 
     def _usable(self, route: Route, k: int, inside: Integers) -> NDArray[np.bool_]:
-        """Tell for each sample `inside` leg k whether both parts would be legs of some use."""
+        """Tell for each sample `inside` leg k whether both parts would be legs of some use.
+
+        On one much shorter than its ramps the aircraft is slower than planned at the split.
+        """
+        passing = lengths(self.w[inside + 1] - self.w[inside - 1])
+        passing /= self.t[inside + 1] - self.t[inside - 1]
         result = np.ones(len(inside), dtype=bool)
         ends = (
             (route.positions[k], self.t[inside] - route.departures[k]),
@@ -268,7 +276,7 @@ class Scheduler:
         )
         for end, lasting in ends:
             length = lengths(self.w[inside] - end)
-            shortest = self.legs.shortest_leg(length / lasting)
+            shortest = self.legs.shortest_leg(np.maximum(length / lasting, _ROOM * passing))
             result &= length >= np.maximum(shortest, self.legs.least)
         return result
 
