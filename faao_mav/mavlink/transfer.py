@@ -147,6 +147,7 @@ class Pace:
     def answer(self, now: float) -> None:
         """Note its answer."""
         if self._repeated:
+            self.wait = max(self.wait / 2, self._least() if self._mean is not None else 0.0)
             return
         took = now - self._asked
         if self._mean is None:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
+sys.path[:0] = [str(Path(__file__).parent.parent / each) for each in (".", "mavlink")]
 
 from conftest import free_port
 from mavsdk.component_type import ComponentType
