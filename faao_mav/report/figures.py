@@ -1,6 +1,6 @@
 """The figures of one flight, as matplotlib figures: metres, seconds, m/s, bit/s/Hz, watts."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from faao_mav.faao.solution import Solution
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.prediction import Prediction
 from faao_mav.report.route_map import route_map
-from faao_mav.report.style import MUTED, SERIES, label, new_figure, styled
+from faao_mav.report.style import MUTED, SERIES, label, legend_above, new_figure, styled
+from faao_mav.report.waypoint_numbers import number_waypoints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +18,11 @@ if TYPE_CHECKING:
 
 __all__ = ["convergence", "flight_figure", "motion", "precoder_power", "rates", "route"]
 
-_PLAN, _PREDICTED, _OTHER = SERIES[0], SERIES[1], SERIES[2]
+_PLAN, _PREDICTED = SERIES[0], SERIES[1]
+_WIDTH = 4.2
+"""Inches: a page makes it as wide as a phone, where 9 points must still be read."""
+_BENEATH: dict[str, Any] = {"color": _PLAN, "linewidth": 3.6, "alpha": 0.45}
+"""How a curve looks that another one may cover."""
 
 
 def flight_figure(
@@ -27,41 +32,49 @@ def flight_figure(
 ) -> "Figure":
     """Return the flight in one figure, as `--figure` saves it: map, speed, and both rates."""
     with styled():
-        figure = new_figure(9.6, 5.0)
-        grid = figure.add_gridspec(2, 2, width_ratios=[1.25, 1.0])
-        route_map(solution, conversion, figure.add_subplot(grid[:, 0]))
-        _speed(figure.add_subplot(grid[0, 1]), solution, conversion)
-        _rate(figure.add_subplot(grid[1, 1]), solution, prediction)
+        figure = new_figure(9.6, 5.6)
+        grid = figure.add_gridspec(3, 2, width_ratios=[1.15, 1.0])
+        plot = figure.add_subplot(grid[:, 0])
+        route_map(solution, conversion, plot)
+        plot.set_title("Route")
+        speed = figure.add_subplot(grid[0, 1])
+        to_uav = figure.add_subplot(grid[1, 1], sharex=speed)
+        to_user = figure.add_subplot(grid[2, 1], sharex=speed, sharey=to_uav)
+        _speed(speed, solution, conversion)
+        _rates((to_uav, to_user), solution, prediction)
+        _share_time(speed, to_uav)
+        number_waypoints(solution, conversion, plot)
         return figure
 
 
 def route(solution: Solution, conversion: Conversion | None = None) -> "Figure":
     """Return the map of the route: see `route_map`."""
     with styled():
-        figure = new_figure(5.8, 4.8)
-        route_map(solution, conversion, figure.subplots())
+        figure = new_figure(_WIDTH, 4.2)
+        plot = figure.subplots()
+        route_map(solution, conversion, plot)
+        number_waypoints(solution, conversion, plot)
         return figure
 
 
 def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure":
     """Return speed and acceleration over time with v_max, v_min and a_max."""
     with styled():
-        figure = new_figure(5.4, 4.6)
+        figure = new_figure(_WIDTH, 4.4)
         upper, lower = figure.subplots(2, 1, sharex=True)
         _speed(upper, solution, conversion)
-        _limit(lower, solution.plan.vehicle.max_acceleration, "a_max")
-        lower.plot(solution.t, _lengths(solution.a), color=_PLAN, label="planned")
-        lower.set_ylim(bottom=0)
-        label(lower, "Acceleration", "time, s", "acceleration, m/s²")
-        lower.legend(loc="best")
+        _acceleration(lower, solution)
+        _share_time(upper)
         return figure
 
 
 def rates(solution: Solution, prediction: Prediction | None = None) -> "Figure":
     """Return I_U and I_G of (7), (8) in every slot: planned, and where the flight is predicted."""
     with styled():
-        figure = new_figure(5.4, 3.4)
-        _rate(figure.subplots(), solution, prediction)
+        figure = new_figure(_WIDTH, 4.4)
+        upper, lower = figure.subplots(2, 1, sharex=True, sharey=True)
+        _rates((upper, lower), solution, prediction)
+        _share_time(upper)
         return figure
 
 
@@ -72,28 +85,30 @@ def precoder_power(solution: Solution) -> "Figure":
     Precoders that know the draw are averaged over the draws.
     """
     with styled():
-        figure = new_figure(5.4, 4.6)
+        figure = new_figure(_WIDTH, 4.4)
         radio = solution.plan.radio
         stations = (
-            ("Base station", solution.P_B, radio.base_station.power),
-            ("UAV", solution.P_U, radio.relay.power),
+            ("Base station", solution.P_B, radio.base_station.power, "W_B"),
+            ("UAV", solution.P_U, radio.relay.power, "W_U"),
         )
         plots = figure.subplots(2, 1, sharex=True)
-        for plot, (name, P, power) in zip(plots, stations, strict=True):
+        for plot, (name, P, power, limit) in zip(plots, stations, strict=True):
             shares = _stream_powers(P)
             unit, scale = _watts(power)
-            _limit(plot, power * scale, "limit W")
+            _limit(plot, power * scale, limit)
             for k, share in enumerate(shares.T):
                 plot.plot(
                     solution.t,
                     share * scale,
                     color=SERIES[k % len(SERIES)],
+                    linewidth=2.4 if k == 0 else 1.2,
                     label=f"stream {k + 1}",
                 )
             plot.set_ylim(bottom=0)
             label(plot, name, "time, s", f"power, {unit}")
             if len(shares.T) <= len(SERIES):
-                plot.legend(loc="best", ncols=3)
+                legend_above(plot)
+        _share_time(plots[0])
         return figure
 
 
@@ -102,12 +117,13 @@ def convergence(solution: Solution) -> "Figure":
     from matplotlib.ticker import MaxNLocator
 
     with styled():
-        figure = new_figure(5.4, 3.0)
+        figure = new_figure(_WIDTH, 2.6)
         plot = figure.subplots()
         steps = np.arange(len(solution.history))
         plot.plot(steps, solution.history, color=_PLAN, marker="o", markersize=3.5)
         plot.xaxis.set_major_locator(MaxNLocator(integer=True))
-        label(plot, "Convergence", "iteration", "rate R_avg, bit/s/Hz")
+        plot.ticklabel_format(axis="y", useOffset=False)
+        label(plot, "", "iteration", "rate R_avg, bit/s/Hz")
         return figure
 
 
@@ -116,31 +132,65 @@ def _speed(plot: "Axes", solution: Solution, conversion: Conversion | None) -> N
     _limit(plot, vehicle.max_speed, "v_max")
     if vehicle.min_speed > 0:
         _limit(plot, vehicle.min_speed, "v_min")
-    plot.plot(solution.t, _lengths(solution.v), color=_PLAN, label="planned")
+    plot.plot(solution.t, _lengths(solution.v), **_planned(conversion))
     if conversion is not None:
-        track = conversion.schedule.track()
+        schedule = conversion.schedule
+        track = schedule.track()
         t = track["predicted_t"]
-        inside = (t >= solution.t[0]) & (t <= solution.t[-1])
+        over = solution.t[-1] + max(0.0, schedule.clock.late(schedule.flown))
+        inside = (t >= solution.t[0]) & (t <= over)
         speed = _lengths(track["predicted_v"])[inside]
         plot.plot(t[inside], speed, color=_PREDICTED, linewidth=1.1, label="predicted")
     plot.set_ylim(bottom=0)
     label(plot, "Speed", "time, s", "speed, m/s")
-    plot.legend(loc="best", ncols=2)
+    legend_above(plot)
 
 
-def _rate(plot: "Axes", solution: Solution, prediction: Prediction | None) -> None:
-    links = (("to UAV", solution.I_U, _PLAN), ("to user", solution.I_G, _OTHER))
-    for name, planned, colour in links:
-        plot.plot(solution.t, planned, color=colour, label=f"{name}, planned")
-    if prediction is not None:
-        flown = (("to UAV", prediction.I_U, _PLAN), ("to user", prediction.I_G, _OTHER))
-        for name, values, colour in flown:
-            plot.plot(
-                solution.t, values, "--", color=colour, linewidth=1.1, label=f"{name}, predicted"
-            )
+def _acceleration(plot: "Axes", solution: Solution) -> None:
+    limit, lengths = solution.plan.vehicle.max_acceleration, _lengths(solution.a)
+    _limit(plot, limit, "a_max")
+    plot.plot(solution.t, lengths, color=_PLAN, label="planned")
     plot.set_ylim(bottom=0)
-    label(plot, "Rates of both links", "time, s", "rate, bit/s/Hz")
-    plot.legend(loc="best", ncols=2)
+    top = 1.2 * max(limit, float(lengths[1:].max()))
+    if lengths[0] > top:  # a(0) has no bound in the paper: it would flatten all the rest
+        plot.set_ylim(top=top)
+        plot.annotate(
+            f"a(0): {lengths[0]:.3g} m/s²",
+            (0.0, 1.0),
+            xytext=(12, -4),
+            xycoords=plot.get_xaxis_transform(),
+            textcoords="offset points",
+            va="top",
+        )
+    label(plot, "Acceleration", "time, s", "acceleration, m/s²")
+    legend_above(plot)
+
+
+def _rates(plots: "tuple[Axes, Axes]", solution: Solution, prediction: Prediction | None) -> None:
+    """Draw each link on its own plot: over known fading, one would hide the other."""
+    planned = (("Base station to UAV", solution.I_U), ("UAV to user", solution.I_G))
+    flown = (prediction.I_U, prediction.I_G) if prediction is not None else (None, None)
+    curves = [values for _, values in planned] + [values for values in flown if values is not None]
+    top = max(float(values.max()) for values in curves) or 1.0
+    for plot, (name, values), predicted in zip(plots, planned, flown, strict=True):
+        plot.plot(solution.t, values, **_planned(predicted))
+        if predicted is not None:
+            plot.plot(solution.t, predicted, color=_PREDICTED, linewidth=1.1, label="predicted")
+        plot.set_ylim(0, 1.08 * top)
+        label(plot, name, "time, s", "rate, bit/s/Hz")
+        legend_above(plot)
+
+
+def _planned(flown: object) -> dict[str, Any]:
+    """Return how a curve of the plan looks: as a band where there is one of the flight on it."""
+    return {"label": "planned"} | ({"color": _PLAN} if flown is None else _BENEATH)
+
+
+def _share_time(*upper: "Axes") -> None:
+    """Leave the time axis of `upper` to the plot beneath them."""
+    for plot in upper:
+        plot.set_xlabel("")
+        plot.tick_params(labelbottom=False)
 
 
 def _limit(plot: "Axes", value: float, name: str) -> None:

@@ -60,6 +60,10 @@ def _sections(data: ReportData) -> Iterator[str]:
         yield _section("Result", f"<dl>{listed}</dl>", "wide")
     if data.findings is not None:
         yield _section("Findings", _findings(data.findings), "wide")
+    if data.conversion is not None and data.conversion.parameters:
+        rows = [(name, f"{value:g}") for name, value in data.conversion.parameters.items()]
+        told = "<p>The mission is timed for these: load them first.</p>"
+        yield _section("Parameters", told + _table(("parameter", "value"), rows))
     if data.solution is not None:
         yield from _drawn(data, data.solution)
         plan = f"<pre>{html.escape(data.solution.plan.text)}</pre>"
@@ -72,18 +76,20 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
     if solution is not None:
         rates = solution.rates
         yield "planned rate", f"{rates.R_avg:.4f} bit/s/Hz"
+        yield "at the start of the optimiser", f"{solution.history[0]:.4f} bit/s/Hz"
         yield "base station to UAV", f"{rates.R_U:.4f} bit/s/Hz"
         yield "UAV to user", f"{rates.R_G:.4f} bit/s/Hz"
         yield "optimiser", f"{'converged' if solution.converged else 'NOT CONVERGED'}"
+        yield "planned duration", f"{solution.plan.flight.duration:g} s"
     if prediction is not None:
         yield "predicted rate", f"{prediction.rates.R_avg:.4f} bit/s/Hz"
         yield "predicted duration", f"{prediction.duration:.1f} s"
-        yield "predicted from plan, rms", f"{prediction.rms_position_error:.1f} m"
+        yield "from the plan at equal times, rms", f"{prediction.rms_position_error:.1f} m"
+        yield "the same, at most", f"{prediction.max_position_error:.1f} m"
+        yield "from the planned path, at most", f"{prediction.max_path_error:.1f} m"
     if data.conversion is not None:
         yield "mission items", str(len(data.conversion.mission.items))
         yield "relay route", f"{data.conversion.schedule.route.distance:.0f} m"
-        for name, value in data.conversion.parameters.items():
-            yield f"set first: {name}", f"{value:g}"
 
 
 def _findings(findings: Sequence[Finding]) -> str:
@@ -142,11 +148,8 @@ def _drawn(data: ReportData, solution: "Solution") -> Iterator[str]:
     )
     if len(solution.starts) > 1:
         ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
-        rows = "".join(
-            f"<tr><td>{html.escape(name)}</td><td>{rate:.4f}</td></tr>" for name, rate in ranked
-        )
-        head = "<thead><tr><th>start</th><th>R_avg, bit/s/Hz</th></tr></thead>"
-        yield _section("Starts", f"<table>{head}<tbody>{rows}</tbody></table>")
+        rows = [(name, f"{rate:.4f}") for name, rate in ranked]
+        yield _section("Starts", _table(("start", "R_avg, bit/s/Hz"), rows))
 
 
 def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:
@@ -156,6 +159,15 @@ def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:
 def _section(heading: str, content: str, kind: str = "") -> str:
     marked = f' class="{kind}"' if kind else ""
     return f"<section{marked}>\n<h2>{heading}</h2>\n{content}\n</section>"
+
+
+def _table(head: tuple[str, str], rows: Sequence[tuple[str, str]]) -> str:
+    names = "".join(f"<th>{html.escape(name)}</th>" for name in head)
+    lines = "".join(
+        f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
+        for name, value in rows
+    )
+    return f"<table><thead><tr>{names}</tr></thead><tbody>{lines}</tbody></table>"
 
 
 def _place(position: tuple[float, float]) -> str:

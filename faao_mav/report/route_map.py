@@ -1,7 +1,7 @@
 """The route on a map: planned with its speeds, predicted, waypoints, stations, fence."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -9,12 +9,11 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import Command
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.fence import Fence
-from faao_mav.mission.item import Mission
 from faao_mav.plan import Plan
-from faao_mav.report.style import INK, MUTED, PAPER, SERIES, label, mark_stations
+from faao_mav.report.style import INK, MUTED, SERIES, label, legend_above, mark_stations
+from faao_mav.report.waypoint_numbers import waypoints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,25 +27,29 @@ _LEVELS = 32
 _SHADES = (0.85, 0.3)
 """Slow and fast on the scale of viridis: its ends vanish on white and on black paper."""
 _ROUND = 72
-_NUMBERED = 30
 
 
 def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -> None:
-    """Draw the map on `plot`: east and north in metres, speeds as colours with a bar."""
+    """Draw the map on `plot`: east and north in metres, speeds as colours with a bar.
+
+    It shows all of the flight and both stations, and of a wider fence what is near them.
+    """
     plan = solution.plan
+    radio = plan.radio
+    stations = np.array([radio.base_station.position, radio.ground_user.position])
+    seen = [solution.w, stations]
+    outlines: list[Outline] = []
     if conversion is not None:
-        for corners, inside in _outlines(conversion.mission.fence, plan):
-            colour = MUTED if inside else SERIES[5]
-            plot.plot(*corners.T, "--" if inside else "-", color=colour, linewidth=1.2)
-            if not inside:
-                plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
+        outlines = list(_outlines(conversion.mission.fence, plan))
+        _fenced(plot, outlines)
     _coloured(plot, solution)
     if conversion is not None:
-        track = conversion.schedule.track()
-        plot.plot(*track["predicted_w"].T, "--", color=INK, linewidth=0.9, label="predicted")
-        _numbered(plot, conversion.mission, plan)
-        plot.legend(loc="best")
-    radio = plan.radio
+        track = conversion.schedule.track()["predicted_w"]
+        plot.plot(*track.T, "--", color=INK, linewidth=0.9, label="predicted")
+        _, places = waypoints(conversion.mission, plan)
+        plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label="waypoint")
+        legend_above(plot, 2)
+        seen += [track, places]
     mark_stations(
         plot,
         (
@@ -55,8 +58,38 @@ def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -
         ),
     )
     plot.set_aspect("equal", adjustable="datalim")
+    _show(plot, np.concatenate(seen), outlines)
+    label(plot, "", "east, m", "north, m")
+
+
+def _fenced(plot: "Axes", outlines: Sequence[Outline]) -> None:
+    """Draw the fence: dashed where the aircraft has to stay inside, filled where outside."""
+    named: set[bool] = set()
+    for corners, inside in outlines:
+        colour = MUTED if inside else SERIES[5]
+        name = "stay inside" if inside else "stay out"
+        plot.plot(
+            *corners.T,
+            "--" if inside else "-",
+            color=colour,
+            linewidth=1.2,
+            label=None if inside in named else name,
+        )
+        named.add(inside)
+        if not inside:
+            plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
+
+
+def _show(plot: "Axes", seen: Real, outlines: Sequence[Outline]) -> None:
+    """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it."""
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    width = float((high - low).max()) or 1.0
+    if outlines:
+        corners = np.concatenate([corners for corners, _ in outlines])
+        corners = np.clip(corners, low - width / 2, high + width / 2)
+        low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+    plot.dataLim.set_points(np.array([low, high]))
     plot.margins(0.08)
-    label(plot, "Route", "east, m", "north, m")
 
 
 def _coloured(plot: "Axes", solution: Solution) -> None:
@@ -71,38 +104,15 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     speeds = np.hypot(*solution.v.T)
     means = np.array([speeds[a : b + 1].mean() for a, b in itertools.pairwise(ends)])
     colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
-    lines = LineCollection(pieces, cmap=colours, linewidths=3, capstyle="round")
+    lines = LineCollection(pieces, cmap=colours, linewidths=5, capstyle="round")
     lines.set_array(means)
-    lines.set_clim(0, max(float(means.max()), 1e-9))
+    lines.set_clim(0, max(round(float(means.max()), 2), 0.01))  # round: labelled at its end
     plot.add_collection(lines)
-    plot.autoscale_view()
     figure = plot.get_figure()
     assert figure is not None
-    figure.colorbar(lines, ax=plot, label="speed, m/s", shrink=0.7)
-
-
-def _numbered(plot: "Axes", mission: Mission, plan: Plan) -> None:
-    """Mark the waypoints, and give as many as can be read the numbers that findings name."""
-    items = [
-        (number, item)
-        for number, item in enumerate(mission.items, 1)
-        if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
-    ]
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    places = frame.to_local([item.x for _, item in items], [item.y for _, item in items])
-    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none")
-    step = -(-len(items) // _NUMBERED) or 1
-    for (number, _), place in list(zip(items, places.tolist(), strict=True))[::step]:
-        plot.annotate(
-            str(number),
-            place,
-            xytext=(-4, -4),
-            textcoords="offset points",
-            ha="right",
-            va="top",
-            fontsize=7,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
-        )
+    bar = figure.colorbar(lines, ax=plot, label="planned speed, m/s", shrink=0.7)
+    if bar.solids is not None:
+        bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
 
 
 def _outlines(fence: Fence, plan: Plan) -> Iterator[Outline]:

@@ -80,6 +80,20 @@ def label(axes: "Axes", title: str, x: str, y: str) -> None:
     axes.set_ylabel(_plain(y))
 
 
+def legend_above(axes: "Axes", columns: int = 3) -> None:
+    """Put the legend over the plot, right of its title, where it hides no curve."""
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.0,
+        borderpad=0.2,
+        ncols=columns,
+        columnspacing=1.2,
+        handlelength=1.6,
+        handletextpad=0.5,
+    )
+
+
 def _plain(text: str) -> str:
     """Keep matplotlib from reading formulas into a plan's names."""
     return text.replace("$", r"\$")

@@ -31,6 +31,13 @@ _SCHEMES = {
     "waterfilling": "water-filling",
     "gaussian": "designed for Gaussian inputs",
 }
+_ALPHABETS = {
+    "bpsk": "BPSK",
+    "qpsk": "QPSK",
+    "8psk": "8-PSK",
+    "16qam": "16-QAM",
+    "64qam": "64-QAM",
+}
 _LOOKS = {name: k for k, name in enumerate(("faao", "gaussian", "mrt", "mmse", "zf"))}
 
 
@@ -81,6 +88,7 @@ def _rates(rows: Sequence[Row], plan: Plan) -> "Figure":
         _lines(plot, inside, axis)
         title = name or plan.name or "rate by scheme"
         label(plot, title, _AXES.get(axis, axis), "rate R_avg, bit/s/Hz")
+        plot.tick_params(labelbottom=True)  # the plot beneath may be none
     for plot in plots[len(panels) :]:
         plot.remove()
     handles, labels = plots[0].get_legend_handles_labels()
@@ -109,7 +117,10 @@ def _lines(plot: "Axes", rows: Sequence[Row], axis: str) -> None:
 
 
 def _routes(rows: Sequence[Row], plan: Plan) -> "Figure":
-    """Draw the routes on a map, a colour for each combination of values and scheme."""
+    """Draw the routes on a map, a colour for each combination of values and scheme.
+
+    Each is thinner than those before it, which can so be seen where they run together.
+    """
     figure = new_figure(5.4, 4.9)
     plot = figure.subplots()
     several = len({row.scheme for row in rows}) > 1
@@ -123,7 +134,8 @@ def _routes(rows: Sequence[Row], plan: Plan) -> "Figure":
         east, north = zip(*row.route, strict=True)
         new = name not in colours
         colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
-        plot.plot(east, north, color=colour, label=name if new else None)
+        width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
+        plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
     radio, flight = plan.radio, plan.flight
     places = (
         ("base station", radio.base_station.position, "s"),
@@ -144,6 +156,8 @@ def _named(values: Mapping[str, Value]) -> str:
     parts = []
     for key, value in values.items():
         text = value if isinstance(value, str) else json.dumps(value)
+        if key == "radio.modulation":
+            text = _ALPHABETS.get(text, text)
         name, unit = _SHORT.get(key, (key.rsplit(".", 1)[-1], ""))
         parts.append(f"{name} = {text}{unit}" if name else text)
     return ", ".join(parts)

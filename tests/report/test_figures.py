@@ -1,5 +1,7 @@
 """The figures say what they show, and show what the flight is."""
 
+import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +34,36 @@ def lines(axes: Any) -> dict[str, Any]:
     return {line.get_label(): line for line in axes.lines}
 
 
-def test_every_plot_has_a_title_and_named_axes_with_units() -> None:
+def drawn(text: Any) -> Any:
+    """The place of a text on the figure, pixels."""
+    return text.get_window_extent()
+
+
+def test_axes_are_named_with_units_and_plots_that_share_a_figure_have_titles() -> None:
     for figure in every():
-        for axes in figure.axes:
-            if axes.get_label() == "<colorbar>":
-                assert axes.get_ylabel() == "speed, m/s"
-                continue
-            assert axes.get_title("left")
-            assert axes.get_xlabel()
+        plots = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+        for axes in set(figure.axes) - set(plots):
+            assert axes.get_ylabel() == "planned speed, m/s"
+        for axes in plots:
+            assert axes.get_title("left") or len(plots) == 1
             assert ", " in axes.get_ylabel()
+            lowest = not any(
+                axes is not other and axes.get_shared_x_axes().joined(axes, other)
+                and other.get_position().y0 < axes.get_position().y0
+                for other in plots
+            )  # fmt: skip
+            assert bool(axes.get_xlabel()) == lowest
+
+
+def test_legends_hide_no_curve() -> None:
+    for figure in every():
+        figure.draw_without_rendering()
+        for axes in figure.axes:
+            if axes.get_legend() is not None:
+                legend = drawn(axes.get_legend())
+                assert legend.y0 >= axes.get_window_extent().y1 - 0.5
+                if axes.get_title("left"):
+                    assert legend.x0 >= drawn(axes._left_title).x1
 
 
 def test_the_curves_are_the_flight() -> None:
@@ -52,11 +75,27 @@ def test_the_curves_are_the_flight() -> None:
     np.testing.assert_array_equal(planned.get_ydata(), np.hypot(*solution.v.T))
     assert set(lines(speed)["v_max"].get_ydata()) == {solution.plan.vehicle.max_speed}
     assert set(lines(acceleration)["a_max"].get_ydata()) == {5.0}
-    (rate,) = figures.rates(solution, found.prediction).axes
-    np.testing.assert_array_equal(lines(rate)["to UAV, planned"].get_ydata(), solution.I_U)
-    np.testing.assert_array_equal(
-        lines(rate)["to user, predicted"].get_ydata(), found.prediction.I_G
-    )
+    to_uav, to_user = figures.rates(solution, found.prediction).axes
+    np.testing.assert_array_equal(lines(to_uav)["planned"].get_ydata(), solution.I_U)
+    np.testing.assert_array_equal(lines(to_user)["predicted"].get_ydata(), found.prediction.I_G)
+
+
+def test_a_flight_that_ends_late_is_drawn_to_its_end() -> None:
+    found = flown()
+    speed, _ = figures.motion(found.solution, found.conversion).axes
+    late = found.prediction.duration - found.solution.plan.flight.duration
+    assert late > 1
+    over = lines(speed)["predicted"].get_xdata()[-1]
+    assert over == pytest.approx(found.solution.t[-1] + late, abs=0.2)
+
+
+def test_an_unbounded_first_acceleration_leaves_the_rest_to_be_seen() -> None:
+    solution = flown().solution
+    a = solution.a.copy()
+    a[0] = (240.0, 0.0)
+    _, acceleration = figures.motion(replace(solution, a=a)).axes
+    assert acceleration.get_ylim()[1] < 10
+    assert [text.get_text() for text in acceleration.texts] == ["a(0): 240 m/s²"]
 
 
 def test_streams_add_up_to_the_power_and_the_strongest_is_first() -> None:
@@ -89,12 +128,40 @@ def test_the_map_has_stations_waypoints_and_fence() -> None:
     items = enumerate(found.conversion.mission.items, 1)
     numbers = {str(number) for number, item in items if item.command == 16}
     assert len(numbers) > 1
-    assert names == {"base station", "user"} | numbers
+    assert {"base station", "user"} < names <= {"base station", "user"} | numbers
     ring = next(line for line in axes.lines if line.get_linestyle() == "-" and
                 len(line.get_xdata()) > 20)  # fmt: skip
     east, north = np.asarray(ring.get_xdata()), np.asarray(ring.get_ydata())
     np.testing.assert_allclose(np.ptp(east), 10.0, rtol=1e-3)
     np.testing.assert_allclose(north.mean(), 0.0002 * 110_950, rtol=0.05)  # m per degree
+
+
+def test_a_fence_of_kilometres_leaves_the_route_to_be_seen() -> None:
+    found = flown()
+    figure = figures.route(found.solution, found.conversion)
+    figure.draw_without_rendering()
+    plot = figure.axes[0]
+    assert np.ptp(plot.dataLim.intervalx) < 3 * np.ptp(found.solution.w[:, 0])
+    assert np.ptp(plot.get_xlim()) < 5 * np.ptp(found.solution.w[:, 0])
+
+
+def test_what_is_written_on_the_map_stays_apart() -> None:
+    found = flown()
+    for figure in (
+        figures.route(found.solution, found.conversion),
+        figures.flight_figure(found.solution, found.conversion, found.prediction),
+    ):
+        figure.draw_without_rendering()
+        plot = figure.axes[0]
+        edge, boxes = plot.get_window_extent(), [drawn(text) for text in plot.texts]
+        route = plot.transData.transform(found.solution.w)
+        for box, other in itertools.combinations(boxes, 2):
+            assert not box.overlaps(other)
+        for text, box in zip(plot.texts, boxes, strict=True):
+            if text.get_text().isdigit():
+                assert not any(box.contains(*point) for point in route)
+                assert edge.contains(*box.min)
+                assert edge.contains(*box.max)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])

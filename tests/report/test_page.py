@@ -59,7 +59,16 @@ def test_every_section_is_there(full: str) -> None:
     page = Page(full)
     headings = page.of("h2")
     assert headings == [
-        *("Result", "Findings", "Route", "Motion", "Link", "Convergence", "Precoders"),
+        *(
+            "Result",
+            "Findings",
+            "Parameters",
+            "Route",
+            "Motion",
+            "Link",
+            "Convergence",
+            "Precoders",
+        ),
         *("Starts", "Plan"),
     ]
     pictures = [attributes for tag, attributes in page.elements if tag == "svg"]
@@ -72,7 +81,11 @@ def test_every_section_is_there(full: str) -> None:
     assert f"{solution.rates.R_avg:.4f} bit/s/Hz" in shown
     assert f"{prediction.duration:.1f} s" in shown
     assert "v_max" in shown
-    assert "to user, predicted" in shown
+    assert page.of("text").count("predicted") == 4  # map, speed, and both rates
+    wanted = flown().conversion.parameters
+    assert wanted
+    cells = page.of("td")
+    assert set(wanted) | {f"{value:g}" for value in wanted.values()} <= set(cells)
     assert re.search(r"faao-mav \d.*numpy \d.*Python \d", shown)
 
 

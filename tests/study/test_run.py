@@ -186,6 +186,31 @@ def test_routes_are_drawn_on_a_map(whole: tuple[Path, tuple[Row, ...]], tmp_path
     assert {"base station", "user", "start", "end"} <= set(names)
 
 
+def test_routes_that_run_together_are_all_seen(whole: tuple[Path, tuple[Row, ...]]) -> None:
+    one = whole[1][0]
+    rows = tuple(replace(one, values={"power_dbm": power}) for power in (0, 10, 20))
+    (axes,) = study_figure(rows, parse_plan(QUICK), "trajectories").axes
+    routes = [line for line in axes.lines if str(line.get_label()).startswith("W = ")]
+    widths = [line.get_linewidth() for line in routes]
+    assert len(set(widths)) == 3
+    assert widths == sorted(widths, reverse=True)
+    assert [line.get_zorder() for line in routes] == [routes[0].get_zorder()] * 3
+
+
+def test_every_panel_has_its_name_and_its_axis(whole: tuple[Path, tuple[Row, ...]]) -> None:
+    names = ("bpsk", "qpsk", "8psk", "16qam")
+    rows = tuple(
+        replace(row, values={"power_dbm": row.values["power_dbm"], "radio.modulation": name})
+        for name in names
+        for row in whole[1]
+    )
+    figure = study_figure(rows, parse_plan(QUICK), "rate")
+    assert [plot.get_title("left") for plot in figure.axes] == ["BPSK", "QPSK", "8-PSK", "16-QAM"]
+    figure.draw_without_rendering()
+    for plot in figure.axes:
+        assert any(tick.label1.get_visible() for tick in plot.xaxis.get_major_ticks())
+
+
 def test_without_results_there_is_nothing_to_draw() -> None:
     failed = (Row("k", {"power_dbm": 1}, "faao", 0, error="no"),)
     with pytest.raises(InputError, match="nothing to draw"):
