@@ -247,3 +247,23 @@ def test_no_mutation_gives_a_traceback_or_a_partial_file(
         assert result.stdout == ""
         assert result.stderr
         assert [p.name for p in folder.iterdir()] == ["plan.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--out", "plan.txt"), "--out plan.txt: is the file of PLAN.yaml too"),
+        (("--out", "m.txt", "--precoders", "m.txt"), "--precoders m.txt: is the file of --out too"),
+        (("--out", "m.txt", "--precoders", "m.param"), "is the file of the parameters of --out"),
+    ],
+)
+def test_no_output_replaces_the_plan_or_another_output(
+    arguments: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("plan.txt").write_text(SMALL)
+    result = run("plan.txt", *arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.txt"]
+    assert Path("plan.txt").read_text() == SMALL

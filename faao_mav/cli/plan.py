@@ -12,7 +12,7 @@ import typer
 from faao_mav.cli.options import AllowArmed, System
 from faao_mav.cli.outcome import exit_status, note
 from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import check_writable, write_whole
+from faao_mav.files import check_apart, check_writable, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.cli.summary import Result
@@ -140,6 +140,8 @@ def _solve(
     targets = [path for path in files if path is not None]
     for path in targets:
         check_writable(path)
+    names = ("--out", "the parameters of --out,", "--save", "--precoders", "--report", "--figure")
+    check_apart(dict(zip(names, files, strict=True)), {"PLAN.yaml": plan_file})
     with progress(shown=sys.stderr.isatty() and not quiet) as observe:
         optimizing = time.perf_counter()
         solution = optimize(read, observe=observe)

@@ -191,6 +191,14 @@ def test_an_empty_mission_is_not_uploaded():
         upload(Mission(()), "udpout:127.0.0.1:9")
 
 
+def test_a_log_does_not_replace_a_mission(tmp_path):
+    path = tmp_path / "m.waypoints"
+    path.write_text("QGC WPL 110\n")
+    with pytest.raises(InputError, match=r"m\.waypoints: give a name that ends in \.tlog"):
+        upload(a_mission(5), "udpout:127.0.0.1:9", log=path)
+    assert path.read_text() == "QGC WPL 110\n"
+
+
 def test_the_log_is_one_that_pymavlink_reads(port, tmp_path):
     path = tmp_path / "exchange.tlog"
     before = time.time()
