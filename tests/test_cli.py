@@ -1,6 +1,7 @@
 """The command line, from plan to mission file."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -193,6 +194,33 @@ def test_as_a_program(plan: Path, tmp_path: Path) -> None:
     assert bad.returncode == 2
     where = tmp_path / "no.yaml"
     assert bad.stderr == f"faao-mission: {where}: cannot be read: No such file or directory\n"
+
+
+def test_output_that_cannot_be_written_or_shown(tmp_path: Path) -> None:
+    script = Path(sys.executable).with_name("faao-mission")
+    mission = tmp_path / "ü.waypoints"
+    mission.write_text("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t47\t8\t400\t1\n")
+    if Path("/dev/full").exists():
+        with Path("/dev/full").open("w") as full:
+            done = subprocess.run(
+                [script, "validate", mission], stdout=full, stderr=subprocess.PIPE, text=True
+            )
+        assert done.returncode == 2
+        assert done.stderr == (
+            "faao-mission: standard output: cannot be used: No space left on device\n"
+        )
+    ascii_only = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(
+        [script, "validate", mission], capture_output=True, text=True, env=ascii_only
+    )
+    assert (done.returncode, done.stderr) == (1, "")
+    assert "\\xfc.waypoints: 0 items" in done.stdout
+
+
+def test_names_that_are_no_unicode(plan: Path, tmp_path: Path) -> None:
+    name = os.fsdecode(b"m\xff")
+    assert run(plan, "--quiet", "--out", tmp_path / f"{name}.waypoints").exit_code == 0
+    assert (tmp_path / f"{name}.param").read_text().startswith("# for m?.waypoints")
 
 
 TINY = edited(SMALL, {"flight.duration": 3, "flight.end": [5, 45], "optimizer.max_iterations": 1})

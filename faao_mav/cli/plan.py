@@ -163,7 +163,7 @@ def _solve(
             text = render_parameters(
                 conversion.parameters, read.vehicle.autopilot, header=f"for {out.name}"
             )
-            write_whole(tuned, text.encode())
+            write_whole(tuned, text.encode(errors="replace"))  # a name may be no Unicode
         if out is not None:
             rendered = (
                 draw_mission(solution, conversion)
