@@ -36,7 +36,9 @@ class _CommandOrPlan(TyperGroup):
     def _check_is_plan(self, ctx: Any, argument: str) -> None:
         """Take a bare word that is no file for a mistyped command."""
         path = Path(argument)
-        if argument.startswith("-") or path.suffix or path.name != argument or os.path.lexists(path):
+        if argument.startswith("-") or path.suffix or path.name != argument:
+            return
+        if os.path.lexists(path):
             return
         near = difflib.get_close_matches(argument, self.commands, n=1)
         hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(self.commands)}"
