@@ -70,6 +70,9 @@ def plan(
     not known to be on the vehicle; 2 unusable arguments or input.
     """
     with exit_status():
+        if upload is None and (system is not None or allow_armed):
+            option = "--allow-armed" if system is None else f"--system {system}"
+            raise InputError(f"{option}: is for an upload; give --upload CONNECTION too")
         result = _solve(
             plan_file, out, save, precoders, report, figure, upload, method, bound, quiet
         )

@@ -184,6 +184,8 @@ def test_no_vehicle(port):
         pytest.raises(LinkError, match="the autopilot of system 9"),
     ):
         download(f"udpout:127.0.0.1:{port}", system=9, wait=0.3)
+    with pytest.raises(LinkError, match="an autopilot with component number 7 within"):
+        download(f"udpout:127.0.0.1:{port}", component=7, wait=0.3)
 
 
 def test_an_empty_mission_is_not_uploaded():
