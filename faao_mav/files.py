@@ -2,10 +2,14 @@
 
 import contextlib
 import os
+import stat
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from faao_mav.errors import InputError
+
+_SHOWN = 40  # characters of a name in that of its temporary file: no name gets too long by it
 
 
 def read_text(path: str | Path, most: int, what: str, error: type[InputError]) -> str:
@@ -34,23 +38,50 @@ def read_text(path: str | Path, most: int, what: str, error: type[InputError]) -
 
 def check_writable(path: str | Path) -> None:
     """Raise `InputError` when `path` plainly cannot be written: better now than after the work."""
-    target = Path(path)
-    if target.is_dir():
+    target = Path(os.path.realpath(path))
+    try:
+        kind = target.stat().st_mode
+    except FileNotFoundError:
+        kind = stat.S_IFREG
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    if stat.S_ISDIR(kind):
         raise InputError(f"{path}: is a directory; give the name of a file")
+    if not stat.S_ISREG(kind):  # a file would take the place of the device
+        raise InputError(f"{path}: is a device or a pipe; give the name of a file")
     if not target.parent.is_dir():
-        raise InputError(f"{path}: there is no directory {target.parent}")
+        raise InputError(f"{path}: there is no directory {Path(path).parent}")
     if not os.access(target.parent, os.W_OK):
         raise InputError(f"{path}: the directory {target.parent} cannot be written to")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise InputError(f"{path}: is write-protected; give another name")
+
+
+def check_apart(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None]) -> None:
+    """Raise `InputError` where one file would be written over another of the same command.
+
+    Both are named as the user names them, an option or an argument; None stands for no file.
+    """
+    taken = {os.path.realpath(path): name for name, path in inputs.items() if path is not None}
+    for name, path in outputs.items():
+        if path is None:
+            continue
+        for other, owner in taken.items():
+            same = other == os.path.realpath(path)
+            if same or (path.exists() and Path(other).exists() and path.samefile(other)):
+                raise InputError(f"{name} {path}: is the file of {owner} too; give another name")
+        taken[os.path.realpath(path)] = name
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write `content` to `path` by way of a temporary file beside it.
 
-    A reader sees the old file or the new one, never a part. Raises `InputError`.
+    A reader sees the old file or the new one, never a part; a symbolic link stays one. Raises
+    `InputError`.
     """
-    target = Path(path)
+    target = Path(os.path.realpath(path))
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name[:_SHOWN]}.", dir=target.parent)
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(content)

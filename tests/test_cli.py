@@ -1,6 +1,7 @@
 """The command line, from plan to mission file."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -195,6 +196,33 @@ def test_as_a_program(plan: Path, tmp_path: Path) -> None:
     assert bad.stderr == f"faao-mission: {where}: cannot be read: No such file or directory\n"
 
 
+def test_output_that_cannot_be_written_or_shown(tmp_path: Path) -> None:
+    script = Path(sys.executable).with_name("faao-mission")
+    mission = tmp_path / "ü.waypoints"
+    mission.write_text("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t47\t8\t400\t1\n")
+    if Path("/dev/full").exists():
+        with Path("/dev/full").open("w") as full:
+            done = subprocess.run(
+                [script, "validate", mission], stdout=full, stderr=subprocess.PIPE, text=True
+            )
+        assert done.returncode == 2
+        assert done.stderr == (
+            "faao-mission: standard output: cannot be used: No space left on device\n"
+        )
+    ascii_only = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(
+        [script, "validate", mission], capture_output=True, text=True, env=ascii_only
+    )
+    assert (done.returncode, done.stderr) == (1, "")
+    assert "\\xfc.waypoints: 0 items" in done.stdout
+
+
+def test_names_that_are_no_unicode(plan: Path, tmp_path: Path) -> None:
+    name = os.fsdecode(b"m\xff")
+    assert run(plan, "--quiet", "--out", tmp_path / f"{name}.waypoints").exit_code == 0
+    assert (tmp_path / f"{name}.param").read_text().startswith("# for m?.waypoints")
+
+
 TINY = edited(SMALL, {"flight.duration": 3, "flight.end": [5, 45], "optimizer.max_iterations": 1})
 VALUES = st.one_of(
     st.none(),
@@ -247,3 +275,23 @@ def test_no_mutation_gives_a_traceback_or_a_partial_file(
         assert result.stdout == ""
         assert result.stderr
         assert [p.name for p in folder.iterdir()] == ["plan.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--out", "plan.txt"), "--out plan.txt: is the file of PLAN.yaml too"),
+        (("--out", "m.txt", "--precoders", "m.txt"), "--precoders m.txt: is the file of --out too"),
+        (("--out", "m.txt", "--precoders", "m.param"), "is the file of the parameters of --out"),
+    ],
+)
+def test_no_output_replaces_the_plan_or_another_output(
+    arguments: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("plan.txt").write_text(SMALL)
+    result = run("plan.txt", *arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.txt"]
+    assert Path("plan.txt").read_text() == SMALL

@@ -89,5 +89,5 @@ def test_the_input_is_not_overwritten(tmp_path: Path) -> None:
     for out in (mission, tmp_path / "." / "m.waypoints", tmp_path / "link.waypoints"):
         result = run(mission, "--out", out)
         assert result.exit_code == 2
-        assert "is the mission to read; give another name" in result.stderr
+        assert "is the file of MISSION too; give another name" in result.stderr
     assert mission.read_bytes() == before

@@ -58,6 +58,7 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     ("word", "part"),
     [
         ("convertt", "convertt: no command and no file of this name; did you mean convert?"),
+        ("z" * 300, "zzz: no command and no file of this name; commands: plan, "),
         ("zzz", "zzz: no command and no file of this name; commands: plan, validate, "),
     ],
 )

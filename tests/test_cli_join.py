@@ -9,15 +9,16 @@ import pytest
 from conftest import SMALL, edited, free_port
 from typer.testing import CliRunner
 
-from faao_mav import download
+from faao_mav import download, upload
 from faao_mav.cli.main import app
 from faao_mav.mavlink.messages import ParamRequestRead
 from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
 from faao_mav.mavlink.protocol import Result
 from faao_mav.mavlink.runner import running
 from faao_mav.mavlink.transport import Transport
+from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
-from faao_mav.mission.item import Home
+from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.mission.parameter_file import read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -98,6 +99,29 @@ def test_upload_after_writing(plan: Path, out: Path) -> None:
         assert "verified     read back and compared" in result.stdout
         found = download(f"udpout:127.0.0.1:{port}")
     assert [item.command for item in found.items] == [i.command for i in read_mission(out).items]
+
+
+def test_a_download_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
+    port, out = free_port(), tmp_path / "back.waypoints"
+    sent = Mission(
+        (MissionItem(16, 3, x=-35.36, y=149.16, z=50),),
+        HOME,
+        Fence(circles=(Circle((-35.36, 149.16), 90.0, inclusion=True),)),
+    )
+    mock = MockAutopilot(manners_of("px4"), home=HOME, beat=0.1)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        assert upload(sent, f"udpout:127.0.0.1:{port}").verified
+        result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out)
+    assert result.exit_code == 0, result.output
+    assert f"{out}: QGC WPL holds no fence: 1 area left out" in result.stderr
+
+
+@pytest.mark.parametrize("option", [("--system", "3"), ("--allow-armed",)])
+def test_options_of_an_upload_without_one(plan: Path, out: Path, option: tuple[str, ...]) -> None:
+    result = run(plan, "--out", out, *option)
+    assert result.exit_code == 2
+    assert f"{' '.join(option)}: is for an upload; give --upload" in result.stderr
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("as_json", [False, True])

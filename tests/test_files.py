@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from faao_mav.errors import InputError
-from faao_mav.files import check_writable, write_whole
+from faao_mav.files import check_apart, check_writable, write_whole
 
 
 def test_content_arrives_and_replaces(tmp_path: Path) -> None:
@@ -49,3 +49,42 @@ def test_places_that_cannot_be_written(tmp_path: Path) -> None:
         write_whole(tmp_path / "absent" / "file.txt", b"")
     check_writable(tmp_path / "file.txt")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_names_that_are_no_place_for_a_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written: File name too long"):
+        check_writable(tmp_path / ("a" * 300))
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/null")):
+        with pytest.raises(InputError, match="is a device or a pipe"):
+            check_writable(path)
+
+
+def test_the_longest_name_that_there_is(tmp_path: Path) -> None:
+    path = tmp_path / ("a" * 255)
+    check_writable(path)
+    write_whole(path, b"whole")
+    assert path.read_bytes() == b"whole"
+
+
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "below").mkdir()
+    link, real = tmp_path / "link.txt", tmp_path / "below" / "real.txt"
+    real.write_bytes(b"old")
+    link.symlink_to(real)
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert real.read_bytes() == b"new"
+
+
+def test_no_file_is_written_over_another_of_the_same_command(tmp_path: Path) -> None:
+    plan, other = tmp_path / "plan.txt", tmp_path / "other.txt"
+    plan.write_text("plan")
+    (tmp_path / "link.txt").symlink_to(plan)
+    (tmp_path / "hard.txt").hardlink_to(plan)
+    check_apart({"--out": other, "--save": None}, {"PLAN": plan, "SOLUTION": None})
+    for name in ("plan.txt", "../" + tmp_path.name + "/plan.txt", "link.txt", "hard.txt"):
+        with pytest.raises(InputError, match=r"^--out .* is the file of PLAN too"):
+            check_apart({"--out": tmp_path / name}, {"PLAN": plan})
+    with pytest.raises(InputError, match=r"^--save .* is the file of --out too"):
+        check_apart({"--out": other, "--save": other}, {"PLAN": plan})

@@ -211,6 +211,12 @@ def test_shortest_duration_depends_on_the_ends(
         ("a: &x 1\nb: *x\n", "line 2: aliases"),
         ("{" * 1000, "nested more than 20 deep"),
         ("? [a]\n: 1\n", "a key has to be a word"),
+        ("a: {1: 2}\n", "line 1, column 5: not valid YAML: a key has to be a word, not 1"),
+        ("a: 1\n~: 2\n", "line 2, column 1: not valid YAML: a key has to be a word, not ~"),
+        ("a:\n\tb: 1\n", "line 2, column 1: not valid YAML: found character '\\t'"),
+        ("a:\n\tb: 1\n", "; indent with spaces"),
+        ("QGC WPL 110\n", "a mission, not a plan; faao-mission validate takes missions"),
+        ('{\n "fileType": "Plan"}', "a mission, not a plan"),
         ("a: !!python/object:os.system 1\n", "line 1"),
         ("a: " + "9" * 5000, "thousands of digits"),
         ("a\x00b", "not valid YAML"),
@@ -224,13 +230,17 @@ def test_text_that_is_no_plan(text: str, part: str) -> None:
     assert part in str(caught.value)
 
 
+def test_a_tiny_time_step_is_told_in_few_digits() -> None:
+    assert "is 1e+301 steps of 1e-300 s" in refused({"flight.time_step": 1e-300})
+
+
 def test_unreadable_files(tmp_path: Path) -> None:
     with pytest.raises(PlanError, match=r"absent\.yaml: cannot be read: No such file"):
         read_plan(tmp_path / "absent.yaml")
     with pytest.raises(PlanError, match="cannot be read"):
         read_plan(tmp_path)
     (tmp_path / "latin.yaml").write_bytes(b"name: \xff\n")
-    with pytest.raises(PlanError, match="not UTF-8"):
+    with pytest.raises(PlanError, match=r"latin\.yaml: line 1: byte 0xff is not UTF-8"):
         read_plan(tmp_path / "latin.yaml")
 
 

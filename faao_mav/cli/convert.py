@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from faao_mav.cli.outcome import exit_status, note
-from faao_mav.errors import InputError
-from faao_mav.files import check_writable, write_whole
+from faao_mav.files import check_apart, check_writable, write_whole
 
 Autopilot = Literal["ardupilot", "px4"]
 
@@ -51,8 +50,7 @@ def _run(mission_file: Path, out: Path, autopilot: Autopilot | None, as_json: bo
     check_readable(mission_file)
     check_suffix(out)
     check_writable(out)
-    if out.exists() and mission_file.exists() and out.samefile(mission_file):
-        raise InputError(f"--out {out}: is the mission to read; give another name")
+    check_apart({"--out": out}, {"MISSION": mission_file})
     read = read_mission_file(mission_file)
     vehicle = Vehicle(autopilot, read.kind or "copter") if autopilot else read.vehicle
     lost = losses_in(read.mission, out, vehicle)

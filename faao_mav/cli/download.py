@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from faao_mav.cli.options import Component, Log, SigningKey, System, Wait
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.outcome import exit_status, note
 
 
 def download(
@@ -35,7 +35,7 @@ def download(
         from faao_mav.cli.transfer_progress import transfer_progress
         from faao_mav.files import check_writable, write_whole
         from faao_mav.mavlink.client import download as run
-        from faao_mav.mission.formats import check_suffix, render_mission
+        from faao_mav.mission.formats import check_suffix, losses_in, render_mission
 
         check_suffix(out)
         check_writable(out)
@@ -50,6 +50,8 @@ def download(
                 observe=observe,
             )
         write_whole(out, render_mission(mission, out).encode())
+        for line in losses_in(mission, out):
+            note(f"{out}: {line}")
     fence = len(mission.fence.polygons) + len(mission.fence.circles)
     typer.echo(
         f"mission      {len(mission.items)} items, {fence} fence areas, "

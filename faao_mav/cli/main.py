@@ -1,6 +1,9 @@
 """`faao-mission`: which command an argument list is for."""
 
 import difflib
+import io
+import os
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +13,7 @@ from typer.core import TyperGroup
 from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.convert import convert
 from faao_mav.cli.download import download
+from faao_mav.cli.outcome import note
 from faao_mav.cli.plan import plan
 from faao_mav.cli.study import study
 from faao_mav.cli.upload import upload
@@ -32,7 +36,9 @@ class _CommandOrPlan(TyperGroup):
     def _check_is_plan(self, ctx: Any, argument: str) -> None:
         """Take a bare word that is no file for a mistyped command."""
         path = Path(argument)
-        if argument.startswith("-") or path.suffix or path.name != argument or path.exists():
+        if argument.startswith("-") or path.suffix or path.name != argument:
+            return
+        if os.path.lexists(path):
             return
         near = difflib.get_close_matches(argument, self.commands, n=1)
         hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(self.commands)}"
@@ -83,5 +89,18 @@ def main(
 
 
 def run() -> None:
-    """Entry point of `faao-mission`."""
-    app()
+    """Entry point of `faao-mission`.
+
+    A character that standard output cannot show is shown as its code. Where nothing can be
+    written there, the exit status is 2, or 1 where the reader has gone.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        app()
+    except OSError as error:
+        where = error.filename or "standard output"
+        note(f"{where}: cannot be used: {error.strerror or error}")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is buffered fails no second time
+        sys.exit(2)

@@ -12,7 +12,7 @@ import typer
 from faao_mav.cli.options import AllowArmed, System
 from faao_mav.cli.outcome import exit_status, note
 from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import check_writable, write_whole
+from faao_mav.files import check_apart, check_writable, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.cli.summary import Result
@@ -70,6 +70,9 @@ def plan(
     not known to be on the vehicle; 2 unusable arguments or input.
     """
     with exit_status():
+        if upload is None and (system is not None or allow_armed):
+            option = "--allow-armed" if system is None else f"--system {system}"
+            raise InputError(f"{option}: is for an upload; give --upload CONNECTION too")
         result = _solve(
             plan_file, out, save, precoders, report, figure, upload, method, bound, quiet
         )
@@ -140,6 +143,8 @@ def _solve(
     targets = [path for path in files if path is not None]
     for path in targets:
         check_writable(path)
+    names = ("--out", "the parameters of --out,", "--save", "--precoders", "--report", "--figure")
+    check_apart(dict(zip(names, files, strict=True)), {"PLAN.yaml": plan_file})
     with progress(shown=sys.stderr.isatty() and not quiet) as observe:
         optimizing = time.perf_counter()
         solution = optimize(read, observe=observe)
@@ -161,7 +166,7 @@ def _solve(
             text = render_parameters(
                 conversion.parameters, read.vehicle.autopilot, header=f"for {out.name}"
             )
-            write_whole(tuned, text.encode())
+            write_whole(tuned, text.encode(errors="replace"))  # a name may be no Unicode
         if out is not None:
             rendered = (
                 draw_mission(solution, conversion)

@@ -75,15 +75,16 @@ def _run(
     from faao_mav.plan.keys import POWER
     from faao_mav.plan.model import Study
     from faao_mav.study import make_cases, parse_vary, run_study
-    from faao_mav.study.sweep import parse_schemes, parse_values
+    from faao_mav.study.sweep import join_grid, parse_schemes, parse_values
 
     if jobs == 0:
         raise InputError("--jobs 0: give a number of processes, or -1 for one a core")
     plan = read_plan(plan_file)
     asked = plan.study or Study({}, ("faao",), 1, "rate")
-    grid = dict(parse_vary(text) for text in vary)
+    options = [parse_vary(text) for text in vary]
     if power is not None:
-        grid[POWER] = parse_values(power, "--power")
+        options.append((POWER, parse_values(power, "--power")))
+    grid = join_grid(options)
     cases = make_cases(
         plan.text,
         vary=grid or asked.vary,

@@ -1,6 +1,7 @@
 """`faao-mission validate MISSION`: whether it will be accepted, can be flown, delivers the link."""
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
@@ -116,9 +117,13 @@ def _judge(
 ) -> "Verdict":
     from faao_mav.cli.findings import Verdict
     from faao_mav.mission.check import check
+    from faao_mav.mission.flight import flight_model
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.mission.validate import Limits
 
+    for option, value in zip(("duration", "distance", "altitude"), given, strict=True):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise InputError(f"--max-{option} {value:g}: expected a number above 0")
     plan, solution = _planned(*plans)
     max_duration, max_distance, max_altitude = given
     limits = Limits(
@@ -129,6 +134,7 @@ def _judge(
     )
     file = read_mission_file(mission_file)
     vehicle, chosen_by = _vehicle(mission_file, file, plan, *asked)
+    flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
     found = check(file.mission, vehicle, limits=limits, solution=solution)
     return Verdict(mission_file, len(file.mission.items), vehicle, chosen_by, found)
 

@@ -3,6 +3,7 @@
 import io
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -165,6 +166,34 @@ def save_solution(
     write_whole(path, buffer.getvalue())
 
 
+def _lack(error: Exception) -> str:
+    return f": {error.args[0]}" if isinstance(error, KeyError) else ""
+
+
+def _check_arrays(arrays: Mapping[str, Any], plan: Plan, source: str) -> None:
+    """Raise `InputError` for arrays that are not of `plan`'s slots and antennas."""
+    n, radio = plan.flight.slots, plan.radio
+    ends = {
+        "B": (radio.relay.antennas, radio.base_station.antennas),
+        "U": (radio.ground_user.antennas, radio.relay.antennas),
+    }
+    shapes: dict[str, tuple[int, ...]] = {"t": (n,), "I_U": (n,), "I_G": (n,)}
+    shapes |= dict.fromkeys(("w", "v", "a"), (n, 2))
+    for hop, (receiving, sending) in ends.items():
+        shapes[f"P_{hop}"] = (n, sending, sending)
+        shapes[f"H_r{hop}"] = (n, receiving, sending)
+    for name, shape in shapes.items():
+        found = arrays[name]
+        draws = name[0] in "PH" and found.ndim == len(shape) + 1  # a leading axis of draws
+        if found.dtype.kind not in "fc" or found.shape[draws:] != shape:
+            raise InputError(
+                f"{source}: {name}: {found.dtype} {found.shape}; expected numbers {shape}, "
+                "as the plan in the file has them"
+            )
+        if not np.isfinite(found).all():
+            raise InputError(f"{source}: {name}: expected finite numbers")
+
+
 def load_solution(path: str | Path) -> Solution:
     """Read what `save_solution` wrote. Raises `InputError` for anything else."""
     try:
@@ -175,7 +204,8 @@ def load_solution(path: str | Path) -> Solution:
             starts = json.loads(str(archive["starts"]))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not a result of faao-mission --save: {error}") from None
+    except (KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(f"{path}: not a result of faao-mission --save{_lack(error)}") from None
     plan = parse_plan(text, f"{path} (plan)")
+    _check_arrays(arrays, plan, str(path))
     return Solution(plan=plan, converged=converged, ending=ending, starts=starts, **arrays)

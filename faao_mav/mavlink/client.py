@@ -180,7 +180,7 @@ def _find(
         options.system, options.component, patience=options.wait, boot=options.timeouts.boot
     )
     found = link.run(search, observe)
-    vehicle = choose(found, connection, options.system, options.wait)
+    vehicle = choose(found, connection, options.system, options.component, options.wait)
     return vehicle, Peer(link.address, vehicle.address, vehicle.firmware)
 
 

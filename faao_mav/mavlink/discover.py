@@ -142,11 +142,16 @@ class AskHome:
 
 
 def choose(
-    found: Sequence[FoundVehicle], connection: str, system: int | None, patience: float
+    found: Sequence[FoundVehicle],
+    connection: str,
+    system: int | None,
+    component: int | None,
+    patience: float,
 ) -> FoundVehicle:
     """Return the one vehicle that was `found`; raises `LinkError` if there is none, or several."""
     if not found:
         who = "an autopilot" if system is None else f"the autopilot of system {system}"
+        who += "" if component is None else f" with component number {component}"
         raise LinkError(
             f"{connection}: no heartbeat of {who} within {patience:g} s; is it switched on and "
             "connected there, and no other program in between?"

@@ -12,10 +12,13 @@ from faao_mav.files import check_writable
 class Tlog:
     """A `.tlog` file: before each packet the time since 1970, 8 bytes, big-endian, microseconds.
 
-    Raises `InputError` if the file cannot be written.
+    Raises `InputError` if the file cannot be written, or by its name is none of these: a slip of
+    the pen must not replace the mission.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
+        if path.suffix != ".tlog":
+            raise InputError(f"--log {path}: give a name that ends in .tlog")
         check_writable(path)
         try:
             self._file = path.open("wb")

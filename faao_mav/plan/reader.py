@@ -9,6 +9,7 @@ import yaml
 from pydantic import ValidationError
 
 from faao_mav.errors import PlanError
+from faao_mav.files import read_text
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import model, schema
 from faao_mav.plan.keys import unknown_key
@@ -23,16 +24,8 @@ def read_plan(path: str | Path, *, method: str | None = None) -> model.Plan:
     `method`, where given, replaces `optimizer.method`. Raises `PlanError` that names the file,
     the key, the value and what would be accepted.
     """
-    source = str(path)
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(4 * MAX_CHARACTERS + 1)
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise PlanError(f"{source}: cannot be read: {error.strerror or error}") from None
-    except ValueError as error:
-        raise PlanError(f"{source}: not UTF-8 text: {error}") from None
-    return parse_plan(text, source, method=method)
+    text = read_text(path, 4 * MAX_CHARACTERS, "a plan", PlanError).removeprefix("\ufeff")
+    return parse_plan(text, str(path), method=method)
 
 
 def parse_plan(text: str, source: str = "plan", *, method: str | None = None) -> model.Plan:
@@ -61,6 +54,10 @@ def _check_available(tree: schema.PlanSection, source: str) -> None:
             raise PlanError(f"{source}: {path}: {shown} does not work yet; {advice}")
     if tree.fence is not None:
         raise PlanError(f"{source}: fence: does not work yet; leave it out")
+
+
+def _count(number: float) -> str:
+    return f"{number:,.0f}" if number < 1e9 else f"{number:.3g}"
 
 
 def _watts(dbm: float) -> float:
@@ -236,7 +233,7 @@ class _Reader:
         if ratio > schema.MAX_SLOTS + 0.5:
             raise self.fail(
                 "flight.duration",
-                f"{flight.duration:g} s is {ratio:,.0f} steps of {step} (flight.time_step); at "
+                f"{flight.duration:g} s is {_count(ratio)} steps of {step} (flight.time_step); at "
                 f"most {schema.MAX_SLOTS:,} are accepted",
             )
         if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio):

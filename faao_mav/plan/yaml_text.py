@@ -20,9 +20,10 @@ class _Loader(yaml.SafeLoader):
     def construct_unique_mapping(self, node: yaml.MappingNode) -> dict[Any, Any]:
         seen = set()
         for key_node, _ in node.value:
-            if not isinstance(key_node, yaml.ScalarNode):
+            if not isinstance(key_node, yaml.ScalarNode) or not key_node.tag.endswith(":str"):
+                shown = f", not {key_node.value}" if isinstance(key_node.value, str) else ""
                 raise yaml.MarkedYAMLError(
-                    problem="a key has to be a word", problem_mark=key_node.start_mark
+                    problem=f"a key has to be a word{shown}", problem_mark=key_node.start_mark
                 )
             if key_node.value in seen:
                 raise yaml.MarkedYAMLError(
@@ -85,6 +86,8 @@ def load_yaml(text: str, source: str) -> dict[Any, Any]:
     `source` names the file in messages. Raises `PlanError` with the line for anything that is
     not one YAML mapping.
     """
+    if text.startswith("QGC WPL") or (text.lstrip()[:1] == "{" and '"fileType"' in text):
+        raise PlanError(f"{source}: a mission, not a plan; faao-mission validate takes missions")
     if len(text) > MAX_CHARACTERS:
         raise PlanError(
             f"{source}: {len(text):,} characters; a plan has at most {MAX_CHARACTERS:,}"
@@ -95,7 +98,8 @@ def load_yaml(text: str, source: str) -> dict[Any, Any]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise PlanError(f"{source}: {where}not valid YAML: {error.problem}") from None
+        advice = "; indent with spaces" if r"'\t'" in (error.problem or "") else ""
+        raise PlanError(f"{source}: {where}not valid YAML: {error.problem}{advice}") from None
     except (yaml.YAMLError, ValueError) as error:
         problem = " ".join(str(error).split())
         raise PlanError(f"{source}: not valid YAML: {problem}") from None

@@ -13,6 +13,7 @@ from faao_mav.files import write_whole
 from faao_mav.study.sweep import Case, Value
 
 ROWS, TABLE = "rows.jsonl", "table.csv"
+_BEGINNING = b'{"key": "'  # of every row: what is cut off must not be somebody's text
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +51,17 @@ def as_dict(row: Row) -> dict[str, Any]:
 
 
 def append_row(row: Row, directory: Path) -> None:
-    """Add `row` to the directory's rows by one write: another reader sees all of it or nothing."""
+    """Add `row` to the directory's rows by one write: another reader sees all of it or nothing.
+
+    Raises `InputError`.
+    """
     line = json.dumps(asdict(row), allow_nan=False) + "\n"
-    with (directory / ROWS).open("ab", buffering=0) as file:
-        file.write(line.encode())
+    path = directory / ROWS
+    try:
+        with path.open("ab", buffering=0) as file:
+            file.write(line.encode())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def load_rows(directory: Path) -> dict[str, Row]:
@@ -70,7 +78,10 @@ def load_rows(directory: Path) -> dict[str, Row]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     whole = content[: content.rfind(b"\n") + 1]
-    if whole != content:
+    rest = content[len(whole) :]
+    if not (rest.startswith(_BEGINNING) or _BEGINNING.startswith(rest)):
+        raise InputError(f"{path}: its last line is no row of a study; give another directory")
+    if rest:
         write_whole(path, whole)
     rows: dict[str, Row] = {}
     names = {field.name for field in fields(Row)}

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import write_whole
+from faao_mav.files import check_writable, write_whole
 from faao_mav.study.rows import TABLE, Row, append_row, in_order, load_rows, table
 from faao_mav.study.sweep import Case
 
@@ -94,10 +94,12 @@ def _rows(cases: Sequence[Case], jobs: int, cluster: str | None) -> Iterator[Row
         with _connected(cluster):
             workers = Parallel(return_as="generator_unordered", batch_size=1)
             yield from workers(delayed(run_case)(case) for case in cases)
-    elif min(effective_n_jobs(jobs), len(cases)) <= 1:
+        return
+    processes = min(effective_n_jobs(jobs), len(cases))  # no more than there is work for
+    if processes <= 1:
         yield from map(run_case, cases)
     else:
-        workers = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
+        workers = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1)
         yield from workers(delayed(run_case)(case) for case in cases)
 
 
@@ -121,6 +123,9 @@ def _connected(address: str) -> Iterator[None]:
 def _prepare(directory: Path) -> dict[str, Row]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise InputError(f"{directory}: is a file; give a directory") from None
     except OSError as error:
         raise InputError(f"{directory}: cannot be made: {error.strerror or error}") from None
+    check_writable(directory / TABLE)
     return load_rows(directory)

@@ -64,6 +64,20 @@ def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
     return key, parse_values(values, f"--vary {key}")
 
 
+def join_grid(options: Sequence[tuple[str, tuple[Value, ...]]]) -> dict[str, tuple[Value, ...]]:
+    """Return the values by key. Raises `InputError` where two options vary the same."""
+    grid: dict[str, tuple[Value, ...]] = {}
+    varied: dict[str, str] = {}
+    for key, values in options:
+        for path in ALIASES.get(key, (key,)):
+            if path in varied:
+                both = key if varied[path] == key else f"{varied[path]} and {key}"
+                raise InputError(f"--vary {both}: varied twice; give all values in one option")
+            varied[path] = key
+        grid[key] = values
+    return grid
+
+
 def parse_values(text: str, option: str) -> tuple[Value, ...]:
     """Read `start:stop:step`, the end included, or `value,value,...` as YAML reads them.
 

@@ -55,6 +55,27 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
         load_solution(path)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("w", np.zeros((3, 2)), r"w: float64 \(3, 2\); expected numbers \(20, 2\)"),
+        ("w", np.full((20, 2), np.nan), "w: expected finite numbers"),
+        ("w", np.array(["a"]), "w: <U1"),
+        ("P_B", np.ones((20, 1, 2)), r"P_B: float64 \(20, 1, 2\); expected numbers \(20, 2, 2\)"),
+        ("H_rU", np.ones((4, 19, 2, 2)), r"H_rU: float64 \(4, 19, 2, 2\); expected"),
+    ],
+)
+def test_arrays_that_are_not_the_plans_are_refused(
+    solution: Solution, tmp_path: Path, name: str, value: "np.ndarray", said: str
+) -> None:
+    path = tmp_path / "result.npz"
+    save_solution(solution, path)
+    with np.load(path) as archive:
+        np.savez(path.with_name("other.npz"), **{**archive, name: value})
+    with pytest.raises(InputError, match=rf"other\.npz: {said}"):
+        load_solution(path.with_name("other.npz"))
+
+
 def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:
     assert replace(solution, P_B=1.1 * solution.P_B).residuals()[
         "(13b) power of the base station"

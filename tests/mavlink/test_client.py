@@ -184,11 +184,21 @@ def test_no_vehicle(port):
         pytest.raises(LinkError, match="the autopilot of system 9"),
     ):
         download(f"udpout:127.0.0.1:{port}", system=9, wait=0.3)
+    with pytest.raises(LinkError, match="an autopilot with component number 7 within"):
+        download(f"udpout:127.0.0.1:{port}", component=7, wait=0.3)
 
 
 def test_an_empty_mission_is_not_uploaded():
     with pytest.raises(InputError, match="no items; clear the vehicle's instead"):
         upload(Mission(()), "udpout:127.0.0.1:9")
+
+
+def test_a_log_does_not_replace_a_mission(tmp_path):
+    path = tmp_path / "m.waypoints"
+    path.write_text("QGC WPL 110\n")
+    with pytest.raises(InputError, match=r"m\.waypoints: give a name that ends in \.tlog"):
+        upload(a_mission(5), "udpout:127.0.0.1:9", log=path)
+    assert path.read_text() == "QGC WPL 110\n"
 
 
 def test_the_log_is_one_that_pymavlink_reads(port, tmp_path):

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from faao_mav.plan import parse_plan
 from faao_mav.report.style import save_figure
 from faao_mav.study import Row, load_rows, make_cases, run_study
 from faao_mav.study.figure import study_figure
+from faao_mav.study.rows import append_row
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
@@ -160,6 +162,51 @@ def test_a_strange_directory_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "rows.jsonl").write_text('{"not": "a row"}\n')
     with pytest.raises(InputError, match="line 1: no row of a study"):
         run_study(CASES, jobs=1, directory=tmp_path)
+
+
+def test_text_that_is_no_cut_off_row_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
+    path.write_text("notes without a line's end")
+    with pytest.raises(InputError, match="its last line is no row of a study"):
+        run_study(CASES, jobs=1, directory=tmp_path)
+    assert path.read_text() == "notes without a line's end"
+
+
+def test_what_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file: is a file; give a directory"):
+        run_study(CASES, jobs=1, directory=tmp_path / "file")
+    (tmp_path / "table.csv").mkdir()
+    with pytest.raises(InputError, match=r"table\.csv: is a directory"):
+        run_study(CASES, jobs=1, directory=tmp_path)
+    assert not (tmp_path / "rows.jsonl").exists()
+
+
+def test_a_row_that_cannot_be_kept_is_an_input_error(tmp_path: Path) -> None:
+    (tmp_path / "rows.jsonl").mkdir()
+    with pytest.raises(InputError, match=r"rows\.jsonl: cannot be written"):
+        append_row(Row("k", {}, "faao", 0), tmp_path)
+
+
+def test_there_are_no_more_processes_than_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def undo(work: Iterable[tuple[Any, Any, Any]]) -> list[Row]:
+        return [call(*arguments, **named) for call, arguments, named in work]
+
+    monkeypatch.setattr("joblib.Parallel", lambda n_jobs, **_: asked.append(n_jobs) or undo)
+    run_study(CASES, jobs=100_000)
+    assert asked == [len(CASES)]
+
+
+def test_a_key_varied_twice_is_refused(plan: Path) -> None:
+    for options in (
+        ("--vary", "flight.altitude=50", "--vary", "flight.altitude=60"),
+        ("--power", "10", "--vary", "radio.relay.power_dbm=20"),
+    ):
+        result = run(plan, *options)
+        assert result.exit_code == 2
+        assert "varied twice" in result.stderr
 
 
 def test_figures_are_written_and_labelled(plan: Path, tmp_path: Path) -> None:
