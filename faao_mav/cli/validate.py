@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from faao_mav.cli.findings import Verdict
     from faao_mav.faao.solution import Solution
     from faao_mav.mission.formats import MissionFile
+    from faao_mav.mission.item import Mission
     from faao_mav.mission.vehicle import Vehicle
     from faao_mav.plan import Plan
 
@@ -60,6 +61,10 @@ def validate(
     max_altitude: Annotated[
         float | None, typer.Option(metavar="M", help="The highest above home, metres.")
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="PAGE.html", help="One page with map and findings."),
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Warnings fail as well.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object instead of the text.")
@@ -86,12 +91,16 @@ def validate(
             raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
         if plan_file is not None and solution_file is not None:
             raise InputError("--plan and --solution: give one; the solution has its plan in it")
-        verdict = _judge(
+        if report is not None:
+            _check_report(report, mission_file, plan_file, solution_file)
+        verdict, mission, solution = _judge(
             mission_file,
             (plan_file, solution_file),
             (autopilot, kind, parameters),
             (max_duration, max_distance, max_altitude),
         )
+        if report is not None:
+            _write_report(report, verdict, mission, solution)
         _show(verdict, as_json)
         if verdict.check.of(Level.ERROR) or (strict and verdict.check.of(Level.WARNING)):
             raise typer.Exit(1)
@@ -114,7 +123,7 @@ def _judge(
     plans: tuple[Path | None, Path | None],
     asked: tuple[str | None, str | None, Path | None],
     given: tuple[float | None, float | None, float | None],
-) -> "Verdict":
+) -> "tuple[Verdict, Mission, Solution | None]":
     from faao_mav.cli.findings import Verdict
     from faao_mav.mission.check import check
     from faao_mav.mission.flight import flight_model
@@ -136,7 +145,41 @@ def _judge(
     vehicle, chosen_by = _vehicle(mission_file, file, plan, *asked)
     flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
     found = check(file.mission, vehicle, limits=limits, solution=solution)
-    return Verdict(mission_file, len(file.mission.items), vehicle, chosen_by, found)
+    verdict = Verdict(mission_file, len(file.mission.items), vehicle, chosen_by, found)
+    return verdict, file.mission, solution
+
+
+def _check_report(
+    report: Path, mission_file: Path, plan_file: Path | None, solution_file: Path | None
+) -> None:
+    """Refuse a page that cannot be written before the work, and one over an input."""
+    from faao_mav.cli.report import check_names
+    from faao_mav.files import check_apart, check_writable
+
+    check_names(report, None)
+    check_writable(report)
+    read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
+    check_apart({"--report": report}, read)
+
+
+def _write_report(
+    report: Path, verdict: "Verdict", mission: "Mission", solution: "Solution | None"
+) -> None:
+    from faao_mav.files import write_whole
+    from faao_mav.report import ReportData, render_report
+
+    found = verdict.check
+    page = render_report(
+        ReportData(
+            solution=solution,
+            findings=found.findings,
+            mission=mission,
+            track=found.track,
+            link=found.link,
+            title=verdict.source.name,
+        )
+    )
+    write_whole(report, page.encode())
 
 
 def _show(verdict: "Verdict", as_json: bool) -> None:

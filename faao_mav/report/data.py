@@ -5,8 +5,11 @@ from dataclasses import dataclass
 
 from faao_mav.faao.solution import Solution
 from faao_mav.mission.convert import Conversion
+from faao_mav.mission.flight.track import Track
+from faao_mav.mission.item import Mission
 from faao_mav.mission.prediction import Prediction
 from faao_mav.mission.validate.finding import Finding
+from faao_mav.mission.validate.link import LinkCheck
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,5 +20,9 @@ class ReportData:
     conversion: Conversion | None = None
     prediction: Prediction | None = None
     findings: Sequence[Finding] | None = None
+    mission: Mission | None = None
+    """A mission by itself, with its predicted flight as `track`, for a page without conversion."""
+    track: Track | None = None
+    link: LinkCheck | None = None
     title: str = ""
     """Without one, the name of the plan."""

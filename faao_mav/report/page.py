@@ -7,6 +7,8 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from faao_mav.mission.flight.track import Track
+from faao_mav.mission.item import Mission
 from faao_mav.mission.validate.finding import Finding
 from faao_mav.report.data import ReportData
 from faao_mav.report.inline_svg import inline_svg
@@ -64,6 +66,8 @@ def _sections(data: ReportData) -> Iterator[str]:
         rows = [(name, f"{value:g}") for name, value in data.conversion.parameters.items()]
         told = "<p>The mission is timed for these: load them first.</p>"
         yield _section("Parameters", told + _table(("parameter", "value"), rows))
+    if data.mission is not None and data.track is not None:
+        yield from _flown(data.mission, data.track)
     if data.solution is not None:
         yield from _drawn(data, data.solution)
         plan = f"<pre>{html.escape(data.solution.plan.text)}</pre>"
@@ -87,6 +91,17 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
         yield "from the plan at equal times, rms", f"{prediction.rms_position_error:.1f} m"
         yield "the same, at most", f"{prediction.max_position_error:.1f} m"
         yield "from the planned path, at most", f"{prediction.max_path_error:.1f} m"
+    if data.link is not None:
+        link = data.link
+        yield "predicted rate", f"{link.predicted_rate:.4f} bit/s/Hz, {100 * link.share:.2f} %"
+        yield "predicted duration of the relay flight", f"{link.predicted_duration:.1f} s"
+        yield "from the plan at equal times, rms", f"{link.rms_position_error:.1f} m"
+        yield "the same, at most", f"{link.max_position_error:.1f} m"
+        yield "from the planned path, at most", f"{link.path_error:.1f} m"
+    if data.mission is not None:
+        yield "mission items", str(len(data.mission.items))
+    if data.track is not None:
+        yield "predicted flight, take-off to end", f"{data.track.t[-1]:.0f} s"
     if data.conversion is not None:
         yield "mission items", str(len(data.conversion.mission.items))
         yield "relay route", f"{data.conversion.schedule.route.distance:.0f} m"
@@ -103,6 +118,16 @@ def _findings(findings: Sequence[Finding]) -> str:
         level = html.escape(finding.level)
         items.append(f'<li class="{level}"><b>{level}</b>: {text}{todo}</li>')
     return f"<ul>{''.join(items)}</ul>"
+
+
+def _flown(mission: Mission, track: Track) -> Iterator[str]:
+    """Yield the figures of a mission that is judged by itself."""
+    from faao_mav.report.mission_figures import mission_map, mission_motion
+
+    title = "Map of the predicted flight with the mission's items and its fence, metres"
+    yield _figure("mission-map", "Mission", mission_map(mission, track), title)
+    title = "Predicted ground speed and height above home over time"
+    yield _figure("mission-motion", "Flight", mission_motion(track), title)
 
 
 def _drawn(data: ReportData, solution: "Solution") -> Iterator[str]:

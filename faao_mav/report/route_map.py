@@ -11,7 +11,6 @@ from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.fence import Fence
-from faao_mav.plan import Plan
 from faao_mav.report.style import INK, MUTED, SERIES, label, legend_above, mark_stations
 from faao_mav.report.waypoint_numbers import waypoints
 
@@ -40,8 +39,9 @@ def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -
     seen = [solution.w, stations]
     outlines: list[Outline] = []
     if conversion is not None:
-        outlines = list(_outlines(conversion.mission.fence, plan))
-        _fenced(plot, outlines)
+        frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+        outlines = list(outlines_of(conversion.mission.fence, frame))
+        draw_fence(plot, outlines)
     _coloured(plot, solution)
     if conversion is not None:
         track = conversion.schedule.track()["predicted_w"]
@@ -58,11 +58,11 @@ def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -
         ),
     )
     plot.set_aspect("equal", adjustable="datalim")
-    _show(plot, np.concatenate(seen), outlines)
+    show_all(plot, np.concatenate(seen), outlines)
     label(plot, "", "east, m", "north, m")
 
 
-def _fenced(plot: "Axes", outlines: Sequence[Outline]) -> None:
+def draw_fence(plot: "Axes", outlines: Sequence[Outline]) -> None:
     """Draw the fence: dashed where the aircraft has to stay inside, filled where outside."""
     named: set[bool] = set()
     for corners, inside in outlines:
@@ -80,7 +80,7 @@ def _fenced(plot: "Axes", outlines: Sequence[Outline]) -> None:
             plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
 
 
-def _show(plot: "Axes", seen: Real, outlines: Sequence[Outline]) -> None:
+def show_all(plot: "Axes", seen: Real, outlines: Sequence[Outline]) -> None:
     """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it."""
     low, high = seen.min(axis=0), seen.max(axis=0)
     width = float((high - low).max()) or 1.0
@@ -115,8 +115,8 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
         bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
 
 
-def _outlines(fence: Fence, plan: Plan) -> Iterator[Outline]:
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+def outlines_of(fence: Fence, frame: LocalFrame) -> Iterator[Outline]:
+    """Yield the areas of `fence` in metres about `frame`'s origin."""
     for polygon in fence.polygons:
         corners = np.array([*polygon.vertices, polygon.vertices[0]])
         yield frame.to_local(corners[:, 0], corners[:, 1]), polygon.inclusion

@@ -234,3 +234,16 @@ def test_a_useless_parameter_is_refused(run: Run, sound: Path) -> None:
         assert result.exit_code == 2
         assert f"{path}" in result.stderr
         assert "WPNAV_SPEED: -5; give a number of at least" in result.stderr
+
+
+def test_a_page_of_a_mission_by_itself_and_beside_its_plan(run: Run, sound: Path) -> None:
+    page = sound.with_suffix(".html")
+    assert run(sound, "--report", page, predicted=True).exit_code == 0
+    text = page.read_text()
+    for heading in ("Result", "Findings", "Mission", "Flight"):
+        assert f"<h2>{heading}</h2>" in text
+    assert "<h2>Route</h2>" not in text
+    assert sound.name in text
+    wrong = run(sound, "--report", sound)
+    assert wrong.exit_code == 2
+    assert "--report" in wrong.stderr
