@@ -217,6 +217,17 @@ def test_output_that_cannot_be_written_or_shown(tmp_path: Path) -> None:
     assert "\\xfc.waypoints: 0 items" in done.stdout
 
 
+def test_parameters_that_no_run_has_written_are_kept(plan: Path, tmp_path: Path) -> None:
+    out, beside = tmp_path / "m.waypoints", tmp_path / "m.param"
+    beside.write_text("WPNAV_SPEED,700\n")
+    result = run(plan, "--out", out)
+    assert result.exit_code == 2
+    assert f"{beside}: the mission's parameters are to go there" in result.stderr
+    assert beside.read_text() == "WPNAV_SPEED,700\n"
+    beside.unlink()
+    assert run(plan, "--out", out).exit_code == run(plan, "--out", out).exit_code == 0
+
+
 def test_names_that_are_no_unicode(plan: Path, tmp_path: Path) -> None:
     name = os.fsdecode(b"m\xff")
     assert run(plan, "--quiet", "--out", tmp_path / f"{name}.waypoints").exit_code == 0

@@ -17,6 +17,8 @@ from faao_mav.files import check_apart, check_writable, write_whole
 if TYPE_CHECKING:
     from faao_mav.cli.summary import Result
 
+_FOR = "for "  # how the file of parameters begins
+
 
 def plan(
     plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
@@ -143,6 +145,8 @@ def _solve(
     targets = [path for path in files if path is not None]
     for path in targets:
         check_writable(path)
+    if tuned is not None:
+        _check_own(tuned)
     names = ("--out", "the parameters of --out,", "--save", "--precoders", "--report", "--figure")
     check_apart(dict(zip(names, files, strict=True)), {"PLAN.yaml": plan_file})
     with progress(shown=sys.stderr.isatty() and not quiet) as observe:
@@ -164,7 +168,7 @@ def _solve(
             write_whole(precoders, precoder_table(solution).encode())
         if out is not None and tuned is not None:
             text = render_parameters(
-                conversion.parameters, read.vehicle.autopilot, header=f"for {out.name}"
+                conversion.parameters, read.vehicle.autopilot, header=f"{_FOR}{out.name}"
             )
             write_whole(tuned, text.encode(errors="replace"))  # a name may be no Unicode
         if out is not None:
@@ -201,6 +205,19 @@ def _solve(
         seconds_total=time.perf_counter() - started,
         written=tuple(targets),
     )
+
+
+def _check_own(tuned: Path) -> None:
+    """Refuse to replace parameters that no run has written: the vehicle's own, perhaps."""
+    if not tuned.exists():
+        return
+    with tuned.open("rb") as file:
+        beginning = file.read(len(_FOR) + 2)
+    if beginning != f"# {_FOR}".encode():
+        raise InputError(
+            f"{tuned}: the mission's parameters are to go there, but it is not of an earlier run; "
+            "rename it, or give --out another name"
+        )
 
 
 def _sound(result: "Result") -> bool:
