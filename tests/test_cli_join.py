@@ -38,6 +38,11 @@ def run(*arguments: object) -> Any:
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
+def edit_plan(path: Path, changes: dict[str, object]) -> Path:
+    path.write_text(edited(path.read_text(), changes))
+    return path
+
+
 @pytest.fixture
 def plan(tmp_path: Path) -> Path:
     path = tmp_path / "plan.yaml"
@@ -187,6 +192,20 @@ def test_parameters_beside_the_mission_are_used_and_that_is_said(plan: Path, out
     assert f"parameters: {other}" in run("validate", out, "--parameters", other).stdout
     beside.unlink()
     assert "parameters: defaults" in run("validate", out).stdout
+
+
+def test_parameters_say_whose_mission_a_text_file_is(plan: Path, out: Path) -> None:
+    run(edit_plan(plan, {"vehicle.autopilot": "px4"}), "--out", out)
+    beside = out.with_suffix(".params")
+    told = run("validate", out).stdout
+    assert "for PX4 and a copter (as its parameters say)" in told
+    assert "0 errors, 0 warnings" in told
+    assert "for PX4" in run("validate", out, "--parameters", beside).stdout
+    out.with_suffix(".param").write_text("WPNAV_ACCEL,50\n")
+    assert "for ArduPilot and a copter (by default" in run("validate", out).stdout
+    other = run("validate", out, "--autopilot", "ardupilot", "--parameters", beside)
+    assert other.exit_code == 2
+    assert "parameters of PX4, but the mission is for ArduPilot (as asked)" in other.stderr
 
 
 def test_the_mock_flies_by_its_parameters(

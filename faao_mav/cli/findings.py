@@ -12,10 +12,9 @@ from rich.table import Table
 from faao_mav.cli.finding_lines import count_of, grouped, items_of, line_of, message_of
 from faao_mav.mission.check import Check
 from faao_mav.mission.validate import Level, Rule
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Vehicle
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
-_NAMES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +109,7 @@ def show_rules(rules: Sequence[Rule], console: Console) -> None:
 def _head(verdict: Verdict) -> str:
     vehicle = verdict.vehicle
     lines = [
-        f"{verdict.source}: {verdict.items} items, for {_NAMES[vehicle.autopilot]} and a "
+        f"{verdict.source}: {verdict.items} items, for {AUTOPILOT_NAMES[vehicle.autopilot]} and a "
         f"{vehicle.kind} ({verdict.chosen_by}); parameters: "
         f"{vehicle.source if vehicle.parameters else 'defaults'}"
     ]
