@@ -55,6 +55,17 @@ def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
     assert told == []
 
 
+def test_the_sample_plane() -> None:
+    text = (MISSIONS / "plane_relay.yaml").read_text()
+    changes = {"flight.duration": 70, "flight.time_step": 0.5, "radio.fading": "none"}
+    conversion, found = checked(text, changes)
+    assert found.track is not None
+    assert [each for each in complaints(found) if not each.startswith("link-")] == []
+    assert found.link is not None
+    assert found.link.share > 0.98
+    assert conversion.vehicle.kind == "plane"
+
+
 @pytest.mark.parametrize("finish", ["rtl", "land", "hover"])
 @pytest.mark.parametrize("takeoff", [True, False])
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])

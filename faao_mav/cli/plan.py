@@ -110,25 +110,20 @@ def _solve(
     from faao_mav.faao.problem import build_problem
     from faao_mav.faao.progress import Progress
     from faao_mav.faao.solution import save_solution
-    from faao_mav.mission.autopilot import legs_of
     from faao_mav.mission.check import check
-    from faao_mav.mission.convert import convert
+    from faao_mav.mission.convert import check_vehicle, convert
     from faao_mav.mission.drawing import draw_mission
-    from faao_mav.mission.flight import copter_model
     from faao_mav.mission.formats import check_suffix, render_mission
     from faao_mav.mission.parameter_file import parameter_path, render_parameters
     from faao_mav.mission.precoder_table import precoder_table
     from faao_mav.mission.prediction import predict_delivery
     from faao_mav.mission.recommend import candidates
     from faao_mav.mission.validate import Limits
-    from faao_mav.mission.vehicle import vehicle_of
     from faao_mav.plan import read_plan
 
     started = time.perf_counter()
     read = read_plan(plan_file, method=method)
-    own = vehicle_of(read)
-    legs_of(own)  # a useless parameter is refused before the work, not after it
-    copter_model(own)
+    check_vehicle(read)
     vehicles = candidates(read)
     tuned = None
     if out is not None:

@@ -125,7 +125,7 @@ def _judge(
     from faao_mav.cli.findings import Verdict
     from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.mission.check import check
-    from faao_mav.mission.flight import flight_model
+    from faao_mav.mission.flight import flight_model, modelled
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.mission.validate import Limits
 
@@ -142,7 +142,8 @@ def _judge(
     )
     file = read_mission_file(mission_file)
     vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
-    flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
+    if modelled(vehicle):
+        flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
     found = check(file.mission, vehicle, limits=limits, solution=solution)
     verdict = Verdict(mission_file, len(file.mission.items), vehicle, chosen_by, found)
     return verdict, file.mission, solution

@@ -12,8 +12,6 @@ from faao_mav.mission.vector import lengths
 MOVING = 0.5
 """Slower ends than this, m/s, are taken as hovers."""
 
-_MARGIN = 1.2
-
 
 def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) -> Route:
     """Return `route` with a leg that is long enough to be at the plan's first speed at w_I.
@@ -61,7 +59,7 @@ def _speed(velocity: Real) -> float:
 def _lead(velocity: Real, legs: Legs, max_speed: float) -> tuple[Real, float]:
     """Return the way, (2,) m, on which `velocity` can be reached, and its nominal duration, s."""
     speed = min(_speed(velocity), max_speed)
-    length = _MARGIN * float(legs.shortest_leg(np.array([speed]))[0])
+    length = legs.run_in(speed)
     return velocity / _speed(velocity) * length, length / speed
 
 

@@ -85,6 +85,7 @@ class _Reader:
             parameters=dict(tree.vehicle.parameters),
         )
         flight = self.flight()
+        self.check_plane(vehicle)
         self.check_speeds(flight, vehicle)
         self.check_steps(flight)
         self.check_reach(flight, vehicle)
@@ -201,6 +202,26 @@ class _Reader:
             seeds=section.seeds,
             figure=section.figure,
         )
+
+    def check_plane(self, vehicle: model.Vehicle) -> None:
+        if vehicle.type != "plane":
+            return
+        if vehicle.autopilot != "ardupilot":
+            raise self.fail(
+                "vehicle.type",
+                f"plane: missions for planes are made for ardupilot, not for {vehicle.autopilot} "
+                "(vehicle.autopilot)",
+            )
+        if vehicle.min_speed == 0:
+            raise self.fail(
+                "vehicle.min_speed", "0 m/s: a plane cannot hover; give its slowest speed, m/s"
+            )
+        if self.tree.mission.on_finish == "land":
+            raise self.fail(
+                "mission.on_finish",
+                "land: a plane needs an approach, which is not planned; give rtl or hover "
+                "(it circles)",
+            )
 
     def check_speeds(self, flight: model.Flight, vehicle: model.Vehicle) -> None:
         if vehicle.min_speed > vehicle.max_speed:
