@@ -31,7 +31,18 @@ def checked(text: str, changes: dict[str, Any]) -> tuple[Conversion, Check]:
     solution = optimize(plan)
     conversion = convert(solution)
     limits = Limits(max_speed=plan.vehicle.max_speed)
-    found = check(conversion.mission, conversion.vehicle, limits=limits, solution=solution)
+    found = check(
+        conversion.mission,
+        conversion.vehicle,
+        limits=limits,
+        solution=solution,
+        lead=conversion.schedule.route.lead,
+    )
+    promised = predict_delivery(solution, conversion)
+    assert found.link is not None
+    assert found.link.predicted_rate == pytest.approx(promised.rates.R_avg, rel=0.005)
+    assert found.link.rms_position_error == pytest.approx(promised.rms_position_error, abs=0.4)
+    assert found.link.path_error == pytest.approx(promised.max_path_error, abs=0.4)
     return conversion, found
 
 

@@ -178,6 +178,7 @@ def _solve(
             conversion.vehicle,
             limits=Limits(max_speed=read.vehicle.max_speed),
             solution=solution,
+            lead=conversion.schedule.route.lead,
         )
         reports.write(report, figure, solution, conversion, prediction, checked.findings)
         information, fresh = price(solution), fresh_rates(solution)
