@@ -180,7 +180,6 @@ def _solve(
             solution=solution,
             lead=conversion.schedule.route.lead,
         )
-        reports.write(report, figure, solution, conversion, prediction, checked.findings)
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None
@@ -188,19 +187,21 @@ def _solve(
             from faao_mav.faao.bound import upper_bound
 
             ceiling = upper_bound(build_problem(read), solution.rates.R_avg)
-    return Result(
-        solution=solution,
-        information=information,
-        fresh=fresh,
-        saturation=limit,
-        bound=ceiling,
-        conversion=conversion,
-        prediction=prediction,
-        findings=checked.findings,
-        seconds_optimize=optimized,
-        seconds_total=time.perf_counter() - started,
-        written=tuple(targets),
-    )
+        result = Result(
+            solution=solution,
+            information=information,
+            fresh=fresh,
+            saturation=limit,
+            bound=ceiling,
+            conversion=conversion,
+            prediction=prediction,
+            findings=checked.findings,
+            seconds_optimize=optimized,
+            seconds_total=0.0,
+            written=tuple(targets),
+        )
+        reports.write(report, figure, result)
+    return replace(result, seconds_total=time.perf_counter() - started)
 
 
 def _check_own(tuned: Path) -> None:
