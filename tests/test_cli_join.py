@@ -121,6 +121,22 @@ def test_a_download_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
     assert f"{out}: QGC WPL holds no fence: 1 area left out" in result.stderr
 
 
+def test_a_planes_mission_on_a_plane(out: Path, tmp_path: Path) -> None:
+    plan = tmp_path / "plane.yaml"
+    level = {"vehicle.min_speed": 12, "vehicle.type": "plane", "flight.duration": 20}
+    free = {"flight.start_velocity": "free", "flight.end_velocity": "free"}
+    far = {"flight.start": [0, 200], "flight.end": [200, 0], "flight.time_step": 1}
+    plan.write_text(edited(GENTLE, level | free | far | {"vehicle.max_speed": 16}))
+    port = free_port()
+    mock = MockAutopilot(ardupilot(), aircraft="plane", home=HOME, beat=0.1)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)["upload"]
+    assert told["verified"] is True
+    assert told["vehicle"]["type"] == "plane"
+
+
 @pytest.mark.parametrize("option", [("--system", "3"), ("--allow-armed",)])
 def test_options_of_an_upload_without_one(plan: Path, out: Path, option: tuple[str, ...]) -> None:
     result = run(plan, "--out", out, *option)
