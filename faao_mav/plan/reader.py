@@ -12,7 +12,7 @@ from faao_mav.errors import PlanError
 from faao_mav.files import read_text
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import model, schema
-from faao_mav.plan.keys import unknown_key
+from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.messages import describe, quote
 from faao_mav.plan.reach import reach, shortest_duration
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, load_yaml
@@ -196,6 +196,8 @@ class _Reader:
         for key in section.vary:
             if problem := unknown_key(key):
                 raise self.fail(f"study.vary.{key}", problem)
+        if both := varied_twice(section.vary):
+            raise self.fail("study.vary", f"{both} vary the same value; leave one out")
         return model.Study(
             vary={key: tuple(values) for key, values in section.vary.items()},
             schemes=tuple(section.schemes),
