@@ -303,6 +303,8 @@ def test_what_a_channel_does():
     assert sum((a ^ b).bit_count() for a, b in zip(damaged, b"abc", strict=True)) == 1
     ((late, _),) = Channel(Faults(reordering=1.0, delay=2.0), "x").carry(b"abc", 1.0)
     assert 1.0 < late <= 3.1
+    channel = Channel(Faults(rate=10.0, latency=0.5), "x")
+    assert [channel.carry(b"abc", now)[0][0] for now in (1.0, 1.1, 9.0)] == [1.8, 2.1, 9.8]
     channel = Channel(Faults(lost=(Lost(MISSION_ACK, 2),)), "x")
     packet = bytes([0xFD, 0, 0, 0, 0, 0, 0, MISSION_ACK, 0, 0])
     assert [len(channel.carry(packet, 0.0)) for _ in range(3)] == [1, 0, 1]
