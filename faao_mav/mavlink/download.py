@@ -13,8 +13,9 @@ from faao_mav.mavlink.messages import (
     MissionRequestList,
     Row,
 )
+from faao_mav.mavlink.pace import Pace, Timeouts
 from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.transfer import Exchange, Outcome, Pace, Peer, Status, Timeouts
+from faao_mav.mavlink.transfer import Exchange, Outcome, Peer, Status
 
 
 class Download(Exchange):
@@ -95,6 +96,8 @@ class Download(Exchange):
 
     def _on_item(self, seq: int, row: Row, now: float) -> Sequence[Message]:
         if self._phase != "items" or seq != len(self._rows):
+            if self._phase == "items" and seq == len(self._rows) - 1:
+                self._pace.answer_again()
             return ()
         self._rows.append(row)
         self._pace.answer(now)

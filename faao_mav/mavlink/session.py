@@ -11,8 +11,9 @@ from typing import Any, Literal, TypeAlias
 from faao_mav.mavlink.clear import Clear
 from faao_mav.mavlink.download import Download
 from faao_mav.mavlink.messages import Row
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import MissionType, Result, meaning
-from faao_mav.mavlink.transfer import Machine, Outcome, Peer, Timeouts
+from faao_mav.mavlink.transfer import Machine, Outcome, Peer
 from faao_mav.mavlink.upload import Upload
 from faao_mav.mavlink.verify import Difference, compare
 from faao_mav.mission.vehicle import Kind

@@ -13,8 +13,8 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
 )
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.transfer import Timeouts
 
 ME = (255, 190)
 ROWS = rows_for("px4", 3)
