@@ -27,6 +27,23 @@ class Timeouts:
     attempts: int = 3
 
 
+@dataclass(slots=True)
+class Question:
+    """What wants an answer: when it was `asked` first, and `put` last.
+
+    `repeats` are for want of an answer; `ambiguous` tells that it was put more than once.
+    """
+
+    asked: float
+    put: float
+    repeats: int = 0
+    ambiguous: bool = False
+
+    def put_again(self, now: float) -> None:
+        """Note that it is put once more, for another reason than that time has passed."""
+        self.put, self.ambiguous = now, True
+
+
 class Pace:
     """When to ask again: as TCP does it, from how long answers take.
 
@@ -46,39 +63,37 @@ class Pace:
 
     def __init__(self, timeouts: Timeouts, insists: float = math.inf) -> None:
         self.wait = timeouts.item
-        self.repeats = 0
         self._timeouts, self._insists = timeouts, insists
         self._mean: float | None = None
         self._deviation = 0.0
-        self._asked = 0.0
-        self._ambiguous = False
         self._unsure_of: float | None = None
         self._in_a_row = 0
 
-    def ask(self, now: float) -> None:
-        """Note a new question."""
-        self._asked, self._ambiguous, self.repeats = now, False, 0
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether the link is not known, or may have become slow."""
+        return self._mean is None or self._in_a_row >= _DOUBTFUL
 
-    def ask_anew(self) -> None:
-        """Note that it was put once more because the other end wanted it."""
-        self._ambiguous = True
+    def ask(self, now: float) -> Question:
+        """Return a new question."""
+        return Question(now, now)
 
-    def repeat(self) -> None:
+    def repeat(self, question: Question, now: float) -> None:
         """Note that it is put once more because no answer came."""
-        self._ambiguous = True
-        self.repeats += 1
-        if self.repeats > 1 or self._is_doubtful():
+        question.put_again(now)
+        question.repeats += 1
+        if question.repeats > 1 or self.is_doubtful:
             self.wait = min(2 * self.wait, self._most())
 
-    def answer(self, now: float) -> None:
+    def answer(self, question: Question, now: float) -> None:
         """Note its answer."""
-        took = now - self._asked
-        if not self._ambiguous and took < self._insists:
+        took = now - question.asked
+        if not question.ambiguous and took < self._insists:
             self._learn(took)
             return
         self._unsure_of = took
         self._in_a_row += 1
-        if not self._is_doubtful():
+        if not self.is_doubtful:
             self.wait = self._least()
 
     def answer_again(self) -> None:
@@ -94,9 +109,6 @@ class Pace:
             self._mean += (took - self._mean) / 8
         self._unsure_of, self._in_a_row = None, 0
         self.wait = self._least()
-
-    def _is_doubtful(self) -> bool:
-        return self._mean is None or self._in_a_row >= _DOUBTFUL
 
     def _least(self) -> float:
         least = (self._mean or 0.0) + 4 * self._deviation

@@ -15,7 +15,7 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     Row,
 )
-from faao_mav.mavlink.pace import Pace, Timeouts
+from faao_mav.mavlink.pace import Pace, Question, Timeouts
 from faao_mav.mavlink.protocol import Firmware, MissionType, Result, State
 from faao_mav.mavlink.transfer import Exchange, Outcome, Peer, Status
 
@@ -66,6 +66,7 @@ class Upload(Exchange):
         self._sent: set[int] = set()
         self._heard = 0.0
         self._pace = Pace(self._timeouts, _INSISTS.get(peer.firmware, math.inf))
+        self._question = Question(0.0, 0.0)
         self._asked_for, self._ahead = -1, 0
         self._most_ahead, self._guessing = _AHEAD, False
         self._booting = False
@@ -120,11 +121,11 @@ class Upload(Exchange):
         if seq >= len(self._rows):
             return ()
         if seq <= self._current:
-            self._pace.ask_anew()
+            self._question.put_again(now)
         else:
             if self._asked_for >= 0:
-                self._pace.answer(now)
-            self._pace.ask(now)
+                self._pace.answer(self._question, now)
+            self._question = self._pace.ask(now)
         self._asked_for, self._ahead, self._guessing = seq, 0, False
         self._phase, self._heard, self._doubt = "items", now, None
         self._left = self._timeouts.retries
@@ -160,13 +161,13 @@ class Upload(Exchange):
         return ()
 
     def _on_out_of_turn(self, now: float) -> Sequence[Message]:
-        if self._pace.repeats == 0:
+        if self._question.repeats == 0:
             self._pace.answer_again()
             return ()
         if self._ahead == self._room():
             return ()
-        self._pace.answer(now)
-        self._pace.ask(now)
+        self._pace.answer(self._question, now)
+        self._question = self._pace.ask(now)
         self._ahead += 1
         self._heard, self._due = now, now + self._pace.wait
         return [self._item(self._current)]
@@ -174,7 +175,7 @@ class Upload(Exchange):
     def _tick_items(self, now: float) -> Sequence[Message]:
         quiet = now - self._heard >= self._timeouts.silence
         if not self._complete() and self._repeats() and not quiet and self._doubt is None:
-            self._pace.repeat()
+            self._pace.repeat(self._question, now)
             self._due = now + self._pace.wait
             return self._again()
         if not self._complete():
@@ -191,7 +192,7 @@ class Upload(Exchange):
         current = self._current
         if self._peer.firmware == "ardupilot":
             return [self._item(current)]
-        last = current + min(self._pace.repeats, self._room())
+        last = current + min(self._question.repeats, self._room())
         self._guessing = self._guessing or last > current
         return [self._item(seq) for seq in range(last, current - 1, -1)]
 

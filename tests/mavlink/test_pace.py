@@ -24,12 +24,12 @@ class Asker:
         Return how often it is put. The answers to further ones come later, before the next.
         """
         asked = [self.now]
-        self.pace.ask(self.now)
+        question = self.pace.ask(self.now)
         while len(asked) <= lost or asked[-1] + self.pace.wait < asked[lost] + took:
             asked.append(asked[-1] + self.pace.wait)
-            self.pace.repeat()
+            self.pace.repeat(question, asked[-1])
         self.now = asked[lost] + took
-        self.pace.answer(self.now)
+        self.pace.answer(question, self.now)
         return len(asked)
 
     def ask_many(self, times: int, took: float) -> int:
@@ -45,11 +45,11 @@ def settled(took: float) -> Asker:
 
 def waits(asker: Asker, count: int) -> list[float]:
     """Return how long one question that is not answered waits each time."""
-    asker.pace.ask(asker.now)
+    question = asker.pace.ask(asker.now)
     found = []
     for _ in range(count):
         found.append(round(asker.pace.wait, 6))
-        asker.pace.repeat()
+        asker.pace.repeat(question, asker.now)
     return found
 
 
@@ -134,17 +134,17 @@ def test_who_asks_again_by_himself_is_not_taken_for_slow():
     asker = Asker(insists=1.0)
     asker.ask_many(20, 0.002)
     for _ in range(4):
-        asker.pace.ask(asker.now)
-        asker.pace.answer(asker.now + 1.003)
+        question = asker.pace.ask(asker.now)
+        asker.pace.answer(question, asker.now + 1.003)
         assert asker.pace.wait == TIMES.quickest
 
 
 def test_a_question_put_once_more_on_request_measures_nothing():
     asker = settled(0.1)
     wait = asker.pace.wait
-    asker.pace.ask(asker.now)
-    asker.pace.ask_anew()
-    asker.pace.answer(asker.now + 0.001)
+    question = asker.pace.ask(asker.now)
+    question.put_again(asker.now)
+    asker.pace.answer(question, asker.now + 0.001)
     assert asker.pace.wait == pytest.approx(wait)
 
 
