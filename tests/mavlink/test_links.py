@@ -1,75 +1,15 @@
 """How long transfers take over links of all kinds, and how much they send: on a simulated clock."""
 
-from dataclasses import dataclass, field
-
 import pytest
-from stations import HOME, VEHICLE, mock_of, peer_of, rows_for, upload_to
+from stations import mock_of, rows_for, there_and_back, upload_to
 
-from faao_mav.mavlink.download import Download
 from faao_mav.mavlink.faults import Faults, Lost
-from faao_mav.mavlink.messages import Message, MissionItemInt, MissionRequestInt
-from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of, px4
-from faao_mav.mavlink.protocol import GROUND_STATION, MissionType, Result
-from faao_mav.mavlink.simulate import Station, simulate
-from faao_mav.mavlink.upload import Upload
+from faao_mav.mavlink.mock import ardupilot, px4
+from faao_mav.mavlink.protocol import MissionType, Result
 
 MISSION = MissionType.MISSION
 KINDS = ["ardupilot", "px4"]
 REQUEST_INT = 51
-
-
-@dataclass
-class Counted:
-    """A machine, and what it sends."""
-
-    machine: object
-    sent: list[Message] = field(default_factory=list)
-
-    def __getattr__(self, name):
-        return getattr(self.machine, name)
-
-    def start(self, now):
-        return self._note(self.machine.start(now))
-
-    def on(self, envelope, now):
-        return self._note(self.machine.on(envelope, now))
-
-    def tick(self, now):
-        return self._note(self.machine.tick(now))
-
-    def number(self, kind):
-        return sum(isinstance(message, kind) for message in self.sent)
-
-    def _note(self, messages):
-        self.sent += messages
-        return messages
-
-
-@dataclass(frozen=True)
-class Course:
-    """How a transfer went: s, and messages of the mission protocol by either end."""
-
-    status: str
-    took: float
-    ours: int
-    theirs: int
-
-
-def there_and_back(kind, count, faults, telemetry=0.0):
-    """Return the courses of an upload of `count` rows and of reading them back."""
-    mock = MockAutopilot(manners_of(kind), home=HOME, rate=telemetry)
-    mock.tick(0.0)
-    rows = rows_for(kind, count)[:count]
-    courses = []
-    for machine in (Upload(rows, peer_of(kind)), Download(peer_of(kind))):
-        client, server = Counted(machine), Counted(mock)
-        stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
-        took = simulate(*stations, faults, until=2000.0)
-        kinds = (MissionItemInt, MissionRequestInt)
-        numbers = client.number(kinds), server.number(kinds)
-        courses.append(Course(client.outcome.status, took, *numbers))
-    assert mock.lists.rows(MISSION)[1:] == client.outcome.rows[1:]
-    return courses
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -81,6 +21,7 @@ def test_600_items_over_a_quick_link(kind, loss, seconds, messages):
         courses = there_and_back(kind, 600, Faults(loss=loss, seed=seed))
         assert sum(course.took for course in courses) < seconds
         for course in courses:
+            assert course.status in ("accepted", "unknown")
             assert course.ours <= messages * 600
             assert course.theirs <= messages * 600
 
