@@ -54,11 +54,11 @@ class Pace:
     - An answer to a repeated question tells nothing of the time that it took (Karn's rule), nor
       does one that took `insists` seconds: so long after its last question the other end asks
       again by itself. With loss both are common, and the next question is asked in the usual
-      time. But a link may have become slow, of which there would never be a measurement: before
-      the first one, and after five such answers in a row, what was doubled stays doubled until
-      a question is answered at once (RFC 8961, 4).
-    - An answer that comes twice says the same earlier: its question was repeated in vain, and the
-      first answer was one to the first asking (RFC 3708).
+      time. But of a link that has become slow there would never be a measurement: before the
+      first one, and after five such answers in a row, what was doubled stays doubled until a
+      question is answered at once (RFC 8961, 4).
+    - An answer that comes twice tells it sooner: its question was repeated in vain, so that the
+      first answer was to the first asking, and is measured after all (RFC 3708).
     """
 
     def __init__(self, timeouts: Timeouts, insists: float = math.inf) -> None:
