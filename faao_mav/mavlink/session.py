@@ -139,8 +139,10 @@ def _upload_part(
                     differences=differences,
                     opaque_id=sent.opaque_id or read.opaque_id,
                 )
-                if wrong and sent.result == Result.ERROR:
-                    report = replace(report, verdict="refused")
+                if sent.result == Result.ERROR:
+                    # Of a reminder or a duplicate if the list is right, else of an item.
+                    told = replace(report, verdict="refused")
+                    report = told if wrong else replace(report, result=None)
             elif _by_us(read):
                 return replace(report, verdict="cancelled")
             elif sent.status == "accepted":

@@ -34,8 +34,10 @@ class Upload(Exchange):
       ERROR may be about a duplicate too (PX4: of MISSION_COUNT, ArduPilot: of the last item): it
       counts when nothing more is asked for.
     - When everything was sent and no answer comes, PX4 is sent the last item again, which it
-      acknowledges again. ArduPilot would say ERROR: the outcome is "unknown", and reading back
-      must tell.
+      takes, or acknowledges again. ArduPilot is sent the item before: if it still waits for the
+      last one it says INVALID_SEQUENCE, and is sent that; ERROR says that it does not wait any
+      more (`GCS_MAVLINK::handle_mission_item`): the outcome is "unknown", and reading back must
+      tell. So it is if nothing comes at all.
     - PX4 asks again after 0.25 s, ArduPilot after 1 s. Silence before that means that the item or
       the request for the next one was lost. PX4 takes what it expects and passes over any other
       item without a word (`handle_mission_item_both`): it is sent the next item, and after it the
@@ -149,7 +151,8 @@ class Upload(Exchange):
         elif result == Result.ERROR:
             self._doubt = result
             if self._phase == "items":
-                self._due = now + self._timeouts.response
+                soon = 2 * self._timeouts.item
+                self._due = now + (soon if self._complete() else self._timeouts.response)
         elif result == Result.NO_SPACE and self._booting:
             self._phase, self._doubt = "booting", result
             self._due = now + self._timeouts.boot
@@ -161,6 +164,8 @@ class Upload(Exchange):
         return ()
 
     def _on_out_of_turn(self, now: float) -> Sequence[Message]:
+        if self._complete() and self._left < self._timeouts.retries:
+            return [self._item(len(self._rows) - 1)]
         if self._question.repeats == 0:
             self._pace.answer_again()
             return ()
@@ -181,10 +186,11 @@ class Upload(Exchange):
         if not self._complete():
             cancel = self._peer.ack(Result.OPERATION_CANCELLED, self._type)
             return [cancel, *self._give_up(now)]
-        if self._peer.firmware == "px4" and self._left > 0 and self._doubt is None:
+        reminder = self._reminder()
+        if reminder is not None and self._left > 0 and self._doubt is None:
             self._left -= 1
-            self._due = now + self._timeouts.response
-            return [self._item(len(self._rows) - 1)]
+            self._due = now + self._patience()
+            return [self._item(reminder)]
         self._end("unknown", self._doubt)
         return ()
 
@@ -217,8 +223,15 @@ class Upload(Exchange):
         return max(min(self._most_ahead, len(self._rows) - 2 - self._asked_for), 0)
 
     def _patience(self) -> float:
-        """Return how long to wait for the last answer: ArduPilot asks again after 1 s or more."""
-        return self._timeouts.response * (1 if self._peer.firmware == "px4" else 2)
+        """Return how long to wait for the last answer, before a reminder and after each."""
+        if self._reminder() is None:
+            return 2 * self._timeouts.response
+        first = max(self._timeouts.item, self._pace.wait)
+        return min(first * 2.0 ** (self._timeouts.retries - self._left), self._timeouts.response)
+
+    def _reminder(self) -> int | None:
+        last = len(self._rows) - 1
+        return {"px4": last, "ardupilot": last - 1 if last else None}.get(self._peer.firmware)
 
     def _announce(self, now: float) -> Sequence[Message]:
         self._due = now + self._timeouts.response

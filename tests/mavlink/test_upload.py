@@ -198,7 +198,7 @@ def test_invalid_sequence_from_ardupilot_ends_nothing():
 
 def test_a_lost_last_answer_of_px4_is_asked_for_by_the_last_item():
     desk = asked_for_all("px4")
-    assert desk.wait(1.6) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
+    assert desk.wait(0.3) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
@@ -211,6 +211,25 @@ def test_without_any_last_answer_of_px4_it_is_unknown_what_it_holds():
 
 def test_ardupilot_is_never_sent_the_last_item_unasked():
     desk = asked_for_all("ardupilot")
+    assert desk.wait(60) == [MissionItemInt(1, 1, 1, 0, ROWS[1])] * 5
+    assert desk.machine.outcome.status == "unknown"
+
+
+def test_ardupilot_tells_by_the_item_before_whether_it_waits_for_the_last():
+    desk = asked_for_all("ardupilot")
+    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []  # of something earlier
+    assert desk.wait(0.3) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
+    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
+    assert desk.wait(0.6) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
+    desk.tell(ack(Result.ERROR))
+    desk.wait(0.6)
+    outcome = desk.machine.outcome
+    assert (outcome.status, outcome.result) == ("unknown", Result.ERROR)
+
+
+def test_of_a_single_item_there_is_none_before():
+    desk = desk_for("ardupilot", rows_for("ardupilot", 2)[:1])
+    desk.tell(request(0))
     assert desk.wait(60) == []
     assert desk.machine.outcome.status == "unknown"
 
