@@ -1,8 +1,8 @@
 """The wire: missions to and from vehicles, and a mock autopilot."""
 
 from faao_mav.mavlink.client import UploadReport, clear, download, upload
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mavlink.transfer import Timeouts
 from faao_mav.mavlink.verify import Difference
 
 __all__ = [

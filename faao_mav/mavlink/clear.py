@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 from faao_mav.mavlink.messages import Envelope, Message, MissionAck, MissionClearAll
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.transfer import Exchange, Outcome, Peer, Status, Timeouts
+from faao_mav.mavlink.transfer import Exchange, Outcome, Peer, Status
 
 
 class Clear(Exchange):

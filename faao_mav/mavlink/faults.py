@@ -20,6 +20,7 @@ class Faults:
 
     `loss`, `duplication` and `corruption` are probabilities. Every packet takes `latency` seconds;
     with probability `reordering` it takes up to `delay` longer, so that later ones overtake it.
+    A line of `rate` bytes per second (0: any) carries one packet after the other, lost ones too.
     Nothing passes during `outages` (from, to; seconds). `lost` names packets one by one.
     """
 
@@ -29,6 +30,7 @@ class Faults:
     reordering: float = 0.0
     delay: float = 0.0
     latency: float = 0.002
+    rate: float = 0.0
     outages: tuple[tuple[float, float], ...] = ()
     lost: tuple[Lost, ...] = ()
     seed: int = 0
@@ -42,26 +44,36 @@ class Channel:
     name: str
     _random: Random = field(init=False)
     _seen: dict[int, int] = field(init=False)
+    _free: float = field(init=False)
 
     def __post_init__(self) -> None:
         self._random = Random(f"{self.faults.seed} {self.name}")
         self._seen = {}
+        self._free = 0.0
 
     def carry(self, packet: bytes, now: float) -> list[tuple[float, bytes]]:
         """Return when `packet`, sent at `now`, arrives, and as what; not at all, once or twice."""
         faults, random = self.faults, self._random
         if self._is_lost(packet) or any(begin <= now < end for begin, end in faults.outages):
             return []
+        sent = self._sent(packet, now)
         copies = 1 + (random.random() < faults.duplication)
         arrivals = []
         for _ in range(copies):
             if random.random() < faults.loss:
                 continue
             late = random.random() < faults.reordering
-            time = now + faults.latency + (random.uniform(0.0, faults.delay) if late else 0.0)
+            time = sent + faults.latency + (random.uniform(0.0, faults.delay) if late else 0.0)
             damaged = random.random() < faults.corruption
             arrivals.append((time, self._damaged(packet) if damaged else packet))
         return arrivals
+
+    def _sent(self, packet: bytes, now: float) -> float:
+        """Return when the last byte of `packet` has gone into the line."""
+        if not self.faults.rate:
+            return now
+        self._free = max(self._free, now) + len(packet) / self.faults.rate
+        return self._free
 
     def _is_lost(self, packet: bytes) -> bool:
         if not self.faults.lost or packet[0] != _MAVLINK_2:

@@ -11,8 +11,9 @@ from typing import Any, Literal, TypeAlias
 from faao_mav.mavlink.clear import Clear
 from faao_mav.mavlink.download import Download
 from faao_mav.mavlink.messages import Row
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import MissionType, Result, meaning
-from faao_mav.mavlink.transfer import Machine, Outcome, Peer, Timeouts
+from faao_mav.mavlink.transfer import Machine, Outcome, Peer
 from faao_mav.mavlink.upload import Upload
 from faao_mav.mavlink.verify import Difference, compare
 from faao_mav.mission.vehicle import Kind
@@ -138,8 +139,10 @@ def _upload_part(
                     differences=differences,
                     opaque_id=sent.opaque_id or read.opaque_id,
                 )
-                if wrong and sent.result == Result.ERROR:
-                    report = replace(report, verdict="refused")
+                if sent.result == Result.ERROR:
+                    # Of a reminder or a duplicate if the list is right, else of an item.
+                    told = replace(report, verdict="refused")
+                    report = told if wrong else replace(report, result=None)
             elif _by_us(read):
                 return replace(report, verdict="cancelled")
             elif sent.status == "accepted":

@@ -10,29 +10,10 @@ from dataclasses import dataclass
 from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
 from faao_mav.mavlink.messages import Envelope, Message, MissionAck, Row, Statustext
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import Address, Firmware, MissionType, Result
 
 Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "cancelled"]
-
-
-@dataclass(frozen=True, slots=True)
-class Timeouts:
-    """How long a transfer waits, s.
-
-    `response`, `item` and `retries` are the guide's: what to re-send, when, how often; on a link
-    that is known to be quick, items are re-sent after `quickest` at the earliest. `silence`
-    is how long a vehicle may say nothing in the middle of a transfer before it has given up
-    itself: PX4 asks again for 5 s, ArduPilot for 8 s, so that six lost packets in a row end
-    nothing. `attempts` is how often a whole transfer is begun.
-    """
-
-    response: float = 1.5
-    item: float = 0.25
-    quickest: float = 0.05
-    retries: int = 5
-    silence: float = 9.0
-    boot: float = 60.0
-    attempts: int = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,52 +95,6 @@ class Machine(Protocol[T_co]):
     def cancel(self, now: float) -> Sequence[Message]:
         """Give up."""
         ...
-
-
-class Pace:
-    """When to ask again: as TCP does it (RFC 6298), from how long answers take.
-
-    Before the first answer that is `Timeouts.item`; after it, mean and four deviations of the
-    time that answers take, at least `Timeouts.quickest`. An answer to a repeated question tells
-    nothing (Karn's rule): the next question starts as slowly as the last one ended.
-    """
-
-    def __init__(self, timeouts: Timeouts) -> None:
-        self._timeouts = timeouts
-        self._mean: float | None = None
-        self._deviation = 0.0
-        self._asked = 0.0
-        self._repeated = False
-        self.wait = timeouts.item
-
-    def ask(self, now: float) -> None:
-        """Note a new question."""
-        self._asked, self._repeated = now, False
-
-    def repeat(self) -> None:
-        """Note that it is asked again."""
-        self._repeated = True
-        slowest = self._timeouts.response
-        if self._mean is not None:
-            slowest = min(max(2 * self._timeouts.item, 2 * self._least()), slowest)
-        self.wait = min(2 * self.wait, slowest)
-
-    def answer(self, now: float) -> None:
-        """Note its answer."""
-        if self._repeated:
-            self.wait = max(self.wait / 2, self._least() if self._mean is not None else 0.0)
-            return
-        took = now - self._asked
-        if self._mean is None:
-            self._mean, self._deviation = took, took / 2
-        else:
-            self._deviation += (abs(took - self._mean) - self._deviation) / 4
-            self._mean += (took - self._mean) / 8
-        self.wait = self._least()
-
-    def _least(self) -> float:
-        least = (self._mean or 0.0) + 4 * self._deviation
-        return min(max(least, self._timeouts.quickest), self._timeouts.response)
 
 
 class Texts:

@@ -1,16 +1,26 @@
 """Missions, peers and short ways to run machines for the tests of the wire."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from faao_mav.mavlink.download import Download
 from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.messages import Envelope, Message, Row
+from faao_mav.mavlink.messages import (
+    Envelope,
+    Message,
+    MissionItemInt,
+    MissionRequestInt,
+    Row,
+)
 from faao_mav.mavlink.mock import Manners, MockAutopilot, MockKind, manners_of
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, Firmware, MissionType
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.session import PartReport, upload_parts
 from faao_mav.mavlink.simulate import Station, simulate
-from faao_mav.mavlink.transfer import Machine, Peer, Script, Timeouts
+from faao_mav.mavlink.transfer import Machine, Peer, Script
+from faao_mav.mavlink.upload import Upload
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 
@@ -107,3 +117,62 @@ def mock_of(kind: MockKind | Manners, **options: Any) -> MockAutopilot:
     """Return a mock autopilot that sends no position reports."""
     manners = kind if isinstance(kind, Manners) else manners_of(kind)
     return MockAutopilot(manners, home=HOME, rate=0.0, **options)
+
+
+@dataclass
+class Counted:
+    """A machine, and what it sends."""
+
+    machine: Machine[Any]
+    sent: list[Message] = field(default_factory=list)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.machine, name)
+
+    def start(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.start(now))
+
+    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        return self._note(self.machine.on(envelope, now))
+
+    def tick(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.tick(now))
+
+    def number(self) -> int:
+        """Return how many items and requests for items those are."""
+        kinds = (MissionItemInt, MissionRequestInt)
+        return sum(isinstance(message, kinds) for message in self.sent)
+
+    def _note(self, messages: Sequence[Message]) -> Sequence[Message]:
+        self.sent += messages
+        return messages
+
+
+@dataclass(frozen=True)
+class Course:
+    """How a transfer went: s, and items and requests sent by either end."""
+
+    status: str
+    took: float
+    ours: int
+    theirs: int
+
+
+def there_and_back(
+    kind: MockKind, count: int, faults: Faults, telemetry: float = 0.0
+) -> list[Course]:
+    """Return the courses of an upload of `count` rows and of reading them back."""
+    mock = MockAutopilot(manners_of(kind), home=HOME, rate=telemetry)
+    mock.tick(0.0)
+    peer = peer_of(firmware_of(kind))
+    rows = rows_for(firmware_of(kind), count)[:count]
+    courses = []
+    machines: tuple[Machine[Any], ...] = (Upload(rows, peer), Download(peer))
+    for machine in machines:
+        client, server = Counted(machine), Counted(mock)
+        stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
+        took = simulate(*stations, faults, until=2000.0)
+        courses.append(Course(client.outcome.status, took, client.number(), server.number()))
+        if client.outcome.rows:
+            assert client.outcome.rows == mock.lists.rows(MissionType.MISSION)
+    return courses

@@ -13,15 +13,16 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
 )
+from faao_mav.mavlink.pace import Timeouts
 from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.transfer import Timeouts
 
 ME = (255, 190)
 ROWS = rows_for("px4", 3)
+MANY = rows_for("ardupilot", 12)[:12]
 
 
-def desk_for(firmware="ardupilot"):
-    desk = Desk(Download(peer_of(firmware)))
+def desk_for(firmware="generic", **timeouts):
+    desk = Desk(Download(peer_of(firmware), timeouts=Timeouts(**timeouts)))
     desk.start()
     return desk
 
@@ -125,6 +126,82 @@ def test_a_list_that_changes_meanwhile_is_read_anew():
     for seq in range(3):
         desk.tell(item(seq))
     assert desk.machine.outcome.rows == ROWS
+
+
+def wide_desk():
+    """Return a desk at which ArduPilot has given row 0, and has been asked for five more."""
+    desk = desk_for("ardupilot")
+    assert desk.tell(MissionCount(*ME, 12, 0)) == [wants(0)]
+    desk.wait(0.1)
+    assert desk.tell(row(0)) == [wants(seq) for seq in (1, 2, 3, 4, 5)]
+    return desk
+
+
+def row(seq):
+    return MissionItemInt(*ME, seq, 0, MANY[seq])
+
+
+def test_ardupilot_is_asked_for_five_rows_at_once():
+    desk = wide_desk()
+    for seq in range(1, 7):
+        assert desk.tell(row(seq)) == [wants(seq + 5)]
+    for seq in range(7, 11):
+        assert desk.tell(row(seq)) == []
+    assert desk.tell(row(11)) == [MissionAck(1, 1, Result.ACCEPTED, 0)]
+    assert desk.machine.outcome.rows == MANY
+
+
+def test_px4_is_asked_for_one_row_after_the_other():
+    desk = desk_for("px4")
+    desk.tell(MissionCount(*ME, 3, 0))
+    for seq in range(2):
+        desk.wait(0.1)
+        assert desk.tell(item(seq)) == [wants(seq + 1)]
+
+
+def test_a_row_is_asked_for_again_when_a_later_one_has_come():
+    desk = wide_desk()
+    assert desk.tell(row(3)) == [wants(1), wants(2), wants(6)]
+    # Answers to requests that were made before those say nothing more.
+    assert desk.tell(row(4)) == [wants(7)]
+    for seq in (2, 1, 5, 6, 7, 8, 9, 10, 11):
+        desk.tell(row(seq))
+    assert desk.machine.outcome.rows == MANY
+
+
+def test_it_is_not_on_a_link_that_changes_the_order():
+    desk = wide_desk()
+    assert desk.tell(row(3)) == [wants(1), wants(2), wants(6)]
+    desk.tell(row(1))
+    desk.tell(row(2))
+    desk.tell(row(1))  # twice: the first was on its way
+    assert desk.tell(row(6)) == [wants(9)]
+
+
+def test_what_is_due_of_five_is_asked_for_again_and_less_often():
+    desk = wide_desk()
+    five = [wants(seq) for seq in (1, 2, 3, 4, 5)]
+    assert desk.wait(0.29) == []
+    assert desk.wait(0.02) == five
+    assert desk.wait(0.3) == five
+    assert desk.wait(0.59) == []
+    assert desk.wait(0.02) == five
+
+
+def test_a_link_that_is_not_known_is_asked_for_one_row():
+    desk = desk_for("ardupilot")
+    desk.tell(MissionCount(*ME, 12, 0))
+    desk.wait(0.3)  # asked for again: the answer measures nothing
+    assert desk.tell(row(0)) == [wants(1)]
+    desk.wait(0.1)
+    assert len(desk.tell(row(1))) == 5
+
+
+def test_one_refusal_of_five_requests_is_one():
+    desk = wide_desk()
+    for _ in range(5):
+        assert desk.tell(MissionAck(*ME, Result.DENIED, 0)) == []
+    assert desk.wait(0.3) == [MissionRequestList(1, 1, 0)]
 
 
 def test_unsupported_changes_to_the_old_request():

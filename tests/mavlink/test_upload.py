@@ -107,6 +107,64 @@ def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware):
     assert desk.machine.outcome.item == 0
 
 
+def seqs(messages):
+    return [message.seq for message in messages]
+
+
+def test_px4_is_sent_the_next_item_and_the_same_again_it_takes_one_of_them():
+    desk = desk_for("px4", rows_for("px4", 9))
+    desk.tell(request(0))
+    assert seqs(desk.wait(0.3)) == [1, 0]
+    assert seqs(desk.wait(0.5)) == [2, 1, 0]
+    assert seqs(desk.wait(1.0)) == [3, 2, 1, 0]
+    assert seqs(desk.wait(1.5)) == [3, 2, 1, 0]
+    assert seqs(desk.tell(request(2))) == [2]
+
+
+def test_px4_is_never_sent_the_last_item_before_it_asks():
+    desk = desk_for("px4", rows_for("px4", 4))
+    desk.tell(request(1))
+    assert seqs(desk.wait(0.8)) == [2, 1, 2, 1]
+    desk.tell(request(2))
+    assert seqs(desk.wait(1.1)) == [2]
+    desk.tell(ack(Result.ACCEPTED))
+    assert desk.machine.outcome is None
+
+
+def test_what_px4_has_taken_unasked_is_sent():
+    desk = desk_for("px4", rows_for("px4", 5))
+    desk.tell(request(0))
+    desk.wait(0.3)
+    for seq in (2, 3, 4):  # the request for item 1 was lost
+        desk.tell(request(seq))
+    desk.tell(ack(Result.ACCEPTED))
+    assert desk.machine.outcome.status == "accepted"
+    assert desk.machine.progress == ("uploading mission", 5, 5)
+
+
+def test_an_unknown_autopilot_is_sent_nothing_unasked():
+    desk = desk_for("generic", rows_for("px4", 9))
+    for seq in range(3):
+        desk.tell(request(seq))
+        assert desk.wait(8.0) == []
+
+
+@pytest.mark.parametrize("result", [Result.INVALID_PARAM1, Result.ERROR])
+def test_which_item_px4_refuses_is_found_out(result):
+    desk = desk_for("px4", rows_for("px4", 9))
+    desk.tell(request(0))
+    desk.wait(0.3)
+    desk.tell(ack(result))  # of item 0, or of item 1
+    assert MissionCount(1, 1, 9, 0) in desk.wait(1.6)
+    desk.tell(request(0))
+    desk.tell(request(1))
+    assert set(seqs(desk.wait(0.6))) == {1}
+    desk.tell(ack(result))
+    desk.wait(1.6)
+    outcome = desk.machine.outcome
+    assert (outcome.status, outcome.result, outcome.item) == ("refused", result, 1)
+
+
 def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that():
     desk = desk_for("ardupilot", rows_for("ardupilot", 5))
     desk.tell(request(0))
@@ -116,6 +174,18 @@ def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that():
     assert following.seq == 1
     # Said again, of the same repetition, it is no news.
     assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []
+
+
+@pytest.mark.parametrize(("count", "ahead"), [(9, [2, 3, 4]), (4, [2])])
+def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(count, ahead):
+    desk = desk_for("ardupilot", rows_for("ardupilot", 9)[:count])
+    desk.tell(request(1))
+    sent = []
+    for _ in range(5):
+        desk.wait(1.6)
+        sent += seqs(desk.tell(ack(Result.INVALID_SEQUENCE)))
+    assert sent == ahead
+    assert set(seqs(desk.wait(1.6))) == {ahead[-1]}
 
 
 def test_invalid_sequence_from_ardupilot_ends_nothing():
@@ -128,7 +198,7 @@ def test_invalid_sequence_from_ardupilot_ends_nothing():
 
 def test_a_lost_last_answer_of_px4_is_asked_for_by_the_last_item():
     desk = asked_for_all("px4")
-    assert desk.wait(1.6) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
+    assert desk.wait(0.3) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
@@ -141,6 +211,25 @@ def test_without_any_last_answer_of_px4_it_is_unknown_what_it_holds():
 
 def test_ardupilot_is_never_sent_the_last_item_unasked():
     desk = asked_for_all("ardupilot")
+    assert desk.wait(60) == [MissionItemInt(1, 1, 1, 0, ROWS[1])] * 5
+    assert desk.machine.outcome.status == "unknown"
+
+
+def test_ardupilot_tells_by_the_item_before_whether_it_waits_for_the_last():
+    desk = asked_for_all("ardupilot")
+    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []  # of something earlier
+    assert desk.wait(0.3) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
+    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
+    assert desk.wait(0.6) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
+    desk.tell(ack(Result.ERROR))
+    desk.wait(0.6)
+    outcome = desk.machine.outcome
+    assert (outcome.status, outcome.result) == ("unknown", Result.ERROR)
+
+
+def test_of_a_single_item_there_is_none_before():
+    desk = desk_for("ardupilot", rows_for("ardupilot", 2)[:1])
+    desk.tell(request(0))
     assert desk.wait(60) == []
     assert desk.machine.outcome.status == "unknown"
 
