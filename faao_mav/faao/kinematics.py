@@ -12,7 +12,7 @@ from faao_mav.arrays import Real
 from faao_mav.plan import Plan
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """Positions w (m), velocities v (m/s) and accelerations a (m/s²), each (N + 2, 2)."""
 
@@ -83,6 +83,41 @@ class Kinematics:
         v = start_velocity + dt * np.vstack([np.zeros(2), np.cumsum(a, axis=0)])
         w = self.start + dt * np.vstack([np.zeros(2), np.cumsum((v[:-1] + v[1:]) / 2, axis=0)])
         return Trajectory(w, v, np.vstack([a, np.zeros(2)]))
+
+
+def followed(kin: Kinematics, v: Real) -> Trajectory:
+    """Return the flight at the speeds v (n, 2), changed a little where the ends ask for it."""
+    return kin.integrate(v[0], np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)]))
+
+
+def settled(kin: Kinematics, start: Trajectory, v: Real) -> Trajectory:
+    """Return the flight at the speeds v (n, 2), drawn towards `start` until it keeps the limits."""
+    found, allowed = followed(kin, v), max(1e-9, _excess(kin, start))
+    for share in (0.0, *10.0 ** np.arange(-9, 0)):
+        flight = Trajectory(
+            *(
+                (1 - share) * own + share * other
+                for own, other in (
+                    (found.w, start.w),
+                    (found.v, start.v),
+                    (found.a, start.a),
+                )
+            )
+        )
+        if _excess(kin, flight) <= allowed:
+            return flight
+    return start
+
+
+def _excess(kin: Kinematics, flight: Trajectory) -> float:
+    """Return the largest violation of a limit, relative to it."""
+    found = kin.residuals(flight)
+    slow = found.get("minimum speed", 0.0)
+    return max(
+        found["(13e) speed"] / kin.max_speed,
+        found["(13f) acceleration"] / kin.max_acceleration,
+        slow / kin.min_speed if slow else 0.0,
+    )
 
 
 def kinematics(plan: Plan) -> Kinematics:
