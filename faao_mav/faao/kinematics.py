@@ -5,6 +5,7 @@ the last one is flown too. a(N+1) moves nothing and is zero.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -73,16 +74,22 @@ class Kinematics:
         """
         dt, steps = self.time_step, self.slots - 1
         a = acceleration[:-1].copy()
-        to_position = dt**2 * (steps - np.arange(steps) - 0.5)
-        rows, missing = [to_position], [self.end - self.start - steps * dt * start_velocity]
+        missing = [self.end - self.start - steps * dt * start_velocity]
         if self.end_velocity is not None:
-            rows.append(np.full(steps, dt))
             missing.append(self.end_velocity - start_velocity)
-        effect = np.array(rows)
-        a += np.linalg.pinv(effect) @ (np.array(missing) - effect @ a)
+        effect, cure = _effect(steps, dt, len(missing))
+        a += cure @ (np.array(missing) - effect @ a)
         v = start_velocity + dt * np.vstack([np.zeros(2), np.cumsum(a, axis=0)])
         w = self.start + dt * np.vstack([np.zeros(2), np.cumsum((v[:-1] + v[1:]) / 2, axis=0)])
         return Trajectory(w, v, np.vstack([a, np.zeros(2)]))
+
+
+@lru_cache(maxsize=16)
+def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
+    """What accelerations do to the last position (and velocity), and its pseudo-inverse."""
+    to_position = dt**2 * (steps - np.arange(steps) - 0.5)
+    effect = np.stack([to_position, np.full(steps, dt)])[:ends]
+    return effect, np.linalg.pinv(effect)
 
 
 def followed(kin: Kinematics, v: Real) -> Trajectory:
