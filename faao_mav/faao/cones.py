@@ -1,8 +1,8 @@
 """Many discs ||x|| <= s_0 at once, as second-order cones with Nesterov-Todd scaling.
 
-A point of the m cones of each flight is (3, flights, m): s = (s_0, x) with s_0 > ||x||. Products
-are those of the Jordan algebra, s o z = (s^T z, s_0 z_1 + z_0 s_1); det s = s_0^2 - ||s_1||^2; the
-barrier is -log det s.
+A point of the m cones of each flight is (3, flights, m): s = (s_0, x) with s_0 > ||x||; slacks s
+and multipliers z together are (3, 2, flights, m). Products are those of the Jordan algebra,
+s o z = (s^T z, s_0 z_1 + z_0 s_1); det s = s_0^2 - ||s_1||^2; the barrier is -log det s.
 Source: Vandenberghe, "The CVXOPT linear and quadratic cone program solvers", 2010.
 """
 
@@ -16,7 +16,7 @@ _TINY = float(np.finfo(float).tiny)
 
 
 def determinant(s: Real) -> Real:
-    """Return s_0^2 - ||s_1||^2, (flights, m)."""
+    """Return s_0^2 - ||s_1||^2, (..., flights, m)."""
     size = np.sqrt(s[1] * s[1] + s[2] * s[2])
     return np.asarray((s[0] - size) * (s[0] + size))
 
@@ -27,7 +27,7 @@ def inverse(s: Real) -> Real:
 
 
 def reach(s: Real, step: Real) -> Real:
-    """Return the largest alpha with s + alpha step in every cone, (flights, 1); huge for any."""
+    """Return the largest alpha with s + alpha step in every cone, (..., flights, 1), or a huge one."""
     second, crossed = step[0] * step[0], s[0] * step[0]
     second -= step[1] * step[1] + step[2] * step[2]
     crossed -= s[1] * step[1] + s[2] * step[2]
@@ -54,21 +54,22 @@ class Scaling:
     curvature: Real
 
     @classmethod
-    def between(cls, s: Real, z: Real) -> "Scaling":
-        """Return the scaling for s and z (3, flights, m)."""
-        size_s, size_z = np.sqrt(determinant(s)), np.sqrt(determinant(z))
-        s, opposite = s / size_s, _flipped(z / size_z)
+    def between(cls, pair: Real) -> "Scaling":
+        """Return the scaling for s and z (3, 2, flights, m)."""
+        size = np.sqrt(determinant(pair))
+        s, opposite = (pair / size).swapaxes(0, 1)
+        opposite = _flipped(opposite)
         w = s + opposite
         # det w is that of s and z, 1 each, and twice s^T z
         w /= np.sqrt(2 + 2 * (s[0] * opposite[0] - s[1] * opposite[1] - s[2] * opposite[2]))
-        stiffness = size_z / size_s
+        stiffness = size[1] / size[0]
         _, x, y = w
         curvature = np.empty_like(w)
         curvature[0], curvature[1], curvature[2] = x * x, x * y, y * y
         curvature *= 2 * stiffness
         stretch = 1 + 2 * (x * x + y * y)
         curvature[::2] += stiffness
-        return cls(z, w, stiffness, stretch, curvature)
+        return cls(pair[:, 1], w, stiffness, stretch, curvature)
 
     def give(self) -> Real:
         """Return the inverse of `curvature`, (3, flights, m)."""

@@ -71,14 +71,12 @@ class FlightScale:
         self.per_gain = bounded / -self.gain
         """-1 / k, or 0: the multipliers of the accelerations in terms of q."""
 
-    def discs(self, first: Real | float, v: Real) -> Real:
-        """Return s_0 = `first` with D v, free speeds and bounded accelerations, (3, flights, m)."""
+    def enter(self, s: Real, first: Real | float, v: Real) -> None:
+        """Enter s_0 = `first` and D v, free speeds and bounded accelerations, into s."""
         n = self.matrix.slots
-        found = np.empty((3, v.shape[1], 2 * n - 1))
-        found[0] = first
-        found[1:, :, :n] = v * self.matrix.moves_v
-        found[1:, :, n:] = self.gains * (v[..., 1:] - v[..., :-1])
-        return found
+        s[0] = first
+        s[1:, :, :n] = v * self.matrix.moves_v
+        s[1:, :, n:] = self.gains * (v[..., 1:] - v[..., :-1])
 
     def left_over(self, y: Real, on_a: Real) -> Real:
         """Return A_v^T y less D^T of forces on the accelerations alone, (2, flights, n).
@@ -95,7 +93,7 @@ class FlightScale:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """An iterate: w, v (2, flights, n), y (2, flights, n - 1), s, z (3, flights, m).
+    """An iterate: w, v (2, flights, n), y (2, flights, n - 1), s and z as one (3, 2, flights, m).
 
     margin (flights, m) = s_0 - 1: how far the limits are still widened. weights, total (J,
     flights, 1), floor t (flights, 1), gradient (2, J, flights, n), hessian (3, J, flights, n).
@@ -104,8 +102,7 @@ class Point:
     w: Real
     v: Real
     y: Real
-    s: Real
-    z: Real
+    pair: Real
     margin: Real
     slow: Slow | None
     weights: Real
@@ -114,22 +111,30 @@ class Point:
     gradient: Real
     hessian: Real
 
+    @property
+    def s(self) -> Real:
+        """The slacks, (3, flights, m)."""
+        return self.pair[:, 0]
+
+    @property
+    def z(self) -> Real:
+        """The multipliers, (3, flights, m)."""
+        return self.pair[:, 1]
+
     def gap(self, length: Real | float = 0.0, step: "Step | None" = None) -> Real:
         """Return the mean of s^T z over the cones, after the share `length` of `step`."""
-        s, z, slow, count = self.s, self.z, self.slow, self.s.shape[-1]
-        if step is not None:
-            s, z = s + length * step.ds, z + length * step.dz
-        both = np.einsum("cbm,cbm->b", s, z)[:, None]
-        if slow is None:
-            return np.asarray(both / count)
-        more = slow.gap(length, *step.slow) if step is not None else slow.gap(0.0, 0.0, 0.0)
-        return np.asarray((both + more) / (count + slow.held()))
+        pair = self.pair if step is None else self.pair + length * step.moves
+        both = np.einsum("cbm,cbm->b", pair[:, 0], pair[:, 1])[:, None]
+        if self.slow is None:
+            return np.asarray(both / pair.shape[-1])
+        both += self.slow.gap(length, *((_NONE, _NONE) if step is None else step.slow))
+        return np.asarray(both / (pair.shape[-1] + self.slow.held()))
 
     def centred(self, mu: Real, share: float) -> "Point":
         """Return the same flights with z = mu s^-1."""
         return replace(
             self,
-            z=mu * cones.inverse(self.s),
+            pair=np.stack([self.s, mu * cones.inverse(self.s)], axis=1),
             slow=self.slow and self.slow.centred(mu),
             floor=best_floor(self.total, share * mu),
         )
@@ -139,23 +144,34 @@ class Point:
 class Step:
     """A direction; dtotal (J, flights, 1) is the first-order change of the F_j, rise that of t.
 
+    `moves` are ds and dz as one (3, 2, flights, m).
+
     `slow` has the changes of s and z of `Slow`, zero without a least speed.
     """
 
     dw: Real
     dv: Real
     dy: Real
-    ds: Real
-    dz: Real
+    moves: Real
     slow: tuple[Real, Real]
     dweights: Real
     dtotal: Real
     rise: Real
 
+    @property
+    def ds(self) -> Real:
+        """The changes of the slacks, (3, flights, m)."""
+        return self.moves[:, 0]
+
+    @property
+    def dz(self) -> Real:
+        """The changes of the multipliers, (3, flights, m)."""
+        return self.moves[:, 1]
+
     def reach(self, point: Point) -> Real:
         """Return the share of the step at which a slack or a multiplier vanishes, (flights, 1)."""
         falls = (-self.dweights / point.weights).max(axis=0)
-        found = np.minimum(cones.reach(point.s, self.ds), cones.reach(point.z, self.dz))
+        found = cones.reach(point.pair, self.moves).min(axis=0)
         if point.slow is not None:
             found = np.minimum(found, point.slow.reach(*self.slow))
         return np.asarray(np.minimum(found, 1 / np.maximum(falls, _TINY)))
@@ -253,8 +269,9 @@ class Newton:
 
         dw, dv, q, y = (found[..., part].transpose(2, 0, 1) for part in (W, V, Q, Y))
         q, y = q[..., :-1], y[..., :-1]
-        ds = scale.discs(-point.margin, dv)
-        z = np.empty_like(point.z)
+        moves = np.empty_like(point.pair)
+        z = moves[:, 1]
+        scale.enter(moves[:, 0], -point.margin, dv)
         z[1:, :, n:] = q * scale.per_gain
         # the multipliers of the speeds from stationarity, not from W^-2 ds: that keeps its digits
         z[1:, :, :n] = scale.left_over(y, z[1:, :, n:])
@@ -265,12 +282,12 @@ class Newton:
             z[1:, :, :n] -= slow.u * raised
             of_least = slope, raised - slow.z
         z[0] = scaling.radial(target, -point.margin, z[1:])
+        z -= point.z
         return Step(
             dw=dw,
             dv=dv,
             dy=y - point.y,
-            ds=ds,
-            dz=z - point.z,
+            moves=moves,
             slow=of_least,
             dweights=weights - point.weights,
             dtotal=np.einsum("cjbn,cbn->jb", point.gradient, dw)[..., None],

@@ -91,8 +91,11 @@ class Search:
         mu = opening.mu * one
         w, v = w / LENGTH, v / kin.max_speed
         total, gradient, hessian = rewards.scaled(rewards.values)
-        s = self.scale.discs(0.0, v)
+        pair = np.empty((3, 2, flights, 2 * kin.slots - 1))
+        s = pair[:, 0]
+        self.scale.enter(s, 0.0, v)
         s[0] = np.maximum(1, np.hypot(s[1], s[2]) + opening.margin)
+        pair[:, 1] = mu * cones.inverse(s)
         floor = best_floor(total, self.share * mu)
         weights = 1 / (total - floor)
         least, moves = kin.min_speed / kin.max_speed, self.scale.matrix.moves_v
@@ -100,8 +103,7 @@ class Search:
             w=w,
             v=v,
             y=np.zeros((2, flights, kin.slots - 1)),
-            s=s,
-            z=mu * cones.inverse(s),
+            pair=pair,
             margin=s[0] - 1,
             slow=Slow.begin(v, least, moves, mu) if least > 0 else None,
             weights=weights / weights.sum(axis=0),
@@ -122,13 +124,12 @@ class Search:
             # not finite: the limits have no interior left
             lost = (self.pace.iterations >= max_iterations) | (self.pace.centrings > _CENTRINGS)
             over = converged | ~np.isfinite(residual) | (lost & (self.pace.attempts == 0))
-            if over.any():
-                for k in np.flatnonzero(over).tolist():
-                    ends[int(self.rows[k])] = self._end(k, residual[k, 0], converged[k, 0])
-                slope = slope[~over[:, 0]]
-                self._keep(~over)
-            if self.rows.size:
-                self._advance(slope)
+            for k in np.flatnonzero(over).tolist():
+                ends[int(self.rows[k])] = self._end(k, residual[k, 0], converged[k, 0])
+            if over.all():
+                break
+            self._keep(~over)
+            self._advance(slope[~over[:, 0]])
         return ends
 
     def _end(self, k: int, residual: float, converged: bool) -> End:
@@ -215,7 +216,7 @@ class Search:
         Return also the step for mu = 0.
         """
         pace, point = self.pace, self.point
-        scaling = cones.Scaling.between(point.s, point.z)
+        scaling = cones.Scaling.between(point.pair)
         cut = pace.skip > 0
         pace.skip = np.maximum(0, pace.skip - 1)
         while True:
@@ -243,12 +244,13 @@ class Search:
         if not taken.any():
             return taken
         margin = point.margin * (1 - length)
+        pair = point.pair + length * step.moves
+        self.scale.enter(pair[:, 0], 1 + margin, v)
         trial = Point(
             w=w,
             v=v,
             y=point.y + np.where(pace.iterations == 1, 1.0, length) * step.dy,
-            s=self.scale.discs(1 + margin, v),
-            z=point.z + length * step.dz,
+            pair=pair,
             margin=margin,
             slow=point.slow and point.slow.moved(v, length, step.slow[1]),
             weights=weights / weights.sum(axis=0),

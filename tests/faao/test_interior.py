@@ -422,6 +422,13 @@ def test_the_band_matrix_is_the_dense_one(seed: int, n: int, first: bool, last: 
     assert (y[..., :-1] * moved).sum() == pytest.approx((matrix.pull(y[..., :-1]) * w).sum())
 
 
+def discs(scale: FlightScale, first: Real | float, v: Real) -> Real:
+    """Return s_0 = `first` and D v as one array."""
+    found = np.empty((3, v.shape[1], 2 * v.shape[2] - 1))
+    scale.enter(found, first, v)
+    return found
+
+
 @pytest.mark.parametrize("make", [plane, copter])
 def test_forces_are_the_transpose_of_what_they_act_on(make: Callable[..., Kinematics]) -> None:
     rng, scale = np.random.default_rng(0), FlightScale(make(2))
@@ -430,7 +437,7 @@ def test_forces_are_the_transpose_of_what_they_act_on(make: Callable[..., Kinema
     v *= scale.matrix.moves_v
     y, on_a = rng.standard_normal((2, 2, 3, n - 1))
     drawn = (y * (scale.matrix.dynamics(w, v) - scale.matrix.dynamics(w, 0 * v))).sum()
-    taken = (on_a * scale.discs(0.0, v)[1:, :, n:]).sum()
+    taken = (on_a * discs(scale, 0.0, v)[1:, :, n:]).sum()
     assert (scale.left_over(y, on_a) * v).sum() == pytest.approx(drawn - taken)
 
 
@@ -463,7 +470,7 @@ def test_the_scaling_of_the_cones(seed: int) -> None:
     rng = np.random.default_rng(seed)
     m = 5
     s, z, (ds, dz) = inside(rng, m), inside(rng, m), rng.standard_normal((2, 3, 1, m))
-    scaling = cones.Scaling.between(s, z)
+    scaling = cones.Scaling.between(np.stack([s, z], axis=1))
     one = np.zeros((3, 1, m))
     one[0] = 1
     assert product(s, cones.inverse(s)) == pytest.approx(one, abs=1e-8)
@@ -515,7 +522,7 @@ def test_a_newton_step_solves_the_linearised_conditions(
     scale, n, mu, share = FlightScale(kin), kin.slots, np.array([[0.3]]), 0.7
     m = 2 * n - 1
     v = 0.01 * rng.standard_normal((2, 1, n))
-    x = scale.discs(0.0, v)[1:]
+    x = discs(scale, 0.0, v)[1:]
     total = rng.standard_normal((2, 1, 1))
     concave = -symmetric(rng, 2, 1, n)[0]
     margin = rng.uniform(0, 0.1, (1, m))
@@ -525,8 +532,10 @@ def test_a_newton_step_solves_the_linearised_conditions(
         w=rng.standard_normal((2, 1, n)),
         v=v,
         y=rng.standard_normal((2, 1, n - 1)),
-        s=np.concatenate([(np.hypot(*x) + 0.1 + margin)[None], x]),
-        z=inside(rng, m) * real,
+        pair=np.stack(
+            [np.concatenate([(np.hypot(*x) + 0.1 + margin)[None], x]), inside(rng, m) * real],
+            axis=1,
+        ),
         margin=margin,
         slow=Slow.begin(v, least, scale.matrix.moves_v, 0.2) if least > 0 else None,
         weights=np.array([0.3, 0.7])[:, None, None],
@@ -537,7 +546,7 @@ def test_a_newton_step_solves_the_linearised_conditions(
     )
     slow = point.slow
     assert (share * mu / (total - point.floor)).sum() == pytest.approx(1)
-    scaling = cones.Scaling.between(point.s, point.z)
+    scaling = cones.Scaling.between(point.pair)
     newton = Newton.at(
         scale,
         point,
@@ -572,7 +581,7 @@ def test_a_newton_step_solves_the_linearised_conditions(
         assert scale.matrix.dynamics(point.w + step.dw, point.v + step.dv) == pytest.approx(
             np.zeros((2, 1, n - 1)), abs=1e-9
         )
-        assert step.ds == pytest.approx(scale.discs(-margin, step.dv))
+        assert step.ds == pytest.approx(discs(scale, -margin, step.dv))
         assert weights.sum() == pytest.approx(1)
         gains = (point.gradient * step.dw[:, None]).sum(axis=(0, -1))[..., None]
         assert step.dtotal == pytest.approx(gains)
