@@ -27,7 +27,10 @@ def inverse(s: Real) -> Real:
 
 
 def reach(s: Real, step: Real) -> Real:
-    """Return the largest alpha with s + alpha step in every cone, (..., flights, 1), or a huge one."""
+    """Return the largest alpha with s + alpha step in every cone, (..., flights, 1).
+
+    It is huge, not infinite, where any will do.
+    """
     second, crossed = step[0] * step[0], s[0] * step[0]
     second -= step[1] * step[1] + step[2] * step[2]
     crossed -= s[1] * step[1] + s[2] * step[2]
