@@ -28,20 +28,26 @@ class Bicubic:
         both = CubicSpline(y, along, axis=2).c  # (4, k - 1, 4, m - 1)
         return cls(x, y, both.transpose(2, 0, 3, 1).reshape(4, 4, -1))
 
-    def value(self, x: Real, y: Real) -> Real:
-        """Return the function at x and y (...)."""
-        s, t, cell = self._at(x, y)
-        return _value(_value(cell, t), s)
+    def rows(self, y: Real) -> "Rows":
+        """Return what is to be known of y (...): once, where it stays."""
+        j, t = _place(self.y, y)
+        return Rows(j, t)
 
-    def by_x(self, x: Real, y: Real) -> tuple[Real, Real, Real]:
+    def value(self, x: Real, rows: "Rows") -> Real:
+        """Return the function at x (...) and the y of `rows`."""
+        s, cell = self._at(x, rows)
+        return _value(_value(cell, rows.into), s)
+
+    def by_x(self, x: Real, rows: "Rows") -> tuple[Real, Real, Real]:
         """Return the function and its first two derivatives by x."""
-        s, t, cell = self._at(x, y)
-        along = _value(cell, t)
+        s, cell = self._at(x, rows)
+        along = _value(cell, rows.into)
         return _value(along, s), _slope(along, s), _bend(along, s)
 
-    def by_both(self, x: Real, y: Real) -> tuple[Real, Real, Real, Real, Real, Real]:
+    def by_both(self, x: Real, rows: "Rows") -> tuple[Real, Real, Real, Real, Real, Real]:
         """Return the function and its derivatives by x, y, xx, xy and yy."""
-        s, t, cell = self._at(x, y)
+        s, cell = self._at(x, rows)
+        t = rows.into
         along, slope, bend = _value(cell, t), _slope(cell, t), _bend(cell, t)
         return (
             _value(along, s),
@@ -52,12 +58,19 @@ class Bicubic:
             _value(bend, s),
         )
 
-    def _at(self, x: Real, y: Real) -> tuple[Real, Real, Real]:
-        """Return where x and y are in their cells, and the polynomials there (4 of y, 4 of x)."""
+    def _at(self, x: Real, rows: "Rows") -> tuple[Real, Real]:
+        """Return how far into their cells x are, and the polynomials there, 4 by 4."""
         i, s = _place(self.x, x)
-        j, t = _place(self.y, y)
-        cell = np.take(self.cells, i * (len(self.y) - 1) + j, axis=2)
-        return s, t, np.swapaxes(cell, 0, 1)
+        cell = self.cells.take(i * (len(self.y) - 1) + rows.cell, axis=2)
+        return s, cell.swapaxes(0, 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """The cells of some y and how far into them y is."""
+
+    cell: Integers
+    into: Real
 
 
 def _place(grid: Real, x: Real) -> tuple[Integers, Real]:

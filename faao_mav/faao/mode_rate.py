@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.faao.bicubic import Bicubic
+from faao_mav.faao.bicubic import Bicubic, Rows
 from faao_mav.faao.place import Partials, Turning
 from faao_mav.faao.problem import Link
 from faao_mav.radio.best_precoder import best_precoders
@@ -48,8 +48,8 @@ class ModeRate:
 
     link: Link
     table: Table
-    fixed: tuple[Real, Real] | None
-    """What `_modes` finds, for links on which it is the same everywhere."""
+    fixed: tuple[Real, Rows] | None
+    """What `_modes` finds, as the table is asked, for links on which it is the same everywhere."""
 
     @property
     def exact(self) -> bool:
@@ -58,19 +58,20 @@ class ModeRate:
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate of every slot, bits (..., n)."""
-        strength, ratio = self.fixed or _modes(self.link, cosine)
-        return self.table.spline.value(gain_log + strength, ratio)
+        strength, rows = self.fixed or _asked(self.table, *_modes(self.link, cosine))
+        return self.table.spline.value(gain_log + strength, rows)
 
     def partials(self, gain_log: Real, cosine: Real) -> Partials:
         """Return the rate and its derivatives by l and u."""
         if self.fixed:
-            strength, ratio = self.fixed
-            return Partials(*self.table.spline.by_x(gain_log + strength, ratio))
+            strength, rows = self.fixed
+            return Partials(*self.table.spline.by_x(gain_log + strength, rows))
         here, up, down = (_modes(self.link, cosine + h) for h in (0, _STEP, -_STEP))
         a_u, k_u = ((x - y) / (2 * _STEP) for x, y in zip(up, down, strict=True))
         a_uu, k_uu = ((x - 2 * m + y) / _STEP**2 for x, m, y in zip(up, here, down, strict=True))
+        strength, rows = _asked(self.table, *here)
         value, by_a, by_k, by_aa, by_ak, by_kk = self.table.spline.by_both(
-            gain_log + here[0], here[1]
+            gain_log + strength, rows
         )
         turning = Turning(
             by_u=by_a * a_u + by_k * k_u,
@@ -85,7 +86,7 @@ class ModeRate:
 
     def start(self, gain_log: Real, cosine: Real) -> Complex:
         """Return nearly the best precoders (n, N_t, N_t): the grid's, in each slot's own basis."""
-        strength, ratio = self.fixed or _modes(self.link, cosine)
+        strength, ratio = _modes(self.link, cosine)
         i = _nearest(self.table.gains, gain_log + strength)
         j = _nearest(self.table.ratios, ratio)
         H_r = self.link.fade(self.link.line_of_sight_at(cosine))
@@ -108,7 +109,13 @@ def mode_rate(link: Link, least: float, most: float) -> ModeRate:
     snapped = (math.floor(low / _SNAP) * _SNAP, math.ceil(high / _SNAP) * _SNAP)
     modes = min(2, link.receive, link.transmit)
     table = _table(link.modulation, link.transmit, modes, *snapped)
-    return ModeRate(link, table, None if link.follows_position else _modes(link, np.zeros(slots)))
+    if link.follows_position:
+        return ModeRate(link, table, None)
+    return ModeRate(link, table, _asked(table, *_modes(link, np.zeros(slots))))
+
+
+def _asked(table: Table, strength: Real, ratio: Real) -> tuple[Real, Rows]:
+    return strength, table.spline.rows(ratio)
 
 
 @lru_cache(maxsize=8)

@@ -64,11 +64,13 @@ class SurfaceRate:
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate of every slot, bits (..., n)."""
-        return self.spline.value(gain_log, cosine)
+        return self.spline.value(gain_log, self.spline.rows(cosine))
 
     def partials(self, gain_log: Real, cosine: Real) -> Partials:
         """Return the rate and its derivatives by l and u."""
-        value, by_l, by_u, by_ll, by_lu, by_uu = self.spline.by_both(gain_log, cosine)
+        value, by_l, by_u, by_ll, by_lu, by_uu = self.spline.by_both(
+            gain_log, self.spline.rows(cosine)
+        )
         return Partials(value, by_l, by_ll, Turning(by_u, by_lu, by_uu))
 
 
