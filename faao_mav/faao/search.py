@@ -12,8 +12,9 @@ import numpy as np
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.faao import cones
 from faao_mav.faao.flights import merged, only
+from faao_mav.faao.iterate import FlightScale, Point, Step, best_floor
 from faao_mav.faao.kinematics import Kinematics
-from faao_mav.faao.newton import FlightScale, Newton, Point, Step, best_floor
+from faao_mav.faao.newton import Newton
 from faao_mav.faao.rewards import LENGTH, ScaledRewards
 from faao_mav.faao.slow import Slow
 
@@ -35,6 +36,13 @@ class Opening:
 
     mu: float
     margin: float
+
+
+FAR = Opening(mu=10.0, margin=1.0)
+"""For any start: the optimum may be far away."""
+
+NEAR = Opening(mu=0.1, margin=0.03)
+"""For starts that are nearly optimal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +90,8 @@ class Search:
         tolerance: float,
         opening: Opening,
     ) -> None:
-        self.kin, self.rewards, self.tolerance = kin, rewards, tolerance
+        self.rewards, self.tolerance = rewards, tolerance
         self.scale, self.share = FlightScale(kin), _SHARE * kin.slots
-        self.opening = opening
         flights = w.shape[1]
         self.rows = np.arange(flights)
         one, none = np.ones((flights, 1)), np.zeros((flights, 1), dtype=np.int_)
@@ -190,7 +197,7 @@ class Search:
         length = np.minimum(1, ahead.reach(point))
         now, left = point.gap(), point.gap(length, ahead)
         keep = np.maximum((left / now) ** 3, np.where(slope < 1, 0.01, 0.1))
-        pace.mu = np.maximum(np.minimum(pace.mu, keep * now), self.tolerance / 20 * pace.steep)
+        pace.mu = np.fmax(np.fmin(pace.mu, keep * now), self.tolerance / 20 * pace.steep)
         second = newton.scaling.second_order(ahead.ds, ahead.dz) * length**2
         step = newton.step(pace.mu, second, ahead.slow[0] * ahead.slow[1] * length**2)
         length = np.minimum(1, _BOUNDARY * step.reach(point))
@@ -273,13 +280,6 @@ class Search:
             np.where(chosen, 0, count) for count in (pace.attempts, pace.short)
         )
         pace.centrings = pace.centrings + chosen
-
-
-FAR = Opening(mu=10.0, margin=1.0)
-"""For any start: the optimum may be far away."""
-
-NEAR = Opening(mu=0.1, margin=0.03)
-"""For starts that are nearly optimal."""
 
 
 def _sum(values: Real) -> Real:

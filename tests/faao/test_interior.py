@@ -15,8 +15,9 @@ from faao_mav.arrays import Real
 from faao_mav.faao import cones
 from faao_mav.faao.banded import SIZE, FlightMatrix, Q, V, W, Y
 from faao_mav.faao.interior import Stage, StageValues, maximize, maximize_all
+from faao_mav.faao.iterate import FlightScale, Point, best_floor
 from faao_mav.faao.kinematics import Kinematics, Trajectory
-from faao_mav.faao.newton import FlightScale, Newton, Point, best_floor
+from faao_mav.faao.newton import Newton
 from faao_mav.faao.scaled import LENGTH, flight_variables
 from faao_mav.faao.slow import Slow
 from faao_mav.faao.start import straight_flight
