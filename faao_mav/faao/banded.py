@@ -4,7 +4,9 @@ Per slot n the unknowns are (w_n, v_n, q_n, y_n), two each: scaled position and 
 force q_n of the limit on v_{n+1} - v_n, and the multiplier y_n of the step
 w_{n+1} - w_n = (h / 2)(v_n + v_{n+1}), which with a_n = k (v_{n+1} - v_n) is (11) and (12).
 Keeping q_n as an unknown, rather than eliminating it, keeps the matrix well conditioned where the
-limit is active. A symmetric 2x2 matrix is stored as its entries (xx, xy, yy), last axis.
+limit is active. Flights stand one after the other in the band and do not touch.
+
+Vectors are (2, flights, slots), symmetric 2x2 matrices (3, flights, slots): xx, xy, yy.
 """
 
 from dataclasses import dataclass
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 
 SIZE = 8
 """Unknowns per slot."""
@@ -22,19 +24,23 @@ W, V, Q, Y = (slice(2 * part, 2 * part + 2) for part in range(4))
 
 _BAND = 6  # y_n meets w_n six places earlier, q_n meets v_{n+1} six places later
 _DIAGONAL = 2 * _BAND
+_ROWS = 3 * _BAND + 1
+_EAST, _NORTH = slice(0, Y.start, 2), slice(1, Y.start, 2)  # of w, v and q
+_UNIT = np.array([1.0, 0.0, 1.0])[:, None, None]
 
 
 @dataclass(frozen=True, slots=True)
 class Factors:
-    """The LU factors of one Newton matrix."""
+    """The LU factors of the Newton matrices; `sound` (flights, 1) tells which are not singular."""
 
     lu: Real
     pivots: Real
+    sound: Flags
 
     def solve(self, right: Real) -> Real:
-        """Return K⁻¹ applied to each of m right-hand sides (m, n, 8)."""
+        """Return K⁻¹ applied to each of m right-hand sides (m, flights, n, 8), overwritten."""
         flat = right.reshape(right.shape[0], -1)
-        found, _ = lapack.dgbtrs(self.lu, _BAND, _BAND, flat.T, self.pivots)
+        found, _ = lapack.dgbtrs(self.lu, _BAND, _BAND, flat.T, self.pivots, overwrite_b=True)
         return np.asarray(found.T).reshape(right.shape)
 
 
@@ -43,69 +49,73 @@ class FlightMatrix:
 
     `half_step` is h / 2. w(0) and w(N+1) are fixed, v(0) and v(N+1) where asked: rows and columns
     of fixed unknowns, and of the multipliers that the last slot lacks, are those of the identity.
+    `moves_w`, `moves_v` (n,) are 0 where fixed and 1 elsewhere.
     """
 
     def __init__(self, slots: int, half_step: float, fixed: tuple[bool, bool]) -> None:
         self.slots, self.half_step = slots, half_step
-        self.moves_w = np.ones((slots, 1))
+        self.moves_w, self.moves_v = np.ones((2, slots))
         self.moves_w[[0, -1]] = 0
-        self.moves_v = np.ones((slots, 1))
-        self.moves_v[[0, -1], 0] = [not is_fixed for is_fixed in fixed]
+        self.moves_v[[0, -1]] = [not is_fixed for is_fixed in fixed]
+        followed = np.arange(slots) < slots - 1
+        self._free = np.stack([self.moves_w, self.moves_v, followed])[:, None, None] > 0
         self._template = self._constants()
 
     def dynamics(self, w: Real, v: Real) -> Real:
-        """Return A (w, v): w_{n+1} - w_n - (h / 2)(v_n + v_{n+1}), (n - 1, 2)."""
-        return np.asarray(w[1:] - w[:-1] - self.half_step * (v[1:] + v[:-1]))
+        """Return A (w, v): w_{n+1} - w_n - (h / 2)(v_n + v_{n+1}), (2, flights, n - 1)."""
+        found = w[..., 1:] - w[..., :-1]
+        found -= self.half_step * (v[..., 1:] + v[..., :-1])
+        return np.asarray(found)
 
-    def pull(self, y: Real) -> tuple[Real, Real]:
-        """Return Aᵀ y as the parts for w and v, (n, 2) each, from y (n - 1, 2)."""
-        on_w, on_v = np.zeros((2, self.slots, 2))
-        on_w[1:] = y
-        on_w[:-1] -= y
-        on_v[1:] = y
-        on_v[:-1] += y
-        on_v *= -self.half_step
-        return on_w * self.moves_w, on_v * self.moves_v
+    def pull(self, y: Real) -> Real:
+        """Return the part of Aᵀ y for w, (2, flights, n), from y (2, flights, n - 1)."""
+        found = np.zeros((*y.shape[:-1], self.slots))
+        found[..., 1:] = y
+        found[..., :-1] -= y
+        found *= self.moves_w
+        return found
 
-    def factor(self, at_w: Real, at_v: Real, give: Real) -> Factors | None:
-        """Factor K with M = diag(`at_w`, `at_v`) and C = diag(`give`); None if it is singular.
+    def factor(self, at_w: Real, at_v: Real, give: Real) -> Factors:
+        """Factor K with M = diag(`at_w`, `at_v`) and C = diag(`give`), (3, flights, n) each."""
+        blocks = np.empty((3, *at_w.shape))
+        blocks[0], blocks[1] = at_w, at_v
+        np.negative(give, out=blocks[2])
+        blocks = np.where(self._free, blocks, _UNIT)
+        sound = np.isfinite(np.einsum("kcbn->b", blocks))[:, None]
+        while True:
+            if not sound.all():
+                blocks = np.where(sound, blocks, _UNIT)
+            lu, pivots, info = lapack.dgbtrf(self._band(blocks), _BAND, _BAND, overwrite_ab=True)
+            if info == 0:
+                return Factors(lu, pivots, sound)
+            sound[(info - 1) // (SIZE * self.slots)] = False
 
-        at_w, at_v are (n, 3), give (n - 1, 3).
-        """
-        band = self._template.copy(order="F")
-        for offset, block, moves in (
-            (W.start, at_w, self.moves_w),
-            (V.start, at_v, self.moves_v),
-        ):
-            moving = moves[:, 0]
-            band[_DIAGONAL, offset::SIZE] = block[:, 0] * moving + (1 - moving)
-            band[_DIAGONAL, offset + 1 :: SIZE] = block[:, 2] * moving + (1 - moving)
-            across = block[:, 1] * moving
-            band[_DIAGONAL + 1, offset::SIZE] = across
-            band[_DIAGONAL - 1, offset + 1 :: SIZE] = across
-        inner = slice(Q.start, -SIZE, SIZE), slice(Q.start + 1, -SIZE, SIZE)
-        band[_DIAGONAL, inner[0]] = -give[:, 0]
-        band[_DIAGONAL, inner[1]] = -give[:, 2]
-        band[_DIAGONAL + 1, inner[0]] = -give[:, 1]
-        band[_DIAGONAL - 1, inner[1]] = -give[:, 1]
-        lu, pivots, info = lapack.dgbtrf(band, _BAND, _BAND, overwrite_ab=True)
-        return Factors(lu, pivots) if info == 0 else None
+    def _band(self, blocks: Real) -> Real:
+        """Return K in LAPACK's band storage, from (w v q, xx xy yy, flights, n)."""
+        cells = np.empty((blocks.shape[2], *self._template.shape))
+        cells[:] = self._template
+        xx, xy, yy = blocks.transpose(1, 2, 3, 0)
+        cells[:, :, _EAST, _DIAGONAL] = xx
+        cells[:, :, _NORTH, _DIAGONAL] = yy
+        cells[:, :, _EAST, _DIAGONAL + 1] = xy
+        cells[:, :, _NORTH, _DIAGONAL - 1] = xy
+        return cells.reshape(-1, _ROWS).T
 
     def _constants(self) -> Real:
-        band = np.zeros((3 * _BAND + 1, SIZE * self.slots), order="F")
-        slot = np.arange(self.slots - 1)
+        """The entries that never change, (n, 8, rows of the band)."""
+        cells = np.zeros((self.slots, SIZE, _ROWS))
         for later in (0, 1):
+            here, there = slice(0, self.slots - 1), slice(later, self.slots - 1 + later)
             sign = 2.0 * later - 1
             for multiplier, moved, value, moves in (
                 (Y, W, sign, self.moves_w),
                 (Y, V, -self.half_step, self.moves_v),
                 (Q, V, sign, self.moves_v),
             ):
-                entries = value * moves[later : self.slots - 1 + later, 0]
+                below = multiplier.start - moved.start - SIZE * later
                 for axis in (0, 1):
-                    row = SIZE * slot + multiplier.start + axis
-                    column = SIZE * (slot + later) + moved.start + axis
-                    band[_DIAGONAL + row - column, column] = entries
-                    band[_DIAGONAL + column - row, row] = entries
-        band[_DIAGONAL, Q.start - SIZE :] = 1
-        return band
+                    entries = value * moves[there]
+                    cells[there, moved.start + axis, _DIAGONAL + below] = entries
+                    cells[here, multiplier.start + axis, _DIAGONAL - below] = entries
+        cells[-1, Q.start :, _DIAGONAL] = 1
+        return cells

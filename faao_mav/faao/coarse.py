@@ -1,20 +1,22 @@
-"""Which starts are worth solving: all are tried on a coarse copy of the flight first."""
+"""Where the starts lead, roughly: all are improved side by side, long flights on a coarse copy."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.faao.interior import Stage, StageValues, maximize
-from faao_mav.faao.kinematics import Kinematics
-from faao_mav.faao.routes import starts
+from faao_mav.faao.interior import Stage, StageValues, maximize_all
+from faao_mav.faao.kinematics import Kinematics, Trajectory, followed, settled
 
-SLOTS = 80
+SLOTS = 60
 """Slots of the coarse copy: enough for a route's shape."""
 
-WORTH_IT = 4 * SLOTS
+WORTH_IT = 2 * SLOTS
 """Slots from which the coarse copy is cheaper than what it saves."""
+
+_COARSE = 3e-3
+"""Tolerance on the copy: that of the flight itself would be wasted on it."""
 
 _HOPEFUL = 5e-3
 """Share of the best value by which a coarse value may be off."""
@@ -36,52 +38,88 @@ class Blocks:
     slots: int
 
     def __call__(self, w: Real) -> StageValues:
-        """Return values (J, slots), gradients and Hessians at positions w (slots, 2)."""
+        """Return values (J, ..., slots), gradients and Hessians at positions w (2, ..., slots)."""
         block = np.rint(np.linspace(0, self.slots - 1, self.fine)).astype(int)
         first = np.searchsorted(block, np.arange(self.slots))
-        at = self.stage(w[block])
+        at = self.stage(w[..., block])
         share = self.slots / self.fine
         return StageValues(
             *(
-                np.add.reduceat(part, first, axis=1) * share
+                np.add.reduceat(part, first, axis=-1) * share
                 for part in (at.value, at.gradient, at.hessian)
             )
         )
 
 
-def rejected(
+@dataclass(frozen=True, slots=True)
+class Rough:
+    """Flights near the local optima that the starts lead to, and those of them to go on with."""
+
+    flights: dict[str, Trajectory]
+    hopeful: list[str]
+
+
+def improved(
     kin: Kinematics,
     stage: Stage,
-    names: Sequence[str],
-    stations: dict[str, Real],
+    routes: Mapping[str, Trajectory],
     *,
     tolerance: float,
     max_iterations: int,
-) -> dict[str, float]:
-    """Return the starts of `names` that need not be solved, with their coarse min_j F_j.
+) -> Rough:
+    """Improve the feasible `routes` to `tolerance`.
 
-    On a copy of the flight with `SLOTS` slots, those are the starts that end clearly below the
-    best, and those that end where a better one does. The best is never among them. Short
-    flights, and those with a least speed, whose turns a coarse copy cannot make, keep all.
+    Without hope are flights that end clearly below the best, and those that end where a better
+    one does. Short flights, those with a least speed, whose turns a coarse copy cannot make, and
+    a single start, which has nothing to be compared with, are improved as they are.
     """
-    if kin.slots < WORTH_IT or kin.min_speed > 0:
-        return {}
-    duration = kin.time_step * (kin.slots - 1)
-    coarse = replace(kin, slots=SLOTS, time_step=duration / (SLOTS - 1))
-    blocks = Blocks(stage, kin.slots, SLOTS)
-    found = {
-        name: maximize(coarse, blocks, flight, tolerance=tolerance, max_iterations=max_iterations)
-        for name, flight in starts(coarse, names, stations).items()
-    }
+    copy, reward, on_copy = kin, stage, list(routes.values())
+    if len(routes) > 1 and kin.slots >= WORTH_IT and kin.min_speed == 0:
+        copy, reward = _coarse(kin), Blocks(stage, kin.slots, SLOTS)
+        tolerance = max(tolerance, _COARSE)
+        on_copy = [followed(copy, _resampled(kin, flight, copy)) for flight in on_copy]
+    solved = maximize_all(copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations)
+    found = dict(zip(routes, solved, strict=True))
     ranked = sorted(found, key=lambda name: -found[name].value)
-    least = found[ranked[0]].value * (1 - _HOPEFUL)
-    kept: list[Real] = []
-    dropped = {}
+    least = found[ranked[0]].value * (1 - (0.0 if copy is kin else _HOPEFUL))
+    hopeful: list[str] = []
     for name in ranked:
         w = found[name].trajectory.w
         near = _SAME * float(np.ptp(w, axis=0).max())
-        if found[name].value < least or any(np.abs(w - other).max() <= near for other in kept):
-            dropped[name] = found[name].value
-        else:
-            kept.append(w)
-    return dropped
+        others = (found[other].trajectory.w for other in hopeful)
+        if found[name].value >= least and all(np.abs(w - other).max() > near for other in others):
+            hopeful.append(name)
+    flights = {name: optimum.trajectory for name, optimum in found.items()}
+    if copy is not kin:
+        flights = {
+            name: settled(kin, routes[name], _resampled(copy, flight, kin))
+            for name, flight in flights.items()
+        }
+    return Rough(flights, hopeful)
+
+
+def _coarse(kin: Kinematics) -> Kinematics:
+    """The same flight in `SLOTS` slots.
+
+    Where a(0) has no bound, v(0) says nothing about v(1): on the copy, whose first slot stands for
+    several, v(0) is free and a(0) bounded.
+    """
+    duration = kin.time_step * (kin.slots - 1)
+    return replace(
+        kin,
+        slots=SLOTS,
+        time_step=duration / (SLOTS - 1),
+        start_velocity=kin.start_velocity if kin.bound_first_acceleration else None,
+        bound_first_acceleration=True,
+    )
+
+
+def _resampled(kin: Kinematics, flight: Trajectory, other: Kinematics) -> Real:
+    """Return the velocities (slots of `other`, 2) of `flight`, which is one of `kin`."""
+    now, then = (k.time_step * np.arange(k.slots) for k in (kin, other))
+    found = np.stack([np.interp(then, now, v) for v in flight.v.T], axis=1)
+    if other.start_velocity is not None:
+        found[0] = other.start_velocity
+    elif kin.start_velocity is not None:
+        found[0] = flight.v[1]
+    return found

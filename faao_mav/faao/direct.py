@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.faao.coarse import rejected
+from faao_mav.faao.coarse import improved
 from faao_mav.faao.design import Design, design
-from faao_mav.faao.interior import Optimum, StageValues, maximize
+from faao_mav.faao.interior import FAR, NEAR, Optimum, StageValues, maximize, maximize_all
+from faao_mav.faao.kinematics import Trajectory
 from faao_mav.faao.mode_rate import ModeRate
-from faao_mav.faao.place import PlaceRate, by_position, coordinates, place
+from faao_mav.faao.place import PlaceRate, place
 from faao_mav.faao.problem import Link, Problem
 from faao_mav.faao.progress import Observer, Progress
 from faao_mav.faao.rate_model import CurveRate, rate_model
@@ -27,7 +28,7 @@ _POLISH = 12
 """Steps at most at exact rates, after those in a table."""
 
 _ROUGH = 1e-3
-"""Tolerance with which starts are compared, in shares of the best rate."""
+"""Tolerance with which starts are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,78 +39,70 @@ class RateField:
     rates: tuple[PlaceRate, ...]
 
     def value(self, w: Real) -> Real:
-        """Return the rates (2, n) at positions w (n, 2), bits."""
-        pairs = zip(self.links, self.rates, strict=True)
-        return np.stack([rate.value(*coordinates(link, w)) for link, rate in pairs])
-
-    def __call__(self, w: Real) -> StageValues:
-        """Return rates, gradients and Hessians at positions w (n, 2): bits, per m, per m²."""
-        values, gradients, hessians = [], [], []
+        """Return the rates (2, ..., n) at positions w (2, ..., n), bits."""
+        found = []
         for link, rate in zip(self.links, self.rates, strict=True):
             at = place(link, w)
+            found.append(rate.value(at.gain_log, at.cosine))
+        return np.stack(found)
+
+    def __call__(self, w: Real) -> StageValues:
+        """Return rates, gradients and Hessians at positions w (2, ..., n), as `Stage` has them."""
+        shape = (len(self.links), *w.shape[1:])
+        value, gradient, hessian = np.empty(shape), np.empty((2, *shape)), np.empty((3, *shape))
+        for j, (link, rate) in enumerate(zip(self.links, self.rates, strict=True)):
+            at = place(link, w)
             partials = rate.partials(at.gain_log, at.cosine)
-            gradient, hessian = by_position(at, partials)
-            values.append(partials.value)
-            gradients.append(gradient)
-            hessians.append(hessian)
-        return StageValues(np.stack(values), np.stack(gradients), np.stack(hessians))
+            value[j] = partials.value
+            gradient[:, j], hessian[:, j] = at.by_position(partials)
+        return StageValues(value, gradient, hessian)
 
 
 def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """Optimise trajectory and precoders of `problem` together.
 
-    The starts of `optimizer.starts` that `coarse` does not reject are improved roughly, the best
-    one to the end. The result is never worse than any of those. Raises `InfeasibleError` when
-    there is no flight at all.
+    The starts of `optimizer.starts` are improved roughly, the best to the end. The result is
+    never worse than any of them. Raises `InfeasibleError` when there is no flight at all.
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     wanted = design(problem.plan)
-    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
-            observe(Progress(number, len(options.starts) + 1, stage, best))
+            observe(Progress(number, 2, stage, best))
 
     tell(0, "rates over the map", 0.0)
     field = rate_field(problem, wanted)
-    spread = rejected(
-        kin,
-        field,
-        options.starts,
-        stations,
-        tolerance=_ROUGH,
-        max_iterations=options.max_iterations,
-    )
-    hopeful = [name for name in options.starts if name not in spread]
-    if wanted.gaussian:  # coarse values are not priced with the alphabet
-        spread = {}
-    routes = starts(kin, hopeful, stations)
-    history: list[float] = []
-    best: Optimum | None = None
-    for number, (name, flight) in enumerate(routes.items(), start=len(spread) + 1):
-        history = history or [_counted(field, wanted, flight.w)]
-        tell(number, f"start {name}", max(history))
-        found = maximize(
-            kin, field, flight, tolerance=_ROUGH, max_iterations=options.max_iterations
+    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    routes = starts(kin, options.starts, stations)
+    tell(1, "the starts", 0.0)
+    rough = improved(kin, field, routes, tolerance=_ROUGH, max_iterations=options.max_iterations)
+    flights = [*routes.values(), *rough.flights.values()]
+    worth = field.value(np.stack([flight.w.T for flight in flights], axis=1)).mean(axis=-1)
+    worth = worth.min(axis=0)
+    counted = [_priced(wanted, field, f.w) for f in flights] if wanted.gaussian else worth.tolist()
+    history = np.maximum.accumulate([counted[0], *counted[len(routes) :]]).tolist()
+    tell(2, "the best start", history[-1])
+
+    def finished(near: list[Trajectory]) -> list[Optimum]:
+        # the half-planes of a least speed turn too fast for short steps to follow
+        begun_afresh = kin.min_speed > 0 or any(flight in routes.values() for flight in near)
+        return maximize_all(
+            kin,
+            field,
+            near,
+            tolerance=options.tolerance,
+            max_iterations=options.max_iterations,
+            opening=FAR if begun_afresh else NEAR,
         )
-        spread[name] = _counted(field, wanted, found.trajectory.w)
-        if best is None or found.value > best.value:
-            best = found
-        history.append(_counted(field, wanted, best.trajectory.w))
-    assert best is not None
-    # in the plan's order; a coarse copy may promise a little too much
-    most = max(spread[name] for name in routes)
-    order = dict.fromkeys((*options.starts, *routes))
-    spread = {name: min(spread[name], most) for name in order if name in spread}
-    tell(len(spread) + 1, "the best start", max(history))
-    final = maximize(
-        kin,
-        field,
-        best.trajectory,
-        tolerance=options.tolerance,
-        max_iterations=options.max_iterations,
-    )
-    final = _polished(problem, wanted, field, final)
+
+    ends = finished([rough.flights[name] for name in rough.hopeful])
+    spread = dict(zip(routes, counted[len(routes) :], strict=True))
+    if not wanted.gaussian:
+        spread |= {name: end.value for name, end in zip(rough.hopeful, ends, strict=True)}
+    if worth.max() > max(end.value for end in ends):
+        ends += finished([flights[int(worth.argmax())]])
+    final = _polished(problem, wanted, field, max(ends, key=lambda end: end.value))
     return _solution(problem, wanted, field, final, history, spread)
 
 
@@ -118,7 +111,7 @@ def _polished(problem: Problem, wanted: Design, field: RateField, found: Optimum
 
     With the precoders held, the rates are exact, and whatever they gain the best ones gain too.
     """
-    if not any(isinstance(rate, ModeRate) and not rate.table.exact for rate in field.rates):
+    if not any(isinstance(rate, ModeRate) and not rate.exact for rate in field.rates):
         return found
     w = found.trajectory.w
     held = []
@@ -135,10 +128,8 @@ def _polished(problem: Problem, wanted: Design, field: RateField, found: Optimum
     return replace(found, trajectory=polished.trajectory, value=polished.value)
 
 
-def _counted(field: RateField, wanted: Design, w: Real) -> float:
-    """R_avg of (9) at positions w: by the field, or, if that is for Gaussian inputs, priced."""
-    if not wanted.gaussian:
-        return float(field.value(w).mean(axis=1).min())
+def _priced(wanted: Design, field: RateField, w: Real) -> float:
+    """R_avg of (9) at positions w with precoders that are made for Gaussian inputs."""
     means = []
     for link in field.links:
         H_r = link.small_scale(w)
@@ -192,11 +183,12 @@ def _solution(
 
 def _precoders(link: Link, rate: PlaceRate, wanted: Design, w: Real, H: Complex) -> Complex:
     """The precoders at the final positions, from the best start that is known for them."""
-    at = coordinates(link, w)
+    where = place(link, w.T)
+    at = where.gain_log, where.cosine
     if isinstance(rate, CurveRate) and wanted.optimal:
         return wanted.precoders(link, H, start=rate.start(*at))
     found = wanted.precoders(link, H)
-    if not isinstance(rate, BestRate | ModeRate):
+    if not isinstance(rate, BestRate | ModeRate) or rate.exact:
         return found
     carried = wanted.precoders(link, H, start=rate.start(*at))
     better = wanted.rate(link, H, carried) > wanted.rate(link, H, found)

@@ -5,6 +5,7 @@ the last one is flown too. a(N+1) moves nothing and is zero.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from faao_mav.arrays import Real
 from faao_mav.plan import Plan
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """Positions w (m), velocities v (m/s) and accelerations a (m/s²), each (N + 2, 2)."""
 
@@ -73,16 +74,57 @@ class Kinematics:
         """
         dt, steps = self.time_step, self.slots - 1
         a = acceleration[:-1].copy()
-        to_position = dt**2 * (steps - np.arange(steps) - 0.5)
-        rows, missing = [to_position], [self.end - self.start - steps * dt * start_velocity]
+        missing = [self.end - self.start - steps * dt * start_velocity]
         if self.end_velocity is not None:
-            rows.append(np.full(steps, dt))
             missing.append(self.end_velocity - start_velocity)
-        effect = np.array(rows)
-        a += np.linalg.pinv(effect) @ (np.array(missing) - effect @ a)
+        effect, cure = _effect(steps, dt, len(missing))
+        a += cure @ (np.array(missing) - effect @ a)
         v = start_velocity + dt * np.vstack([np.zeros(2), np.cumsum(a, axis=0)])
         w = self.start + dt * np.vstack([np.zeros(2), np.cumsum((v[:-1] + v[1:]) / 2, axis=0)])
         return Trajectory(w, v, np.vstack([a, np.zeros(2)]))
+
+
+@lru_cache(maxsize=16)
+def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
+    """What accelerations do to the last position (and velocity), and its pseudo-inverse."""
+    to_position = dt**2 * (steps - np.arange(steps) - 0.5)
+    effect = np.stack([to_position, np.full(steps, dt)])[:ends]
+    return effect, np.linalg.pinv(effect)
+
+
+def followed(kin: Kinematics, v: Real) -> Trajectory:
+    """Return the flight at the speeds v (n, 2), changed a little where the ends ask for it."""
+    return kin.integrate(v[0], np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)]))
+
+
+def settled(kin: Kinematics, start: Trajectory, v: Real) -> Trajectory:
+    """Return the flight at the speeds v (n, 2), drawn towards `start` until it keeps the limits."""
+    found, allowed = followed(kin, v), max(1e-9, _excess(kin, start))
+    for share in (0.0, *10.0 ** np.arange(-9, 0)):
+        flight = Trajectory(
+            *(
+                (1 - share) * own + share * other
+                for own, other in (
+                    (found.w, start.w),
+                    (found.v, start.v),
+                    (found.a, start.a),
+                )
+            )
+        )
+        if _excess(kin, flight) <= allowed:
+            return flight
+    return start
+
+
+def _excess(kin: Kinematics, flight: Trajectory) -> float:
+    """Return the largest violation of a limit, relative to it."""
+    found = kin.residuals(flight)
+    slow = found.get("minimum speed", 0.0)
+    return max(
+        found["(13e) speed"] / kin.max_speed,
+        found["(13f) acceleration"] / kin.max_acceleration,
+        slow / kin.min_speed if slow else 0.0,
+    )
 
 
 def kinematics(plan: Plan) -> Kinematics:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.faao.place import Partials
+from faao_mav.faao.bicubic import Bicubic, Rows
+from faao_mav.faao.place import Partials, Turning
 from faao_mav.faao.problem import Link
 from faao_mav.radio.best_precoder import best_precoders
 
@@ -34,7 +35,7 @@ class Table:
     closed form, so that only the spline errs.
     """
 
-    spline: Any
+    spline: Bicubic
     gains: Real
     ratios: Real
     Q: Complex
@@ -47,33 +48,33 @@ class ModeRate:
 
     link: Link
     table: Table
+    fixed: tuple[Real, Rows] | None
+    """What `_modes` finds, as the table is asked, for links on which it is the same everywhere."""
+
+    @property
+    def exact(self) -> bool:
+        """Whether the best precoders are known in closed form."""
+        return self.table.exact
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
-        """Return the rate of every slot, bits (n,)."""
-        strength, ratio = _modes(self.link, cosine)
-        return np.asarray(self.table.spline(gain_log + strength, ratio, grid=False))
+        """Return the rate of every slot, bits (..., n)."""
+        strength, rows = self.fixed or _asked(self.table, *_modes(self.link, cosine))
+        return self.table.spline.value(gain_log + strength, rows)
 
     def partials(self, gain_log: Real, cosine: Real) -> Partials:
         """Return the rate and its derivatives by l and u."""
-        strength, ratio = _modes(self.link, cosine)
-        a = gain_log + strength
-        orders = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-        value, by_a, by_k, by_aa, by_ak, by_kk = (
-            np.asarray(self.table.spline(a, ratio, dx=i, dy=j, grid=False)) for i, j in orders
-        )
-        zero = np.zeros_like(value)
-        if not self.link.follows_position:
-            return Partials(value, by_a, zero, by_aa, zero, zero)
-        up, down = _modes(self.link, cosine + _STEP), _modes(self.link, cosine - _STEP)
+        if self.fixed:
+            strength, rows = self.fixed
+            return Partials(*self.table.spline.by_x(gain_log + strength, rows))
+        here, up, down = (_modes(self.link, cosine + h) for h in (0, _STEP, -_STEP))
         a_u, k_u = ((x - y) / (2 * _STEP) for x, y in zip(up, down, strict=True))
-        a_uu, k_uu = (
-            (x - 2 * m + y) / _STEP**2 for x, m, y in zip(up, (strength, ratio), down, strict=True)
+        a_uu, k_uu = ((x - 2 * m + y) / _STEP**2 for x, m, y in zip(up, here, down, strict=True))
+        strength, rows = _asked(self.table, *here)
+        value, by_a, by_k, by_aa, by_ak, by_kk = self.table.spline.by_both(
+            gain_log + strength, rows
         )
-        return Partials(
-            value=value,
-            by_l=by_a,
+        turning = Turning(
             by_u=by_a * a_u + by_k * k_u,
-            by_ll=by_aa,
             by_lu=by_aa * a_u + by_ak * k_u,
             by_uu=by_aa * a_u**2
             + 2 * by_ak * a_u * k_u
@@ -81,6 +82,7 @@ class ModeRate:
             + by_a * a_uu
             + by_k * k_uu,
         )
+        return Partials(value, by_a, by_aa, turning)
 
     def start(self, gain_log: Real, cosine: Real) -> Complex:
         """Return nearly the best precoders (n, N_t, N_t): the grid's, in each slot's own basis."""
@@ -106,14 +108,19 @@ def mode_rate(link: Link, least: float, most: float) -> ModeRate:
     high = most + max(s.max() for s in strengths) + 0.1
     snapped = (math.floor(low / _SNAP) * _SNAP, math.ceil(high / _SNAP) * _SNAP)
     modes = min(2, link.receive, link.transmit)
-    return ModeRate(link, _table(link.modulation, link.transmit, modes, *snapped))
+    table = _table(link.modulation, link.transmit, modes, *snapped)
+    if link.follows_position:
+        return ModeRate(link, table, None)
+    return ModeRate(link, table, _asked(table, *_modes(link, np.zeros(slots))))
+
+
+def _asked(table: Table, strength: Real, ratio: Real) -> tuple[Real, Rows]:
+    return strength, table.spline.rows(ratio)
 
 
 @lru_cache(maxsize=8)
 def _table(modulation: str, antennas: int, modes: int, low: int, high: int) -> Table:
     """Search the grid: every point is reached from the searched points around it, the best kept."""
-    from scipy.interpolate import RectBivariateSpline
-
     gains = np.linspace(low, high, round((high - low) / _SPACING) + 1)
     ratios = np.linspace(0, 1, _RATIOS)
     H = np.zeros((len(gains), len(ratios), modes, antennas), dtype=np.complex128)
@@ -121,7 +128,7 @@ def _table(modulation: str, antennas: int, modes: int, low: int, high: int) -> T
     if modes == 2:
         H[..., 1, 1] = np.exp(gains / 2)[:, None] * ratios
     rate, Q, exact = _search(modulation, H)
-    return Table(RectBivariateSpline(gains, ratios, rate), gains, ratios, Q, exact)
+    return Table(Bicubic.through(gains, ratios, rate), gains, ratios, Q, exact)
 
 
 def _search(modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
@@ -145,7 +152,7 @@ def _search(modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
 
 
 def _modes(link: Link, cosine: Real) -> tuple[Real, Real]:
-    """Return ln(W lambda_1² / sigma²) and kappa of H_r (n,) at direction cosines u (n,)."""
+    """Return ln(W lambda_1² / sigma²) and kappa of H_r (..., n) at direction cosines u (..., n)."""
     snr = math.log(link.power / link.noise)
     H_r = link.fade(link.line_of_sight_at(cosine))
     if H_r.shape[-2] > H_r.shape[-1]:

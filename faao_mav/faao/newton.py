@@ -11,132 +11,28 @@ with + for new multipliers, H = -sum_j weights_j Hessian(F_j), G the gradients o
 scaling of `cones`, c the share of the barrier that keeps t below the F_j, and
 D v = (v, k (v_{n+1} - v_n)) what the limits bound. A least speed adds to D the half-planes of
 `slow`, whose own curvature is left out.
+
+Several flights take their steps side by side, each its own: see `iterate`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.faao import cones
-from faao_mav.faao.banded import SIZE, Factors, FlightMatrix, Q, V, W, Y
-from faao_mav.faao.kinematics import Kinematics
-from faao_mav.faao.rewards import LENGTH
-from faao_mav.faao.slow import Slow
+from faao_mav.faao.banded import SIZE, Factors, Q, V, W, Y
+from faao_mav.faao.iterate import NONE, FlightScale, Point, Step
 
-_UNBOUNDED = 1e20
-
-
-def best_floor(total: Real, weight: float) -> float:
-    """Return the t that maximises t + `weight` sum_j log(total_j - t)."""
-    least = float(total.min())
-    # the gradient rises along t and is <= 0 here: Newton's method on it meets no pole below
-    floor: float = least - weight * total.shape[0]
-    for _ in range(50):
-        apart = total - floor
-        excess = weight * float((1 / apart).sum()) - 1
-        step = excess / (weight * float((1 / apart**2).sum()))
-        if abs(excess) < 1e-12 or floor - step == floor:
-            break
-        floor = floor - step if floor - step < least else (floor + least) / 2
-    return floor
-
-
-class FlightScale:
-    """The flight in solver units: what the limits bound as a linear map of the speeds."""
-
-    def __init__(self, kin: Kinematics) -> None:
-        self.matrix = FlightMatrix(
-            kin.slots,
-            kin.max_speed * kin.time_step / LENGTH / 2,
-            (kin.start_velocity is not None, kin.end_velocity is not None),
-        )
-        self.gain = kin.max_speed / (kin.max_acceleration * kin.time_step)
-        self.bounded = np.ones((kin.slots - 1, 1))
-        self.bounded[: kin.first_bounded_acceleration] = 0
-
-    def limited(self, v: Real) -> Real:
-        """Return the free speeds and the bounded accelerations of v (n, 2), (2, 2 n - 1)."""
-        a = self.gain * (v[1:] - v[:-1]) * self.bounded
-        return np.concatenate([(v * self.matrix.moves_v).T, a.T], axis=1)
-
-    def spread(self, forces: Real) -> Real:
-        """Return the transpose of `limited` applied to (2, 2 n - 1), (n, 2)."""
-        n = self.matrix.slots
-        on_v = forces[:, :n].T.copy()
-        on_a = self.gain * self.bounded * forces[:, n:].T
-        on_v[1:] += on_a
-        on_v[:-1] -= on_a
-        return on_v * self.matrix.moves_v
-
-
-@dataclass(frozen=True, slots=True)
-class Point:
-    """An iterate. margin (m,) = s_0 - 1: how far the limits are still widened."""
-
-    w: Real
-    v: Real
-    y: Real
-    s: Real
-    z: Real
-    margin: Real
-    slow: Slow
-    weights: Real
-    total: Real
-    floor: float
-    gradient: Real
-    hessian: Real
-
-    def gap(self) -> float:
-        """Return the mean of s^T z over the cones."""
-        slow = self.slow
-        both = (self.s * self.z).sum() + (slow.s * slow.z).sum()
-        return float(both / (self.s.shape[1] + slow.on.sum()))
-
-    def centred(self, mu: float, share: float) -> "Point":
-        """Return the same flight with z = mu s^-1."""
-        return replace(
-            self,
-            z=mu * cones.inverse(self.s),
-            slow=self.slow.centred(mu),
-            floor=best_floor(self.total, share * mu),
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """A direction; dtotal (J,) is the first-order change of the F_j, rise that of t.
-
-    `slow` has the changes of s and z of `Slow`.
-    """
-
-    dw: Real
-    dv: Real
-    dy: Real
-    ds: Real
-    dz: Real
-    slow: tuple[Real, Real]
-    dweights: Real
-    dtotal: Real
-    rise: float
-
-    def reach(self, point: Point) -> float:
-        """Return the share of the step at which a slack or a multiplier vanishes."""
-        falls = float((-self.dweights / point.weights).max())
-        return min(
-            cones.reach(point.s, self.ds),
-            cones.reach(point.z, self.dz),
-            point.slow.reach(*self.slow),
-            1 / falls if falls > 0 else np.inf,
-        )
+_TINY = float(np.finfo(float).tiny)
+_UNBOUNDED = np.array([1e20, 0.0, 1e20])[:, None, None]
 
 
 @dataclass(frozen=True, slots=True)
 class Newton:
-    """The factored system at a point; `curvature` (n, 3) is H with its proximal term.
+    """The factored system at a point; `curvature` (3, flights, n) is H with its proximal term.
 
-    `columns` are the solutions for the gradients of F_j, for mu = 0 without correction, and for
-    mu s^-1 with mu = 1: a step without correction is a combination of them.
+    `columns` are the solutions for the gradients of F_j, and for mu = 0 without correction.
     """
 
     scale: FlightScale
@@ -145,7 +41,6 @@ class Newton:
     scaling: cones.Scaling
     curvature: Real
     give: Real
-    at_v: Real
     factors: Factors
     columns: Real
     border: Real
@@ -158,129 +53,135 @@ class Newton:
         scaling: cones.Scaling,
         *,
         share: float,
-        proximal: float,
-        exact: bool,
-    ) -> "Newton | None":
-        """Factor the system with H as it is, if `exact`, else with its negative part cut.
+        proximal: Real,
+        cut: Flags,
+    ) -> "Newton":
+        """Factor the system, with the negative part of H cut where `cut` (flights, 1)."""
+        n, (links, flights) = scale.matrix.slots, point.total.shape[:2]
+        give = np.empty((3, flights, n))  # the last slot has none
+        give[..., :-1] = scaling.give()[..., n:] / scale.gain**2
+        if not scale.gains.all():
+            give[..., :-1] = np.where(scale.gains > 0, give[..., :-1], _UNBOUNDED)
+        curvature = -np.einsum("jb,cjbn->cbn", point.weights[..., 0], point.hessian)
+        if cut.any():
+            curvature = np.where(cut, _convex(curvature), curvature)
+        curvature[::2] += proximal
+        at_v, forces, push = scaling.curvature[..., :n], scaling.lean() * point.margin, NONE
+        if point.slow is not None:
+            at_v, push = at_v + point.slow.stiffness(), point.slow.push(0.0, 0.0)
+        factors = scale.matrix.factor(curvature, at_v, give)
 
-        None if the matrix is singular, or if `exact` and it is not that of a minimum.
-        """
-        give = scaling.give[scale.matrix.slots :] / scale.gain**2
-        if not scale.bounded.all():
-            give = np.where(scale.bounded > 0, give, np.array([_UNBOUNDED, 0, _UNBOUNDED]))
-        curvature = -np.tensordot(point.weights, point.hessian, 1)
-        if not exact:
-            curvature = _convex(curvature)
-        curvature[:, [0, 2]] += proximal
-        n, links = scale.matrix.slots, point.total.shape[0]
-        at_v = point.slow.stiffness()
-        factors = scale.matrix.factor(curvature, scaling.curvature[:n] + at_v, give)
-        if factors is None:
-            return None
-        right = np.zeros((links + 2, n, SIZE))
-        right[:links, :, W] = point.gradient
-        _load(right[links], scale, give, scaling.lean * point.margin)
-        right[links, :-1, Y] = -scale.matrix.dynamics(point.w, point.v)
-        _load(right[-1], scale, give, cones.inverse(point.s)[1:])
-        slow, none = point.slow, np.zeros(n)
-        right[links, :, V] += slow.u * slow.raised(-slow.margin, 0.0, none)[:, None]
-        right[-1, :, V] += slow.u * (slow.on / slow.s)[:, None]
+        right = np.zeros((links + 1, flights, n, SIZE))
+        right[:links, ..., W] = point.gradient.transpose(1, 2, 3, 0)
+        _load(right[links], scale, give, forces, push)
+        ahead = scale.matrix.dynamics(point.w, point.v)
+        np.negative(ahead.transpose(1, 2, 0), out=right[links, :, :-1, Y])
         columns = factors.solve(right)
-        flat = point.gradient.reshape(links, -1)
-        border = flat @ columns[:links, :, W].reshape(links, -1).T
-        border[np.diag_indices(links)] += (point.total - point.floor) / point.weights
-        newton = cls(scale, point, share, scaling, curvature, give, at_v, factors, columns, border)
-        return newton if not exact or newton.convex() else None
 
-    def convex(self) -> bool:
-        """Tell whether the system looks like one of a minimum: two necessary signs."""
-        if not np.isfinite(self.border).all():
-            return False
-        if np.linalg.eigvalsh((self.border + self.border.T) / 2)[0] <= 0:
-            return False
-        step = self.step(self.point.gap())
-        size = float((step.dw * step.dw).sum() + (step.dv * step.dv).sum())
-        return self.decrease(step) > 1e-8 * size
+        border = np.einsum("cibn,jbnc->bij", point.gradient, columns[:links, ..., W])
+        room = (point.total - point.floor) / point.weights
+        border[:, range(links), range(links)] += room[..., 0].T
+        return cls(scale, point, share, scaling, curvature, give, factors, columns, border)
 
-    def step(self, mu: float, correction: Real | None = None, of_slow: Real | float = 0.0) -> Step:
-        """Solve for `mu`, less the second-order `correction` (3, m), `of_slow` (n,)."""
+    def convex(self, step: Step) -> Flags:
+        """Tell whether the systems look like those of minima, by two signs, (flights, 1)."""
+        both = self.border + np.swapaxes(self.border, 1, 2)
+        both = np.where(np.isfinite(both).all(axis=(1, 2), keepdims=True), both, 0.0)
+        size = sum(np.einsum("cbn,cbn->b", x, x) for x in (step.dw, step.dv))
+        falls = self.decrease(step) > 1e-8 * size[:, None]
+        return np.asarray((np.linalg.eigvalsh(both)[:, :1] > 0) & falls)
+
+    def step(self, mu: Real, correction: Real | None = None, of_slow: Real = NONE) -> Step:
+        """Solve for `mu` (flights, 1), less the second-order `correction` (3, flights, m).
+
+        `of_slow` (flights, n) is that of `Slow`. Without a correction mu must be zero.
+        """
         point, scaling, scale, slow = self.point, self.scaling, self.scale, self.point.slow
-        n, links = scale.matrix.slots, point.total.shape[0]
-        alone = self.columns[links] + mu * self.columns[-1]
-        target = mu * cones.inverse(point.s)
+        n, (links, flights) = scale.matrix.slots, point.total.shape[:2]
+        alone, target = self.columns[links], None
         if correction is not None:
-            right = np.zeros((1, n, SIZE))
-            _load(right[0], scale, self.give, -correction[1:])
-            right[0, :, V] -= slow.u * np.asarray(of_slow / slow.s)[:, None]
-            alone += self.factors.solve(right)[0]
-            target -= correction
-        ds_0 = -point.margin
+            target = mu * cones.inverse(point.s) - correction
+            right, push = np.zeros((1, flights, n, SIZE)), NONE
+            if slow is not None:
+                push = slow.push(mu, of_slow) - slow.push(0.0, 0.0)
+            _load(right[0], scale, self.give, target[1:], push)
+            alone = alone + self.factors.solve(right)[0]
 
-        flat = point.gradient.reshape(links, -1)
-        system = np.ones((links + 1, links + 1))
-        system[:links, :links] = self.border
-        system[:links, links], system[links, links] = -1, 0
-        wanted = np.ones(links + 1)
-        wanted[:links] = mu * self.share / point.weights - flat @ alone[:, W].ravel()
-        solved = np.linalg.solve(system, wanted)
-        weights, rise = solved[:links], float(solved[links])
-        found = alone + np.tensordot(weights, self.columns[:links], 1)
+        # G dw - dt + (F - t) weights+ / weights = mu c / weights, and the weights sum to one
+        system = np.ones((flights, links + 1, links + 1))
+        system[:, :links, :links] = self.border
+        system[:, :links, links], system[:, links, links] = -1, 0
+        wanted = np.ones((flights, links + 1, 1))
+        known = np.einsum("cjbn,bnc->bj", point.gradient, alone[..., W])
+        wanted[:, :links, 0] = (mu * self.share / point.weights)[..., 0].T - known
+        solved = np.linalg.solve(system, wanted).transpose(1, 0, 2)
+        weights, rise = solved[:links], solved[links]
+        found = alone + np.einsum("jb,jbnk->bnk", weights[..., 0], self.columns[:links])
 
-        dw, dv, y = found[:, W], found[:, V], found[:-1, Y]
-        ds = np.vstack([ds_0, scale.limited(dv)])
-        slope = slow.slope(dv)
-        raised = slow.raised(slope, mu, of_slow * np.ones(n))
-        z = np.zeros_like(point.z)
-        z[1:, n:] = (-found[:-1, Q] / scale.gain * scale.bounded).T
+        dw, dv, q, y = (found[..., part].transpose(2, 0, 1) for part in (W, V, Q, Y))
+        q, y = q[..., :-1], y[..., :-1]
+        moves = np.empty_like(point.pair)
+        z = moves[:, 1]
+        scale.enter(moves[:, 0], -point.margin, dv)
+        z[1:, :, n:] = q * scale.per_gain
         # the multipliers of the speeds from stationarity, not from W^-2 ds: that keeps its digits
-        pushed = slow.u * raised[:, None]
-        z[1:, :n] = (scale.matrix.pull(y)[1] - scale.spread(z[1:]) - pushed).T
-        z[0] = scaling.radial(target, ds_0, z[1:])
+        z[1:, :, :n] = scale.left_over(y, z[1:, :, n:])
+        of_least = NONE, NONE
+        if slow is not None:
+            slope = slow.slope(dv)
+            raised = slow.raised(slope, mu, of_slow)
+            z[1:, :, :n] -= slow.u * raised
+            of_least = slope, raised - slow.z
+        z[0] = scaling.radial(target, -point.margin, z[1:])
+        z -= point.z
         return Step(
             dw=dw,
             dv=dv,
             dy=y - point.y,
-            ds=ds,
-            dz=z - point.z,
-            slow=(slope, raised - slow.z),
+            moves=moves,
+            slow=of_least,
             dweights=weights - point.weights,
-            dtotal=flat @ dw.ravel(),
+            dtotal=np.einsum("cjbn,cbn->jb", point.gradient, dw)[..., None],
             rise=rise,
         )
 
-    def bend(self, step: Step) -> float:
-        """Return dw^T H dw."""
-        return float((step.dw * _times(self.curvature, step.dw)).sum())
+    def bend(self, step: Step) -> Real:
+        """Return dw^T H dw, (flights, 1)."""
+        return _quadratic(self.curvature, step.dw)
 
-    def decrease(self, step: Step) -> float:
-        """Return the curvature of the whole model along `step`."""
-        x, point = step.ds[1:].T, self.point
-        stiff = float((x * _times(self.scaling.curvature, x)).sum())
+    def decrease(self, step: Step) -> Real:
+        """Return the curvature of the whole model along `step`, (flights, 1)."""
+        point = self.point
         kink = point.weights / (point.total - point.floor) * (step.dtotal - step.rise) ** 2
-        stiff += float((step.dv * _times(self.at_v, step.dv)).sum())
-        return self.bend(step) + stiff + float(kink.sum())
+        found = self.bend(step) + _quadratic(self.scaling.curvature, step.ds[1:]) + kink.sum(axis=0)
+        if point.slow is not None:
+            found += _quadratic(point.slow.stiffness(), step.dv)
+        return np.asarray(found)
 
 
-def _load(right: Real, scale: FlightScale, give: Real, forces: Real) -> None:
-    """Enter forces (2, 2 n - 1) on what the limits bound into a right-hand side (n, 8)."""
+def _load(right: Real, scale: FlightScale, give: Real, forces: Real, push: Real) -> None:
+    """Enter forces (2, flights, 2 n - 1) on what the limits bound, and a `push` on the speeds."""
     n = scale.matrix.slots
-    right[:, V] = forces[:, :n].T * scale.matrix.moves_v
-    right[:-1, Q] = scale.gain * _times(give, forces[:, n:].T * scale.bounded) * scale.bounded
+    x, y = scale.gains * forces[..., n:]
+    xx, xy, yy = give[..., :-1]
+    right[..., V] = (forces[..., :n] * scale.matrix.moves_v + push).transpose(1, 2, 0)
+    right[:, :-1, Q.start] = xx * x + xy * y
+    right[:, :-1, Q.start + 1] = xy * x + yy * y
 
 
-def _times(packed: Real, x: Real) -> Real:
-    """Return the product of symmetric matrices (n, 3) and vectors (n, 2), (n, 2)."""
-    xx, xy, yy = packed.T
-    return np.stack([xx * x[:, 0] + xy * x[:, 1], xy * x[:, 0] + yy * x[:, 1]], axis=1)
+def _quadratic(packed: Real, x: Real) -> Real:
+    """Return sum_n x_n^T M_n x_n, (flights, 1), of M (3, flights, n) and x (2, flights, n)."""
+    xx, xy, yy = packed
+    east, north = x
+    each = xx * east * east + 2 * xy * east * north + yy * north * north
+    return np.asarray(each.sum(axis=-1, keepdims=True))
 
 
 def _convex(packed: Real) -> Real:
-    """Return the nearest positive semidefinite matrices, (n, 3)."""
-    xx, xy, yy = packed.T
+    """Return the nearest positive semidefinite matrices, (3, flights, n)."""
+    xx, xy, yy = packed
     middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     low = np.minimum(middle - radius, 0)
     # with eigenvalues low < 0 <= high: high (M - low I) / (high - low); with both < 0: zero
-    share = np.where(
-        low < 0, np.maximum(middle + radius, 0) / np.maximum(2 * radius, np.finfo(float).tiny), 1
-    )
-    return np.stack([share * (xx - low), share * xy, share * (yy - low)], axis=1)
+    share = np.where(low < 0, np.maximum(middle + radius, 0) / np.maximum(2 * radius, _TINY), 1)
+    return np.stack([share * (xx - low), share * xy, share * (yy - low)])

@@ -85,12 +85,12 @@ class Link:
         return self.fade(self.line_of_sight_at(away[:, 0] / d))
 
     def line_of_sight_at(self, cosine: Real) -> Complex:
-        """Return H^LoS (n, N_r, N_t) at direction cosines u = (x - x_j) / d (n,)."""
+        """Return H^LoS (..., N_r, N_t) at direction cosines u = (x - x_j) / d (...)."""
         if not self.follows_position:
             ones = line_of_sight_all_ones(self.receive, self.transmit)
-            return np.broadcast_to(ones, (len(cosine), *ones.shape))
+            return np.broadcast_to(ones, (*cosine.shape, *ones.shape))
         across = np.sqrt(np.maximum(0.0, 1 - cosine**2))
-        outward = np.column_stack([cosine, across, np.zeros_like(cosine)])
+        outward = np.stack([cosine, across, np.zeros_like(cosine)], axis=-1)
         wave = outward if self.to_relay else -outward
         return line_of_sight_ula(wave, self.receive, self.transmit)
 

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.faao.bicubic import Bicubic
 from faao_mav.faao.design import Design
 from faao_mav.faao.mode_rate import has_few_modes, mode_rate
-from faao_mav.faao.place import Partials, PlaceRate
+from faao_mav.faao.place import Partials, PlaceRate, Turning
 from faao_mav.faao.problem import Link
 from faao_mav.faao.slot_rate import BestRate, DifferencedRate
 
@@ -38,14 +39,13 @@ class CurveRate:
     precoders: Complex
 
     def value(self, gain_log: Real, cosine: Real) -> Real:  # noqa: ARG002
-        """Return the rate of every slot, bits (n,)."""
+        """Return the rate of every slot, bits (..., n)."""
         return np.asarray(self.spline(gain_log))
 
     def partials(self, gain_log: Real, cosine: Real) -> Partials:  # noqa: ARG002
         """Return the rate and its derivatives by l."""
         value, by_l, by_ll = (np.asarray(self.spline(gain_log, k)) for k in range(3))
-        zero = np.zeros_like(value)
-        return Partials(value, by_l, zero, by_ll, zero, zero)
+        return Partials(value, by_l, by_ll)
 
     def start(self, gain_log: Real, cosine: Real) -> Complex:
         """Return nearly the best precoders ((S,) n, N_t, N_t): the grid's, turned to u."""
@@ -60,16 +60,18 @@ class CurveRate:
 class SurfaceRate:
     """A rate that depends on l and u: a bicubic spline through exact values."""
 
-    spline: Any
+    spline: Bicubic
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
-        """Return the rate of every slot, bits (n,)."""
-        return np.asarray(self.spline(gain_log, cosine, grid=False))
+        """Return the rate of every slot, bits (..., n)."""
+        return self.spline.value(gain_log, self.spline.rows(cosine))
 
     def partials(self, gain_log: Real, cosine: Real) -> Partials:
         """Return the rate and its derivatives by l and u."""
-        orders = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-        return Partials(*(self.spline(gain_log, cosine, dx=i, dy=j, grid=False) for i, j in orders))
+        value, by_l, by_u, by_ll, by_lu, by_uu = self.spline.by_both(
+            gain_log, self.spline.rows(cosine)
+        )
+        return Partials(value, by_l, by_ll, Turning(by_u, by_lu, by_uu))
 
 
 def rate_model(link: Link, design: Design, farthest: float) -> PlaceRate:
@@ -126,14 +128,12 @@ def _grid(least: float, most: float, points: int) -> Real:
 
 
 def _surface(link: Link, design: Design, least: float, most: float) -> SurfaceRate:
-    from scipy.interpolate import RectBivariateSpline
-
     gain_log = _grid(least, most, _SURFACE_POINTS[0])
     cosine = np.linspace(-1, 1, _SURFACE_POINTS[1])
     H_r = link.fade(link.line_of_sight_at(np.tile(cosine, len(gain_log))))
     H = np.exp(np.repeat(gain_log, len(cosine)) / 2)[:, None, None] * H_r
     rate = _rate(link, design, H).reshape(len(gain_log), len(cosine))
-    return SurfaceRate(RectBivariateSpline(gain_log, cosine, rate))
+    return SurfaceRate(Bicubic.through(gain_log, cosine, rate))
 
 
 def _rate(link: Link, design: Design, H: Complex) -> Real:

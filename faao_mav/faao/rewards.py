@@ -5,17 +5,21 @@ from typing import Protocol
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 
 LENGTH = 100.0
 """Unit of length inside the solver, m."""
 
 _FLAT = 1e-9  # a gain per 100 m, relative to the reward, that is not worth a detour
+_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, slots=True)
 class StageValues:
-    """f, its gradient (1/m) and its Hessian (1/m^2): (J, n), (J, n, 2), (J, n, 2, 2)."""
+    """f, its gradient (1/m) and its Hessian (1/m^2) as xx, xy, yy.
+
+    (J, ..., n), (2, J, ..., n) and (3, J, ..., n).
+    """
 
     value: Real
     gradient: Real
@@ -26,40 +30,46 @@ class Stage(Protocol):
     """The rewards f_jn of being at w_n, n = 0 .. N+1."""
 
     def __call__(self, w: Real, /) -> StageValues:
-        """Return the rewards at w (n, 2), m; not-a-number where there is none."""
+        """Return the rewards at w (2, ..., n), m; not-a-number where there is none."""
         ...
 
 
 class ScaledRewards:
-    """The F_j in solver units, relative to the start so that small gains keep their digits."""
+    """The F_j of some flights in solver units, relative to their starts: small gains keep digits.
+
+    `first` (J, flights, 1) are the F_j of the starts, in the unit of the rewards.
+    """
 
     def __init__(self, stage: Stage, w: Real) -> None:
-        self.stage = stage
-        values = stage(w)
-        self.base = values.value
-        self.first = self.base.mean(axis=1)
-        steepest = np.abs(values.gradient).max(axis=(1, 2)) * LENGTH
-        above = self.first - self.first.min()
+        """Take the starts w (2, flights, n), m."""
+        self.stage, self.values = stage, stage(w)
+        self.base = self.values.value
+        self.first = self.base.mean(axis=-1, keepdims=True)
+        steepest = np.abs(self.values.gradient).max(axis=(0, -1))[..., None] * LENGTH
+        above = self.first - self.first.min(axis=0)
         # an F_j far above the least one has no say in the unit
-        near = steepest / np.maximum(steepest + above, np.finfo(float).tiny)
-        self.unit = float((near * steepest).max())
-        self.flat = not self.unit > _FLAT * float(np.abs(self.first).max())
-        if not self.flat:
-            self.offset = above * w.shape[0] / self.unit
-            rounding = 2 * np.finfo(float).eps * float(np.abs(self.base).sum(axis=1).max())
-            self.noise = 1e-9 + rounding / self.unit
-            self.at_start = self.scaled(values)
+        near = steepest / np.maximum(steepest + above, _TINY)
+        unit = (near * steepest).max(axis=0)
+        self.flat: Flags = ~(unit > _FLAT * np.abs(self.first).max(axis=0))
+        self.unit = np.where(self.flat, 1.0, unit)
+        self.offset = above * w.shape[-1] / self.unit
+        rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1, keepdims=True)
+        self.noise = 1e-9 + rounding.max(axis=0) / self.unit
+
+    def keep(self, flights: Flags) -> None:
+        """Forget all flights but these."""
+        self.base, self.offset = self.base[:, flights], self.offset[:, flights]
+        self.unit, self.noise = self.unit[flights], self.noise[flights]
 
     def __call__(self, w: Real) -> tuple[Real, Real, Real]:
-        """Return the F_j (J,), their gradients (J, n, 2) and Hessians (J, n, 3) at scaled w."""
+        """Return the F_j (J, flights, 1), their gradients and Hessians at scaled w."""
         return self.scaled(self.stage(w * LENGTH))
 
     def scaled(self, values: StageValues) -> tuple[Real, Real, Real]:
         """Return the same for `values`."""
-        total = (values.value - self.base).sum(axis=1) / self.unit + self.offset
-        packed = values.hessian.reshape(*values.hessian.shape[:2], 4)[:, :, [0, 1, 3]]
+        total = (values.value - self.base).sum(axis=-1, keepdims=True) / self.unit + self.offset
         return (
             total,
             values.gradient * (LENGTH / self.unit),
-            packed * (LENGTH**2 / self.unit),
+            values.hessian * (LENGTH**2 / self.unit),
         )

@@ -1,14 +1,14 @@
 """Flights to start from: straight, and by way of the stations."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.faao.cruise import cruise_by
-from faao_mav.faao.kinematics import Kinematics, Trajectory
-from faao_mav.faao.start import even_speed, farthest, straight_flight
+from faao_mav.faao.kinematics import Kinematics, Trajectory, followed
+from faao_mav.faao.start import even_speed, fewest_slots, straight_flight
 
 _BISECTIONS = 12
 _WORTHWHILE = 0.02
@@ -41,21 +41,21 @@ def _by_way_of(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
     """The flight that goes the largest possible share of the way to `stations`."""
     anchors = [_nearest_on_line(kin.start, kin.end, p) for p in stations]
 
-    def attempt(share: float) -> Trajectory | None:
-        return _visit(kin, [a + share * (p - a) for a, p in zip(anchors, stations, strict=True)])
+    def attempt(share: float) -> list[_Leg] | None:
+        stops = [a + share * (p - a) for a, p in zip(anchors, stations, strict=True)]
+        return _legs(kin, stops)
 
-    whole = attempt(1.0)
-    if whole is not None:
-        return whole
-    low, high, best = 0.0, 1.0, None
+    low, high, best = 0.0, 1.0, attempt(1.0)
+    if best is not None:
+        return _flown(kin, best)
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
-        flight = attempt(middle)
-        if flight is None:
+        legs = attempt(middle)
+        if legs is None:
             high = middle
         else:
-            low, best = middle, flight
-    return best if low >= _WORTHWHILE else None
+            low, best = middle, legs
+    return _flown(kin, best) if best is not None and low >= _WORTHWHILE else None
 
 
 def _nearest_on_line(a: Real, b: Real, p: Real) -> Real:
@@ -65,56 +65,55 @@ def _nearest_on_line(a: Real, b: Real, p: Real) -> Real:
     return np.asarray(a + share * line)
 
 
-def _visit(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
-    """Straight legs from stop to stop as fast as allowed, with equal hovers at the stops."""
+@dataclass(frozen=True, slots=True)
+class _Leg:
+    """A straight flight `distance` metres along `direction`, in the fewest slots it takes."""
+
+    kin: Kinematics
+    direction: Real
+    distance: float
+
+
+def _legs(kin: Kinematics, stops: list[Real]) -> list[_Leg] | None:
+    """The legs from stop to stop as fast as allowed; None if they take more than the time."""
     points = [kin.start, *stops, kin.end]
-    legs = []
+    legs, spare = [], kin.slots - 1
     for k in range(len(points) - 1):
-        last = k == len(points) - 2
-        legs.append(
-            replace(
-                kin,
-                start=points[k],
-                end=points[k + 1],
-                start_velocity=kin.start_velocity if k == 0 else np.zeros(2),
-                end_velocity=kin.end_velocity if last else np.zeros(2),
-                bound_first_acceleration=kin.bound_first_acceleration or k > 0,
-            )
+        first, last = k == 0, k == len(points) - 2
+        leg = replace(
+            kin,
+            start=points[k],
+            end=points[k + 1],
+            start_velocity=kin.start_velocity if first else np.zeros(2),
+            end_velocity=kin.end_velocity if last else np.zeros(2),
+            bound_first_acceleration=kin.bound_first_acceleration or not first,
         )
-    fitted = [_quickest(leg) for leg in legs]
-    if any(leg is None for leg in fitted):
-        return None
-    profiles = [leg for leg in fitted if leg is not None]
-    spare = kin.slots - 1 - sum(len(v) - 1 for v in profiles)
-    if spare < 0:
-        return None
-    hovers = np.full(len(stops), spare // len(stops))
-    hovers[: spare % len(stops)] += 1
-    parts = [profiles[0]]
-    for hover, profile in zip(hovers, profiles[1:], strict=True):
-        parts += [np.zeros((hover, 2)), profile[1:]]
-    v = np.vstack(parts)
-    a = np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)])
-    return kin.integrate(v[0], a)
-
-
-def _quickest(leg: Kinematics) -> Real | None:
-    """Velocities (m, 2) of the quickest straight flight of `leg`, at most its slots long."""
-    line = leg.end - leg.start
-    distance = float(np.linalg.norm(line))
-    direction = line / distance if distance else np.array([1.0, 0.0])
-    across = np.array([-direction[1], direction[0]])
-    for velocity in (leg.start_velocity, leg.end_velocity):
-        if velocity is not None and abs(velocity @ across) > 1e-12 * leg.max_speed:
+        line = leg.end - leg.start
+        distance = float(np.hypot(*line))
+        direction = line / distance if distance else np.array([1.0, 0.0])
+        across = np.array([-direction[1], direction[0]])
+        for velocity in (leg.start_velocity, leg.end_velocity):
+            if velocity is not None and abs(velocity @ across) > 1e-12 * leg.max_speed:
+                return None
+        slots = fewest_slots(leg, direction, distance)
+        if slots is None or slots - 1 > spare:
             return None
-    low, high = 1, leg.slots
-    if farthest(leg, direction) < distance:
-        return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        if farthest(replace(leg, slots=middle), direction) >= distance:
-            high = middle
-        else:
-            low = middle
-    speed = even_speed(replace(leg, slots=high), direction, distance)
-    return None if speed is None else speed[:, None] * direction
+        spare -= slots - 1
+        legs.append(_Leg(replace(leg, slots=slots), direction, distance))
+    return legs
+
+
+def _flown(kin: Kinematics, legs: list[_Leg]) -> Trajectory | None:
+    """The flight along `legs`, with equal hovers between them for the time that is left."""
+    parts = []
+    for leg in legs:
+        speed = even_speed(leg.kin, leg.direction, leg.distance)
+        if speed is None:
+            return None
+        parts.append(speed[:, None] * leg.direction)
+    stops = len(legs) - 1
+    spare = kin.slots - 1 - sum(len(v) - 1 for v in parts)
+    for k in range(stops):
+        hover = spare // stops + (k < spare % stops)
+        parts[k + 1] = np.vstack([np.zeros((hover, 2)), parts[k + 1][1:]])
+    return followed(kin, np.vstack(parts))

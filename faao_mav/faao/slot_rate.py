@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.faao.place import Partials
+from faao_mav.faao.place import Partials, Turning
 from faao_mav.faao.problem import Link
 from faao_mav.radio.best_precoder import best_precoders
 from faao_mav.radio.rate import cutoff_rate
@@ -22,22 +22,36 @@ class BestRate:
     a cautious model. Precoders are carried from call to call: each search starts from the last.
     """
 
+    exact = False
+    """They are found by a search."""
+
     def __init__(self, link: Link) -> None:
         self.link = link
         self._last: Complex | None = None
 
     def precoders(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return the best precoders (n, N_t, N_t) at l and u (n,)."""
-        H = channel(self.link, gain_log, cosine)
+        """Return the best precoders (..., n, N_t, N_t) at l and u (..., n)."""
         found = best_precoders(
-            H, self.link.power, self.link.modulation, self.link.noise, start=self._last
+            channel(self.link, gain_log, cosine),
+            self.link.power,
+            self.link.modulation,
+            self.link.noise,
+            start=self._near(gain_log.shape),
         )
         self._last = found.P
         return found.P
 
     def start(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return nearly the best precoders (n, N_t, N_t): those of the last call."""
-        return self.precoders(gain_log, cosine) if self._last is None else self._last
+        """Return nearly the best precoders (..., n, N_t, N_t): those of the last call."""
+        near = self._near(gain_log.shape)
+        return self.precoders(gain_log, cosine) if near is None else near
+
+    def _near(self, shape: tuple[int, ...]) -> Complex | None:
+        """Return the last precoders for slots of this shape; of other flights the first's."""
+        if self._last is None or self._last.shape[:-2] == shape:
+            return self._last
+        one = self._last.reshape(-1, *self._last.shape[-3:])[0]
+        return np.broadcast_to(one, (*shape, *one.shape[1:]))
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate of every slot, bits (n,)."""
@@ -77,30 +91,30 @@ class FixedRate:
         """
         link, classes = self.link, self.link.classes
         P, H_r, slope, bend = self._by_cosine(cosine)
-        Pu = np.sqrt(np.exp(gain_log) / (4 * link.noise))[:, None, None] * (P @ classes.vectors.T)
+        Pu = np.sqrt(np.exp(gain_log) / (4 * link.noise))[..., None, None] * (P @ classes.vectors.T)
         z = H_r @ Pu
         D = _inner(z, z)
         least = np.minimum(0.0, np.log(classes.symbols / classes.multiplicity).min())
         e = classes.multiplicity * np.exp(-D + least)
-        total = e.sum(axis=1) + classes.symbols * np.exp(least)
-        p = e / total[:, None]
-        value = cutoff_rate(np.exp(gain_log / 2)[:, None, None] * H_r, P, classes, link.noise)
+        total = e.sum(axis=-1) + classes.symbols * np.exp(least)
+        p = e / total[..., None]
+        value = cutoff_rate(np.exp(gain_log / 2)[..., None, None] * H_r, P, classes, link.noise)
 
         def mean(terms: Real) -> Real:
-            return np.asarray(np.sum(p * terms, axis=1))
+            return np.asarray(np.sum(p * terms, axis=-1))
 
         m_l = mean(D)
         by_ll = mean(D - D**2) + m_l**2
         if slope is None or bend is None:
-            zero = np.zeros_like(value)
-            return Partials(value, m_l / _LN2, zero, by_ll / _LN2, zero, zero)
+            return Partials(value, m_l / _LN2, by_ll / _LN2)
         dz = slope @ Pu
         D_u = 2 * _inner(z, dz)
         D_uu = 2 * (_inner(dz, dz) + _inner(z, bend @ Pu))
         m_u = mean(D_u)
         by_lu = mean(D_u - D * D_u) + m_l * m_u
         by_uu = mean(D_uu - D_u**2) + m_u**2
-        return Partials(value, *(x / _LN2 for x in (m_l, m_u, by_ll, by_lu, by_uu)))
+        turning = Turning(m_u / _LN2, by_lu / _LN2, by_uu / _LN2)
+        return Partials(value, m_l / _LN2, by_ll / _LN2, turning)
 
     def _by_cosine(self, cosine: Real) -> tuple[Complex, Complex, Complex | None, Complex | None]:
         """P, H_r and the first two derivatives of H_r by u, in the frame that P is fixed in.
@@ -117,7 +131,7 @@ class FixedRate:
         if not self.turning:
             turned = link.los_share * phase * los
             return self.P, link.fade(los), turned, phase * turned
-        Q = los[:, 0, :, None] * self.P
+        Q = los[..., 0, :, None] * self.P
         H_r = np.conj(los) * link.fade(los)
         turned = -phase * (H_r - link.los_share)
         return Q, H_r, turned, -phase * turned
@@ -147,20 +161,19 @@ class DifferencedRate:
         middle, up, down = at(0, 0), at(1, 0), at(-1, 0)
         by_l, by_ll = (up - down) / (2 * h), (up - 2 * middle + down) / h**2
         if not self.link.follows_position:
-            zero = np.zeros_like(middle)
-            return Partials(middle, by_l, zero, by_ll, zero, zero)
+            return Partials(middle, by_l, by_ll)
         right, left = at(0, 1), at(0, -1)
         by_lu = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / (4 * h**2)
         by_u, by_uu = (right - left) / (2 * h), (right - 2 * middle + left) / h**2
-        return Partials(middle, by_l, by_u, by_ll, by_lu, by_uu)
+        return Partials(middle, by_l, by_ll, Turning(by_u, by_lu, by_uu))
 
 
 def channel(link: Link, gain_log: Real, cosine: Real) -> Complex:
     """Return H of (1) or (2) at l and u (n,)."""
     H_r = link.fade(link.line_of_sight_at(cosine))
-    return np.asarray(np.exp(gain_log / 2)[:, None, None] * H_r)
+    return np.asarray(np.exp(gain_log / 2)[..., None, None] * H_r)
 
 
 def _inner(a: Complex, b: Complex) -> Real:
-    """Re a^H b over the receiving antennas: (n, N_r, k) twice to (n, k)."""
-    return np.asarray(np.sum(a.real * b.real + a.imag * b.imag, axis=1))
+    """Re a^H b over the receiving antennas: (..., N_r, k) twice to (..., k)."""
+    return np.asarray(np.sum(a.real * b.real + a.imag * b.imag, axis=-2))

@@ -41,7 +41,8 @@ class Solution:
     (n,) of (7), (8) in bits; `history` R_avg of the start and after each iteration.
     Fading that is averaged over has a leading axis of draws, and so have precoders that know it.
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
-    what did; `starts` what each start of the direct method led to, bit/s/Hz.
+    what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
+    those that were not followed to the end.
     """
 
     plan: Plan

@@ -6,8 +6,6 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.faao.kinematics import Kinematics, Trajectory
 
-_BISECTIONS = 100
-
 
 def straight_flight(kin: Kinematics) -> Trajectory:
     """Return a feasible flight: along the line from w_I to w_F at the most even speed.
@@ -48,20 +46,51 @@ def even_speed(kin: Kinematics, direction: Real, distance: float) -> Real | None
         return None
     if not _flown(kin, lower) - slack <= distance <= _flown(kin, upper) + slack:
         return None
-    slow, fast = -kin.max_speed, kin.max_speed
-    for _ in range(_BISECTIONS):
-        middle = (slow + fast) / 2
-        if _flown(kin, np.clip(middle, lower, upper)) < distance:
-            slow = middle
+    # the flown distance rises with the speed, in straight pieces between the limits
+    share = np.full(kin.slots, kin.time_step)
+    share[[0, -1]] /= 2
+    limits = np.concatenate([lower, upper])
+    order = np.argsort(limits)
+    speeds = limits[order]
+    rise = np.cumsum(np.concatenate([share, -share])[order])
+    flown = share @ lower + np.concatenate([[0.0], np.cumsum(rise[:-1] * np.diff(speeds))])
+    return np.asarray(np.clip(np.interp(distance, flown, speeds), lower, upper))
+
+
+def fewest_slots(kin: Kinematics, direction: Real, distance: float) -> int | None:
+    """Return the least number of slots in which a straight flight gets `distance` metres far.
+
+    None if those of `kin` are too few. It speeds up as long as it can, then slows down: how far it
+    gets in 2, 3, ... slots is known from the sums of both.
+    """
+    after = np.arange(kin.slots)
+    slots = after[1:] + 1
+    gain = kin.max_acceleration * kin.time_step
+    rising, falling = np.full((2, kin.slots), kin.max_speed)
+    split, possible = np.zeros_like(slots), np.ones(slots.shape, dtype=bool)
+    if kin.end_velocity is not None:
+        last = float(kin.end_velocity @ direction)
+        falling = np.minimum(kin.max_speed, last + gain * after)
+    if kin.start_velocity is not None:
+        first = float(kin.start_velocity @ direction)
+        if kin.bound_first_acceleration:
+            rising = np.minimum(kin.max_speed, first + gain * after)
+        rising[0] = first
+        if kin.end_velocity is None:
+            split = slots
+        elif kin.bound_first_acceleration:
+            split = np.floor(((slots - 1) + (last - first) / gain) / 2).astype(int) + 1
         else:
-            fast = middle
-    return np.asarray(np.clip(fast, lower, upper))
-
-
-def farthest(kin: Kinematics, direction: Real) -> float:
-    """Return how far along `direction` a straight flight gets, m; minus infinity for none."""
-    lower, upper = _speed_limits(kin, direction)
-    return -np.inf if (lower > upper + 1e-12).any() else _flown(kin, upper)
+            split = (first <= falling[slots - 1]).astype(int)
+        if kin.end_velocity is not None:
+            possible = abs(first - last) <= gain * (slots - 1) + 1e-12
+    split = np.clip(split, 0, slots)
+    sums = (np.concatenate([[0.0], np.cumsum(speed)]) for speed in (rising, falling))
+    up, down = sums
+    ends = np.minimum(rising[0], falling[slots - 1]) + np.minimum(rising[slots - 1], falling[0])
+    flown = kin.time_step * (up[split] + down[slots - split] - ends / 2)
+    enough = np.flatnonzero(possible & (flown >= distance))
+    return int(slots[enough[0]]) if enough.size else None
 
 
 def _speed_limits(kin: Kinematics, direction: Real) -> tuple[Real, Real]:

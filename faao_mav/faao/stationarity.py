@@ -23,7 +23,7 @@ def kkt_residual(
 
     from faao_mav.faao.scaled import flight_variables, solve
 
-    values = stage(trajectory.w)
+    values = stage(trajectory.w.T)
     total = values.value.mean(axis=1)
     slots = values.value.shape[1]
     unit = float(np.abs(values.gradient).max())
@@ -32,8 +32,10 @@ def kkt_residual(
     flight = flight_variables(kin)
     shift = (flight.w - trajectory.w / LENGTH) * (LENGTH / reach)
     gains = [
-        (above / (unit * reach)) + cp.sum(cp.multiply(gradient / (unit * slots), shift))
-        for above, gradient in zip(total - total.min(), values.gradient, strict=True)
+        (above / (unit * reach)) + cp.sum(cp.multiply(gradient.T / (unit * slots), shift))
+        for above, gradient in zip(
+            total - total.min(), np.moveaxis(values.gradient, 1, 0), strict=True
+        )
     ]
     gain = cp.Variable()
     problem = cp.Problem(

@@ -6,12 +6,13 @@ values only; one P for many draws of a channel has no such reduction.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InputError
-from faao_mav.radio.constellation import difference_classes
+from faao_mav.radio.constellation import DifferenceClasses, difference_classes
 from faao_mav.radio.precoder import (
     _check_positive,
     _with_power,
@@ -31,20 +32,47 @@ _CHUNK = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class BestPrecoders:
-    """Precoders and what they reach.
+    """Precoders and, on demand, what they reach.
 
     Attributes:
         P: (..., N_t, N_t), tr(P^H P) = W.
-        rate: (...) the cutoff rate R_0, bit/s/Hz; its mean where P serves many draws.
-        log_sum: (...) s with N log2(rho) - R_0 = log2(1 + e^s), which still tells precoders apart
-            where R_0 equals N log2(rho) to the last digit; see ``log_nonzero_sum``.
         exact: a closed form was used and the optimum is global; else the best of the starts.
+        draws: (..., S, N_r, N_t), the channels that each P serves.
+        classes: the differences of the alphabet.
+        noise: σ², W.
     """
 
     P: Complex
-    rate: Real
-    log_sum: Real
     exact: bool
+    draws: Complex
+    classes: DifferenceClasses
+    noise: float
+
+    @cached_property
+    def rate(self) -> Real:
+        """(...) the cutoff rate R_0, bit/s/Hz; its mean where P serves many draws."""
+        each = cutoff_rate(self.draws, self.P[..., None, :, :], self.classes, self.noise)
+        return np.asarray(np.mean(each, axis=-1))
+
+    @cached_property
+    def log_sum(self) -> Real:
+        """(...) s with N log2(rho) - R_0 = log2(1 + e^s), see ``log_nonzero_sum``.
+
+        It still tells precoders apart where R_0 equals N log2(rho) to the last digit.
+        """
+        S, receive, N = self.draws.shape[-3:]
+        flat, P = self.draws.reshape(-1, S, receive, N), self.P.reshape(-1, 1, N, N)
+        sums, found = ClassSum(self.classes), np.empty(len(flat))
+        step = max(1, _CHUNK // (S * N * max(N, receive)))
+        for first in range(0, len(flat), step):
+            part = slice(first, first + step)
+            HP = flat[part] @ P[part] / (2.0 * np.sqrt(self.noise))
+            gram = np.conj(np.swapaxes(HP, -1, -2)) @ HP
+            F = value(sums, gram, np.broadcast_to(np.eye(N), (len(HP), N, N)))
+            # δ = ln(1 + e^s), where s is ln δ to the last digit once δ is that small.
+            with np.errstate(divide="ignore"):
+                found[part] = np.where(F < -36.0, F, np.log(np.expm1(np.exp(F))))
+        return found.reshape(self.P.shape[:-2])
 
 
 def _checked(H: Complex, axes: int, power: float, noise: float, start: Complex | None) -> Complex:
@@ -86,21 +114,7 @@ def _best(
             begin = None if given is None else given[part]
             P[part], _ = search(A[part], classes, tolerance, begin, known)
     P = _with_power(P, power)
-    rate = np.mean(cutoff_rate(flat, P[:, None], classes, noise), axis=1)
-    sums = ClassSum(classes)
-    log_sum = np.empty(len(flat))
-    step = max(1, _CHUNK // (S * N * max(N, receive)))
-    for first in range(0, len(flat), step):
-        part = slice(first, first + step)
-        HP = flat[part] @ P[part, None] / (2.0 * np.sqrt(noise))
-        gram = np.conj(np.swapaxes(HP, -1, -2)) @ HP
-        F = value(sums, gram, np.broadcast_to(np.eye(N), (len(HP), N, N)))
-        # δ = ln(1 + e^s), where s is ln δ to the last digit once δ is that small.
-        with np.errstate(divide="ignore"):
-            log_sum[part] = np.where(F < -36.0, F, np.log(np.expm1(np.exp(F))))
-    return BestPrecoders(
-        P.reshape(*shape, N, N), rate.reshape(shape), log_sum.reshape(shape), exact
-    )
+    return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)
 
 
 def _known(H: Complex, power: float, noise: float) -> Complex:

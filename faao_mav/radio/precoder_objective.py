@@ -154,8 +154,11 @@ def _log_mean(y: Real) -> Real:
 
 
 def _quadratic(G: Complex, Q: Complex) -> tuple[Complex, Real]:
-    GQ = G @ Q[:, None]
-    return GQ, _coordinates(np.conj(np.swapaxes(Q, -1, -2))[:, None] @ GQ)
+    """G Q, (b, S, q, N), and the coordinates of Q^H G Q, (b, S, N²): one product for all draws."""
+    b, S, q, N = *G.shape[:3], Q.shape[2]
+    GQ = (G.reshape(b, S * q, q) @ Q).reshape(b, S, q, N)
+    Z = np.conj(np.swapaxes(Q, 1, 2)) @ GQ.transpose(0, 2, 1, 3).reshape(b, q, S * N)
+    return GQ, _coordinates(Z.reshape(b, N, S, N).transpose(0, 2, 1, 3))
 
 
 def value(sums: ClassSum, G: Complex, Q: Complex) -> Real:
@@ -188,18 +191,22 @@ def evaluate(sums: ClassSum, G: Complex, Q: Complex) -> Objective:
     # dz_a = <2 G Q B_a, dQ>, and s has the gradient -Σ_a mean_a dz_a.
     turned = GQ.reshape(-1, sums.antennas) @ (2.0 * np.concatenate(sums.basis, axis=1))
     turned = turned.reshape(b, S, q, width, sums.antennas)
-    slopes = to_real(np.swapaxes(turned, 2, 3))
-    each = -(mean[:, :, None] @ slopes)[:, :, 0]
-    gradient = (first[:, None] @ each)[:, 0]
+    parts = np.empty((b, S, width, 2, q, sums.antennas))
+    parts[:, :, :, 0], parts[:, :, :, 1] = (
+        np.swapaxes(x, 2, 3) for x in (turned.real, turned.imag)
+    )
+    slopes = parts.reshape(b, S, width, m)
+    stacked = slopes.reshape(b, S * width, m)
+    shared = mean * first[..., None]
+    gradient = -(shared.reshape(b, 1, S * width) @ stacked)[:, 0]
 
     inner = first[..., None, None] * covariance
     inner += second[..., None, None] * (mean[..., :, None] * mean[..., None, :])
-    stacked = slopes.reshape(b, S * width, m)
     hessian = np.swapaxes(stacked, 1, 2) @ (inner @ slopes).reshape(b, S * width, m)
     hessian -= gradient[:, :, None] * gradient[:, None, :]
 
     # The curvature of z: the quadratic form tr(G E M E^H), M = Σ_a mean_a B_a, as a real matrix.
-    M = np.tensordot(mean * first[..., None], sums.basis, axes=1)
+    M = np.tensordot(shared, sums.basis, axes=1)
     K = 2.0 * np.einsum("bsij,bskl->biljk", G, M, optimize=True).reshape(b, m // 2, m // 2)
     half = m // 2
     hessian[:, :half, :half] -= K.real

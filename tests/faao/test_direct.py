@@ -250,8 +250,9 @@ def test_same_seed_same_bytes(faint_plan: MakePlan) -> None:
 def test_progress_is_told(faint_plan: MakePlan) -> None:
     told: list[Progress] = []
     solution = optimize(faint_plan(), observe=told.append)
-    assert [p.iteration for p in told] == list(range(len(solution.starts) + 2))
-    assert [p.stage for p in told[:2]] == ["rates over the map", "start straight"]
+    assert [p.iteration for p in told] == [0, 1, 2]
+    assert [p.stage for p in told] == ["rates over the map", "the starts", "the best start"]
+    assert 0 < told[-1].best_rate <= solution.rates.R_avg
 
 
 def test_more_draws_than_can_be_held_are_refused(small_plan: MakePlan) -> None:

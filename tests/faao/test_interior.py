@@ -14,9 +14,10 @@ from scipy.optimize import minimize
 from faao_mav.arrays import Real
 from faao_mav.faao import cones
 from faao_mav.faao.banded import SIZE, FlightMatrix, Q, V, W, Y
-from faao_mav.faao.interior import Stage, StageValues, maximize
+from faao_mav.faao.interior import Stage, StageValues, maximize, maximize_all
+from faao_mav.faao.iterate import FlightScale, Point, best_floor
 from faao_mav.faao.kinematics import Kinematics, Trajectory
-from faao_mav.faao.newton import FlightScale, Newton, Point, best_floor
+from faao_mav.faao.newton import Newton
 from faao_mav.faao.scaled import LENGTH, flight_variables
 from faao_mav.faao.slow import Slow
 from faao_mav.faao.start import straight_flight
@@ -57,13 +58,16 @@ class Radial:
     stations: Real
 
     def __call__(self, w: Real, /) -> StageValues:
-        away = w - self.stations[:, None]
-        q = HEIGHT**2 + (away**2).sum(axis=2)
+        away = w[:, None] - self.stations.T.reshape(2, -1, *(1,) * (w.ndim - 1))
+        q = HEIGHT**2 + (away**2).sum(axis=0)
         found = [self.law(row, c) for row, c in zip(q, self.constants, strict=True)]
         f, slope, bend = (np.array(part) for part in zip(*found, strict=True))
-        hessian = 4 * bend[..., None, None] * away[..., :, None] * away[..., None, :]
+        x, y = away
+        level = 2 * slope
         return StageValues(
-            f, 2 * slope[..., None] * away, hessian + 2 * slope[..., None, None] * np.eye(2)
+            f,
+            2 * slope * away,
+            np.stack([4 * bend * x * x + level, 4 * bend * x * y, 4 * bend * y * y + level]),
         )
 
 
@@ -105,7 +109,7 @@ def worst(kin: Kinematics, flight: Trajectory) -> float:
 
 
 def reward(stage: Stage, flight: Trajectory) -> float:
-    return float(stage(flight.w).value.mean(axis=1).min())
+    return float(stage(flight.w.T).value.mean(axis=1).min())
 
 
 HERE = {"start": np.array([100.0, 100.0]), "end": np.array([100.0, 100.0])}
@@ -194,9 +198,9 @@ class Level:
     slope: float
 
     def __call__(self, w: Real, /) -> StageValues:
-        n = len(w)
+        shape = (2, *w.shape[1:])
         return StageValues(
-            np.full((2, n), 2.0), np.full((2, n, 2), self.slope), np.zeros((2, n, 2, 2))
+            np.full(shape, 2.0), np.full((2, *shape), self.slope), np.zeros((3, *shape))
         )
 
 
@@ -218,7 +222,7 @@ def test_a_reward_that_fails_somewhere_is_avoided() -> None:
     def stage(w: Real, /) -> StageValues:
         values = ACTIVE(w)
         return StageValues(
-            np.where(w.sum(axis=1) > 400, np.nan, values.value), values.gradient, values.hessian
+            np.where(w.sum(axis=0) > 400, np.nan, values.value), values.gradient, values.hessian
         )
 
     kin = plane(50)
@@ -283,7 +287,7 @@ def test_a_small_problem_agrees_with_slsqp(law: Law) -> None:
             [
                 1 - (flight.v**2).sum(axis=1) / kin.max_speed**2,
                 1 - (flight.a[k : n - 1] ** 2).sum(axis=1) / kin.max_acceleration**2,
-                stage(flight.w).value.mean(axis=1) - x[-1],
+                stage(flight.w.T).value.mean(axis=1) - x[-1],
             ]
         )
 
@@ -371,11 +375,11 @@ def test_the_certificate_sees_what_is_to_be_gained() -> None:
     assert gain > best.value - reward(ACTIVE, early) > 0
 
 
-def symmetric(rng: np.random.Generator, n: int) -> tuple[Real, Real]:
-    """Random positive definite 2x2 matrices, packed and as such."""
-    root = rng.standard_normal((n, 2, 2))
-    full = root @ root.transpose(0, 2, 1) + 0.1 * np.eye(2)
-    return full.reshape(n, 4)[:, [0, 1, 3]], full
+def symmetric(rng: np.random.Generator, *shape: int) -> tuple[Real, Real]:
+    """Random positive definite 2x2 matrices: packed (3, *shape), and as such (*shape, 2, 2)."""
+    root = rng.standard_normal((*shape, 2, 2))
+    full = root @ np.swapaxes(root, -1, -2) + 0.1 * np.eye(2)
+    return np.moveaxis(full.reshape(*shape, 4)[..., [0, 1, 3]], -1, 0), full
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.booleans(), st.booleans())
@@ -384,48 +388,81 @@ def test_the_band_matrix_is_the_dense_one(seed: int, n: int, first: bool, last: 
     rng = np.random.default_rng(seed)
     if n == 2:
         first = last = False  # otherwise nothing can move, and K is singular
-    h = 0.3
+    h, flights = 0.3, 2
     matrix = FlightMatrix(n, h, (first, last))
-    (at_w, full_w), (at_v, full_v) = symmetric(rng, n), symmetric(rng, n)
-    give, full_give = symmetric(rng, n - 1)
-    dense = np.zeros((n, SIZE, n, SIZE))
-    eye = np.eye(2)
-    for i in range(n):
-        dense[i, W, i, W], dense[i, V, i, V] = full_w[i], full_v[i]
-        if i == n - 1:
-            dense[i, Q, i, Q] = dense[i, Y, i, Y] = eye
-            continue
-        dense[i, Q, i, Q] = -full_give[i]
-        for later, sign in ((i, -1.0), (i + 1, 1.0)):
-            for row, column, value in ((Q, V, sign), (Y, V, -h), (Y, W, sign)):
-                dense[i, row, later, column] = value * eye
-                dense[later, column, i, row] = value * eye
-    fixed = [(0, W), (n - 1, W)] + [(0, V)] * first + [(n - 1, V)] * last
-    for i, part in fixed:
-        dense[i, part] = 0
-        dense[:, :, i, part] = 0
-        dense[i, part, i, part] = eye
-    right = rng.standard_normal((3, n, SIZE))
-    factors = matrix.factor(at_w, at_v, give)
-    assert factors is not None
-    expected = np.linalg.solve(dense.reshape(n * SIZE, -1), right.reshape(3, -1).T).T
-    assert factors.solve(right).reshape(3, -1) == pytest.approx(expected, rel=1e-6, abs=1e-8)
-
-    w, v, y = rng.standard_normal((3, n, 2))
-    on_w, on_v = matrix.pull(y[:-1])
-    moved_w, moved_v = w * matrix.moves_w, v * matrix.moves_v
-    assert (y[:-1] * matrix.dynamics(moved_w, moved_v)).sum() == pytest.approx(
-        (on_w * w).sum() + (on_v * v).sum()
+    (at_w, full_w), (at_v, full_v), (give, full_give) = (
+        symmetric(rng, flights, n) for _ in range(3)
     )
+    factors = matrix.factor(at_w, at_v, give)
+    assert factors.sound.all()
+    right = rng.standard_normal((3, flights, n, SIZE))
+    solved = factors.solve(right.copy())
+    eye = np.eye(2)
+    for k in range(flights):
+        dense = np.zeros((n, SIZE, n, SIZE))
+        for i in range(n):
+            dense[i, W, i, W], dense[i, V, i, V] = full_w[k, i], full_v[k, i]
+            if i == n - 1:
+                dense[i, Q, i, Q] = dense[i, Y, i, Y] = eye
+                continue
+            dense[i, Q, i, Q] = -full_give[k, i]
+            for later, sign in ((i, -1.0), (i + 1, 1.0)):
+                for row, column, value in ((Q, V, sign), (Y, V, -h), (Y, W, sign)):
+                    dense[i, row, later, column] = value * eye
+                    dense[later, column, i, row] = value * eye
+        fixed = [(0, W), (n - 1, W)] + [(0, V)] * first + [(n - 1, V)] * last
+        for i, part in fixed:
+            dense[i, part] = 0
+            dense[:, :, i, part] = 0
+            dense[i, part, i, part] = eye
+        expected = np.linalg.solve(dense.reshape(n * SIZE, -1), right[:, k].reshape(3, -1).T).T
+        assert solved[:, k].reshape(3, -1) == pytest.approx(expected, rel=1e-6, abs=1e-8)
+
+    w, y = rng.standard_normal((2, 2, flights, n))
+    moved = matrix.dynamics(w * matrix.moves_w, np.zeros_like(w))
+    assert (y[..., :-1] * moved).sum() == pytest.approx((matrix.pull(y[..., :-1]) * w).sum())
+
+
+def discs(scale: FlightScale, first: Real | float, v: Real) -> Real:
+    """Return s_0 = `first` and D v as one array."""
+    found = np.empty((3, v.shape[1], 2 * v.shape[2] - 1))
+    scale.enter(found, first, v)
+    return found
+
+
+@pytest.mark.parametrize("make", [plane, copter])
+def test_forces_are_the_transpose_of_what_they_act_on(make: Callable[..., Kinematics]) -> None:
+    rng, scale = np.random.default_rng(0), FlightScale(make(2))
+    n = scale.matrix.slots
+    v, w = rng.standard_normal((2, 2, 3, n))
+    v *= scale.matrix.moves_v
+    y, on_a = rng.standard_normal((2, 2, 3, n - 1))
+    drawn = (y * (scale.matrix.dynamics(w, v) - scale.matrix.dynamics(w, 0 * v))).sum()
+    taken = (on_a * discs(scale, 0.0, v)[1:, :, n:]).sum()
+    assert (scale.left_over(y, on_a) * v).sum() == pytest.approx(drawn - taken)
+
+
+def test_a_singular_flight_leaves_the_others_alone() -> None:
+    rng = np.random.default_rng(0)
+    matrix = FlightMatrix(5, 0.5, (True, True))
+    at_w, at_v, give = (symmetric(rng, 3, 5)[0] for _ in range(3))
+    alone = matrix.factor(at_w[:, 2:], at_v[:, 2:], give[:, 2:])
+    at_w[:, 0] = np.nan
+    at_w[:, 1] = at_v[:, 1] = give[:, 1] = 0
+    factors = matrix.factor(at_w, at_v, give)
+    assert factors.sound[:, 0].tolist() == [False, False, True]
+    right = rng.standard_normal((1, 3, 5, SIZE))
+    assert factors.solve(right.copy())[:, 2] == pytest.approx(alone.solve(right[:, 2:])[:, 0])
 
 
 def inside(rng: np.random.Generator, m: int) -> Real:
-    x = rng.standard_normal((2, m))
-    return np.vstack([np.hypot(*x) + 10.0 ** rng.uniform(-4, 1, m), x])
+    """A point of the cones of one flight."""
+    x = rng.standard_normal((2, 1, m))
+    return np.concatenate([(np.hypot(*x) + 10.0 ** rng.uniform(-4, 1, m))[None], x])
 
 
 def product(a: Real, b: Real) -> Real:
-    return np.vstack([(a * b).sum(axis=0), a[0] * b[1:] + b[0] * a[1:]])
+    return np.concatenate([(a * b).sum(axis=0)[None], a[0] * b[1:] + b[0] * a[1:]])
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -433,13 +470,15 @@ def product(a: Real, b: Real) -> Real:
 def test_the_scaling_of_the_cones(seed: int) -> None:
     rng = np.random.default_rng(seed)
     m = 5
-    s, z, (ds, dz) = inside(rng, m), inside(rng, m), rng.standard_normal((2, 3, m))
-    scaling = cones.Scaling(s, z)
-    assert product(s, cones.inverse(s)) == pytest.approx(
-        np.vstack([np.ones(m), np.zeros((2, m))]), abs=1e-8
-    )
+    s, z, (ds, dz) = inside(rng, m), inside(rng, m), rng.standard_normal((2, 3, 1, m))
+    scaling = cones.Scaling.between(np.stack([s, z], axis=1))
+    one = np.zeros((3, 1, m))
+    one[0] = 1
+    assert product(s, cones.inverse(s)) == pytest.approx(one, abs=1e-8)
+    curvature, give, lean = scaling.curvature, scaling.give(), scaling.lean()
+    second = scaling.second_order(ds, dz)
     for i in range(m):
-        w, eta = scaling.point[:, i], scaling.stiffness[i] ** -0.5
+        w, eta = scaling.point[:, 0, i], scaling.stiffness[0, i] ** -0.5
         full = eta * np.block(
             [[w[:1], w[1:]], [w[1:, None], np.eye(2) + np.outer(w[1:], w[1:]) / (1 + w[0])]]
         )
@@ -449,25 +488,26 @@ def test_the_scaling_of_the_cones(seed: int) -> None:
         def close(expected: Real, size: float = float(np.abs(square).max())) -> Any:
             return pytest.approx(expected, rel=1e-5, abs=1e-7 * size)
 
-        assert full @ z[:, i] == pytest.approx(back @ s[:, i], rel=1e-5, abs=1e-7)
-        assert square @ s[:, i] == close(z[:, i])
-        xx, xy, yy = scaling.curvature[i]
+        assert full @ z[:, 0, i] == pytest.approx(back @ s[:, 0, i], rel=1e-5, abs=1e-7)
+        assert square @ s[:, 0, i] == close(z[:, 0, i])
+        xx, xy, yy = curvature[:, 0, i]
         block = np.array([[xx, xy], [xy, yy]])
         assert block == close(square[1:, 1:])
-        xx, xy, yy = scaling.give[i]
+        xx, xy, yy = give[:, 0, i]
         assert block @ [[xx, xy], [xy, yy]] == pytest.approx(np.eye(2), abs=1e-6)
-        assert scaling.lean[:, i] == close(square[1:, 0])
-        goal = z - np.einsum("ij,j->i", square, ds[:, i])[:, None]
-        assert scaling.radial(z, ds[0], goal[1:] * np.ones(m))[i] == close(goal[0, i])
-        scaled = full @ z[:, i : i + 1]
-        unknown = full @ scaling.second_order(ds, dz)[:, i : i + 1]
-        wanted = product(back @ ds[:, i : i + 1], full @ dz[:, i : i + 1])
-        assert product(scaled, unknown) == pytest.approx(
+        assert lean[:, 0, i] == close(square[1:, 0])
+        goal = z - np.einsum("ij,j->i", square, ds[:, 0, i])[:, None, None]
+        assert scaling.radial(z, ds[0], goal[1:])[0, i] == close(goal[0, 0, i])
+        unaimed = goal - z
+        assert scaling.radial(None, ds[0], unaimed[1:])[0, i] == close(unaimed[0, 0, i])
+        scaled = full @ z[:, :, i]
+        wanted = product(back @ ds[:, :, i], full @ dz[:, :, i])
+        assert product(scaled, full @ second[:, :, i]) == pytest.approx(
             wanted, rel=1e-5, abs=1e-6 * np.abs(wanted).max()
         )
-    longest = cones.reach(s, ds)
+    longest = float(cones.reach(s, ds)[0, 0])
     assert longest > 0
-    if np.isfinite(longest):
+    if longest < 1e10:
         tip = s + longest * ds
         assert (tip[0] - np.hypot(*tip[1:])).min() == pytest.approx(0, abs=1e-7 * (1 + longest))
         assert (s + 0.999 * longest * ds)[0].min() > 0
@@ -476,75 +516,99 @@ def test_the_scaling_of_the_cones(seed: int) -> None:
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.booleans(), st.sampled_from([0.0, 0.005, 0.1]))
 @settings(max_examples=25)
 def test_a_newton_step_solves_the_linearised_conditions(
-    seed: int, hover: bool, exact: bool, least: float
+    seed: int, hover: bool, cut: bool, least: float
 ) -> None:
     rng = np.random.default_rng(seed)
     kin = copter(1.4) if hover else plane(1.4)
-    scale, n, mu, share = FlightScale(kin), kin.slots, 0.3, 0.7
+    scale, n, mu, share = FlightScale(kin), kin.slots, np.array([[0.3]]), 0.7
     m = 2 * n - 1
-    v = 0.01 * rng.standard_normal((n, 2))
-    x = scale.limited(v)
-    total = rng.standard_normal(2)
-    concave = -symmetric(rng, 2 * n)[0].reshape(2, n, 3)
-    margin = rng.uniform(0, 0.1, m)
-    z = inside(rng, m)
-    slow = Slow.begin(v, least, scale.matrix.moves_v[:, 0], 0.2)
+    v = 0.01 * rng.standard_normal((2, 1, n))
+    x = discs(scale, 0.0, v)[1:]
+    total = rng.standard_normal((2, 1, 1))
+    concave = -symmetric(rng, 2, 1, n)[0]
+    margin = rng.uniform(0, 0.1, (1, m))
     # a limit on what cannot move is there in name only, and pulls at nothing
-    real = np.vstack([np.ones(m), x != 0])
+    real = np.concatenate([np.ones((1, 1, m)), x != 0])
     point = Point(
-        w=rng.standard_normal((n, 2)),
+        w=rng.standard_normal((2, 1, n)),
         v=v,
-        y=rng.standard_normal((n - 1, 2)),
-        s=np.vstack([np.hypot(*x) + 0.1 + margin, x]),
-        z=z * real,
+        y=rng.standard_normal((2, 1, n - 1)),
+        pair=np.stack(
+            [np.concatenate([(np.hypot(*x) + 0.1 + margin)[None], x]), inside(rng, m) * real],
+            axis=1,
+        ),
         margin=margin,
-        slow=slow,
-        weights=np.array([0.3, 0.7]),
+        slow=Slow.begin(v, least, scale.matrix.moves_v, 0.2) if least > 0 else None,
+        weights=np.array([0.3, 0.7])[:, None, None],
         total=total,
         floor=best_floor(total, share * mu),
-        gradient=rng.standard_normal((2, n, 2)) * scale.matrix.moves_w,
+        gradient=rng.standard_normal((2, 2, 1, n)) * scale.matrix.moves_w,
         hessian=concave,
     )
+    slow = point.slow
     assert (share * mu / (total - point.floor)).sum() == pytest.approx(1)
-    scaling = cones.Scaling(point.s, point.z)
-    newton = Newton.at(scale, point, scaling, share=share, proximal=0.01, exact=exact)
-    assert newton is not None
-    correction = 0.01 * rng.standard_normal((3, m)) * real
-    of_slow = 0.01 * rng.standard_normal(n) * slow.on
-    step = newton.step(mu, correction, of_slow)
+    scaling = cones.Scaling.between(point.pair)
+    newton = Newton.at(
+        scale,
+        point,
+        scaling,
+        share=share,
+        proximal=np.array([[0.01]]),
+        cut=np.array([[cut]]),
+    )
+    assert newton.factors.sound.all()
+    correction = 0.01 * rng.standard_normal((3, 1, m)) * real
+    of_slow = 0.01 * rng.standard_normal((1, n)) * (slow.on if slow else 0)
+    none = np.zeros((1, 1))
+    corrected = newton.step(mu, correction, of_slow), mu, correction, of_slow
+    for step, at, taken, slowly in ((newton.step(none), none, none, none), corrected):
+        xx, xy, yy = -(point.weights * concave).sum(axis=1)
+        dx, dy = step.dw
+        bent = np.stack([(xx + 0.01) * dx + xy * dy, xy * dx + (yy + 0.01) * dy])
+        weights, z = point.weights + step.dweights, point.z + step.dz
+        on_w = scale.matrix.pull(point.y + step.dy)
+        force = bent * scale.matrix.moves_w + on_w - (weights * point.gradient).sum(axis=1)
+        assert force == pytest.approx(np.zeros((2, 1, n)), abs=1e-7)
+        pulled = z[1:, :, :n] * scale.matrix.moves_v
+        if slow is not None:
+            raised = slow.z + step.slow[1]
+            assert slow.s * raised + slow.z * step.slow[0] == pytest.approx(
+                at * slow.on - slowly, abs=1e-7
+            )
+            assert step.slow[0] == pytest.approx((slow.u * step.dv).sum(axis=0) - slow.margin)
+            pulled = pulled + slow.u * raised
+        on_v = scale.left_over(point.y + step.dy, z[1:, :, n:])
+        assert on_v == pytest.approx(pulled, abs=1e-7 * (1 + np.abs(pulled).max()))
+        assert scale.matrix.dynamics(point.w + step.dw, point.v + step.dv) == pytest.approx(
+            np.zeros((2, 1, n - 1)), abs=1e-9
+        )
+        assert step.ds == pytest.approx(discs(scale, -margin, step.dv))
+        assert weights.sum() == pytest.approx(1)
+        gains = (point.gradient * step.dw[:, None]).sum(axis=(0, -1))[..., None]
+        assert step.dtotal == pytest.approx(gains)
+        assert gains - step.rise + (total - point.floor) * weights / point.weights == pytest.approx(
+            at * share / point.weights
+        )
+        target = at * cones.inverse(point.s) - taken
+        for i in range(m):
+            w = scaling.point[:, 0, i] * [1, -1, -1]
+            square = scaling.stiffness[0, i] * (2 * np.outer(w, w) - np.diag([1, -1, -1]))
+            found = z[:, 0, i] + square @ step.ds[:, 0, i]
+            assert found == pytest.approx(
+                target[:, 0, i], rel=1e-5, abs=1e-6 * np.abs(square).max()
+            )
 
-    curvature = -np.tensordot(point.weights, concave, 1) + 0.01 * np.array([1, 0, 1])
-    xx, xy, yy = curvature.T
-    bent = np.stack(
-        [xx * step.dw[:, 0] + xy * step.dw[:, 1], xy * step.dw[:, 0] + yy * step.dw[:, 1]], axis=1
-    )
-    weights, z = point.weights + step.dweights, point.z + step.dz
-    on_w, on_v = scale.matrix.pull(point.y + step.dy)
-    force = bent * scale.matrix.moves_w + on_w - np.tensordot(weights, point.gradient, 1)
-    assert force == pytest.approx(np.zeros((n, 2)), abs=1e-7)
-    raised = slow.z + step.slow[1]
-    assert slow.s * raised + slow.z * step.slow[0] == pytest.approx(
-        mu * slow.on - of_slow, abs=1e-7
-    )
-    assert step.slow[0] == pytest.approx((slow.u * step.dv).sum(axis=1) - slow.margin)
-    pulled = scale.spread(z[1:]) + slow.u * raised[:, None]
-    assert on_v == pytest.approx(pulled, abs=1e-7 * (1 + np.abs(pulled).max()))
-    assert scale.matrix.dynamics(point.w + step.dw, point.v + step.dv) == pytest.approx(
-        np.zeros((n - 1, 2)), abs=1e-9
-    )
-    assert step.ds == pytest.approx(np.vstack([-margin, scale.limited(step.dv)]))
-    assert weights.sum() == pytest.approx(1)
-    gains = (point.gradient * step.dw).sum(axis=(1, 2))
-    assert step.dtotal == pytest.approx(gains)
-    assert gains - step.rise + (total - point.floor) * weights / point.weights == pytest.approx(
-        mu * share / point.weights
-    )
-    target = mu * cones.inverse(point.s) - correction
-    for i in range(m):
-        w = scaling.point[:, i] * [1, -1, -1]
-        square = scaling.stiffness[i] * (2 * np.outer(w, w) - np.diag([1, -1, -1]))
-        found = z[:, i] + square @ step.ds[:, i]
-        assert found == pytest.approx(target[:, i], rel=1e-5, abs=1e-6 * np.abs(square).max())
+
+def test_flights_side_by_side_do_not_know_of_each_other() -> None:
+    """The searches from several starts are those from each alone."""
+    kin, stage = SCENARIOS["plane 50 s"]
+    others = [maximize(kin, stage, straight_flight(kin), max_iterations=k) for k in (2, 4, 30)]
+    begun = [straight_flight(kin), *(other.trajectory for other in others)]
+    together = maximize_all(kin, stage, begun)
+    for flight, found in zip(begun, together, strict=True):
+        alone = maximize(kin, stage, flight)
+        assert found.iterations == alone.iterations
+        assert found.trajectory.w == pytest.approx(alone.trajectory.w, abs=1e-6)
 
 
 def test_a_long_flight_takes_time_in_proportion() -> None:

@@ -9,7 +9,7 @@ from conftest import MakePlan
 
 from faao_mav.arrays import Real
 from faao_mav.faao.design import Design, design
-from faao_mav.faao.place import PlaceRate, by_position, coordinates, place
+from faao_mav.faao.place import PlaceRate, place
 from faao_mav.faao.problem import Link, build_problem
 from faao_mav.faao.rate_model import rate_model
 from faao_mav.faao.slot_rate import BestRate, DifferencedRate, FixedRate
@@ -35,9 +35,15 @@ def places(link: Link, seed: int = 3) -> Real:
     return link.station + rng.uniform(-150, 150, (20, 2))
 
 
+def coordinates(link: Link, w: Real) -> tuple[Real, Real]:
+    at = place(link, w.T)
+    return at.gain_log, at.cosine
+
+
 def derivatives(link: Link, rate: PlaceRate, w: Real) -> tuple[Real, Real]:
-    at = place(link, w)
-    return by_position(at, rate.partials(at.gain_log, at.cosine))
+    at = place(link, w.T)
+    gradient, hessian = at.by_position(rate.partials(at.gain_log, at.cosine))
+    return gradient.T, hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
 
 
 @pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
