@@ -41,7 +41,7 @@ def checked(text: str, changes: dict[str, Any]) -> tuple[Conversion, Check]:
     promised = predict_delivery(solution, conversion)
     assert found.link is not None
     assert found.link.predicted_rate == pytest.approx(promised.rates.R_avg, rel=0.005)
-    assert found.link.rms_position_error == pytest.approx(promised.rms_position_error, abs=0.4)
+    assert found.link.rms_position_error == pytest.approx(promised.rms_position_error, abs=1.0)
     assert found.link.path_error == pytest.approx(promised.max_path_error, abs=0.4)
     return conversion, found
 
