@@ -163,6 +163,11 @@ class Scheduler:
 
     def _flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`."""
+        route, path, clock = self._told(route)
+        return Schedule(route, path, self.model.fly(path), clock)
+
+    def _told(self, route: Route) -> tuple[Route, FlightPath, Clock]:
+        """Return `route` with its acceptance radii, the path to fly, and the flight's clock."""
         stops = route.holds + route.delays > 0
         stops[[0, -1]] = True
         reach = np.concatenate([[np.inf], route.leg_lengths, [np.inf]])
@@ -187,17 +192,17 @@ class Scheduler:
             near=self.tolerance,
             lead=route.lead,
         )
-        return Schedule(route, path, self.model.fly(path), clock)
+        return route, path, clock
 
     def _fitted(self, route: Route, top: float, groups: Integers | None = None) -> Schedule:
-        first = self._flight(route)
+        route, path, clock = self._told(route)
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
         free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
         speeds, waits, lead = fit(
             self.model,
-            first.path,
-            first.clock,
+            path,
+            clock,
             groups=_own_speeds(route) if groups is None else groups,
             free=free,
             min_speed=SLOWEST,

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
 from faao_mav.mission.flight.arducopter.course import Course, grid_of, table_of
 from faao_mav.mission.flight.arducopter.follow import Follower, pursue
@@ -80,6 +80,9 @@ class ArduCopter:
     linear_drag: float = 0.28
     quadratic_drag: float = 0.026
 
+    _routers: list[Router] = field(default_factory=list, init=False, repr=False, compare=False)
+    """The last one: flights along the same points come one after the other."""
+
     @classmethod
     def from_vehicle(cls, vehicle: Vehicle, latitude: float | None = None) -> "ArduCopter":
         """Return the model with the limits that `vehicle.parameters` set, of either generation.
@@ -115,7 +118,7 @@ class ArduCopter:
         stopping = np.any(waits > 0, axis=0)
         stopping[[0, -1]] = True
         scale = np.array([self.east_metre, self.north_metre, 1.0])
-        router = Router(path.points * scale, path.splines, stopping, self._bounds())
+        router = self._router(path.points * scale, path.splines, stopping)
         fly = _target if rough else self._followed
         flights = []
         for speed, wait in zip(speeds.tolist(), waits.tolist(), strict=True):
@@ -124,6 +127,12 @@ class ArduCopter:
                 replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
             )
         return flights
+
+    def _router(self, points: Real, splines: Flags, stopping: Flags) -> Router:
+        """Return what knows the legs along `points` already, if they are those of the last call."""
+        if not (self._routers and self._routers[0].leads_along(points, splines, stopping)):
+            self._routers[:] = [Router(points, splines, stopping, self._bounds())]
+        return self._routers[0]
 
     def _followed(self, course: Course, step: float) -> Flown:
         """Return the flight of the aircraft after its target."""
