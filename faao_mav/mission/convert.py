@@ -57,8 +57,9 @@ def convert(solution: "Solution") -> Conversion:
     if best[0].cost > _GOOD and plan.vehicle.autopilot == "ardupilot":
         liveliest = trials[-1]
         bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
-        found = _best([liveliest.first(route) for route in bent])
-        best = min(best, found, key=lambda each: each[0].cost)
+        new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
+        firsts = [liveliest.first(route) for route in new.values()]
+        best = min(best, _best(firsts), key=lambda each: each[0].cost)
     schedule, trial = best
     return Conversion(assemble(schedule.route, plan), schedule, trial.vehicle, trial.parameters)
 
