@@ -53,13 +53,14 @@ def convert(solution: "Solution") -> Conversion:
     top = min(plan.vehicle.max_speed, FASTEST)
     trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
     straight = plan_route(t, w, plan)
-    best = _best([trial.first(straight) for trial in trials])
+    firsts = [trial.first(straight) for trial in trials]
+    best = min(_refined(firsts), key=lambda each: each[0].cost)
     if best[0].cost > _GOOD and plan.vehicle.autopilot == "ardupilot":
         liveliest = trials[-1]
         bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
         new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
         firsts = [liveliest.first(route) for route in new.values()]
-        best = min(best, _best(firsts), key=lambda each: each[0].cost)
+        best = min([best, *_refined(firsts)], key=lambda each: each[0].cost)
     schedule, trial = best
     return Conversion(assemble(schedule.route, plan), schedule, trial.vehicle, trial.parameters)
 
@@ -90,14 +91,14 @@ class _Trial:
         return planner.first(begun), self
 
 
-def _best(firsts: list[tuple[Schedule, _Trial]]) -> tuple[Schedule, _Trial]:
-    """Refine first schedules, the closest to the plan first, until one is good."""
+def _refined(firsts: list[tuple[Schedule, _Trial]]) -> list[tuple[Schedule, _Trial]]:
+    """Return first schedules refined, the closest to the plan first, up to one that is good."""
     found: list[tuple[Schedule, _Trial]] = []
     for first, trial in sorted(firsts, key=lambda each: each[0].error):
         found.append((trial.scheduler.refined(first), trial))
         if found[-1][0].cost <= _GOOD:
             break
-    return min(found, key=lambda each: each[0].cost)
+    return found
 
 
 def _splines(straight: Legs, speed: float) -> Iterator[Splines]:

@@ -199,7 +199,7 @@ class Scheduler:
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
         free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
-        speeds, waits, lead = fit(
+        found = fit(
             self.model,
             path,
             clock,
@@ -208,7 +208,9 @@ class Scheduler:
             min_speed=SLOWEST,
             max_speed=top,
         )
-        return self._flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
+        route = replace(route, speeds=found.speeds, lead=found.lead)
+        route, path, clock = self._told(self._waiting(route, found.waits))
+        return Schedule(route, path, found.flown, clock)
 
     def _waiting(self, route: Route, waits: Real) -> Route:
         """Return `route` with `waits` (m,), s, as holds, and as delays what holds cannot say."""

@@ -111,7 +111,7 @@ class Router:
                 step = self._known[key] = self._step(*key)
             end = start
             if step.leg is not None:
-                legs.append(Placed(step.leg, start, self._points[k], self._points[k + 1]))
+                legs.append(Placed(step.leg, start, self._points[k], self._steps[k]))
                 end = legs[-1].end
             if self._stopping[k + 1]:
                 stops.append(Stop(k + 1, end, waits[k + 1]))

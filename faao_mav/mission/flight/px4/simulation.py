@@ -74,6 +74,10 @@ class Simulation:
         self._limits, self._points, self._radii = limits, points, radii.tolist()
         self._known: dict[Leg, list[tuple[State, Stretch]]] = {}
 
+    def leads_along(self, points: Real, radii: Real) -> bool:
+        """Tell whether these are the points and radii."""
+        return np.array_equal(points, self._points) and self._radii == radii.tolist()
+
     def fly(self, speeds: Real, holds: Real, beyond: float) -> list[Log]:
         """Fly every variant until the last one has ended, and on for `beyond` seconds.
 
