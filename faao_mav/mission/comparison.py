@@ -10,7 +10,7 @@ from faao_mav.arrays import Real
 from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.flight.track import Track
-from faao_mav.mission.outline import plan_route
+from faao_mav.mission.outline import set_out
 from faao_mav.mission.prediction import Prediction, price_flight
 from faao_mav.mission.timing import MOST_LEAD
 from faao_mav.mission.validate.link import LinkCheck, Stretch
@@ -60,7 +60,7 @@ def _in_frame_of(solution: Solution, track: Track) -> Real:
 
 def _start(solution: Solution, track: Track, w: Real) -> float:
     """Return when, on the clock of `track`, the plan's reads 0: up to `MOST_LEAD` after leaving."""
-    waited = plan_route(solution.t, solution.w, solution.plan).departures[0] - solution.t[0]
+    waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
     left = track.reached[np.isfinite(track.reached)]
     if len(left) == 0:
         return float(track.t[0])
