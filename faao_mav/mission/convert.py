@@ -53,8 +53,7 @@ def convert(solution: "Solution") -> Conversion:
     top = min(plan.vehicle.max_speed, FASTEST)
     trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
     straight = plan_route(t, w, plan)
-    firsts = [trial.first(straight) for trial in trials]
-    best = min(_refined(firsts), key=lambda each: each[0].cost)
+    best = min(_refined(_firsts(trials, straight)), key=lambda each: each[0].cost)
     if best[0].cost > _GOOD and plan.vehicle.autopilot == "ardupilot":
         liveliest = trials[-1]
         bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
@@ -89,6 +88,17 @@ class _Trial:
         planner = self.scheduler
         begun = with_run_in(route, planner.t, planner.w, self.legs, planner.max_speed)
         return planner.first(begun), self
+
+
+def _firsts(trials: list[_Trial], straight: Route) -> list[tuple[Schedule, _Trial]]:
+    """Return how all fly `straight`, the liveliest first: the next begins with its speeds."""
+    found: list[tuple[Schedule, _Trial]] = []
+    route = straight
+    for trial in reversed(trials):
+        found.append(trial.first(route))
+        flown = found[-1][0].route
+        route = replace(straight, speeds=flown.speeds[flown.first : flown.last], lead=flown.lead)
+    return found
 
 
 def _refined(firsts: list[tuple[Schedule, _Trial]]) -> list[tuple[Schedule, _Trial]]:

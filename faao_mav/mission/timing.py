@@ -33,7 +33,7 @@ _STEP = 0.25  # of a rough flight, s
 _SAMPLES = 400
 _ITERATIONS = 15
 _DAMPINGS = 10.0 ** np.array([-4, -2, -1, 0, 2])
-_ENOUGH, _PLENTY = 0.05, 0.5
+_ENOUGH, _PLENTY = 0.05, 0.4
 """Shares by which an iteration has to lessen the sum of squares: with slopes that were measured,
 for another one; and with any, for the next to learn its slopes from it."""
 
