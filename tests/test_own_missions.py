@@ -31,7 +31,18 @@ def checked(text: str, changes: dict[str, Any]) -> tuple[Conversion, Check]:
     solution = optimize(plan)
     conversion = convert(solution)
     limits = Limits(max_speed=plan.vehicle.max_speed)
-    found = check(conversion.mission, conversion.vehicle, limits=limits, solution=solution)
+    found = check(
+        conversion.mission,
+        conversion.vehicle,
+        limits=limits,
+        solution=solution,
+        lead=conversion.schedule.route.lead,
+    )
+    promised = predict_delivery(solution, conversion)
+    assert found.link is not None
+    assert found.link.predicted_rate == pytest.approx(promised.rates.R_avg, rel=0.005)
+    assert found.link.rms_position_error == pytest.approx(promised.rms_position_error, abs=0.4)
+    assert found.link.path_error == pytest.approx(promised.max_path_error, abs=0.4)
     return conversion, found
 
 
@@ -53,6 +64,17 @@ def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
     if parameters == "keep":  # the defaults may be too slow for a plan, and that is said
         told = [each for each in told if not each.startswith("link-")]
     assert told == []
+
+
+def test_the_sample_plane() -> None:
+    text = (MISSIONS / "plane_relay.yaml").read_text()
+    changes = {"flight.duration": 70, "flight.time_step": 0.5, "radio.fading": "none"}
+    conversion, found = checked(text, changes)
+    assert found.track is not None
+    assert [each for each in complaints(found) if not each.startswith("link-")] == []
+    assert found.link is not None
+    assert found.link.share > 0.98
+    assert conversion.vehicle.kind == "plane"
 
 
 @pytest.mark.parametrize("finish", ["rtl", "land", "hover"])

@@ -23,7 +23,7 @@ def refused(changes: dict[str, Any]) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["paper", "paper_active", "copter_relay"])
+@pytest.mark.parametrize("name", ["paper", "paper_active", "copter_relay", "plane_relay"])
 def test_sample_plans_are_valid(name: str) -> None:
     plan = read_plan(MISSIONS / f"{name}.yaml")
     assert plan.text == (MISSIONS / f"{name}.yaml").read_text()
@@ -167,13 +167,38 @@ def test_required_keys(key: str) -> None:
     ("key", "value"),
     [
         ("radio.causal", True),
-        ("vehicle.type", "plane"),
         ("fence", {"inclusion": [[0, 0], [9, 0], [9, 9]]}),
     ],
 )
 def test_what_does_not_work_yet_says_so(key: str, value: object) -> None:
     assert f"{key}: " in (message := refused({key: value}))
     assert "does not work yet" in message
+
+
+PLANE = {
+    "vehicle.type": "plane",
+    "vehicle.min_speed": 12,
+    "flight.start_velocity": "free",
+    "flight.end_velocity": "free",
+}
+
+
+def test_a_plane_is_a_vehicle() -> None:
+    vehicle = parse_plan(edited(SMALL, PLANE)).vehicle
+    assert (vehicle.type, vehicle.min_speed) == ("plane", 12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"vehicle.min_speed": 0}, "vehicle.min_speed: 0 m/s: a plane cannot hover"),
+        ({"vehicle.autopilot": "px4"}, "vehicle.type: plane: missions for planes are made for"),
+        ({"mission.on_finish": "land"}, "mission.on_finish: land: a plane needs an approach"),
+        ({"flight.end_velocity": "hover"}, "flight.end_velocity: hover is 0 m/s"),
+    ],
+)
+def test_what_a_plane_cannot_do(changes: dict[str, object], said: str) -> None:
+    assert said in refused(PLANE | changes)
 
 
 def test_too_short_a_duration_says_how_long_it_takes() -> None:

@@ -33,6 +33,15 @@ def result(small_plan: MakePlan) -> Result:
     )
 
 
+def test_a_prediction_that_no_flight_has_confirmed_says_so(result: Result) -> None:
+    vehicle = replace(result.conversion.vehicle, kind="plane")
+    plane = replace(result, conversion=replace(result.conversion, vehicle=vehicle))
+    assert "not compared with recorded flights" in as_text(plane)
+    assert as_dict(plane)["predicted"]["calibrated"] is False
+    assert "not compared" not in as_text(result)
+    assert as_dict(result)["predicted"]["calibrated"] is True
+
+
 def test_it_says_what_was_found(result: Result) -> None:
     lines = as_text(result).splitlines()
     assert lines[0] == "over the hill"

@@ -34,6 +34,10 @@ def autopilot(
         Literal["ardupilot", "px4", "px4-legacy-first"],
         typer.Option(help="Whose manners it has."),
     ] = "ardupilot",
+    aircraft: Annotated[
+        Literal["copter", "plane"],
+        typer.Option("--type", help="What it flies: a copter, or with ardupilot a plane."),
+    ] = "copter",
     system: Annotated[int, typer.Option(min=1, max=255, metavar="N", help="Its number.")] = 1,
     home: Annotated[
         str, typer.Option(metavar="LAT,LON,ALT", help="Where it stands: degrees, m AMSL.")
@@ -79,10 +83,12 @@ def autopilot(
 
         values = {} if parameters is None else read_parameters(parameters)
         flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"
-        vehicle = Vehicle(flown_by, parameters=values, source=str(parameters or "parameters"))
+        source = str(parameters or "parameters")
+        vehicle = Vehicle(flown_by, aircraft, values, source)
         flight_model(vehicle)  # useless parameters are refused here, not in flight
         mock = MockAutopilot(
             manners_of(kind),
+            aircraft=aircraft,
             address=Address(system, 1),
             home=read_home(home),
             fly=predicted(vehicle),

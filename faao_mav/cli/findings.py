@@ -9,13 +9,20 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from faao_mav.cli.finding_lines import count_of, grouped, items_of, line_of, message_of
+from faao_mav.cli.finding_lines import (
+    UNCALIBRATED,
+    count_of,
+    grouped,
+    items_of,
+    line_of,
+    message_of,
+)
 from faao_mav.mission.check import Check
+from faao_mav.mission.flight import flight_model
 from faao_mav.mission.validate import Level, Rule
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Vehicle
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
-_NAMES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +48,14 @@ def as_dict(verdict: Verdict) -> dict[str, Any]:
         "autopilot": verdict.vehicle.autopilot,
         "type": verdict.vehicle.kind,
         "parameters": verdict.vehicle.source if verdict.vehicle.parameters else None,
-        "predicted": {"duration": float(check.track.t[-1])} if check.track else None,
+        "predicted": (
+            {
+                "duration": float(check.track.t[-1]),
+                "calibrated": flight_model(verdict.vehicle).calibrated,
+            }
+            if check.track
+            else None
+        ),
         "link": asdict(check.link) | {"share": check.link.share} if check.link else None,
         "errors": len(check.of(Level.ERROR)),
         "warnings": len(check.of(Level.WARNING)),
@@ -110,7 +124,7 @@ def show_rules(rules: Sequence[Rule], console: Console) -> None:
 def _head(verdict: Verdict) -> str:
     vehicle = verdict.vehicle
     lines = [
-        f"{verdict.source}: {verdict.items} items, for {_NAMES[vehicle.autopilot]} and a "
+        f"{verdict.source}: {verdict.items} items, for {AUTOPILOT_NAMES[vehicle.autopilot]} and a "
         f"{vehicle.kind} ({verdict.chosen_by}); parameters: "
         f"{vehicle.source if vehicle.parameters else 'defaults'}"
     ]
@@ -118,7 +132,10 @@ def _head(verdict: Verdict) -> str:
     if check.track is None:
         lines.append(f"flight not predicted: {check.unpredicted}")
     else:
-        lines.append(f"predicted flight: {check.track.t[-1]:.0f} s")
+        lines.append(
+            f"predicted flight: {check.track.t[-1]:.0f} s"
+            f"{'' if flight_model(vehicle).calibrated else f' ({UNCALIBRATED})'}"
+        )
     if check.link is not None:
         lines.append(
             f"predicted link: {check.link.predicted_rate:.4f} bit/s/Hz, "

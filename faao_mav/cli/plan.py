@@ -110,23 +110,18 @@ def _solve(
     from faao_mav.faao.problem import build_problem
     from faao_mav.faao.progress import Progress
     from faao_mav.faao.solution import save_solution
-    from faao_mav.mission.autopilot import legs_of
     from faao_mav.mission.check import check
-    from faao_mav.mission.convert import convert
-    from faao_mav.mission.flight import copter_model
+    from faao_mav.mission.convert import check_vehicle, convert
     from faao_mav.mission.formats import check_suffix, render_mission
     from faao_mav.mission.parameter_file import parameter_path, render_parameters
     from faao_mav.mission.prediction import predict_delivery
     from faao_mav.mission.recommend import candidates
     from faao_mav.mission.validate import Limits
-    from faao_mav.mission.vehicle import vehicle_of
     from faao_mav.plan import read_plan
 
     started = time.perf_counter()
     read = read_plan(plan_file, method=method)
-    own = vehicle_of(read)
-    legs_of(own)  # a useless parameter is refused before the work, not after it
-    copter_model(own)
+    check_vehicle(read)
     vehicles = candidates(read)
     tuned = None
     if out is not None:
@@ -184,8 +179,8 @@ def _solve(
             conversion.vehicle,
             limits=Limits(max_speed=read.vehicle.max_speed),
             solution=solution,
+            lead=conversion.schedule.route.lead,
         )
-        reports.write(report, figure, solution, conversion, prediction, checked.findings)
         information, fresh = price(solution), fresh_rates(solution)
         limit = saturation(solution)
         ceiling = None
@@ -193,19 +188,21 @@ def _solve(
             from faao_mav.faao.bound import upper_bound
 
             ceiling = upper_bound(build_problem(read), solution.rates.R_avg)
-    return Result(
-        solution=solution,
-        information=information,
-        fresh=fresh,
-        saturation=limit,
-        bound=ceiling,
-        conversion=conversion,
-        prediction=prediction,
-        findings=checked.findings,
-        seconds_optimize=optimized,
-        seconds_total=time.perf_counter() - started,
-        written=tuple(targets),
-    )
+        result = Result(
+            solution=solution,
+            information=information,
+            fresh=fresh,
+            saturation=limit,
+            bound=ceiling,
+            conversion=conversion,
+            prediction=prediction,
+            findings=checked.findings,
+            seconds_optimize=optimized,
+            seconds_total=0.0,
+            written=tuple(targets),
+        )
+        reports.write(report, figure, result)
+    return replace(result, seconds_total=time.perf_counter() - started)
 
 
 def _check_own(tuned: Path) -> None:

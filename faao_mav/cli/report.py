@@ -7,10 +7,7 @@ from faao_mav.errors import InputError
 from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
-    from faao_mav.faao.solution import Solution
-    from faao_mav.mission.convert import Conversion
-    from faao_mav.mission.prediction import Prediction
-    from faao_mav.mission.validate import Finding
+    from faao_mav.cli.summary import Result
 
 
 def check_names(report: Path | None, figure: Path | None) -> None:
@@ -23,19 +20,24 @@ def check_names(report: Path | None, figure: Path | None) -> None:
         check_figure_path(figure, "--figure")
 
 
-def write(
-    report: Path | None,
-    figure: Path | None,
-    solution: "Solution",
-    conversion: "Conversion",
-    prediction: "Prediction",
-    findings: "tuple[Finding, ...]",
-) -> None:
-    """Write the page and the figure, where asked for."""
+def write(report: Path | None, figure: Path | None, result: "Result") -> None:
+    """Write the page and the figure of `result`, where asked for."""
+    solution, conversion, prediction = result.solution, result.conversion, result.prediction
     if report is not None:
         from faao_mav.report import ReportData, render_report
 
-        page = render_report(ReportData(solution, conversion, prediction, findings))
+        page = render_report(
+            ReportData(
+                solution,
+                conversion,
+                prediction,
+                result.findings,
+                information=result.information,
+                fresh=result.fresh,
+                saturation=result.saturation,
+                bound=result.bound,
+            )
+        )
         write_whole(report, page.encode())
     if figure is not None:
         from faao_mav.report.figures import flight_figure

@@ -4,7 +4,7 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,9 +14,7 @@ from faao_mav.errors import InputError
 if TYPE_CHECKING:
     from faao_mav.cli.findings import Verdict
     from faao_mav.faao.solution import Solution
-    from faao_mav.mission.formats import MissionFile
     from faao_mav.mission.item import Mission
-    from faao_mav.mission.vehicle import Vehicle
     from faao_mav.plan import Plan
 
 
@@ -125,8 +123,9 @@ def _judge(
     given: tuple[float | None, float | None, float | None],
 ) -> "tuple[Verdict, Mission, Solution | None]":
     from faao_mav.cli.findings import Verdict
+    from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.mission.check import check
-    from faao_mav.mission.flight import flight_model
+    from faao_mav.mission.flight import flight_model, modelled
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.mission.validate import Limits
 
@@ -142,8 +141,9 @@ def _judge(
         max_speed=plan.vehicle.max_speed if plan else None,
     )
     file = read_mission_file(mission_file)
-    vehicle, chosen_by = _vehicle(mission_file, file, plan, *asked)
-    flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
+    vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
+    if modelled(vehicle):
+        flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
     found = check(file.mission, vehicle, limits=limits, solution=solution)
     verdict = Verdict(mission_file, len(file.mission.items), vehicle, chosen_by, found)
     return verdict, file.mission, solution
@@ -211,49 +211,3 @@ def _planned(
     plan = read_plan(plan_file)
     with progress(shown=sys.stderr.isatty()) as observe:
         return plan, optimize(plan, observe=observe)
-
-
-def _vehicle(
-    mission_file: Path,
-    file: "MissionFile",
-    plan: "Plan | None",
-    autopilot: str | None,
-    kind: str | None,
-    parameters: Path | None,
-) -> tuple["Vehicle", str]:
-    """Return the vehicle, and what told which: arguments, then the plan, then the mission.
-
-    Its parameters are those asked for, else those beside the mission, over the plan's own.
-    """
-    from faao_mav.mission.parameter_file import parameter_path, read_parameters
-    from faao_mav.mission.vehicle import Autopilot, Kind, Vehicle, vehicle_of
-
-    base, chosen_by = Vehicle(), "by default; --autopilot and --type say otherwise"
-    if file.autopilot is not None:
-        base, chosen_by = Vehicle(file.autopilot, file.kind or "copter"), "as the file says"
-    if plan is not None:
-        base, chosen_by = vehicle_of(plan), "as the plan says"
-    if autopilot is not None or kind is not None:
-        chosen_by = "as asked"
-    for name, value, known in (
-        ("--autopilot", autopilot, get_args(Autopilot)),
-        ("--type", kind, get_args(Kind)),
-    ):
-        if value is not None and value not in known:
-            raise InputError(f"{name} {value}: expected {' or '.join(known)}")
-    values, source = base.parameters, base.source
-    if autopilot is not None and autopilot != base.autopilot:
-        values = {}  # of another autopilot
-    whose: Autopilot = autopilot or base.autopilot  # type: ignore[assignment]  # checked above
-    beside = parameter_path(mission_file, whose)
-    if parameters is not None:
-        values, source = read_parameters(parameters), str(parameters)
-    elif beside.is_file():
-        values, source = {**values, **read_parameters(beside)}, f"{beside}, beside the mission"
-    vehicle = Vehicle(
-        whose,
-        kind or base.kind,  # type: ignore[arg-type]
-        values,
-        source,
-    )
-    return vehicle, chosen_by

@@ -14,15 +14,21 @@ if TYPE_CHECKING:
 
 _DECIMALS = 9  # of a degree: 0.1 mm
 
+_AIRSPEED, _GROUND_SPEED = 0.0, 1.0
+"""Types of DO_CHANGE_SPEED. ArduPlane takes the second for the least ground speed."""
+
+_PITCH = 15.0
+"""Degrees by which a plane climbs at least until it is at its altitude."""
+
 
 def assemble(route: Route, plan: "Plan") -> Mission:
     """Return the mission that flies `route` at `plan.flight.altitude` above the origin.
 
     Home is the plan's origin. The items: TAKEOFF there, if the plan asks for it; the way to w_I
-    at the vehicle's greatest speed; for each leg its waypoint, before it a DO_CHANGE_SPEED where
-    the speed is another, after it a NAV_DELAY where the wait has a fraction that the autopilot
-    would not keep; and what `plan.mission.on_finish` says. Unused parameters are 0: ArduPilot
-    refuses NaN.
+    at the vehicle's greatest speed, a plane's at the speed that it begins with; for each leg its
+    waypoint, before it a DO_CHANGE_SPEED where the speed is another, after it a NAV_DELAY where
+    the wait has a fraction that the autopilot would not keep; and what `plan.mission.on_finish`
+    says. Unused parameters are 0: ArduPilot refuses NaN.
 
     Raises `InfeasibleError` if home and items are more than `plan.mission.max_items`.
     """
@@ -35,17 +41,19 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         for x, y in zip(latitudes, longitudes, strict=True)
     ]
 
+    plane = plan.vehicle.type == "plane"
+    axis = _AIRSPEED if plane else _GROUND_SPEED
     items = []
     if plan.mission.takeoff:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
         here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
-        items.append(_at(Command.NAV_TAKEOFF, here, altitude))
-    commanded = min(plan.vehicle.max_speed, FASTEST)
-    items.append(_change_speed(commanded))
+        items.append(_at(Command.NAV_TAKEOFF, here, altitude, _PITCH if plane else 0.0))
+    commanded = float(route.speeds[0]) if plane else min(plan.vehicle.max_speed, FASTEST)
+    items.append(_change_speed(commanded, axis))
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
         if speed != commanded:
-            items.append(_change_speed(speed))
+            items.append(_change_speed(speed, axis))
             commanded = speed
         hold, delay = float(route.holds[k]), float(route.delays[k])
         if plan.vehicle.autopilot == "px4":  # keeps fractions
@@ -86,11 +94,13 @@ def _waypoint(
     return MissionItem(command, frame, params, *place, float(altitude))
 
 
-def _at(command: Command, place: tuple[float, float], altitude: float) -> MissionItem:
+def _at(
+    command: Command, place: tuple[float, float], altitude: float, param1: float = 0.0
+) -> MissionItem:
     frame = Frame.GLOBAL_RELATIVE_ALT
-    return MissionItem(command, frame, (0.0, 0.0, 0.0, 0.0), *place, float(altitude))
+    return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), *place, float(altitude))
 
 
-def _change_speed(speed: float) -> MissionItem:
-    # Type 1 is ground speed; throttle -1 leaves it alone.
-    return MissionItem(Command.DO_CHANGE_SPEED, Frame.MISSION, (1.0, float(speed), -1.0, 0.0))
+def _change_speed(speed: float, axis: float) -> MissionItem:
+    # throttle -1 leaves it alone
+    return MissionItem(Command.DO_CHANGE_SPEED, Frame.MISSION, (axis, float(speed), -1.0, 0.0))

@@ -1,6 +1,7 @@
-"""What ArduCopter and PX4 do with the legs between waypoints: the limits that shape them.
+"""What autopilots do with the legs between waypoints: the limits that shape them.
 
-Models and defaults as measured on ArduCopter 4.7 and PX4 1.16 in simulation.
+Models and defaults as measured on ArduCopter 4.7 and PX4 1.16 in simulation; ArduPlane's are
+those of its documentation.
 """
 
 import math
@@ -11,6 +12,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
+from faao_mav.mission.flight.plane import ArduPlane
 from faao_mav.mission.vehicle import Vehicle
 
 Name: TypeAlias = tuple[str, float]
@@ -25,6 +27,12 @@ _PX4_JERK: tuple[Name, ...] = (("MPC_JERK_AUTO", 1.0),)
 _NARROW_RADIUS, _RADIUS_SHARE = 4.0, 0.45
 _CUT = 1.3
 """Metres of a corner that a wide radius may cost."""
+
+_RUN_IN = 1.2
+"""Of the shortest leg: what a copter gets to be at speed at w_I."""
+
+_SETTLING = 4.0
+"""Look-aheads of its guidance in which an aeroplane comes onto a track, whatever its course."""
 
 _JERK_LAG = 0.30
 """ArduCopter's t_j: what a ramp takes beyond the ideal jerk-limited one, s."""
@@ -59,6 +67,10 @@ class ArduCopterLegs:
         """
         return speed * self.ramp_duration(speed)
 
+    def run_in(self, speed: float) -> float:
+        """Return the length of a leg at whose end the aircraft has `speed`, m/s, for sure, m."""
+        return _RUN_IN * float(self.shortest_leg(np.array([speed]))[0])
+
     def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
         """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
         return np.zeros_like(turn)
@@ -83,6 +95,10 @@ class Px4Legs:
         b = 4 * self.acceleration**2 / self.jerk
         return speed * (speed + b) / (2 * self.acceleration)
 
+    def run_in(self, speed: float) -> float:
+        """Return the length of a leg at whose end the aircraft has `speed`, m/s, for sure, m."""
+        return _RUN_IN * float(self.shortest_leg(np.array([speed]))[0])
+
     def radii(self, room: Real, turn: Real) -> Real:
         """Return acceptance radii, m, for waypoints whose shorter leg is `room` (n,), m.
 
@@ -94,7 +110,32 @@ class Px4Legs:
         return np.minimum(np.maximum(_NARROW_RADIUS, cut), _RADIUS_SHARE * room)
 
 
-Legs: TypeAlias = ArduCopterLegs | Px4Legs
+@dataclass(frozen=True, slots=True)
+class ArduPlaneLegs:
+    """How ArduPlane flies a leg: `look_ahead`, s, is how far ahead its guidance aims."""
+
+    whole_seconds: ClassVar[bool] = False
+    least: ClassVar[float] = 0.0
+
+    look_ahead: float
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg that is flown at `speed`, m; same shape.
+
+        One look-ahead: shorter ones are cut.
+        """
+        return self.look_ahead * speed
+
+    def run_in(self, speed: float) -> float:
+        """Return the length of a leg at whose end the aircraft flies along it at `speed`, m."""
+        return _SETTLING * self.look_ahead * speed
+
+    def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
+        """Return acceptance radii, m: 0, ArduPlane's own; the shape of `turn`."""
+        return np.zeros_like(turn)
+
+
+Legs: TypeAlias = ArduCopterLegs | Px4Legs | ArduPlaneLegs
 
 
 def legs_of(vehicle: Vehicle) -> Legs:
@@ -104,6 +145,9 @@ def legs_of(vehicle: Vehicle) -> Legs:
     WPNAV_ACCEL in centimetres and WPNAV_JERK in metres; MPC_ACC_HOR and MPC_JERK_AUTO for PX4.
     Raises `InputError` if the one that counts is not a positive number.
     """
+    if vehicle.kind == "plane":
+        plane = ArduPlane.from_vehicle(vehicle)
+        return ArduPlaneLegs(plane.damping * plane.period / math.pi)
     if vehicle.autopilot == "px4":
         px4 = Px4Legs()
         return Px4Legs(

@@ -33,10 +33,12 @@ def check(
     *,
     limits: Limits | None = None,
     solution: "Solution | None" = None,
+    lead: float | None = None,
 ) -> Check:
     """Predict the flight of `mission` by `vehicle` and judge both by all rules.
 
-    With a `solution` also by what the flight makes of that plan. A mission that cannot be
+    With a `solution` also by what the flight makes of that plan, which begins `lead` seconds after
+    the flight does where that is known. A mission that cannot be
     predicted is judged by its items alone; nothing is raised.
     """
     track, unpredicted = _track(mission, vehicle)
@@ -44,7 +46,7 @@ def check(
     if solution is not None and track is not None:
         from faao_mav.mission.comparison import compare_with_plan  # the radio's code
 
-        link = compare_with_plan(solution, track)
+        link = compare_with_plan(solution, track, lead=lead)
     findings = validate(mission, vehicle, track=track, limits=limits, link=link)
     return Check(track, unpredicted, link, findings)
 

@@ -9,9 +9,11 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.deviation import passing
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.outline import set_out
 from faao_mav.mission.prediction import Prediction, price_flight
+from faao_mav.mission.run_in import begins_at_speed
 from faao_mav.mission.timing import MOST_LEAD
 from faao_mav.mission.validate.link import LinkCheck, Stretch
 from faao_mav.mission.vector import lengths
@@ -22,16 +24,17 @@ _LEAST = 1e-6
 """bit/s/Hz: less is not lost but rounded."""
 
 
-def compare_with_plan(solution: Solution, track: Track) -> LinkCheck:
+def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = None) -> LinkCheck:
     """Return what the flight `track` makes of the plan that `solution` solves.
 
     The plan leaves w_I when the flight leaves the item nearest to it (of several the one that
-    brings both closest at equal times, rms), or up to `timing.MOST_LEAD` seconds later: the
-    mission does not say by how much the aircraft sets out before the plan. A track that is
-    nowhere near is compared all the same.
+    brings both closest at equal times, rms), or `lead` seconds later. Without one, as a mission
+    does not say by how much the aircraft sets out before the plan, it is what brings both closest,
+    up to `timing.MOST_LEAD`. A plan that begins at speed does when the flight passes w_I. A track
+    that is nowhere near is compared all the same.
     """
     w = _in_frame_of(solution, track)
-    start = _start(solution, track, w)
+    start = _start(solution, track, w, lead)
     t = track.t - start
     flown = price_flight(solution, t, w)
     during = np.interp(solution.t, t, track.position[:, 2])
@@ -58,9 +61,10 @@ def _in_frame_of(solution: Solution, track: Track) -> Real:
     return own.to_local(*track.frame.to_geodetic(track.position[:, :2]))
 
 
-def _start(solution: Solution, track: Track, w: Real) -> float:
-    """Return when, on the clock of `track`, the plan's reads 0: up to `MOST_LEAD` after leaving."""
+def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> float:
+    """Return when, on the clock of `track`, the plan's reads 0."""
     waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
+    moving = waited == 0 and begins_at_speed(solution.t, solution.w)
     left = track.reached[np.isfinite(track.reached)]
     if len(left) == 0:
         return float(track.t[0])
@@ -73,7 +77,11 @@ def _start(solution: Solution, track: Track, w: Real) -> float:
         return float(np.mean(np.sum((np.stack(at, axis=-1) - solution.w) ** 2, axis=1)))
 
     nearest = min(map(float, near), key=apart)
-    return min((nearest + lead for lead in map(float, _LEADS)), key=apart)
+    if moving:
+        return passing(track.t, w, solution.w[0], nearest)
+    if lead is not None:
+        return nearest + lead
+    return min((nearest + each for each in map(float, _LEADS)), key=apart)
 
 
 def _worst(solution: Solution, flown: Prediction) -> Stretch | None:

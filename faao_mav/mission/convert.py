@@ -4,11 +4,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from faao_mav.errors import InputError
 from faao_mav.mission.assemble import assemble
-from faao_mav.mission.autopilot import Legs, legs_of
-from faao_mav.mission.flight import copter_model
+from faao_mav.mission.autopilot import ArduCopterLegs, Legs, legs_of
+from faao_mav.mission.flight import copter_model, flight_model
+from faao_mav.mission.flight.plane import ArduPlane
 from faao_mav.mission.item import Mission
 from faao_mav.mission.outline import Splines, plan_route
+from faao_mav.mission.plane_schedule import PlaneScheduler
 from faao_mav.mission.recommend import FASTEST, candidates
 from faao_mav.mission.route import Route
 from faao_mav.mission.run_in import with_run_in
@@ -17,12 +20,16 @@ from faao_mav.mission.vehicle import Vehicle, vehicle_of
 
 if TYPE_CHECKING:
     from faao_mav.faao.solution import Solution
+    from faao_mav.plan import Plan
 
 _SPLINE_SPACING, _SPLINE_TIMES = 10.0, (2.0, 3.0)
 """Metres, and seconds of flight, between spline waypoints at least."""
 
 _BRAKING = 1.1
 """Of v²/a: splines use half of the acceleration."""
+
+_PLANE_SHARE = 0.4
+"""Of the path tolerance: what a plane's waypoints may use up, for it strays from them."""
 
 _GOOD = 1.5
 """Metres of error that no better parameters are sought for."""
@@ -41,6 +48,27 @@ class Conversion:
     parameters: Mapping[str, float]
 
 
+def check_vehicle(plan: "Plan") -> None:
+    """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
+
+    That is one with useless parameters, or a plane that flies at none of the plan's speeds.
+    """
+    vehicle = vehicle_of(plan)
+    legs_of(vehicle)
+    model = flight_model(vehicle)
+    if not isinstance(model, ArduPlane):
+        return
+    least, most = model.min_speed, model.max_speed
+    flown = f"the plane flies {least:g} to {most:g} m/s (AIRSPEED_MIN, AIRSPEED_MAX"
+    flown += "; vehicle.parameters may say otherwise)"
+    for key, speed in (
+        ("min_speed", plan.vehicle.min_speed),
+        ("max_speed", plan.vehicle.max_speed),
+    ):
+        if not least <= speed <= most:
+            raise InputError(f"{plan.source}: vehicle.{key}: {speed:g} m/s; {flown}")
+
+
 def convert(solution: "Solution") -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
@@ -52,10 +80,11 @@ def convert(solution: "Solution") -> Conversion:
     plan, t, w = solution.plan, solution.t, solution.w
     top = min(plan.vehicle.max_speed, FASTEST)
     trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
-    straight = plan_route(t, w, plan)
+    share = _PLANE_SHARE if plan.vehicle.type == "plane" else 1.0
+    straight = plan_route(t, w, plan, share=share)
     best = min(_refined(_firsts(trials, straight)), key=lambda each: each[0].cost)
-    if best[0].cost > _GOOD and plan.vehicle.autopilot == "ardupilot":
-        liveliest = trials[-1]
+    liveliest = trials[-1]
+    if best[0].cost > _GOOD and isinstance(liveliest.legs, ArduCopterLegs):
         bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
         new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
         firsts = [liveliest.first(route) for route in new.values()]
@@ -78,16 +107,24 @@ class _Trial:
         plan = solution.plan
         given = vehicle_of(plan)
         vehicle = replace(given, parameters={**given.parameters, **parameters})
-        legs, model = legs_of(vehicle), copter_model(vehicle, plan.origin.latitude)
-        near = plan.mission.path_tolerance
-        scheduler = Scheduler(solution.t, solution.w, model, legs, top, near)
-        return cls(parameters, vehicle, legs, scheduler)
+        legs = legs_of(vehicle)
+        return cls(parameters, vehicle, legs, _scheduler(solution, vehicle, legs, top))
 
     def first(self, route: Route) -> tuple[Schedule, "_Trial"]:
         """Return `route` with the speeds and holds that fit best, not yet refined."""
         planner = self.scheduler
         begun = with_run_in(route, planner.t, planner.w, self.legs, planner.max_speed)
         return planner.first(begun), self
+
+
+def _scheduler(solution: "Solution", vehicle: Vehicle, legs: Legs, top: float) -> Scheduler:
+    plan, t, w = solution.plan, solution.t, solution.w
+    near = plan.mission.path_tolerance
+    if vehicle.kind == "plane":
+        plane = ArduPlane.from_vehicle(vehicle)
+        least, most = plane.min_speed, min(plan.vehicle.max_speed, plane.max_speed)
+        return PlaneScheduler(t, w, plane, legs, most, near, max(plan.vehicle.min_speed, least))
+    return Scheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top, near)
 
 
 def _firsts(trials: list[_Trial], straight: Route) -> list[tuple[Schedule, _Trial]]:
@@ -111,7 +148,7 @@ def _refined(firsts: list[tuple[Schedule, _Trial]]) -> list[tuple[Schedule, _Tri
     return found
 
 
-def _splines(straight: Legs, speed: float) -> Iterator[Splines]:
+def _splines(straight: ArduCopterLegs, speed: float) -> Iterator[Splines]:
     """Yield what may be splines on a flight at `speed` m/s: all, or some."""
     braking = _BRAKING * speed**2 / straight.acceleration
     for seconds in _SPLINE_TIMES:

@@ -69,4 +69,20 @@ def settled(t: Real, w: Real, end: Real, near: float, due: float) -> float:
     return float(t[k] + max(0.0, min(1.0, share)) * (t[k + 1] - t[k]))
 
 
+def passing(t: Real, w: Real, place: Real, about: float) -> float:
+    """Return when a flight at `w` (k, 2) m at `t` (k,) s is closest to `place` (2,) m, s.
+
+    That is at `about`, s, or soon after: an autopilot takes a waypoint as reached where it is
+    within a radius of it.
+    """
+    first, last = np.searchsorted(t, [about - _SOON, about + _SOON])
+    t, w = t[first:last], w[first:last]
+    steps = np.diff(w, axis=0)
+    along = np.sum((place - w[:-1]) * steps, axis=1)
+    share = np.clip(along / np.maximum(np.sum(steps**2, axis=1), 1e-9), 0.0, 1.0)
+    k = int(np.argmin(lengths(w[:-1] + share[:, None] * steps - place)))
+    return float(t[k] + share[k] * (t[k + 1] - t[k]))
+
+
+_SOON = 3.0  # s
 _CELLS = 1 << 14  # pairs of point and leg held at once: what stays in a processor's cache is fast

@@ -53,11 +53,16 @@ class Splines:
 
 
 def plan_route(
-    t: ArrayLike, w: ArrayLike, plan: "Plan", *, splines: Splines | None = None
+    t: ArrayLike,
+    w: ArrayLike,
+    plan: "Plan",
+    *,
+    splines: Splines | None = None,
+    share: float = 1.0,
 ) -> Route:
     """Return waypoints, holds and speeds that follow the trajectory.
 
-    The polyline through the waypoints passes every sample of `w` within
+    The polyline through the waypoints passes every sample of `w` within `share` of
     `plan.mission.path_tolerance`. Hovers are one waypoint with a hold of whole seconds; what
     rounding leaves over is carried to the next hold. Between hovers `simplify` chooses the
     waypoints; each leg's speed is its length over its planned duration, to 0.001 m/s, at most
@@ -68,7 +73,7 @@ def plan_route(
     `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
-    tolerance = plan.mission.path_tolerance
+    tolerance = share * plan.mission.path_tolerance
     stops = _stops(times, positions, tolerance)
     waypoints, curved = [stops[0]], [False]
     for start, stop in pairwise(stops):

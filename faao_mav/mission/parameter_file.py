@@ -7,7 +7,7 @@ with `#` are comments. As read by Mission Planner, pymavlink (MAVProxy) and QGro
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
 
@@ -31,10 +31,23 @@ _HEXADECIMAL = re.compile(r"0x[0-9a-f]{1,8}", re.ASCII | re.IGNORECASE)
 _WHOLE = re.compile(r"\d{1,3}", re.ASCII)
 _MAX_SHOWN = 40
 
+_OF_PX4 = ("MPC_", "NAV_", "COM_", "EKF2_")
+_OF_ARDUPILOT = ("WPNAV_", "WP_", "ATC_", "PSC_", "ARMING_")
+
 
 def parameter_path(mission: Path, autopilot: Autopilot) -> Path:
     """Return the file of parameters beside `mission`: `.param`, or `.params` for PX4."""
     return mission.with_suffix(".params" if autopilot == "px4" else ".param")
+
+
+def autopilot_of(parameters: Iterable[str]) -> Autopilot | None:
+    """Return whose names `parameters` are, None where they do not tell."""
+    names = tuple(parameters)
+    px4 = any(name.startswith(_OF_PX4) for name in names)
+    ardupilot = any(name.startswith(_OF_ARDUPILOT) for name in names)
+    if px4 == ardupilot:
+        return None
+    return "px4" if px4 else "ardupilot"
 
 
 def read_parameters(path: str | Path) -> dict[str, float]:

@@ -9,8 +9,6 @@ a waypoint's altitude.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from faao_mav.errors import PlanError
-
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
 
@@ -38,9 +36,11 @@ _JERK = {"ardupilot": 10.0, "px4": 20.0}
 def candidates(plan: "Plan") -> tuple[Mapping[str, float], ...]:
     """Return sets of parameters to try, the gentlest first; one empty set for `keep`.
 
+    Likewise for aeroplanes: how they turn and how fast they may fly is tuned on each.
+
     ArduPilot's have the names of both generations: a vehicle takes those that it knows.
     """
-    if plan.mission.parameters == "keep":
+    if plan.mission.parameters == "keep" or plan.vehicle.type == "plane":
         return ({},)
     autopilot, limit = plan.vehicle.autopilot, plan.vehicle.max_acceleration
     low, high = _RANGE[autopilot]
@@ -75,11 +75,3 @@ def _px4(plan: "Plan", acceleration: float) -> dict[str, float]:
         "MPC_XY_ERR_MAX": 10.0,
         "NAV_MC_ALT_RAD": 3.0,
     }
-
-
-def check(plan: "Plan") -> None:
-    """Raise `PlanError` for a plan whose aircraft has no parameters to recommend."""
-    if plan.vehicle.type == "plane" and plan.mission.parameters == "recommend":
-        raise PlanError(
-            f"{plan.source}: mission.parameters: recommend is for multicopters; use keep"
-        )

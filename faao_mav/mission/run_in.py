@@ -9,22 +9,20 @@ from faao_mav.mission.autopilot import Legs
 from faao_mav.mission.route import Route
 from faao_mav.mission.vector import lengths
 
-MOVING = 0.5
+_MOVING = 0.5
 """Slower ends than this, m/s, are taken as hovers."""
-
-_MARGIN = 1.2
 
 
 def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) -> Route:
     """Return `route` with a leg that is long enough to be at the plan's first speed at w_I.
 
     Likewise one after w_F, so that the aircraft does not brake before it. Ends at which the plan
-    waits, or is slower than `MOVING`, get none. `t` (n,) s, `w` (n, 2) m.
+    waits, or is hardly moving, get none. `t` (n,) s, `w` (n, 2) m.
     """
     if len(route.positions) < 2:
         return route
     into, out = _end_velocities(t, w)
-    if _speed(into) > MOVING and route.departures[0] == route.arrivals[0]:
+    if begins_at_speed(t, w) and route.departures[0] == route.arrivals[0]:
         lead, lasting = _lead(into, legs, max_speed)
         route = replace(
             _with(route, 0, route.positions[0] - lead, route.arrivals[0] - lasting, _speed(into)),
@@ -32,13 +30,18 @@ def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) ->
             last=route.last + 1,
         )
         route.holds[1] = 0.0
-    if _speed(out) > MOVING and route.departures[-1] == route.arrivals[-1]:
+    if _speed(out) > _MOVING and route.departures[-1] == route.arrivals[-1]:
         lead, lasting = _lead(out, legs, max_speed)
         end = len(route.positions)
         route = _with(
             route, end, route.positions[-1] + lead, route.departures[-1] + lasting, _speed(out)
         )
     return route
+
+
+def begins_at_speed(t: Real, w: Real) -> bool:
+    """Tell whether the plan `t` (n,) s, `w` (n, 2) m does not begin with a hover."""
+    return _speed(_end_velocities(t, w)[0]) > _MOVING
 
 
 def _end_velocities(t: Real, w: Real) -> tuple[Real, Real]:
@@ -61,7 +64,7 @@ def _speed(velocity: Real) -> float:
 def _lead(velocity: Real, legs: Legs, max_speed: float) -> tuple[Real, float]:
     """Return the way, (2,) m, on which `velocity` can be reached, and its nominal duration, s."""
     speed = min(_speed(velocity), max_speed)
-    length = _MARGIN * float(legs.shortest_leg(np.array([speed]))[0])
+    length = legs.run_in(speed)
     return velocity / _speed(velocity) * length, length / speed
 
 

@@ -121,9 +121,9 @@ class Scheduler:
     """The plan and the vehicle that all trials of a conversion have in common.
 
     `t` (n,) s and `w` (n, 2) m are the plan; `legs` says how short a leg may be for its speed,
-    and how wide its acceptance radius; no speed is above `max_speed`, m/s, unless the aircraft
-    would not keep up: then by at most a tenth. The flight is over when the aircraft is within
-    `tolerance` m of w_F.
+    and how wide its acceptance radius; no speed is below `min_speed` or above `max_speed`, m/s,
+    unless the aircraft would not keep up: then by at most a tenth. The flight is over when the
+    aircraft is within `tolerance` m of w_F.
     """
 
     t: Real
@@ -132,6 +132,7 @@ class Scheduler:
     legs: Legs
     max_speed: float
     tolerance: float
+    min_speed: float = SLOWEST
 
     def first(self, route: Route) -> Schedule:
         """Return `route` with the speeds and holds that fit best."""
@@ -139,14 +140,14 @@ class Scheduler:
         waits[0] = max(waits[0], _SETTLED)
         if route.last == len(route.holds) - 1:  # it ends at rest
             waits[-1] = max(waits[-1], _SETTLING)
-        return self._fitted(self._waiting(route, waits), self.max_speed)
+        return self.fitted(self._waiting(route, waits), self.max_speed)
 
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""
         best, top = first, self.max_speed
         if best.error > ALLOWED:  # corners cost time that only speed makes up for
             top *= _FASTER
-            best = self._fitted(best.route, top)
+            best = self.fitted(best.route, top)
         for _ in range(_ROUNDS):
             finer = self._finer(best, top)
             if finer is None:
@@ -159,9 +160,9 @@ class Scheduler:
             if moved.cost > _WORTHWHILE * best.cost:
                 break
             best = moved
-        return self._rounded(self._shared(best, top), top)
+        return self.rounded(self.shared(best, top), top)
 
-    def _flight(self, route: Route) -> Schedule:
+    def flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`."""
         route, path, clock = self._told(route)
         return Schedule(route, path, self.model.fly(path), clock)
@@ -194,7 +195,11 @@ class Scheduler:
         )
         return route, path, clock
 
-    def _fitted(self, route: Route, top: float, groups: Integers | None = None) -> Schedule:
+    def fitted(self, route: Route, top: float, groups: Integers | None = None) -> Schedule:
+        """Return the flight of `route` with the speeds and holds that fit best.
+
+        No speed is above `top`, m/s; legs with the same number in `groups` share one.
+        """
         route, path, clock = self._told(route)
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
@@ -205,7 +210,7 @@ class Scheduler:
             clock,
             groups=_own_speeds(route) if groups is None else groups,
             free=free,
-            min_speed=SLOWEST,
+            min_speed=self.min_speed,
             max_speed=top,
         )
         route = replace(route, speeds=found.speeds, lead=found.lead)
@@ -226,7 +231,7 @@ class Scheduler:
         for count in dict.fromkeys((len(times), len(times) // 2, 1)):
             if 0 < count <= len(times):
                 split = _split(found.route, sorted(times[:count]), self.t, self.w)
-                finer = self._fitted(split, top)
+                finer = self.fitted(split, top)
                 if finer.cost <= _WORTHWHILE * found.cost:
                     return finer
         return None
@@ -245,7 +250,7 @@ class Scheduler:
         nearest = np.array([flown[np.argmin(lengths(flown - place))] for place in planned])
         positions = route.positions.copy()
         positions[points] -= _MOVED * (nearest.reshape(-1, 2) - planned)
-        return self._fitted(replace(route, positions=positions), top)
+        return self.fitted(replace(route, positions=positions), top)
 
     def _splits(self, found: Schedule) -> list[float]:
         """Return the plan's times at which legs that are off by too much are best split.
@@ -287,32 +292,32 @@ class Scheduler:
             result &= length >= np.maximum(shortest, self.legs.least)
         return result
 
-    def _shared(self, found: Schedule, top: float) -> Schedule:
+    def shared(self, found: Schedule, top: float) -> Schedule:
         """Return `found` with one speed for neighbouring legs wherever that hardly costs."""
         for alike in _ALIKE:
             groups = _groups(found.route.speeds, alike)
             if len(groups) == 0 or groups[-1] == len(groups) - 1:
                 continue
-            tried = self._fitted(found.route, top, groups)
+            tried = self.fitted(found.route, top, groups)
             if tried.cost <= max(_DEARER * found.cost, ALLOWED / 2):
                 return tried
         return found
 
-    def _rounded(self, found: Schedule, top: float) -> Schedule:
+    def rounded(self, found: Schedule, top: float) -> Schedule:
         """Return `found` with the values that are sent."""
         route = found.route
         top = np.floor(top * 10**_SPEED_DIGITS) / 10**_SPEED_DIGITS or top
         waits = np.round(route.holds + route.delays, _HOLD_DIGITS)
         speeds = np.minimum(np.round(route.speeds, _SPEED_DIGITS), top)
         lead = round(route.lead, _HOLD_DIGITS)
-        sent = self._flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
+        sent = self.flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
         if route.last < len(waits) - 1:
             return sent
         # the relay is needed to the end of the plan's last slot
         lasting = self.t[-1] - self.t[0] + self.t[-1] - self.t[-2]
         early = lasting + sent.clock.start(sent.flown) - sent.flown.arrivals[-1]
         waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
-        return self._flight(self._waiting(sent.route, waits))
+        return self.flight(self._waiting(sent.route, waits))
 
 
 def _turns(positions: Real) -> Real:

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.mission.deviation import settled
+from faao_mav.mission.deviation import passing, settled
 from faao_mav.mission.flight import CopterModel, FlightPath, Flown
-from faao_mav.mission.vector import lengths
 
 SPEED_STEP, HOLD_STEP = 0.02, 0.05
 """Finite differences, m/s and s: above the predictions' noise, below what the physics bends."""
@@ -42,9 +41,6 @@ _LAST, _LAST_WEIGHT = 4.0, 3.5
 
 ON_TIME, _LATEST = 3.0, 5.0
 """Metres of rms error that a second too early or too late at the end weighs, up to so many."""
-
-_SOON = 3.0
-"""Seconds in which an aircraft passes a waypoint that counts as reached."""
 
 _NO_CRAWL = 0.5
 """Legs are not slowed below this, m/s, unless the plan creeps."""
@@ -75,7 +71,8 @@ class Clock:
         """Return the time of `flown` at which the plan's clock reads 0."""
         if self.leaving:
             return float(flown.departures[self.point]) + self.lead - self.at
-        return _passing(flown, self.w[0], float(flown.arrivals[self.point])) - self.at
+        about = float(flown.arrivals[self.point])
+        return passing(flown.t, flown.position[:, :2], self.w[0], about) - self.at
 
     def late(self, flown: Flown) -> float:
         """Return by how much later than planned `flown` is over, s."""
@@ -179,20 +176,6 @@ def fit(
         slope = _learnt(slope, moved, changed, steps) if trusted else None
     (speeds,), (held,) = told(x[None])
     return Fit(speeds, held, float(x[-1]), flown)
-
-
-def _passing(flown: Flown, place: Real, about: float) -> float:
-    """Return when `flown` is closest to `place` (2,), s, at `about` or soon after.
-
-    An autopilot takes a waypoint as reached where it is within a radius of it.
-    """
-    first, last = np.searchsorted(flown.t, [about - _SOON, about + _SOON])
-    t, w = flown.t[first:last], flown.position[first:last, :2]
-    steps = np.diff(w, axis=0)
-    along = np.sum((place - w[:-1]) * steps, axis=1)
-    share = np.clip(along / np.maximum(np.sum(steps**2, axis=1), 1e-9), 0.0, 1.0)
-    k = int(np.argmin(lengths(w[:-1] + share[:, None] * steps - place)))
-    return float(t[k] + share[k] * (t[k + 1] - t[k]))
 
 
 def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real, dampings: Real) -> Real:

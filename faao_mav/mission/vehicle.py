@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 Autopilot: TypeAlias = Literal["ardupilot", "px4"]
 Kind: TypeAlias = Literal["copter", "plane"]
 
+AUTOPILOT_NAMES = {"ardupilot": "ArduPilot", "px4": "PX4"}
+
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:

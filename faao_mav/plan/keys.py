@@ -1,6 +1,7 @@
 """The dotted keys of a plan, as a study varies them."""
 
 import difflib
+from collections.abc import Iterable
 
 from faao_mav.plan.messages import paths
 from faao_mav.plan.schema import PlanSection
@@ -13,6 +14,17 @@ ALIASES = {POWER: ("radio.base_station.power_dbm", "radio.relay.power_dbm")}
 
 _FREE = "vehicle.parameters."  # any name below it
 _NOT_VARIED = ("study", "name")
+
+
+def varied_twice(keys: Iterable[str]) -> str:
+    """Return two of `keys`, joined, that stand for the same value of a plan; nothing if none do."""
+    varied: dict[str, str] = {}
+    for key in keys:
+        for path in ALIASES.get(key, (key,)):
+            if path in varied:
+                return key if varied[path] == key else f"{varied[path]} and {key}"
+            varied[path] = key
+    return ""
 
 
 def unknown_key(key: str) -> str:

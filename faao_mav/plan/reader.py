@@ -12,7 +12,7 @@ from faao_mav.errors import PlanError
 from faao_mav.files import read_text
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import model, schema
-from faao_mav.plan.keys import unknown_key
+from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.messages import describe, quote
 from faao_mav.plan.reach import reach, shortest_duration
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, load_yaml
@@ -85,6 +85,7 @@ class _Reader:
             parameters=dict(tree.vehicle.parameters),
         )
         flight = self.flight()
+        self.check_plane(vehicle)
         self.check_speeds(flight, vehicle)
         self.check_steps(flight)
         self.check_reach(flight, vehicle)
@@ -195,12 +196,34 @@ class _Reader:
         for key in section.vary:
             if problem := unknown_key(key):
                 raise self.fail(f"study.vary.{key}", problem)
+        if both := varied_twice(section.vary):
+            raise self.fail("study.vary", f"{both} vary the same value; leave one out")
         return model.Study(
             vary={key: tuple(values) for key, values in section.vary.items()},
             schemes=tuple(section.schemes),
             seeds=section.seeds,
             figure=section.figure,
         )
+
+    def check_plane(self, vehicle: model.Vehicle) -> None:
+        if vehicle.type != "plane":
+            return
+        if vehicle.autopilot != "ardupilot":
+            raise self.fail(
+                "vehicle.type",
+                f"plane: missions for planes are made for ardupilot, not for {vehicle.autopilot} "
+                "(vehicle.autopilot)",
+            )
+        if vehicle.min_speed == 0:
+            raise self.fail(
+                "vehicle.min_speed", "0 m/s: a plane cannot hover; give its slowest speed, m/s"
+            )
+        if self.tree.mission.on_finish == "land":
+            raise self.fail(
+                "mission.on_finish",
+                "land: a plane needs an approach, which is not planned; give rtl or hover "
+                "(it circles)",
+            )
 
     def check_speeds(self, flight: model.Flight, vehicle: model.Vehicle) -> None:
         if vehicle.min_speed > vehicle.max_speed:

@@ -309,8 +309,5 @@ class PlanSection(Section):
     study: StudySection | None = None
 
 
-NOT_YET: tuple[tuple[str, object, str], ...] = (
-    ("radio.causal", True, "leave it false"),
-    ("vehicle.type", "plane", "use copter"),
-)
+NOT_YET: tuple[tuple[str, object, str], ...] = (("radio.causal", True, "leave it false"),)
 """Values that the schema knows and the program does not, with what to write instead."""

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from faao_mav.faao.bound import Bound
+from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.faao.solution import Solution
 from faao_mav.mission.convert import Conversion
 from faao_mav.mission.flight.track import Track
@@ -24,5 +26,9 @@ class ReportData:
     """A mission by itself, with its predicted flight as `track`, for a page without conversion."""
     track: Track | None = None
     link: LinkCheck | None = None
+    information: MutualInformation | None = None
+    fresh: FreshRates | None = None
+    saturation: Saturation | None = None
+    bound: Bound | None = None
     title: str = ""
     """Without one, the name of the plan."""

@@ -7,6 +7,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from faao_mav.mission.flight import flight_model
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.item import Mission
 from faao_mav.mission.validate.finding import Finding
@@ -85,12 +86,15 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
         yield "UAV to user", f"{rates.R_G:.4f} bit/s/Hz"
         yield "optimiser", f"{'converged' if solution.converged else 'NOT CONVERGED'}"
         yield "planned duration", f"{solution.plan.flight.duration:g} s"
+    yield from _priced(data)
     if prediction is not None:
         yield "predicted rate", f"{prediction.rates.R_avg:.4f} bit/s/Hz"
         yield "predicted duration", f"{prediction.duration:.1f} s"
         yield "from the plan at equal times, rms", f"{prediction.rms_position_error:.1f} m"
         yield "the same, at most", f"{prediction.max_position_error:.1f} m"
         yield "from the planned path, at most", f"{prediction.max_path_error:.1f} m"
+    if data.conversion is not None and not flight_model(data.conversion.vehicle).calibrated:
+        yield "the model that predicts", "after documents, not compared with recorded flights"
     if data.link is not None:
         link = data.link
         yield "predicted rate", f"{link.predicted_rate:.4f} bit/s/Hz, {100 * link.share:.2f} %"
@@ -105,6 +109,30 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
     if data.conversion is not None:
         yield "mission items", str(len(data.conversion.mission.items))
         yield "relay route", f"{data.conversion.schedule.route.distance:.0f} m"
+
+
+def _priced(data: ReportData) -> Iterator[tuple[str, str]]:
+    """What the plan is worth by other measures than its own."""
+    if data.information is not None:
+        information = data.information
+        yield (
+            "mutual information",
+            f"{information.average:.3f} ± {information.error:.1g} bit/s/Hz",
+        )
+    if data.fresh is not None:
+        fresh = data.fresh
+        yield (
+            "on fading that was not planned on",
+            f"{fresh.average:.4f} ± {fresh.error:.1g} bit/s/Hz",
+        )
+    if data.saturation is not None:
+        limit = data.saturation
+        yield "at most, by the alphabet", f"{limit.ceiling:g} bit/s/Hz"
+        if limit.saturated:
+            yield "saturated", f"{limit.spare_db:.1f} dB less power would do"
+    if data.bound is not None:
+        kind = "" if data.bound.exact else " (numerical)"
+        yield "no route can exceed", f"{data.bound.value:.4f} bit/s/Hz{kind}"
 
 
 def _findings(findings: Sequence[Finding]) -> str:

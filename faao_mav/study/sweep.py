@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, get_args
 import yaml
 
 from faao_mav.errors import InputError, PlanError
-from faao_mav.plan.keys import ALIASES, unknown_key
+from faao_mav.plan.keys import ALIASES, unknown_key, varied_twice
 from faao_mav.plan.model import StudyScheme
 from faao_mav.plan.yaml_text import load_yaml
 
@@ -66,16 +66,9 @@ def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
 
 def join_grid(options: Sequence[tuple[str, tuple[Value, ...]]]) -> dict[str, tuple[Value, ...]]:
     """Return the values by key. Raises `InputError` where two options vary the same."""
-    grid: dict[str, tuple[Value, ...]] = {}
-    varied: dict[str, str] = {}
-    for key, values in options:
-        for path in ALIASES.get(key, (key,)):
-            if path in varied:
-                both = key if varied[path] == key else f"{varied[path]} and {key}"
-                raise InputError(f"--vary {both}: varied twice; give all values in one option")
-            varied[path] = key
-        grid[key] = values
-    return grid
+    if both := varied_twice(key for key, _ in options):
+        raise InputError(f"--vary {both}: varied twice; give all values in one option")
+    return dict(options)
 
 
 def parse_values(text: str, option: str) -> tuple[Value, ...]:

@@ -31,6 +31,7 @@ from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 
 TO = (VEHICLE.system, VEHICLE.component)
+MISSION = (MissionType.MISSION, "ardupilot")
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
 
@@ -91,6 +92,23 @@ def test_a_whole_flight(kind):
     currents = [message.seq for message in only(out, MissionCurrent)]
     assert currents == sorted(currents)
     assert only(out, Heartbeat)[-1].base_mode & 128 == 0
+
+
+def test_a_plane_has_its_own_number_modes_and_storage():
+    items = list(a_mission(5).items)
+    items[2] = dataclasses.replace(items[2], params=(7.0, 40.0, 0.0, 0.0))
+    desk = desk_for("ardupilot", Mission(tuple(items), HOME), aircraft="plane", speedup=20.0)
+    assert result(desk.tell(command(400, 1))) == 0
+    assert result(desk.tell(SetMode(1, 1, AUTO["ardupilot"]))) == 0  # TRAINING, for a plane
+    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt == 0
+    assert result(desk.tell(SetMode(1, 1, 10))) == 0
+    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt > 0
+    assert only(desk.wait(1.5), Heartbeat)[-1].type == 1
+    desk.machine.lists.put(
+        MissionType.MISSION, 3, rows_of(Mission(tuple(items), HOME), *MISSION)[3]
+    )
+    kept = desk.machine.lists.rows(MissionType.MISSION)[3]
+    assert kept.params[:2] == (0.0, 40.0)
 
 
 def test_positions_are_those_of_the_track():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.mavparm import MAVParmDict
 
 from faao_mav.errors import InputError, ParameterFileError
-from faao_mav.mission.parameter_file import read_parameters, render_parameters
+from faao_mav.mission.parameter_file import autopilot_of, read_parameters, render_parameters
 
 names = st.from_regex(r"[A-Z][A-Z0-9_]{0,15}", fullmatch=True)
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -167,3 +167,19 @@ def test_any_text_is_read_or_refused(folder, text):
     except ParameterFileError:
         return
     assert read(render_parameters(parameters, "ardupilot"), folder) == parameters
+
+
+@pytest.mark.parametrize(
+    ("names", "whose"),
+    [
+        (["WPNAV_SPEED"], "ardupilot"),
+        (["WP_SPD", "RTL_ALT"], "ardupilot"),
+        (["RTL_RETURN_ALT", "MPC_XY_CRUISE"], "px4"),
+        (["NAV_ACC_RAD"], "px4"),
+        (["RTL_ALT"], None),
+        (["MPC_XY_CRUISE", "WPNAV_SPEED"], None),
+        ([], None),
+    ],
+)
+def test_names_tell_whose_parameters_they_are(names: list[str], whose: str | None) -> None:
+    assert autopilot_of(names) == whose

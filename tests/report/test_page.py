@@ -12,6 +12,8 @@ from reported import FINDINGS, HOSTILE, flown
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
+from faao_mav.faao.bound import Bound
+from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.report import ReportData, render_report
 
 VOID = {"meta", "br", "link", "img", "input", "hr"}
@@ -87,6 +89,26 @@ def test_every_section_is_there(full: str) -> None:
     cells = page.of("td")
     assert set(wanted) | {f"{value:g}" for value in wanted.values()} <= set(cells)
     assert re.search(r"faao-mav \d.*numpy \d.*Python \d", shown)
+
+
+def test_what_the_plan_is_worth_by_other_measures() -> None:
+    data = ReportData(
+        solution=flown().solution,
+        information=MutualInformation(1.9, 1.8, 0.004),
+        fresh=FreshRates(1.7, 1.6, 0.01, 0.02),
+        saturation=Saturation(2.0, 3.2),
+        bound=Bound(1.95, exact=False),
+    )
+    page = Page(render_report(data))
+    told = dict(zip(page.of("dt"), page.of("dd"), strict=True))
+    assert told["mutual information"] == "1.800 ± 0.004 bit/s/Hz"
+    assert told["on fading that was not planned on"] == "1.6000 ± 0.02 bit/s/Hz"
+    assert told["at most, by the alphabet"] == "2 bit/s/Hz"
+    assert told["saturated"] == "3.2 dB less power would do"
+    assert told["no route can exceed"] == "1.9500 bit/s/Hz (numerical)"
+    exact = Page(render_report(ReportData(saturation=Saturation(2.0, 0.0), bound=Bound(2.0, True))))
+    assert exact.of("dt") == ["at most, by the alphabet", "no route can exceed"]
+    assert exact.of("dd")[-1] == "2.0000 bit/s/Hz"
 
 
 def test_a_part_that_is_not_there_leaves_its_sections_out() -> None:

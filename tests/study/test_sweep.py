@@ -144,6 +144,10 @@ def test_the_study_of_a_plan() -> None:
         ({"vari": {}}, "study.vari: unknown key; did you mean vary?"),
         ({"vary": {"fligth.duration": [1]}}, "did you mean flight.duration?"),
         ({"vary": {"flight.duration": []}}, "study.vary.flight.duration: nothing is not accepted"),
+        (
+            {"vary": {"power_dbm": [1], "radio.relay.power_dbm": [2]}},
+            "study.vary: power_dbm and radio.relay.power_dbm vary the same value",
+        ),
         ({"vary": {"flight.duration": 5}}, "study.vary.flight.duration: 5 is not accepted"),
         ({"schemes": ["rzf"]}, "'rzf' is not accepted; give a list of faao"),
         ({"seeds": 0}, "study.seeds: 0 is not accepted; give a whole number, 1 to 10000"),

@@ -128,6 +128,19 @@ def test_who_flies_it(run: Run, tmp_path: Path) -> None:
     assert run(plan, "--type", "boat").exit_code == 2
 
 
+def test_a_prediction_says_how_far_it_is_to_be_trusted(sound: Path) -> None:
+    app = typer.Typer()
+    app.command()(validate)
+
+    def told(*options: str) -> str:
+        return CliRunner().invoke(app, [str(sound), *options]).stdout
+
+    assert "not compared with recorded flights)" in told("--type", "plane")
+    assert "not compared" not in told()
+    without = told("--autopilot", "px4", "--type", "plane")
+    assert "flight not predicted: there is no model of how PX4 flies planes" in without
+
+
 def test_parameters_come_from_a_file(run: Run, sound: Path, tmp_path: Path) -> None:
     parameters = tmp_path / "my.param"
     parameters.write_text("ARMING_MIS_ITEMS,1\n")

@@ -35,7 +35,7 @@ from faao_mav.mavlink.rows import mission_of
 from faao_mav.mission.flight import Track
 from faao_mav.mission.item import Home, Mission
 from faao_mav.mission.vehicle import Autopilot as Family
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.mission.vehicle import Kind, Vehicle
 
 Fly: TypeAlias = Callable[[Mission], Track]
 
@@ -57,7 +57,7 @@ class Cmd(IntEnum):
 
 
 _AUTOPILOT_VERSION, _HOME_POSITION = 148, 242
-_QUADROTOR = 2
+_MAV_TYPES: dict[Kind, int] = {"copter": 2, "plane": 1}  # quadrotor, fixed wing
 _INFO = 6
 # MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
 _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
@@ -65,8 +65,9 @@ _AT_REST = Posture(np.zeros(3), np.zeros(3), 0)
 
 
 class MockAutopilot:
-    """A copter that takes missions as ArduPilot or PX4 does, and flies them along `fly`'s track.
+    """It takes missions as ArduPilot or PX4 does, and flies them along `fly`'s track.
 
+    `aircraft` is what its heartbeats say that it is, and whose missions it stores.
     It boots for `boot` seconds, in which it refuses lists. Armed and set to the mission it flies
     what it holds, `speedup` times as fast as predicted, reports its position `rate` times a
     second, and disarms where the flight ends on the ground. Heartbeats are `beat` seconds apart.
@@ -80,6 +81,7 @@ class MockAutopilot:
         self,
         manners: Manners | None = None,
         *,
+        aircraft: Kind = "copter",
         address: Address = Address(1, 1),  # noqa: B008
         home: Home = Home(-35.363262, 149.165237, 584.0),  # noqa: B008
         fly: Fly | None = None,
@@ -92,8 +94,8 @@ class MockAutopilot:
         self.manners = manners or Manners()
         self.address, self.home = address, home
         autopilot: Family = "ardupilot" if self.manners.kind == "ardupilot" else "px4"
-        self._modes = Modes(autopilot)
-        self.lists = Lists(Vehicle(autopilot), home)
+        self._modes, self._type = Modes(autopilot, aircraft), _MAV_TYPES[aircraft]
+        self.lists = Lists(Vehicle(autopilot, aircraft), home)
         self.parameters = Parameters(autopilot, parameters)
         self._server: ArduPilotServer | Px4Server = (
             ArduPilotServer(self.lists, self.manners, self._is_ready, self._is_flying)
@@ -301,4 +303,4 @@ class MockAutopilot:
             state = State.ACTIVE if self._armed else State.STANDBY
         autopilot = Autopilot.ARDUPILOT if self._modes.autopilot == "ardupilot" else Autopilot.PX4
         base_mode = self._modes.base_mode | (ARMED if self._armed else 0)
-        return Heartbeat(_QUADROTOR, autopilot, base_mode, self._modes.custom_mode, state)
+        return Heartbeat(self._type, autopilot, base_mode, self._modes.custom_mode, state)

@@ -1,21 +1,25 @@
 """Flight modes, as far as they start a mission."""
 
 from faao_mav.mavlink.messages import CommandLong
-from faao_mav.mission.vehicle import Autopilot
+from faao_mav.mission.vehicle import Autopilot, Kind
 
-_COPTER_STABILIZE, _COPTER_AUTO = 0, 3
+_STABILIZE: dict[Kind, int] = {"copter": 0, "plane": 2}
+_AUTO: dict[Kind, int] = {"copter": 3, "plane": 10}
 _PX4_AUTO, _PX4_MISSION, _PX4_LOITER = 4, 4, 3
 _CUSTOM_MODE = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _AUTO_FLAGS = 4 | 8 | 16  # auto, guided, stabilised
 
 
 class Modes:
-    """The custom mode of a vehicle, in its firmware's own numbers."""
+    """The custom mode of a vehicle, in its firmware's own numbers.
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self.autopilot = autopilot
+    ArduPilot's are those of COPTER_MODE and PLANE_MODE in MAVLink's ardupilotmega dialect.
+    """
+
+    def __init__(self, autopilot: Autopilot, kind: Kind = "copter") -> None:
+        self.autopilot, self._kind = autopilot, kind
         self.custom_mode = (
-            _COPTER_STABILIZE if autopilot == "ardupilot" else _px4_mode(_PX4_AUTO, _PX4_LOITER)
+            _STABILIZE[kind] if autopilot == "ardupilot" else _px4_mode(_PX4_AUTO, _PX4_LOITER)
         )
 
     @property
@@ -43,7 +47,9 @@ class Modes:
         return _px4_mode(whole(command.param2), whole(command.param3))
 
     def _mission_mode(self) -> int:
-        return _COPTER_AUTO if self.autopilot == "ardupilot" else _px4_mode(_PX4_AUTO, _PX4_MISSION)
+        if self.autopilot == "ardupilot":
+            return _AUTO[self._kind]
+        return _px4_mode(_PX4_AUTO, _PX4_MISSION)
 
 
 def whole(param: float) -> int:

@@ -1,6 +1,6 @@
 """How a vehicle will fly a mission."""
 
-from faao_mav.mission.flight.models import copter_model, flight_model
+from faao_mav.mission.flight.models import copter_model, flight_model, modelled
 from faao_mav.mission.flight.path import CopterModel, FlightModel, FlightPath, Flown
 from faao_mav.mission.flight.track import Track
 
@@ -12,4 +12,5 @@ __all__ = [
     "Track",
     "copter_model",
     "flight_model",
+    "modelled",
 ]

@@ -1,8 +1,14 @@
 """Which model predicts the flight of a vehicle."""
 
+from faao_mav.errors import InputError
 from faao_mav.mission.flight.arducopter import ArduCopter
 from faao_mav.mission.flight.path import CopterModel, FlightModel
 from faao_mav.mission.vehicle import Vehicle
+
+
+def modelled(vehicle: Vehicle) -> bool:
+    """Tell whether the flight of `vehicle` can be predicted."""
+    return vehicle.kind == "copter" or vehicle.autopilot == "ardupilot"
 
 
 def copter_model(vehicle: Vehicle, latitude: float | None = None) -> CopterModel:
@@ -18,8 +24,13 @@ def copter_model(vehicle: Vehicle, latitude: float | None = None) -> CopterModel
 
 
 def flight_model(vehicle: Vehicle, latitude: float | None = None) -> FlightModel:
-    """Return the model of `vehicle` with its parameters; raises `InputError` for useless ones."""
-    if vehicle.kind == "plane" and vehicle.autopilot == "ardupilot":
+    """Return the model of `vehicle` with its parameters.
+
+    Raises `InputError` for useless ones, and for a vehicle that is not `modelled`.
+    """
+    if not modelled(vehicle):
+        raise InputError("there is no model of how PX4 flies planes")
+    if vehicle.kind == "plane":
         from faao_mav.mission.flight.plane import ArduPlane
 
         return ArduPlane.from_vehicle(vehicle)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,9 @@ class Flown:
 
 
 class FlightModel(Protocol):
-    """How one kind of vehicle flies legs."""
+    """How one kind of vehicle flies legs; `calibrated`: compared with recorded flights."""
+
+    calibrated: ClassVar[bool]
 
     @property
     def cruise_speed(self) -> float:

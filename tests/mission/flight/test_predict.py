@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
+from faao_mav.mission.flight import modelled
 from faao_mav.mission.flight.predict import predict
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.vehicle import Vehicle
@@ -405,3 +406,11 @@ def test_items_are_flown_in_order(items: list[MissionItem], end: MissionItem) ->
     moved = np.linalg.norm(np.diff(track.position, axis=0), axis=1)
     fastest = 2 * max([10.0, *(i.params[1] for i in items if i.command == Command.DO_CHANGE_SPEED)])
     assert (moved <= fastest * np.diff(track.t) + 0.05).all()
+
+
+def test_px4_planes_are_not_predicted_as_copters() -> None:
+    vehicle = Vehicle("px4", "plane")
+    assert not modelled(vehicle)
+    with pytest.raises(InputError, match="no model of how PX4 flies planes"):
+        predict(Mission((at(Command.NAV_WAYPOINT, 100),)), vehicle)
+    assert all(map(modelled, VEHICLES))

@@ -1,0 +1,74 @@
+"""Who flies a mission file: what tells, and in which order it is believed."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+from faao_mav.errors import InputError
+from faao_mav.mission.parameter_file import autopilot_of, parameter_path, read_parameters
+from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Autopilot, Kind, Vehicle, vehicle_of
+
+if TYPE_CHECKING:
+    from faao_mav.mission.formats import MissionFile
+    from faao_mav.plan import Plan
+
+
+def choose_vehicle(
+    mission_file: Path,
+    file: "MissionFile",
+    plan: "Plan | None",
+    asked: tuple[str | None, str | None, Path | None],
+) -> tuple[Vehicle, str]:
+    """Return the vehicle, and what told which.
+
+    `asked` are --autopilot, --type and --parameters. What they leave open the plan says, else the
+    mission's file, else the names of the parameters. The parameters are those asked for, else
+    those beside the mission, over the plan's own. Raises `InputError` for unknown names, and for
+    parameters of another autopilot than the mission's.
+    """
+    autopilot, kind, parameters = asked
+    for name, value, known in (
+        ("--autopilot", autopilot, get_args(Autopilot)),
+        ("--type", kind, get_args(Kind)),
+    ):
+        if value is not None and value not in known:
+            raise InputError(f"{name} {value}: expected {' or '.join(known)}")
+    given = read_parameters(parameters) if parameters is not None else None
+    base, chosen_by = _told(mission_file, file, plan, given)
+    if autopilot is not None or kind is not None:
+        chosen_by = "as asked"
+    whose: Autopilot = autopilot or base.autopilot  # type: ignore[assignment]  # checked above
+    values, source = base.parameters, base.source
+    if whose != base.autopilot:
+        values = {}
+    beside = parameter_path(mission_file, whose)
+    if parameters is not None and given is not None:
+        theirs = autopilot_of(given)
+        if theirs is not None and theirs != whose:
+            raise InputError(
+                f"{parameters}: parameters of {AUTOPILOT_NAMES[theirs]}, but the mission is for "
+                f"{AUTOPILOT_NAMES[whose]} ({chosen_by}): "
+                f"give the vehicle's own, or --autopilot {theirs}"
+            )
+        values, source = given, str(parameters)
+    elif beside.is_file():
+        values, source = {**values, **read_parameters(beside)}, f"{beside}, beside the mission"
+    chosen: Kind = kind or base.kind  # type: ignore[assignment]  # checked above
+    return Vehicle(whose, chosen, values, source), chosen_by
+
+
+def _told(
+    mission_file: Path, file: "MissionFile", plan: "Plan | None", given: dict[str, float] | None
+) -> tuple[Vehicle, str]:
+    """Return what plan, mission and parameters say of the vehicle, and which of them it was."""
+    if plan is not None:
+        return vehicle_of(plan), "as the plan says"
+    if file.autopilot is not None:
+        return Vehicle(file.autopilot, file.kind or "copter"), "as the file says"
+    if given is not None:
+        theirs = autopilot_of(given)
+    else:
+        found = [a for a in get_args(Autopilot) if parameter_path(mission_file, a).is_file()]
+        theirs = found[0] if len(found) == 1 else None
+    if theirs is not None:
+        return Vehicle(theirs), "as its parameters say"
+    return Vehicle(), "by default; --autopilot and --type say otherwise"
