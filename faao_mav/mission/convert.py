@@ -82,7 +82,8 @@ def convert(solution: "Solution") -> Conversion:
     trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
     share = _PLANE_SHARE if plan.vehicle.type == "plane" else 1.0
     straight = plan_route(t, w, plan, share=share)
-    best = min(_refined(_firsts(trials, straight)), key=lambda each: each[0].cost)
+    firsts = [trial.first(straight) for trial in trials]
+    best = min(_refined(firsts), key=lambda each: each[0].cost)
     liveliest = trials[-1]
     if best[0].cost > _GOOD and isinstance(liveliest.legs, ArduCopterLegs):
         bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
@@ -125,17 +126,6 @@ def _scheduler(solution: "Solution", vehicle: Vehicle, legs: Legs, top: float) -
         least, most = plane.min_speed, min(plan.vehicle.max_speed, plane.max_speed)
         return PlaneScheduler(t, w, plane, legs, most, near, max(plan.vehicle.min_speed, least))
     return Scheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top, near)
-
-
-def _firsts(trials: list[_Trial], straight: Route) -> list[tuple[Schedule, _Trial]]:
-    """Return how all fly `straight`, the liveliest first: the next begins with its speeds."""
-    found: list[tuple[Schedule, _Trial]] = []
-    route = straight
-    for trial in reversed(trials):
-        found.append(trial.first(route))
-        flown = found[-1][0].route
-        route = replace(straight, speeds=flown.speeds[flown.first : flown.last], lead=flown.lead)
-    return found
 
 
 def _refined(firsts: list[tuple[Schedule, _Trial]]) -> list[tuple[Schedule, _Trial]]:

@@ -204,7 +204,7 @@ class Scheduler:
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
         free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
-        found = fit(
+        speeds, waits, lead = fit(
             self.model,
             path,
             clock,
@@ -213,9 +213,7 @@ class Scheduler:
             min_speed=self.min_speed,
             max_speed=top,
         )
-        route = replace(route, speeds=found.speeds, lead=found.lead)
-        route, path, clock = self._told(self._waiting(route, found.waits))
-        return Schedule(route, path, found.flown, clock)
+        return self.flight(self._waiting(replace(route, speeds=speeds, lead=lead), waits))
 
     def _waiting(self, route: Route, waits: Real) -> Route:
         """Return `route` with `waits` (m,), s, as holds, and as delays what holds cannot say."""

@@ -1,15 +1,13 @@
 """Speeds and holds with which the predicted flight keeps the plan's time.
 
 minimise sum_i |p(t_i) - w(t_i)|² over the speeds commanded for the legs and the holds at the
-hovers, p being the predicted flight. A Levenberg-Marquardt method with bounds: the prediction has
-no gradients, but it is smooth. The slopes are finite differences, and learnt from the steps taken
-(Broyden) as long as these gain a lot. All differences are flown at once, and then all dampings:
-roughly, which costs less, since both are compared with a flight that is known. What looks best is
-flown in full before it counts. An error early in the flight shows in everything that follows:
-later legs and holds make up for earlier ones.
+hovers, p being the predicted flight. A Levenberg-Marquardt method with bounds on finite
+differences: the prediction has no gradients, but it is smooth. All differences are flown at once,
+and then all dampings: roughly, which costs less, since both are compared with a flight that is
+known. What looks best is flown in full before it counts. An error early in the flight shows in
+everything that follows: later legs and holds make up for earlier ones.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,13 +26,12 @@ MOST_LEAD = 2.0
 SHORTEST_HOLD = 1.0
 """A hold at least, s: an autopilot that is not told to wait flies through."""
 
-_STEP = 0.25  # of a rough flight, s
+_STEP = 0.25  # of the predicted flight, s
 _SAMPLES = 400
-_ITERATIONS = 15
+_ITERATIONS = 12
 _DAMPINGS = 10.0 ** np.array([-4, -2, -1, 0, 2])
-_ENOUGH, _PLENTY = 0.05, 0.4
-"""Shares by which an iteration has to lessen the sum of squares: with slopes that were measured,
-for another one; and with any, for the next to learn its slopes from it."""
+_ENOUGH = 0.05
+"""Share by which an iteration has to lessen the sum of squares."""
 
 _LAST, _LAST_WEIGHT = 4.0, 3.5
 """The last seconds of the flight weigh more: they decide when it is over."""
@@ -86,16 +83,6 @@ class Clock:
         return np.stack([np.interp(times, flown.t, x) for x in flown.position.T[:2]], axis=-1)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fit:
-    """The speeds (m - 1,), m/s, the waits at the points (m,) and the lead, s, and their flight."""
-
-    speeds: Real
-    waits: Real
-    lead: float
-    flown: Flown
-
-
 def fit(
     model: CopterModel,
     path: FlightPath,
@@ -105,8 +92,8 @@ def fit(
     free: NDArray[np.bool_],
     min_speed: float,
     max_speed: float,
-) -> Fit:
-    """Return the speeds, waits and lead that fit best.
+) -> tuple[Real, Real, float]:
+    """Return the speeds (m - 1,), the waits at the points (m,) and the lead, s, that fit best.
 
     Legs with the same number in `groups` (m - 1,), counted from 0, share a speed. Speeds stay
     within `min_speed` and `max_speed` (m/s), the waits at the points `free` (m,) at or above
@@ -115,7 +102,7 @@ def fit(
     """
     waits = path.holds + path.delays
     if len(path.speeds) == 0:
-        return Fit(path.speeds, waits, 0.0, model.fly(path))
+        return path.speeds, waits, 0.0
     samples = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
     t, w = clock.t[samples], clock.w[samples]
     count = int(groups.max()) + 1
@@ -127,55 +114,44 @@ def fit(
     steps = np.repeat([SPEED_STEP, HOLD_STEP], [count, held_count + 1])
     begin = np.clip(np.concatenate([means, waits[free], [clock.lead]]), low, high)
 
-    def told(x: Real) -> tuple[Real, Real]:
+    def flown(x: Real) -> tuple[Real, Real]:
         held = np.tile(waits, (len(x), 1))
         held[:, free] = x[:, count:-1]
         return x[:, :count][:, groups], held
 
     weights = np.where(t > t[-1] - _LAST, _LAST_WEIGHT, 1.0)[:, None] / np.sqrt(len(t))
 
-    def errors(flights: Sequence[Flown], x: Real) -> Real:
-        """Return the residuals (B, r) of the flights of the variants x (B, k)."""
+    def errors(x: Real, *, rough: bool) -> Real:
+        """Return the residuals (B, r) of the variants x (B, k)."""
         apart = []
-        for one, lead in zip(flights, x[:, -1], strict=True):
+        for one, lead in zip(
+            model.fly_many(path, *flown(x), _STEP, rough=rough), x[:, -1], strict=True
+        ):
             led = replace(clock, lead=lead)
             late = ON_TIME * np.clip(led.late(one), -_LATEST, _LATEST)
             apart.append(np.append((led.positions(one, t) - w) * weights, late))
         leash = _LEASH * (x[:, :count] - begin[:count])
         return np.hstack([np.stack(apart), leash / np.sqrt(count)])
 
-    def rough(x: Real) -> Real:
-        return errors(model.fly_many(path, *told(x), _STEP, rough=True), x)
-
-    def exact(x: Real) -> tuple[Flown, Real]:
-        (flown,) = model.fly_many(path, *told(x[None]))
-        return flown, errors([flown], x[None])[0]
-
-    x, (flown, now) = begin, exact(begin)
-    slope = None
+    x, now = begin, errors(begin[None], rough=False)[0]
+    dampings = _DAMPINGS
     for _ in range(_ITERATIONS):
-        measured = slope is None
-        if slope is None:
-            dampings = _DAMPINGS
-            signed = np.where(x + steps > high, -steps, steps)
-            here, *tried = rough(np.vstack([x, x + np.diag(signed)]))
-            slope = ((tried - here) / signed[:, None]).T
+        signed = np.where(x + steps > high, -steps, steps)
+        tried = errors(np.vstack([x, x + np.diag(signed)]), rough=True)
+        slope = ((tried[1:] - tried[0]) / signed[:, None]).T
         ahead = _steps(x, slope, now, low, high, dampings)
-        there = rough(ahead)
-        least = int(np.argmin(np.sum((now + there - here) ** 2, axis=1)))
-        chosen = np.flatnonzero(dampings[least] == _DAMPINGS)[0]
+        guessed = now + errors(ahead, rough=True) - tried[0]
+        least = int(np.argmin(np.sum(guessed**2, axis=1)))
+        best, chosen = ahead[least], np.flatnonzero(dampings[least] == _DAMPINGS)[0]
         dampings = _DAMPINGS[max(0, chosen - 1) : chosen + 2]
-        best_flown, found = exact(ahead[least])
-        moved, changed = ahead[least] - x, found - now
+        found = errors(best[None], rough=False)[0]
         before, after = float(now @ now), float(found @ found)
         if after < before:
-            x, flown, now, here = ahead[least], best_flown, found, there[least]
-        if measured and after > (1 - _ENOUGH) * before:
+            x, now = best, found
+        if after > (1 - _ENOUGH) * before:
             break
-        trusted = after <= (1 - _PLENTY) * before
-        slope = _learnt(slope, moved, changed, steps) if trusted else None
-    (speeds,), (held,) = told(x[None])
-    return Fit(speeds, held, float(x[-1]), flown)
+    speeds, held = flown(x[None])
+    return speeds[0], held[0], float(x[-1])
 
 
 def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real, dampings: Real) -> Real:
@@ -190,12 +166,3 @@ def _steps(x: Real, slope: Real, error: Real, low: Real, high: Real, dampings: R
         for damping in dampings
     ]
     return np.clip(x + np.array(steps), low, high)
-
-
-def _learnt(slope: Real, moved: Real, changed: Real, steps: Real) -> Real:
-    """Return `slope` (r, k) with the least change by which `moved` (k,) makes `changed` (r,).
-
-    Broyden's update, each unknown measured in its `steps` (k,).
-    """
-    scaled = moved / steps**2
-    return slope + np.outer(changed - slope @ moved, scaled / (moved @ scaled))
