@@ -1,6 +1,7 @@
 """`faao-mission`: which command an argument list is for."""
 
 import difflib
+import gc
 import io
 import os
 import sys
@@ -18,6 +19,9 @@ from faao_mav.cli.plan import plan
 from faao_mav.cli.study import study
 from faao_mav.cli.upload import upload
 from faao_mav.cli.validate import validate
+
+_ALLOCATIONS = 50_000
+"""Between collections of garbage: modules and short-lived arrays leave hardly any cycles."""
 
 DEFAULT = "plan"
 """The command of an argument list that names none."""
@@ -94,6 +98,8 @@ def run() -> None:
     A character that standard output cannot show is shown as its code. Where nothing can be
     written there, the exit status is 2, or 1 where the reader has gone.
     """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # small matrices: more threads wait and spin
+    gc.set_threshold(_ALLOCATIONS)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

@@ -112,10 +112,8 @@ def _solve(
     from faao_mav.faao.solution import save_solution
     from faao_mav.mission.check import check
     from faao_mav.mission.convert import check_vehicle, convert
-    from faao_mav.mission.drawing import draw_mission
     from faao_mav.mission.formats import check_suffix, render_mission
     from faao_mav.mission.parameter_file import parameter_path, render_parameters
-    from faao_mav.mission.precoder_table import precoder_table
     from faao_mav.mission.prediction import predict_delivery
     from faao_mav.mission.recommend import candidates
     from faao_mav.mission.validate import Limits
@@ -160,6 +158,8 @@ def _solve(
         if save is not None:
             save_solution(solution, save, conversion.schedule.track())
         if precoders is not None:
+            from faao_mav.mission.precoder_table import precoder_table
+
             write_whole(precoders, precoder_table(solution).encode())
         if out is not None and tuned is not None:
             text = render_parameters(
@@ -167,11 +167,12 @@ def _solve(
             )
             write_whole(tuned, text.encode(errors="replace"))  # a name may be no Unicode
         if out is not None:
-            rendered = (
-                draw_mission(solution, conversion)
-                if out.suffix.lower() == ".kml"
-                else render_mission(conversion.mission, out, conversion.vehicle)
-            )
+            if out.suffix.lower() == ".kml":
+                from faao_mav.mission.drawing import draw_mission
+
+                rendered = draw_mission(solution, conversion)
+            else:
+                rendered = render_mission(conversion.mission, out, conversion.vehicle)
             write_whole(out, rendered.encode())
         checked = check(
             conversion.mission,

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 def check_names(report: Path | None, figure: Path | None) -> None:
     """Raise `InputError` for names whose ending says another format."""
-    from faao_mav.report.style import check_figure_path
-
     if report is not None and report.suffix not in (".html", ".htm"):
         raise InputError(f"--report {report}: give a name that ends in .html")
     if figure is not None:
+        from faao_mav.report.style import check_figure_path
+
         check_figure_path(figure, "--figure")
 
 

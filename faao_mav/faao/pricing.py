@@ -15,8 +15,8 @@ from faao_mav.radio.rate import cutoff_rate
 SATURATED = 0.999
 """Share of N log2(rho) from which a link counts as saturated."""
 
-_MOST_PAIRS, _PART_PAIRS, _PARTS = 1000, 120, 4
-_COARSER = 4.0  # the noise of a part may err more: its slots and draws do
+_MOST_PAIRS, _PART_PAIRS, _PARTS = 1000, 150, 6
+_COARSER = 6.0  # the noise of a part may err more: its slots and draws do
 _FRESH_DRAWS = 64
 _FRESH_SEARCHES = 128
 

@@ -20,6 +20,7 @@ from faao_mav.faao.mode_rate import has_few_modes, mode_rate
 from faao_mav.faao.place import Partials, PlaceRate, Turning
 from faao_mav.faao.problem import Link
 from faao_mav.faao.slot_rate import BestRate, DifferencedRate
+from faao_mav.faao.spline import Spline
 
 _CURVE_POINTS = 97
 _SEARCH_EVERY = 12
@@ -89,13 +90,11 @@ def rate_model(link: Link, design: Design, farthest: float) -> PlaceRate:
 
 def best_curve(link: Link, design: Design, least: float, most: float) -> CurveRate:
     """Tabulate the rate of `link` between two logarithms of the path gain."""
-    from scipy.interpolate import CubicSpline
-
     gain_log = _grid(least, most, _CURVE_POINTS)
     H_r = link.fade(link.line_of_sight_at(np.zeros(len(gain_log))))
     H = np.exp(gain_log / 2)[:, None, None] * H_r
     P = _along(link, design, H) if design.optimal else design.precoders(link, H)
-    return CurveRate(link, CubicSpline(gain_log, design.rate(link, H, P)), gain_log, P)
+    return CurveRate(link, Spline.through(gain_log, design.rate(link, H, P)), gain_log, P)
 
 
 def _along(link: Link, design: Design, H: Complex) -> Complex:

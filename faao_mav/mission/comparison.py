@@ -11,7 +11,7 @@ from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.deviation import passing
 from faao_mav.mission.flight.track import Track
-from faao_mav.mission.outline import plan_route
+from faao_mav.mission.outline import set_out
 from faao_mav.mission.prediction import Prediction, price_flight
 from faao_mav.mission.run_in import begins_at_speed
 from faao_mav.mission.timing import MOST_LEAD
@@ -63,7 +63,7 @@ def _in_frame_of(solution: Solution, track: Track) -> Real:
 
 def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> float:
     """Return when, on the clock of `track`, the plan's reads 0."""
-    waited = plan_route(solution.t, solution.w, solution.plan).departures[0] - solution.t[0]
+    waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
     moving = waited == 0 and begins_at_speed(solution.t, solution.w)
     left = track.reached[np.isfinite(track.reached)]
     if len(left) == 0:

@@ -82,12 +82,14 @@ def convert(solution: "Solution") -> Conversion:
     trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
     share = _PLANE_SHARE if plan.vehicle.type == "plane" else 1.0
     straight = plan_route(t, w, plan, share=share)
-    best = _best([trial.first(straight) for trial in trials])
+    firsts = [trial.first(straight) for trial in trials]
+    best = min(_refined(firsts), key=lambda each: each[0].cost)
     liveliest = trials[-1]
     if best[0].cost > _GOOD and isinstance(liveliest.legs, ArduCopterLegs):
         bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
-        found = _best([liveliest.first(route) for route in bent])
-        best = min(best, found, key=lambda each: each[0].cost)
+        new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
+        firsts = [liveliest.first(route) for route in new.values()]
+        best = min([best, *_refined(firsts)], key=lambda each: each[0].cost)
     schedule, trial = best
     return Conversion(assemble(schedule.route, plan), schedule, trial.vehicle, trial.parameters)
 
@@ -126,14 +128,14 @@ def _scheduler(solution: "Solution", vehicle: Vehicle, legs: Legs, top: float) -
     return Scheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top, near)
 
 
-def _best(firsts: list[tuple[Schedule, _Trial]]) -> tuple[Schedule, _Trial]:
-    """Refine first schedules, the closest to the plan first, until one is good."""
+def _refined(firsts: list[tuple[Schedule, _Trial]]) -> list[tuple[Schedule, _Trial]]:
+    """Return first schedules refined, the closest to the plan first, up to one that is good."""
     found: list[tuple[Schedule, _Trial]] = []
     for first, trial in sorted(firsts, key=lambda each: each[0].error):
         found.append((trial.scheduler.refined(first), trial))
         if found[-1][0].cost <= _GOOD:
             break
-    return min(found, key=lambda each: each[0].cost)
+    return found
 
 
 def _splines(straight: ArduCopterLegs, speed: float) -> Iterator[Splines]:

@@ -91,6 +91,14 @@ def plan_route(
     return replace(route, splines=np.array(curved))
 
 
+def set_out(t: Real, w: Real, plan: "Plan") -> float:
+    """Return when the trajectory leaves its beginning, s: where `plan_route` lets it hover first.
+
+    `t` (n,) s, `w` (n, 2) m.
+    """
+    return float(t[_stops(t, w, plan.mission.path_tolerance)[0].last])
+
+
 def _with_splines(
     t: Real, path: Real, inner: list[int], splines: Splines
 ) -> tuple[list[int], list[bool]]:

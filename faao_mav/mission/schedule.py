@@ -164,6 +164,11 @@ class Scheduler:
 
     def flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`."""
+        route, path, clock = self._told(route)
+        return Schedule(route, path, self.model.fly(path), clock)
+
+    def _told(self, route: Route) -> tuple[Route, FlightPath, Clock]:
+        """Return `route` with its acceptance radii, the path to fly, and the flight's clock."""
         stops = route.holds + route.delays > 0
         stops[[0, -1]] = True
         reach = np.concatenate([[np.inf], route.leg_lengths, [np.inf]])
@@ -188,21 +193,21 @@ class Scheduler:
             near=self.tolerance,
             lead=route.lead,
         )
-        return Schedule(route, path, self.model.fly(path), clock)
+        return route, path, clock
 
     def fitted(self, route: Route, top: float, groups: Integers | None = None) -> Schedule:
         """Return the flight of `route` with the speeds and holds that fit best.
 
         No speed is above `top`, m/s; legs with the same number in `groups` share one.
         """
-        first = self.flight(route)
+        route, path, clock = self._told(route)
         free = (route.holds > 0) & (np.arange(len(route.holds)) != 0)
         free[-1] = False
         free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
         speeds, waits, lead = fit(
             self.model,
-            first.path,
-            first.clock,
+            path,
+            clock,
             groups=_own_speeds(route) if groups is None else groups,
             free=free,
             min_speed=self.min_speed,

@@ -15,5 +15,8 @@ def distances_to_segment(points: Real, begin: Real, end: Real) -> Real:
     """Return the distance of each of `points` (n, 2) from the segment of two points (2,), (n,)."""
     chord = end - begin
     square = float(chord @ chord)
-    along = np.clip((points - begin) @ chord / square, 0, 1) if square > 0 else 0 * points[:, 0]
-    return lengths(points - begin - np.outer(along, chord))
+    away = points - begin
+    if square > 0:
+        along = np.minimum(np.maximum(away @ chord / square, 0), 1)
+        away -= along[:, None] * chord
+    return lengths(away)

@@ -28,6 +28,7 @@ _LN2 = float(np.log(2.0))
 _CLASSES = 1 << 20  # difference vectors for which the cutoff rate is worth asking
 _NEGLIGIBLE = 1e-6  # standard deviations of the noise: adds below 1e-12 bit
 _WEAK = 1e-3  # total SNR below which two terms of the series are right to six digits
+_ROUGH = 0.1  # bits that a slot among many may err: spreads of rougher ones say little
 _RARE = 0.5  # gap of the cutoff rate, bits, below which errors are rare
 _GRID_POINTS = 64  # input vectors up to which averaging each over a grid is the cheaper way
 
@@ -198,7 +199,7 @@ def mean_mutual_information(
         noise,
         rng,
         tolerance=0.25 * tolerance,
-        random_tolerance=min(0.75 * tolerance * float(np.sqrt(n)), 0.05),
+        random_tolerance=min(0.75 * tolerance * float(np.sqrt(n)), _ROUGH),
         pooled=True,
     )
     spread = float(np.sqrt(np.sum(slots.error[slots.random] ** 2)))

@@ -23,6 +23,7 @@ _GRID_SPACING = (0.8, 0.03)  # the first and the last tried, standard deviations
 _SHIFTS = 16
 _WIDE = 2.0  # standard deviation of the noises that look for rare errors
 _LATTICE = (16, 1 << 15)  # points per shift, the first and the last number tried
+_POOLED = 4  # the first where it is all slots together that have to meet the tolerance
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +208,8 @@ def by_lattice(
 
     active = np.arange(n)
     count, most = _LATTICE
+    if pooled:
+        count = _POOLED
     mean = all_means(active, lattice(count, coordinates))
     error = _spread(mean)
     while count < most:

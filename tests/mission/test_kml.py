@@ -13,8 +13,8 @@ from relay_flights import dash_hover_dash, mission_of, plan_with
 from faao_mav.errors import InputError, MissionFileError
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence
-from faao_mav.mission.formats import losses_in, read_mission, write_kml
-from faao_mav.mission.formats.kml import Station, TimedTrack
+from faao_mav.mission.formats import losses_in, read_mission
+from faao_mav.mission.formats.kml import Station, TimedTrack, write_kml
 
 NAMES = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
 HOME = Home(47.0, 8.0, 400.0)

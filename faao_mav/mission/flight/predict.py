@@ -310,7 +310,10 @@ class _Walk:
         if change.axis in ("climb", "descent") and isinstance(self.model, ArduCopter):
             if change.speed is not None:
                 self.fly()
-                self.model = replace(self.model, **{f"{change.axis}_speed": change.speed})
+                if change.axis == "climb":
+                    self.model = replace(self.model, climb_speed=change.speed)
+                else:
+                    self.model = replace(self.model, descent_speed=change.speed)
         else:
             self.speed = self._own_speed() if change.speed is None else change.speed
 

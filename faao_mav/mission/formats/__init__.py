@@ -5,7 +5,6 @@ from typing import Literal, TypeAlias
 
 from faao_mav.errors import MissionFileError
 from faao_mav.files import read_text
-from faao_mav.mission.formats.kml import write_kml
 from faao_mav.mission.formats.losses import losses
 from faao_mav.mission.formats.mission_file import MissionFile
 from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
@@ -25,7 +24,6 @@ __all__ = [
     "read_qgc_plan",
     "read_wpl",
     "render_mission",
-    "write_kml",
     "write_qgc_plan",
     "write_wpl",
 ]
@@ -77,6 +75,8 @@ def render_mission(mission: Mission, path: str | Path, vehicle: Vehicle | None =
             except MissionFileError as error:
                 raise MissionFileError(f"{path}: {error}") from None
         case "kml":
+            from faao_mav.mission.formats.kml import write_kml  # brings an XML library along
+
             return write_kml(mission, name=path.stem)
 
 

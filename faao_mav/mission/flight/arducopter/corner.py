@@ -1,6 +1,7 @@
 """Corners: how early the next leg begins where the aircraft does not stop."""
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -8,6 +9,9 @@ from faao_mav.mission.flight.arducopter.leg import Leg
 
 Direction: TypeAlias = tuple[float, float, float]
 """A unit vector: east, north, up."""
+
+_TICKS = 1 << 40
+"""In the longest overlap: how finely it is sought."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,5 @@ def half_overlap(
 
     if excess(longest) <= 1e-9:
         return longest
-    from scipy.optimize import brentq  # waits until a corner needs it
-
-    return float(brentq(excess, 0.0, longest, xtol=1e-12))
+    tick = longest / _TICKS
+    return tick * bisect_left(range(_TICKS), 0.0, key=lambda ticks: excess(ticks * tick))

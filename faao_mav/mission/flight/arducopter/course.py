@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -21,12 +22,12 @@ east, north; speed east, north; climb rate squared; acceleration east, north."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A leg that begins `start` s into the course and leads from `origin` to `destination` (3,)."""
+    """A leg from `origin` on by `step`, both (3,) m, that begins `start` s into the course."""
 
     leg: Leg | CurvedLeg
     start: float
     origin: Real
-    destination: Real
+    step: Real
 
     @property
     def end(self) -> float:
@@ -62,22 +63,36 @@ class Course:
         """When the target comes to its end, s on its clock."""
         return max([placed.end for placed in self.legs], default=0.0)
 
-    def motion(self, clock: Real, derivatives: int) -> Real:
-        """Return positions, m, and so many of their `derivatives`, up to 2, at `clock` (n,).
 
-        The shape is (n, 3 (1 + derivatives)); `clock` increases. The acceleration on splines is
-        not fed forward, so it is left out.
-        """
-        motion: Real = np.zeros((len(clock), 3 * (derivatives + 1)))
-        motion[:, :3] = self.origin
-        straight = [(placed, placed.leg) for placed in self.legs if isinstance(placed.leg, Leg)]
-        if straight:
-            _add_straight(motion, clock, straight)
-        for placed in self.legs:
-            if isinstance(placed.leg, CurvedLeg):
-                _add_curved(motion, clock, placed, placed.leg)
-        _add_done(motion, clock, self.legs)
-        return motion
+def motions(courses: Sequence[Course], clocks: Sequence[Real], derivatives: int) -> list[Real]:
+    """Return for every course positions, m, and so many of their `derivatives`, up to 2.
+
+    The clocks (n,) increase; the shapes are (n, 3 (1 + derivatives)). The acceleration on splines
+    is not fed forward, so it is left out.
+    """
+    bounds = np.cumsum([0, *map(len, clocks)])
+    motion: Real = np.zeros((bounds[-1], 3 * (derivatives + 1)))
+    parts = [motion[first:last] for first, last in pairwise(bounds.tolist())]
+    under_way: list[tuple[Placed, Leg, int, int]] = []
+    for course, clock, part, first in zip(
+        courses, clocks, parts, bounds[:-1].tolist(), strict=True
+    ):
+        begins, ends = np.searchsorted(
+            clock,
+            [[placed.start for placed in course.legs], [placed.end for placed in course.legs]],
+        )
+        steps = np.zeros((len(clock) + 1, 3))
+        steps[0] = course.origin
+        np.add.at(steps, ends, np.reshape([placed.step for placed in course.legs], (-1, 3)))
+        np.cumsum(steps[:-1], axis=0, out=part[:, :3])
+        for placed, begin, end in zip(course.legs, begins.tolist(), ends.tolist(), strict=True):
+            if isinstance(placed.leg, Leg):
+                under_way.append((placed, placed.leg, first + begin, end - begin))
+            else:
+                _add_curved(part, clock, slice(begin, end), placed, placed.leg)
+    if under_way:
+        _add_straight(motion, np.concatenate(clocks), under_way)
+    return parts
 
 
 def table_of(motion: Real) -> Sequence[Row]:
@@ -93,18 +108,20 @@ def grid_of(course: Course) -> Real:
     return grid
 
 
-def _add_straight(motion: Real, clock: Real, legs: Sequence[tuple[Placed, Leg]]) -> None:
-    """Add the motion under way on straight legs to `motion` (n, 3 to 9)."""
-    starts = np.array([placed.start for placed, _ in legs])
-    begins = np.searchsorted(clock, starts)
-    counts = np.searchsorted(clock, [placed.end for placed, _ in legs]) - begins
+def _add_straight(motion: Real, clock: Real, legs: Sequence[tuple[Placed, Leg, int, int]]) -> None:
+    """Add the motion under way on straight legs to `motion` (n, 3 to 9).
+
+    Each comes with its first sample and the number of its samples.
+    """
+    placed, flown, firsts, each = zip(*legs, strict=True)
+    starts, counts = np.array([one.start for one in placed]), np.array(each)
     which = np.repeat(np.arange(len(legs)), counts)
-    sample = np.arange(len(which)) + np.repeat(begins + counts - np.cumsum(counts), counts)
+    sample = np.arange(len(which)) + np.repeat(firsts + counts - np.cumsum(counts), counts)
     local = clock[sample] - starts[which]
     # the phases of all legs in one sorted list: no leg lasts as long as `far`
-    far = 2 * max(leg.duration for _, leg in legs) + 1
-    table = np.concatenate([leg.table for _, leg in legs])
-    table_of_leg = np.repeat(np.arange(len(legs)), [len(leg.table) for _, leg in legs])
+    far = 2 * max(leg.duration for leg in flown) + 1
+    table = np.concatenate([leg.table for leg in flown])
+    table_of_leg = np.repeat(np.arange(len(legs)), [len(leg.table) for leg in flown])
     found = np.searchsorted(table_of_leg * far + table[:, 0], which * far + local, "right") - 1
     begin, w, q, c, s, v, a = table[found].T
     t = local - begin
@@ -114,30 +131,22 @@ def _add_straight(motion: Real, clock: Real, legs: Sequence[tuple[Placed, Leg]])
         along.append(v + t * (a + t * c / 2) + q * (1 - np.cos(w * t)))
     if motion.shape[1] > 6:
         along.append(a + t * c + q * w * sine)
-    steps = np.array([placed.destination - placed.origin for placed, _ in legs])
-    directions = steps / np.array([[leg.length] for _, leg in legs])
+    steps = np.array([one.step for one in placed])
+    directions = steps / np.array([[leg.length] for leg in flown])
     for axis in np.flatnonzero(directions.any(axis=0)):
         share = directions[which, axis]
         for kind, scalar in enumerate(along):
             motion[:, 3 * kind + axis] += np.bincount(sample, share * scalar, len(motion))
 
 
-def _add_curved(motion: Real, clock: Real, placed: Placed, leg: CurvedLeg) -> None:
+def _add_curved(
+    motion: Real, clock: Real, under_way: slice, placed: Placed, leg: CurvedLeg
+) -> None:
     """Add position and velocity under way on a spline leg."""
-    first, last = np.searchsorted(clock, [placed.start, placed.end])
-    local = clock[first:last] - placed.start
+    local = clock[under_way] - placed.start
     kinds = [leg.curve.points - placed.origin]
     if motion.shape[1] > 3:
         kinds.append(leg.curve.tangents * leg.speeds[:, None])
     for kind, values in enumerate(kinds):
         for axis in range(3):
-            motion[first:last, 3 * kind + axis] += np.interp(local, leg.times, values[:, axis])
-
-
-def _add_done(motion: Real, clock: Real, legs: Sequence[Placed]) -> None:
-    """Add what the legs that are over have led to."""
-    done = np.searchsorted(clock, [placed.end for placed in legs])
-    steps = np.zeros((len(motion) + 1, 3))
-    for first, placed in zip(done.tolist(), legs, strict=True):
-        steps[first] += placed.destination - placed.origin
-    motion[:, :3] += np.cumsum(steps[:-1], axis=0)
+            motion[under_way, 3 * kind + axis] += np.interp(local, leg.times, values[:, axis])

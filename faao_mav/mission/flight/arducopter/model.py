@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
-from faao_mav.mission.flight.arducopter.course import Course, grid_of, table_of
+from faao_mav.mission.flight.arducopter.course import Course, grid_of, motions, table_of
 from faao_mav.mission.flight.arducopter.follow import Follower, pursue
 from faao_mav.mission.flight.arducopter.route import Bounds, Router
 from faao_mav.mission.flight.parameters import Parameter, limits_of
@@ -80,6 +80,9 @@ class ArduCopter:
     linear_drag: float = 0.28
     quadratic_drag: float = 0.026
 
+    _routers: list[Router] = field(default_factory=list, init=False, repr=False, compare=False)
+    """The last one: flights along the same points come one after the other."""
+
     @classmethod
     def from_vehicle(cls, vehicle: Vehicle, latitude: float | None = None) -> "ArduCopter":
         """Return the model with the limits that `vehicle.parameters` set, of either generation.
@@ -88,7 +91,10 @@ class ArduCopter:
         Raises `InputError` for a value that is too small to fly with or not finite.
         """
         model = cls(**limits_of(vehicle, _PARAMETERS))
-        return model if latitude is None else replace(model, **_metres(latitude))
+        if latitude is None:
+            return model
+        east, north = _metres(latitude)
+        return replace(model, east_metre=east, north_metre=north)
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -115,20 +121,30 @@ class ArduCopter:
         stopping = np.any(waits > 0, axis=0)
         stopping[[0, -1]] = True
         scale = np.array([self.east_metre, self.north_metre, 1.0])
-        router = Router(path.points * scale, path.splines, stopping, self._bounds())
-        fly = _target if rough else self._followed
-        flights = []
-        for speed, wait in zip(speeds.tolist(), waits.tolist(), strict=True):
-            flown = fly(router.course(speed, wait), step)
-            flights.append(
-                replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
-            )
-        return flights
+        router = self._router(path.points * scale, path.splines, stopping)
+        courses = [
+            router.course(speed, wait)
+            for speed, wait in zip(speeds.tolist(), waits.tolist(), strict=True)
+        ]
+        if rough:
+            flights = _targets(courses, step)
+        else:
+            flights = [self._followed(course, step) for course in courses]
+        return [
+            replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
+            for flown in flights
+        ]
+
+    def _router(self, points: Real, splines: Flags, stopping: Flags) -> Router:
+        """Return what knows the legs along `points` already, if they are those of the last call."""
+        if not (self._routers and self._routers[0].leads_along(points, splines, stopping)):
+            self._routers[:] = [Router(points, splines, stopping, self._bounds())]
+        return self._routers[0]
 
     def _followed(self, course: Course, step: float) -> Flown:
         """Return the flight of the aircraft after its target."""
         grid = grid_of(course)
-        target = course.motion(grid, 2)
+        (target,) = motions([course], [grid], 2)
         pursuit = pursue(course, table_of(target), self._follower(), self.acceleration / self.jerk)
         arrivals = np.interp(course.passed, pursuit.clock, pursuit.t)
         departures = _stopped(course, arrivals, pursuit.arrivals)
@@ -168,8 +184,18 @@ class ArduCopter:
         )
 
 
-def _target(course: Course, step: float) -> Flown:
-    """Return the flight of the target, whose clock only stands still where it has to wait."""
+def _targets(courses: Sequence[Course], step: float) -> list[Flown]:
+    """Return the flights of the targets, whose clocks only stand still where they have to wait."""
+    timings = [_timing(course, step) for course in courses]
+    found = motions(courses, [clock for *_, clock in timings], 1)
+    return [
+        Flown(arrivals, departures, t, motion[:, :3], motion[:, 3:])
+        for (arrivals, departures, t, _), motion in zip(timings, found, strict=True)
+    ]
+
+
+def _timing(course: Course, step: float) -> tuple[Real, Real, Real, Real]:
+    """Return arrivals and departures, times, and the target's clock then."""
     times = [stop.time for stop in course.stops]
     waited = np.cumsum([course.wait] + [stop.wait for stop in course.stops])
     arrivals = course.passed + waited[np.searchsorted(times, course.passed)]
@@ -179,8 +205,7 @@ def _target(course: Course, step: float) -> Flown:
     clock = np.interp(
         t, np.append([0.0, course.wait], knots), np.append([0.0, 0.0], np.repeat(times, 2))
     )
-    motion = course.motion(clock, 1)
-    return Flown(arrivals, departures, t, motion[:, :3], motion[:, 3:])
+    return arrivals, departures, t, clock
 
 
 def _stopped(course: Course, arrivals: Real, stops: Real) -> Real:
@@ -196,12 +221,12 @@ def _times(departures: Real, step: float) -> Real:
     return step * np.arange(math.ceil(departures[-1] / step - 1e-9) + 1)
 
 
-def _metres(latitude: float) -> dict[str, float]:
-    """The autopilot's metres per metre of WGS84 at `latitude` degrees."""
+def _metres(latitude: float) -> tuple[float, float]:
+    """The autopilot's metres per metre of WGS84 at `latitude` degrees, east and north."""
     a, e2 = 6_378_137.0, 6.69437999014e-3
     w = 1 - e2 * math.sin(math.radians(latitude)) ** 2
     degree = math.pi / 180 * a / math.sqrt(w)
-    return {"east_metre": _DEGREE / degree, "north_metre": _DEGREE * w / (degree * (1 - e2))}
+    return _DEGREE / degree, _DEGREE * w / (degree * (1 - e2))
 
 
 def _check(path: FlightPath, waits: Real, step: float) -> None:

@@ -9,6 +9,7 @@ middle, so its length is its mean speed times its duration.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeAlias
 
 Phase: TypeAlias = tuple[float, float, float]
@@ -80,6 +81,7 @@ class Ramp:
         return [phase for phase in phases if phase[0] > 0]
 
 
+@lru_cache(maxsize=4096)  # a leg asks for the same ramp several times, flights share legs
 def ramp_from_rest(limits: Limits, room: float) -> Ramp:
     """Return the ramp from rest to the highest speed that `limits` and `room` metres allow.
 

@@ -80,6 +80,7 @@ class Router:
         self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_], bounds: Bounds
     ) -> None:
         self._points, self._bounds = points, bounds
+        self._marks = np.stack([splines, stopping])
         self._stopping: list[bool] = stopping.tolist()
         self._steps = np.diff(points, axis=0)
         self._lengths: list[float] = np.linalg.norm(self._steps, axis=1).tolist()
@@ -89,6 +90,14 @@ class Router:
         # flights that differ in a few speeds have most of their legs in common
         self._known: dict[tuple[int, float, float | None, float, float], _Step] = {}
         self._from_rest: dict[tuple[int, float], Leg] = {}
+
+    def leads_along(
+        self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_]
+    ) -> bool:
+        """Tell whether these are the points."""
+        return np.array_equal(points, self._points) and np.array_equal(
+            [splines, stopping], self._marks
+        )
 
     def course(self, speeds: Sequence[float], waits: Sequence[float]) -> Course:
         """Return the course at `speeds` (m - 1,), m/s, with `waits` (m,), s, at the stops."""
@@ -102,7 +111,7 @@ class Router:
                 step = self._known[key] = self._step(*key)
             end = start
             if step.leg is not None:
-                legs.append(Placed(step.leg, start, self._points[k], self._points[k + 1]))
+                legs.append(Placed(step.leg, start, self._points[k], self._steps[k]))
                 end = legs[-1].end
             if self._stopping[k + 1]:
                 stops.append(Stop(k + 1, end, waits[k + 1]))

@@ -1,7 +1,7 @@
 """A PX4 multicopter as a flight model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -58,6 +58,11 @@ class Px4:
     climb_acceleration: float = 4.0
     descent_acceleration: float = 3.0
 
+    _simulations: list[Simulation] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+    """The last one: flights along the same points come one after the other."""
+
     @classmethod
     def from_vehicle(cls, vehicle: Vehicle) -> "Px4":
         """Return the model with the limits that `vehicle.parameters` set.
@@ -97,8 +102,14 @@ class Px4:
         if len(path.points) == 1:
             return _standing(path.points[0], hold[:, 0], step)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
-        logs = Simulation(self._limits(), path.points, radii).fly(speed, hold, beyond=step)
+        logs = self._simulation(path.points, radii).fly(speed, hold, beyond=step)
         return sampled(logs, path.points[0, 2], step)
+
+    def _simulation(self, points: Real, radii: Real) -> Simulation:
+        """Return what has flown legs of this path already, if it is that of the last call."""
+        if not (self._simulations and self._simulations[0].leads_along(points, radii)):
+            self._simulations[:] = [Simulation(self._limits(), points, radii)]
+        return self._simulations[0]
 
     def _limits(self) -> Limits:
         return Limits(

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
+from typing import TypeAlias
 
 import numpy as np
 
@@ -62,17 +63,26 @@ class Log:
     motion: Real
 
 
+_Entered: TypeAlias = dict[Leg, list[tuple[State, Stretch]]]
+"""The legs that variants have flown, with the states in which they were entered."""
+
+
 class Simulation:
     """Flights of variants of the path through `points` (m, 3), m >= 2, with `radii` (m,).
 
     A leg that is entered as it was before, with the same command, is flown as it was before. So
     variants that differ by one speed or hold are flown from there only, and until they move as if
-    it had not changed.
+    it had not changed. From one call of `fly` to the next only legs that are entered in exactly the
+    same state are remembered: what is flown does not depend on what was flown before.
     """
 
     def __init__(self, limits: Limits, points: Real, radii: Real) -> None:
         self._limits, self._points, self._radii = limits, points, radii.tolist()
-        self._known: dict[Leg, list[tuple[State, Stretch]]] = {}
+        self._known: dict[tuple[Leg, State], Stretch] = {}
+
+    def leads_along(self, points: Real, radii: Real) -> bool:
+        """Tell whether these are the points and radii."""
+        return np.array_equal(points, self._points) and self._radii == radii.tolist()
 
     def fly(self, speeds: Real, holds: Real, beyond: float) -> list[Log]:
         """Fly every variant until the last one has ended, and on for `beyond` seconds.
@@ -84,7 +94,8 @@ class Simulation:
             legs(self._limits, self._points, self._radii, speed, hold)
             for speed, hold in zip(speeds.tolist(), holds.tolist(), strict=True)
         ]
-        flights = [self._flight(route) for route in routes]
+        alike: _Entered = {}
+        flights = [self._flight(route, alike) for route in routes]
         ends = [
             start + START_LAG + sum(stretch.departure for stretch in flight)
             for start, flight in zip(starts, flights, strict=True)
@@ -100,13 +111,14 @@ class Simulation:
         east, north, up = self._points[0].tolist()
         return at_rest(complex(east, north), up if np.ptp(self._points[:, 2]) > 0 else None)
 
-    def _flight(self, route: list[Leg]) -> list[Stretch]:
+    def _flight(self, route: list[Leg], alike: _Entered) -> list[Stretch]:
         state, result = self._start(), []
         for leg in route:
-            flown = self._known.setdefault(leg, [])
+            flown = alike.setdefault(leg, [])
             stretch = next((after for before, after in flown if _alike(before, state)), None)
             if stretch is None:
-                stretch = _fly(self._limits, leg, state)
+                if (stretch := self._known.get((leg, state))) is None:
+                    stretch = self._known[leg, state] = _fly(self._limits, leg, state)
                 flown.append((state, stretch))
             result.append(stretch)
             state = stretch.end
