@@ -60,7 +60,7 @@ _ASTRAY, _SURELY = 8.0, 0.95
 """Metres of error that one metre beyond so much of the path tolerance weighs."""
 
 _DEARER = 1.05
-_SPEED_DIGITS, _HOLD_DIGITS = 2, 1
+_SPEED_DIGITS, _HOLD_DIGITS = 3, 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

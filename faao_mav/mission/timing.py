@@ -36,7 +36,7 @@ _ENOUGH = 0.05
 _LAST, _LAST_WEIGHT = 4.0, 3.5
 """The last seconds of the flight weigh more: they decide when it is over."""
 
-ON_TIME, _LATEST = 3.0, 5.0
+ON_TIME, _LATEST = 5.0, 5.0
 """Metres of rms error that a second too early or too late at the end weighs, up to so many."""
 
 _NO_CRAWL = 0.5
