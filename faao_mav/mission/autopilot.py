@@ -25,8 +25,9 @@ _PX4_ACCELERATION: tuple[Name, ...] = (("MPC_ACC_HOR", 1.0),)
 _PX4_JERK: tuple[Name, ...] = (("MPC_JERK_AUTO", 1.0),)
 
 _NARROW_RADIUS, _RADIUS_SHARE = 4.0, 0.45
-_CUT = 1.3
-"""Metres of a corner that a wide radius may cost."""
+_CUT, _LIVELY_CUT, _LIVELY = 1.3, 1.0, 10.0
+"""Metres of a corner that a wide radius may cut, and at a jerk from the last, m/s³, on: an aircraft
+that is soon at speed again loses less in a corner."""
 
 _RUN_IN = 1.2
 """Of the shortest leg: what a copter gets to be at speed at w_I."""
@@ -106,7 +107,7 @@ class Px4Legs:
         alpha, but cuts it: by r tan(turn / 4) about, `turn` (n,) in radians. One as long as its
         leg would count at once.
         """
-        cut = _CUT / np.maximum(np.tan(turn / 4), 1e-9)
+        cut = (_CUT if self.jerk < _LIVELY else _LIVELY_CUT) / np.maximum(np.tan(turn / 4), 1e-9)
         return np.minimum(np.maximum(_NARROW_RADIUS, cut), _RADIUS_SHARE * room)
 
 
