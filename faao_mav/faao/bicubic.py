@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.faao.spline import pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,10 +23,8 @@ class Bicubic:
     @classmethod
     def through(cls, x: Real, y: Real, values: Real) -> "Bicubic":
         """Return the spline through `values` (m, k) on the even grids `x` (m,) and `y` (k,)."""
-        from scipy.interpolate import CubicSpline
-
-        along = CubicSpline(x, values).c  # (4, m - 1, k)
-        both = CubicSpline(y, along, axis=2).c  # (4, k - 1, 4, m - 1)
+        along = pieces(float(x[1] - x[0]), values)  # (4, m - 1, k)
+        both = pieces(float(y[1] - y[0]), np.moveaxis(along, 2, 0))  # (4, k - 1, 4, m - 1)
         return cls(x, y, both.transpose(2, 0, 3, 1).reshape(4, 4, -1))
 
     def rows(self, y: Real) -> "Rows":

@@ -52,13 +52,12 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     at = np.stack([np.interp(solution.t, t, x) for x in w.T], axis=-1)
     near, end = solution.plan.mission.path_tolerance, solution.w[-1]
     due = float(solution.t[-1])
-    arrived = settled(t, w, end, near, due)
+    late = settled(t, w, end, near, due) - settled(solution.t, solution.w, end, near, due)
     # a path flown late is the same path: it counts up to w_F
-    within = (t >= solution.t[0]) & (t <= max(float(solution.t[-1]), arrived))
+    within = (t >= solution.t[0]) & (t <= due + max(0.0, late))
     apart = deviation(solution.w, at, w[within] if within.any() else at)
     I_U, I_G = delivered(solution, at)
     near_U, near_G = delivered(solution, at, nearest_slots(solution, at))
-    late = arrived - settled(solution.t, solution.w, end, near, due)
     return Prediction(
         w=at,
         I_U=I_U,

@@ -167,7 +167,7 @@ def test_values_are_what_is_sent(flight):
     assert speeds == list(route.speeds)
     assert waits[1:] == pytest.approx((route.holds + route.delays)[1:])
     assert (route.holds == np.round(route.holds)).all()
-    assert np.round(route.speeds, 2) == pytest.approx(route.speeds, abs=1e-12)
+    assert np.round(route.speeds, 3) == pytest.approx(route.speeds, abs=1e-12)
     assert route.speeds.min() > 0
     assert route.speeds.max() <= 1.1 * plan.vehicle.max_speed
 
