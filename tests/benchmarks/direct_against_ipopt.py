@@ -8,12 +8,15 @@ the building of the model. Everything printed is measured in the run.
 """
 
 import argparse
+import os
 import resource
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 import numpy as np
 import yaml
