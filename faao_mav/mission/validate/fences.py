@@ -60,10 +60,10 @@ def _return(case: Case) -> Iterator[Issue]:
 
 
 def _points(case: Case, points: list[tuple[str, Any]], action: str) -> Iterator[Issue]:
-    import shapely
-
     if case.fence is None or not points:
         return
+    import shapely
+
     broken = case.fence.broken(shapely.points([place for _, place in points]))
     for k in np.flatnonzero(broken.any).tolist():
         yield Issue(None, f"{points[k][0]} is {' and '.join(map(_what, broken.parts(k)))}", action)
@@ -71,11 +71,11 @@ def _points(case: Case, points: list[tuple[str, Any]], action: str) -> Iterator[
 
 @RULES.add("fence-leg", Level.ERROR, "a leg leaves the fence", _GEOMETRY)
 def _legs(case: Case) -> Iterator[Issue]:
-    import shapely
-
     fence = case.fence
     if fence is None or not case.legs:
         return
+    import shapely
+
     for k in np.flatnonzero(fence.broken_legs.any).tolist():
         leg = case.legs[k]
         start = "home" if leg.start.index == HOME else f"item {number(leg.start.index)}"
