@@ -7,9 +7,6 @@ from faao_mav.mission.validate.finding import Finding, Level
 
 _MAX_ITEMS_SHOWN = 8
 
-UNCALIBRATED = "by a model after the autopilot's documents, not compared with recorded flights"
-"""Said of a prediction."""
-
 
 def count_of(findings: Sequence[Finding], level: Level) -> str:
     """Return how many of `findings` are of `level`, as in "2 errors"."""

@@ -9,16 +9,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from faao_mav.cli.finding_lines import (
-    UNCALIBRATED,
-    count_of,
-    grouped,
-    items_of,
-    line_of,
-    message_of,
-)
+from faao_mav.cli.finding_lines import count_of, grouped, items_of, line_of, message_of
 from faao_mav.mission.check import Check
-from faao_mav.mission.flight import flight_model
+from faao_mav.mission.flight import caveat
 from faao_mav.mission.validate import Level, Rule
 from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Vehicle
 
@@ -51,7 +44,7 @@ def as_dict(verdict: Verdict) -> dict[str, Any]:
         "predicted": (
             {
                 "duration": float(check.track.t[-1]),
-                "calibrated": flight_model(verdict.vehicle).calibrated,
+                "calibrated": not caveat(verdict.vehicle),
             }
             if check.track
             else None
@@ -132,10 +125,8 @@ def _head(verdict: Verdict) -> str:
     if check.track is None:
         lines.append(f"flight not predicted: {check.unpredicted}")
     else:
-        lines.append(
-            f"predicted flight: {check.track.t[-1]:.0f} s"
-            f"{'' if flight_model(vehicle).calibrated else f' ({UNCALIBRATED})'}"
-        )
+        doubt = caveat(vehicle)
+        lines.append(f"predicted flight: {check.track.t[-1]:.0f} s{f' ({doubt})' if doubt else ''}")
     if check.link is not None:
         lines.append(
             f"predicted link: {check.link.predicted_rate:.4f} bit/s/Hz, "

@@ -32,6 +32,7 @@ def write(report: Path | None, figure: Path | None, result: "Result") -> None:
                 conversion,
                 prediction,
                 result.findings,
+                vehicle=conversion.vehicle,
                 information=result.information,
                 fresh=result.fresh,
                 saturation=result.saturation,

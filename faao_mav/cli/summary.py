@@ -5,12 +5,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from faao_mav.cli.finding_lines import UNCALIBRATED, count_of, grouped, line_of
+from faao_mav.cli.finding_lines import count_of, grouped, line_of
 from faao_mav.faao.bound import Bound
 from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.faao.solution import Solution
 from faao_mav.mission.convert import Conversion
-from faao_mav.mission.flight import flight_model
+from faao_mav.mission.flight import caveat
 from faao_mav.mission.prediction import Prediction
 from faao_mav.mission.validate.finding import Finding, Level
 
@@ -77,7 +77,7 @@ def as_dict(result: Result) -> dict[str, Any]:
             "max_path_error": result.prediction.max_path_error,
             "max_position_error": result.prediction.max_position_error,
             "rms_position_error": result.prediction.rms_position_error,
-            "calibrated": flight_model(result.conversion.vehicle).calibrated,
+            "calibrated": not caveat(result.conversion.vehicle),
         },
         "validation": [asdict(finding) for finding in result.findings],
         "upload": _upload_as_dict(result.upload),
@@ -131,8 +131,8 @@ def as_text(result: Result) -> str:
         f"             {flown.rms_position_error:.1f} m rms from the plan at equal times, "
         f"{flown.max_position_error:.1f} m at most; {flown.max_path_error:.1f} m from its path",
     ]
-    if not flight_model(result.conversion.vehicle).calibrated:
-        lines.append(f"             {UNCALIBRATED}")
+    if doubt := caveat(result.conversion.vehicle):
+        lines.append(f"             {doubt}")
     lines += _checked(result.findings)
     if result.conversion.parameters:
         wanted = ", ".join(f"{name} {v:g}" for name, v in result.conversion.parameters.items())

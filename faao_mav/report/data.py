@@ -12,6 +12,7 @@ from faao_mav.mission.item import Mission
 from faao_mav.mission.prediction import Prediction
 from faao_mav.mission.validate.finding import Finding
 from faao_mav.mission.validate.link import LinkCheck
+from faao_mav.mission.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +27,7 @@ class ReportData:
     """A mission by itself, with its predicted flight as `track`, for a page without conversion."""
     track: Track | None = None
     link: LinkCheck | None = None
+    vehicle: Vehicle | None = None
     information: MutualInformation | None = None
     fresh: FreshRates | None = None
     saturation: Saturation | None = None

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from faao_mav.mission.flight import flight_model
+from faao_mav.mission.flight import caveat, modelled
 from faao_mav.mission.flight.track import Track
 from faao_mav.mission.item import Mission
 from faao_mav.mission.validate.finding import Finding
@@ -88,20 +88,24 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
         yield "planned duration", f"{solution.plan.flight.duration:g} s"
     yield from _priced(data)
     if prediction is not None:
-        yield "predicted rate", f"{prediction.rates.R_avg:.4f} bit/s/Hz"
-        yield "predicted duration", f"{prediction.duration:.1f} s"
-        yield "from the plan at equal times, rms", f"{prediction.rms_position_error:.1f} m"
-        yield "the same, at most", f"{prediction.max_position_error:.1f} m"
-        yield "from the planned path, at most", f"{prediction.max_path_error:.1f} m"
-    if data.conversion is not None and not flight_model(data.conversion.vehicle).calibrated:
-        yield "the model that predicts", "after documents, not compared with recorded flights"
+        yield from _predicted(
+            f"{prediction.rates.R_avg:.4f} bit/s/Hz",
+            prediction.duration,
+            prediction.rms_position_error,
+            prediction.max_position_error,
+            prediction.max_path_error,
+        )
     if data.link is not None:
         link = data.link
-        yield "predicted rate", f"{link.predicted_rate:.4f} bit/s/Hz, {100 * link.share:.2f} %"
-        yield "predicted duration of the relay flight", f"{link.predicted_duration:.1f} s"
-        yield "from the plan at equal times, rms", f"{link.rms_position_error:.1f} m"
-        yield "the same, at most", f"{link.max_position_error:.1f} m"
-        yield "from the planned path, at most", f"{link.path_error:.1f} m"
+        yield from _predicted(
+            f"{link.predicted_rate:.4f} bit/s/Hz, {100 * link.share:.2f} %",
+            link.predicted_duration,
+            link.rms_position_error,
+            link.max_position_error,
+            link.path_error,
+        )
+    if data.vehicle is not None and modelled(data.vehicle) and (doubt := caveat(data.vehicle)):
+        yield "predicted", doubt
     if data.mission is not None:
         yield "mission items", str(len(data.mission.items))
     if data.track is not None:
@@ -109,6 +113,17 @@ def _facts(data: ReportData) -> Iterator[tuple[str, str]]:
     if data.conversion is not None:
         yield "mission items", str(len(data.conversion.mission.items))
         yield "relay route", f"{data.conversion.schedule.route.distance:.0f} m"
+
+
+def _predicted(
+    rate: str, duration: float, rms: float, most: float, path: float
+) -> Iterator[tuple[str, str]]:
+    """What the predicted relay flight makes of the plan: s, m."""
+    yield "predicted rate", rate
+    yield "predicted duration of the relay flight", f"{duration:.1f} s"
+    yield "from the plan at equal times, rms", f"{rms:.1f} m"
+    yield "the same, at most", f"{most:.1f} m"
+    yield "from the planned path, at most", f"{path:.1f} m"
 
 
 def _priced(data: ReportData) -> Iterator[tuple[str, str]]:

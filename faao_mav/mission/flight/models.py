@@ -11,6 +11,13 @@ def modelled(vehicle: Vehicle) -> bool:
     return vehicle.kind == "copter" or vehicle.autopilot == "ardupilot"
 
 
+def caveat(vehicle: Vehicle) -> str:
+    """Return what to say of predictions for a `modelled` vehicle; nothing where they are proven."""
+    if flight_model(vehicle).calibrated:
+        return ""
+    return "by a model after the autopilot's documents, not compared with recorded flights"
+
+
 def copter_model(vehicle: Vehicle, latitude: float | None = None) -> CopterModel:
     """Return the model of a multicopter that flies at `latitude`, degrees.
 
