@@ -4,7 +4,7 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from faao_mav.cli.findings import Verdict
     from faao_mav.faao.solution import Solution
     from faao_mav.mission.item import Mission
+    from faao_mav.mission.vehicle import Autopilot, Kind
     from faao_mav.plan import Plan
 
 
@@ -38,9 +39,11 @@ def validate(
             help="Instead of --plan: what --save wrote, with the plan in it, already solved.",
         ),
     ] = None,
-    autopilot: Annotated[str | None, typer.Option(metavar="A", help="ardupilot or px4.")] = None,
+    autopilot: Annotated[
+        Literal["ardupilot", "px4"] | None, typer.Option(help="Whose mission it is.")
+    ] = None,
     kind: Annotated[
-        str | None, typer.Option("--type", metavar="T", help="copter or plane.")
+        Literal["copter", "plane"] | None, typer.Option("--type", help="What flies it.")
     ] = None,
     parameters: Annotated[
         Path | None,
@@ -119,7 +122,7 @@ def _list_rules(as_json: bool) -> None:
 def _judge(
     mission_file: Path,
     plans: tuple[Path | None, Path | None],
-    asked: tuple[str | None, str | None, Path | None],
+    asked: "tuple[Autopilot | None, Kind | None, Path | None]",
     given: tuple[float | None, float | None, float | None],
 ) -> "tuple[Verdict, Mission, Solution | None]":
     from faao_mav.cli.findings import Verdict
@@ -176,6 +179,7 @@ def _write_report(
             mission=mission,
             track=found.track,
             link=found.link,
+            vehicle=verdict.vehicle,
             title=verdict.source.name,
         )
     )

@@ -16,27 +16,21 @@ def choose_vehicle(
     mission_file: Path,
     file: "MissionFile",
     plan: "Plan | None",
-    asked: tuple[str | None, str | None, Path | None],
+    asked: tuple[Autopilot | None, Kind | None, Path | None],
 ) -> tuple[Vehicle, str]:
     """Return the vehicle, and what told which.
 
     `asked` are --autopilot, --type and --parameters. What they leave open the plan says, else the
     mission's file, else the names of the parameters. The parameters are those asked for, else
-    those beside the mission, over the plan's own. Raises `InputError` for unknown names, and for
-    parameters of another autopilot than the mission's.
+    those beside the mission, over the plan's own. Raises `InputError` for parameters of another
+    autopilot than the mission's.
     """
     autopilot, kind, parameters = asked
-    for name, value, known in (
-        ("--autopilot", autopilot, get_args(Autopilot)),
-        ("--type", kind, get_args(Kind)),
-    ):
-        if value is not None and value not in known:
-            raise InputError(f"{name} {value}: expected {' or '.join(known)}")
     given = read_parameters(parameters) if parameters is not None else None
     base, chosen_by = _told(mission_file, file, plan, given)
     if autopilot is not None or kind is not None:
         chosen_by = "as asked"
-    whose: Autopilot = autopilot or base.autopilot  # type: ignore[assignment]  # checked above
+    whose = autopilot or base.autopilot
     values, source = base.parameters, base.source
     if whose != base.autopilot:
         values = {}
@@ -52,8 +46,7 @@ def choose_vehicle(
         values, source = given, str(parameters)
     elif beside.is_file():
         values, source = {**values, **read_parameters(beside)}, f"{beside}, beside the mission"
-    chosen: Kind = kind or base.kind  # type: ignore[assignment]  # checked above
-    return Vehicle(whose, chosen, values, source), chosen_by
+    return Vehicle(whose, kind or base.kind, values, source), chosen_by
 
 
 def _told(
