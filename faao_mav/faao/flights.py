@@ -5,13 +5,16 @@ What belongs to a flight as a whole has one slot: (..., flights, 1).
 
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from faao_mav.arrays import Flags
 
-Record = TypeVar("Record")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Record = TypeVar("Record", bound="DataclassInstance")
 
 
 def only(record: Record, flights: Flags) -> Record:
@@ -29,10 +32,10 @@ def merged(taken: Flags, new: Record, old: Record) -> Record:
 def _each(change: Callable[..., Any], first: Record, *others: Record) -> Record:
     """Apply `change` to every array of like records, and to those of the records in them."""
     changed = {}
-    for field in fields(first):  # type: ignore[arg-type]
+    for field in fields(first):
         parts = [getattr(record, field.name) for record in (first, *others)]
         if isinstance(parts[0], np.ndarray):
             changed[field.name] = change(*parts)
         elif is_dataclass(parts[0]):
             changed[field.name] = _each(change, *parts)
-    return replace(first, **changed)  # type: ignore[type-var]
+    return replace(first, **changed)

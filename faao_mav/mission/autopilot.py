@@ -29,12 +29,6 @@ _CUT, _LIVELY_CUT, _LIVELY = 1.3, 1.0, 10.0
 """Metres of a corner that a wide radius may cut, and at a jerk from the last, m/s³, on: an aircraft
 that is soon at speed again loses less in a corner."""
 
-_RUN_IN = 1.2
-"""Of the shortest leg: what a copter gets to be at speed at w_I."""
-
-_SETTLING = 4.0
-"""Look-aheads of its guidance in which an aeroplane comes onto a track, whatever its course."""
-
 _JERK_LAG = 0.30
 """ArduCopter's t_j: what a ramp takes beyond the ideal jerk-limited one, s."""
 
@@ -47,6 +41,8 @@ class ArduCopterLegs:
     """Whether holds lose their fractions."""
     least: ClassVar[float] = 0.0
     """Shorter legs, m, are not flown: both their ends count as reached at once."""
+    run_in: ClassVar[float] = 1.2
+    """Of the shortest leg: what it takes to be at speed, and on the leg, for sure."""
 
     acceleration: float = 2.5
     jerk: float = 1.0
@@ -68,10 +64,6 @@ class ArduCopterLegs:
         """
         return speed * self.ramp_duration(speed)
 
-    def run_in(self, speed: float) -> float:
-        """Return the length of a leg at whose end the aircraft has `speed`, m/s, for sure, m."""
-        return _RUN_IN * float(self.shortest_leg(np.array([speed]))[0])
-
     def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
         """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
         return np.zeros_like(turn)
@@ -83,6 +75,7 @@ class Px4Legs:
 
     whole_seconds: ClassVar[bool] = False
     least: ClassVar[float] = 3.0  # NAV_ACC_RAD is 2 m
+    run_in: ClassVar[float] = 1.2
 
     acceleration: float = 3.0
     jerk: float = 4.0
@@ -95,10 +88,6 @@ class Px4Legs:
         """
         b = 4 * self.acceleration**2 / self.jerk
         return speed * (speed + b) / (2 * self.acceleration)
-
-    def run_in(self, speed: float) -> float:
-        """Return the length of a leg at whose end the aircraft has `speed`, m/s, for sure, m."""
-        return _RUN_IN * float(self.shortest_leg(np.array([speed]))[0])
 
     def radii(self, room: Real, turn: Real) -> Real:
         """Return acceptance radii, m, for waypoints whose shorter leg is `room` (n,), m.
@@ -117,6 +106,7 @@ class ArduPlaneLegs:
 
     whole_seconds: ClassVar[bool] = False
     least: ClassVar[float] = 0.0
+    run_in: ClassVar[float] = 4.0  # to come onto a track, whatever its course
 
     look_ahead: float
 
@@ -126,10 +116,6 @@ class ArduPlaneLegs:
         One look-ahead: shorter ones are cut.
         """
         return self.look_ahead * speed
-
-    def run_in(self, speed: float) -> float:
-        """Return the length of a leg at whose end the aircraft flies along it at `speed`, m."""
-        return _SETTLING * self.look_ahead * speed
 
     def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
         """Return acceptance radii, m: 0, ArduPlane's own; the shape of `turn`."""

@@ -51,7 +51,8 @@ class Conversion:
 def check_vehicle(plan: "Plan") -> None:
     """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
 
-    That is one with useless parameters, or a plane that flies at none of the plan's speeds.
+    That is one with useless parameters, or a plane that does not fly the plan's least or greatest
+    speed.
     """
     vehicle = vehicle_of(plan)
     legs_of(vehicle)

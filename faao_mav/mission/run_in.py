@@ -64,7 +64,7 @@ def _speed(velocity: Real) -> float:
 def _lead(velocity: Real, legs: Legs, max_speed: float) -> tuple[Real, float]:
     """Return the way, (2,) m, on which `velocity` can be reached, and its nominal duration, s."""
     speed = min(_speed(velocity), max_speed)
-    length = legs.run_in(speed)
+    length = legs.run_in * float(legs.shortest_leg(np.array([speed]))[0])
     return velocity / _speed(velocity) * length, length / speed
 
 
