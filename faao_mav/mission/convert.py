@@ -11,11 +11,12 @@ from faao_mav.mission.flight import copter_model, flight_model
 from faao_mav.mission.flight.plane import ArduPlane
 from faao_mav.mission.item import Mission
 from faao_mav.mission.outline import Splines, plan_route
-from faao_mav.mission.plane_schedule import PlaneScheduler
+from faao_mav.mission.plane_scheduler import PlaneScheduler
 from faao_mav.mission.recommend import FASTEST, candidates
 from faao_mav.mission.route import Route
 from faao_mav.mission.run_in import with_run_in
-from faao_mav.mission.schedule import Schedule, Scheduler
+from faao_mav.mission.schedule import Schedule
+from faao_mav.mission.scheduler import Scheduler
 from faao_mav.mission.vehicle import Vehicle, vehicle_of
 
 if TYPE_CHECKING:

@@ -1,10 +1,10 @@
 """The relay route, before it becomes mission items."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Real
+from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.mission.vector import lengths
 
 
@@ -45,3 +45,29 @@ class Route:
     def distance(self) -> float:
         """Length of the relay route, m: without the way to w_I and from w_F."""
         return float(self.leg_lengths[self.first : self.last].sum())
+
+    @property
+    def turns(self) -> Real:
+        """By how much the way turns at each waypoint, (m,), rad; 0 at both ends."""
+        headings = np.arctan2(*np.diff(self.positions, axis=0).T[::-1])
+        turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
+        return np.concatenate([[0.0], turns, [0.0]])[: len(self.positions)]
+
+    def with_waypoints(self, at: Integers, positions: Real, times: Real, speeds: Real) -> "Route":
+        """Return the route with plain waypoints before those that are at indices `at` (k,) now.
+
+        `positions` (k, 2) are passed at `times` (k,); `speeds` (k,) are those of the new legs that
+        end there, or, behind the last waypoint, begin there. `first` and `last` stay.
+        """
+        still = np.zeros(len(at))
+        return replace(
+            self,
+            positions=np.insert(self.positions, at, positions, axis=0),
+            arrivals=np.insert(self.arrivals, at, times),
+            departures=np.insert(self.departures, at, times),
+            speeds=np.insert(self.speeds, np.minimum(at, len(self.speeds)), speeds),
+            holds=np.insert(self.holds, at, still),
+            delays=np.insert(self.delays, at, still),
+            radii=np.insert(self.radii, at, still),
+            splines=np.insert(self.splines, at, False),
+        )

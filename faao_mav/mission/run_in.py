@@ -25,7 +25,7 @@ def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) ->
     if begins_at_speed(t, w) and route.departures[0] == route.arrivals[0]:
         lead, lasting = _lead(into, legs, max_speed)
         route = replace(
-            _with(route, 0, route.positions[0] - lead, route.arrivals[0] - lasting, _speed(into)),
+            _with(route, 0, route.positions[0] - lead, route.arrivals[0] - lasting, into),
             first=1,
             last=route.last + 1,
         )
@@ -33,9 +33,7 @@ def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) ->
     if _speed(out) > _MOVING and route.departures[-1] == route.arrivals[-1]:
         lead, lasting = _lead(out, legs, max_speed)
         end = len(route.positions)
-        route = _with(
-            route, end, route.positions[-1] + lead, route.departures[-1] + lasting, _speed(out)
-        )
+        route = _with(route, end, route.positions[-1] + lead, route.departures[-1] + lasting, out)
     return route
 
 
@@ -68,16 +66,7 @@ def _lead(velocity: Real, legs: Legs, max_speed: float) -> tuple[Real, float]:
     return velocity / _speed(velocity) * length, length / speed
 
 
-def _with(route: Route, at: int, position: Real, time: float, speed: float) -> Route:
+def _with(route: Route, at: int, position: Real, time: float, velocity: Real) -> Route:
     """Return `route` with a waypoint more at its beginning (`at` 0) or its end."""
-    return replace(
-        route,
-        positions=np.insert(route.positions, at, position, axis=0),
-        arrivals=np.insert(route.arrivals, at, time),
-        departures=np.insert(route.departures, at, time),
-        speeds=np.insert(route.speeds, max(at - 1, 0) if at else 0, speed),
-        holds=np.insert(route.holds, at, 0.0),
-        delays=np.insert(route.delays, at, 0.0),
-        radii=np.insert(route.radii, at, 0.0),
-        splines=np.insert(route.splines, at, False),
-    )
+    speed = np.array([_speed(velocity)])
+    return route.with_waypoints(np.array([at]), position[None], np.array([time]), speed)

@@ -22,7 +22,7 @@ from faao_mav.mission.autopilot import legs_of
 from faao_mav.mission.flight import copter_model
 from faao_mav.mission.flight.predict import predict
 from faao_mav.mission.outline import Splines
-from faao_mav.mission.schedule import Scheduler
+from faao_mav.mission.scheduler import Scheduler
 from faao_mav.mission.vehicle import vehicle_of
 
 STEP = 0.2

@@ -15,7 +15,7 @@ from faao_mav.mission.flight.path import FlightPath
 from faao_mav.mission.flight.plane import ArduPlane
 from faao_mav.mission.flight.predict import predict
 from faao_mav.mission.flight.track import Track
-from faao_mav.mission.plane_schedule import PlaneScheduler
+from faao_mav.mission.plane_scheduler import PlaneScheduler
 from faao_mav.mission.run_in import with_run_in
 from faao_mav.mission.vehicle import vehicle_of
 from faao_mav.plan import Plan
