@@ -10,42 +10,42 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from faao_mav.errors import FaaoError
-    from faao_mav.faao.optimize import optimize
-    from faao_mav.faao.pricing import price, saturation
-    from faao_mav.faao.solution import Solution, load_solution, save_solution
     from faao_mav.mavlink import download, upload
-    from faao_mav.mission import Mission, MissionItem, to_mission
+    from faao_mav.mission import Mission, MissionItem
     from faao_mav.mission.formats import read_mission, render_mission
-    from faao_mav.mission.parameter_file import read_parameters, render_parameters
-    from faao_mav.mission.validate import Finding, Limits, LinkCheck, validate
     from faao_mav.mission.vehicle import Vehicle
+    from faao_mav.optimizer.optimize import optimize
+    from faao_mav.optimizer.pricing import price, saturation
+    from faao_mav.optimizer.solution import Solution, load_solution, save_solution
     from faao_mav.plan import Plan, parse_plan, read_plan
+    from faao_mav.schedule import to_mission
+    from faao_mav.validate import Finding, Limits, LinkCheck
+    from faao_mav.vehicle.parameter_file import read_parameters, render_parameters
 
 _HOMES = {
     "FaaoError": "errors",
-    "Finding": "mission.validate",
-    "Limits": "mission.validate",
-    "LinkCheck": "mission.validate",
+    "Finding": "validate",
+    "Limits": "validate",
+    "LinkCheck": "validate",
     "Mission": "mission",
     "MissionItem": "mission",
     "Plan": "plan",
-    "Solution": "faao.solution",
+    "Solution": "optimizer.solution",
     "Vehicle": "mission.vehicle",
     "download": "mavlink",
-    "load_solution": "faao.solution",
-    "optimize": "faao.optimize",
+    "load_solution": "optimizer.solution",
+    "optimize": "optimizer.optimize",
     "parse_plan": "plan",
-    "price": "faao.pricing",
+    "price": "optimizer.pricing",
     "read_mission": "mission.formats",
-    "read_parameters": "mission.parameter_file",
+    "read_parameters": "vehicle.parameter_file",
     "read_plan": "plan",
     "render_mission": "mission.formats",
-    "render_parameters": "mission.parameter_file",
-    "saturation": "faao.pricing",
-    "save_solution": "faao.solution",
-    "to_mission": "mission",
+    "render_parameters": "vehicle.parameter_file",
+    "saturation": "optimizer.pricing",
+    "save_solution": "optimizer.solution",
+    "to_mission": "schedule",
     "upload": "mavlink",
-    "validate": "mission.validate",
 }
 
 __all__ = [
@@ -72,7 +72,6 @@ __all__ = [
     "save_solution",
     "to_mission",
     "upload",
-    "validate",
 ]
 
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.mission.formats import read_mission, read_mission_file
-from faao_mav.mission.parameter_file import read_parameters
+from faao_mav.vehicle.parameter_file import read_parameters
 
 
 def run(*arguments: object) -> Any:

@@ -13,13 +13,13 @@ from faao_mav import download, upload
 from faao_mav.cli.main import app
 from faao_mav.mavlink.messages import ParamRequestRead
 from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
-from faao_mav.mavlink.protocol import Result
 from faao_mav.mavlink.runner import running
+from faao_mav.mavlink.transfer.protocol import Result
 from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.mission.parameter_file import read_parameters
+from faao_mav.vehicle.parameter_file import read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 GENTLE = edited(

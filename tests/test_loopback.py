@@ -14,17 +14,17 @@ from typer.testing import CliRunner
 
 from faao_mav import download
 from faao_mav.cli.main import app
-from faao_mav.faao.solution import load_solution
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.mock import MockAutopilot, manners_of
 from faao_mav.mavlink.runner import predicted, running
-from faao_mav.mission.comparison import compare_with_plan
-from faao_mav.mission.dialect import as_stored
-from faao_mav.mission.flight import Track
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home, Mission
-from faao_mav.mission.parameter_file import parameter_path, read_parameters
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.optimizer.solution import load_solution
+from faao_mav.validate.comparison import compare_with_plan
+from faao_mav.vehicle import Track
+from faao_mav.vehicle.dialects import as_stored
+from faao_mav.vehicle.parameter_file import parameter_path, read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 SPEEDUP, RATE = 40.0, 80.0

@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 from conftest import MISSIONS, SMALL, MakePlan, edited
 
-from faao_mav.faao.optimize import optimize
-from faao_mav.mission.check import Check, check
-from faao_mav.mission.convert import Conversion, convert
-from faao_mav.mission.prediction import predict_delivery
-from faao_mav.mission.validate import Limits
+from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
+from faao_mav.schedule.convert import Conversion, convert
+from faao_mav.schedule.prediction import predict_delivery
+from faao_mav.validate import Limits
+from faao_mav.validate.check import Check, check
 
 SHORT: dict[str, Any] = {
     "vehicle.max_speed": 8.0,

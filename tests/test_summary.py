@@ -7,11 +7,11 @@ import pytest
 from conftest import MakePlan
 
 from faao_mav.cli.summary import Result, as_dict, as_text
-from faao_mav.faao.bound import Bound
-from faao_mav.faao.optimize import optimize
-from faao_mav.faao.pricing import MutualInformation, saturation
-from faao_mav.mission import convert
-from faao_mav.mission.prediction import predict_delivery
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.pricing import MutualInformation, saturation
+from faao_mav.optimizer.search.bound import Bound
+from faao_mav.schedule import convert
+from faao_mav.schedule.prediction import predict_delivery
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from faao_mav.errors import InputError
 if TYPE_CHECKING:
     from faao_mav.mavlink.messages import Row
     from faao_mav.mavlink.mock import MockAutopilot
-    from faao_mav.mavlink.protocol import MissionType
+    from faao_mav.mavlink.transfer.protocol import MissionType
     from faao_mav.mission.item import Home
     from faao_mav.mission.vehicle import Autopilot
 
@@ -74,12 +74,12 @@ def autopilot(
         from faao_mav.mavlink.codec import read_key
         from faao_mav.mavlink.faults import Faults
         from faao_mav.mavlink.mock import MockAutopilot, manners_of
-        from faao_mav.mavlink.protocol import Address
         from faao_mav.mavlink.runner import predicted, serve
+        from faao_mav.mavlink.transfer.protocol import Address
         from faao_mav.mavlink.transport import open_transport
-        from faao_mav.mission.flight import flight_model
-        from faao_mav.mission.parameter_file import read_parameters
         from faao_mav.mission.vehicle import Vehicle
+        from faao_mav.vehicle import flight_model
+        from faao_mav.vehicle.parameter_file import read_parameters
 
         values = {} if parameters is None else read_parameters(parameters)
         flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"
@@ -127,7 +127,7 @@ class Diary:
 
     def __call__(self, mock: "MockAutopilot") -> None:
         """Print what is new since the last call."""
-        from faao_mav.mavlink.protocol import MissionType
+        from faao_mav.mavlink.transfer.protocol import MissionType
 
         lists = {part: mock.lists.rows(part) for part in MissionType}
         if not self._told:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from faao_mav.mission.validate.finding import Finding, Level
+from faao_mav.validate.finding import Finding, Level
 
 _MAX_ITEMS_SHOWN = 8
 

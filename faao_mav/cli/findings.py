@@ -10,10 +10,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from faao_mav.cli.finding_lines import count_of, grouped, items_of, line_of, message_of
-from faao_mav.mission.check import Check
-from faao_mav.mission.flight import caveat
-from faao_mav.mission.validate import Level, Rule
 from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Vehicle
+from faao_mav.validate import Level, Rule
+from faao_mav.validate.check import Check
+from faao_mav.vehicle import caveat
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
 

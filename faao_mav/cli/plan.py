@@ -105,19 +105,19 @@ def _solve(
     from faao_mav.cli import report as reports
     from faao_mav.cli.progress import progress
     from faao_mav.cli.summary import Result
-    from faao_mav.faao.optimize import optimize
-    from faao_mav.faao.pricing import fresh_rates, price, saturation
-    from faao_mav.faao.problem import build_problem
-    from faao_mav.faao.progress import Progress
-    from faao_mav.faao.solution import save_solution
-    from faao_mav.mission.check import check
-    from faao_mav.mission.convert import check_vehicle, convert
     from faao_mav.mission.formats import check_suffix, render_mission
-    from faao_mav.mission.parameter_file import parameter_path, render_parameters
-    from faao_mav.mission.prediction import predict_delivery
-    from faao_mav.mission.recommend import candidates
-    from faao_mav.mission.validate import Limits
+    from faao_mav.optimizer.optimize import optimize
+    from faao_mav.optimizer.pricing import fresh_rates, price, saturation
+    from faao_mav.optimizer.problem import build_problem
+    from faao_mav.optimizer.progress import Progress
+    from faao_mav.optimizer.solution import save_solution
     from faao_mav.plan import read_plan
+    from faao_mav.schedule.convert import check_vehicle, convert
+    from faao_mav.schedule.prediction import predict_delivery
+    from faao_mav.validate import Limits
+    from faao_mav.validate.check import check
+    from faao_mav.vehicle.parameter_file import parameter_path, render_parameters
+    from faao_mav.vehicle.recommend import candidates
 
     started = time.perf_counter()
     read = read_plan(plan_file, method=method)
@@ -158,7 +158,7 @@ def _solve(
         if save is not None:
             save_solution(solution, save, conversion.schedule.track())
         if precoders is not None:
-            from faao_mav.mission.precoder_table import precoder_table
+            from faao_mav.schedule.precoder_table import precoder_table
 
             write_whole(precoders, precoder_table(solution).encode())
         if out is not None and tuned is not None:
@@ -168,7 +168,7 @@ def _solve(
             write_whole(tuned, text.encode(errors="replace"))  # a name may be no Unicode
         if out is not None:
             if out.suffix.lower() == ".kml":
-                from faao_mav.mission.drawing import draw_mission
+                from faao_mav.report.drawing import draw_mission
 
                 rendered = draw_mission(solution, conversion)
             else:
@@ -185,7 +185,7 @@ def _solve(
         limit = saturation(solution)
         ceiling = None
         if bound:
-            from faao_mav.faao.bound import upper_bound
+            from faao_mav.optimizer.search.bound import upper_bound
 
             ceiling = upper_bound(build_problem(read), solution.rates.R_avg)
         result = Result(
@@ -221,7 +221,7 @@ def _check_own(tuned: Path) -> None:
 def _sound(result: "Result") -> bool:
     """Say the errors that validation found, and whether there are none."""
     from faao_mav.cli.finding_lines import grouped, line_of
-    from faao_mav.mission.validate.finding import Level
+    from faao_mav.validate.finding import Level
 
     errors = [finding for finding in result.findings if finding.level is Level.ERROR]
     for group in grouped(errors):

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from faao_mav.cli.finding_lines import count_of, grouped, line_of
-from faao_mav.faao.bound import Bound
-from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
-from faao_mav.faao.solution import Solution
-from faao_mav.mission.convert import Conversion
-from faao_mav.mission.flight import caveat
-from faao_mav.mission.prediction import Prediction
-from faao_mav.mission.validate.finding import Finding, Level
+from faao_mav.optimizer.pricing import FreshRates, MutualInformation, Saturation
+from faao_mav.optimizer.search.bound import Bound
+from faao_mav.optimizer.solution import Solution
+from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.prediction import Prediction
+from faao_mav.validate.finding import Finding, Level
+from faao_mav.vehicle import caveat
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport

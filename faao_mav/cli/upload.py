@@ -12,8 +12,8 @@ from faao_mav.cli.outcome import exit_status
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
-    from faao_mav.mavlink.session import PartReport
-    from faao_mav.mavlink.verify import Difference
+    from faao_mav.mavlink.transfer.session import PartReport
+    from faao_mav.mavlink.transfer.verify import Difference
 
 
 def upload(

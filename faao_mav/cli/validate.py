@@ -13,9 +13,9 @@ from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
     from faao_mav.cli.findings import Verdict
-    from faao_mav.faao.solution import Solution
     from faao_mav.mission.item import Mission
     from faao_mav.mission.vehicle import Autopilot, Kind
+    from faao_mav.optimizer.solution import Solution
     from faao_mav.plan import Plan
 
 
@@ -83,7 +83,7 @@ def validate(
     or a file that cannot be read.
     """
     with exit_status():
-        from faao_mav.mission.validate.finding import Level
+        from faao_mav.validate.finding import Level
 
         if rules:
             _list_rules(as_json)
@@ -111,7 +111,7 @@ def _list_rules(as_json: bool) -> None:
     from rich.console import Console
 
     from faao_mav.cli.findings import rules_as_dict, show_rules
-    from faao_mav.mission.validate import RULES
+    from faao_mav.validate import RULES
 
     if as_json:
         typer.echo(json.dumps(rules_as_dict(RULES)))
@@ -127,10 +127,10 @@ def _judge(
 ) -> "tuple[Verdict, Mission, Solution | None]":
     from faao_mav.cli.findings import Verdict
     from faao_mav.cli.vehicle import choose_vehicle
-    from faao_mav.mission.check import check
-    from faao_mav.mission.flight import flight_model, modelled
     from faao_mav.mission.formats import read_mission_file
-    from faao_mav.mission.validate import Limits
+    from faao_mav.validate import Limits
+    from faao_mav.validate.check import check
+    from faao_mav.vehicle import flight_model, modelled
 
     for option, value in zip(("duration", "distance", "altitude"), given, strict=True):
         if value is not None and not (math.isfinite(value) and value > 0):
@@ -202,14 +202,14 @@ def _planned(
 ) -> "tuple[Plan | None, Solution | None]":
     """Return the plan and what its flight is to be; a plan alone is solved for that."""
     if solution_file is not None:
-        from faao_mav.faao.solution import load_solution
+        from faao_mav.optimizer.solution import load_solution
 
         solution = load_solution(solution_file)
         return solution.plan, solution
     if plan_file is None:
         return None, None
     from faao_mav.cli.progress import progress
-    from faao_mav.faao.optimize import optimize
+    from faao_mav.optimizer.optimize import optimize
     from faao_mav.plan import read_plan
 
     plan = read_plan(plan_file)

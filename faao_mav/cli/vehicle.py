@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from faao_mav.errors import InputError
-from faao_mav.mission.parameter_file import autopilot_of, parameter_path, read_parameters
 from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Autopilot, Kind, Vehicle, vehicle_of
+from faao_mav.vehicle.parameter_file import autopilot_of, parameter_path, read_parameters
 
 if TYPE_CHECKING:
     from faao_mav.mission.formats import MissionFile

@@ -9,20 +9,20 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink.codec import read_key
 from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.link import Link, Observe
-from faao_mav.mavlink.pace import Timeouts
-from faao_mav.mavlink.protocol import MissionType, Result, meaning
 from faao_mav.mavlink.rows import mission_of, rows_of
-from faao_mav.mavlink.session import (
+from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.mavlink.transfer.protocol import MissionType, Result, meaning
+from faao_mav.mavlink.transfer.session import (
     PartReport,
     clear_lists,
     download_lists,
     explain,
     upload_parts,
 )
-from faao_mav.mavlink.transfer import Peer, Script
-from faao_mav.mission.dialect import item_limit
+from faao_mav.mavlink.transfer.transfer import Peer, Script
 from faao_mav.mission.item import Mission
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle.dialects import item_limit
 
 _ABSENT = (Result.UNSUPPORTED, Result.INVALID)
 """What a vehicle answers that has no such list at all."""

@@ -20,8 +20,8 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     Row,
 )
-from faao_mav.mavlink.protocol import Address
 from faao_mav.mavlink.rows import coordinate_scale
+from faao_mav.mavlink.transfer.protocol import Address
 
 KEY_BYTES = 32
 _SIGNING_EPOCH = 1_420_070_400  # 2015-01-01, when the clock of signatures starts

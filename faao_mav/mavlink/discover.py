@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.messages import CommandLong, Envelope, Heartbeat, HomePosition, Message
-from faao_mav.mavlink.protocol import FIRMWARE_NAMES, Address, Autopilot, Firmware, State
+from faao_mav.mavlink.transfer.protocol import FIRMWARE_NAMES, Address, Autopilot, Firmware, State
 from faao_mav.mission.item import Home
 from faao_mav.mission.vehicle import Kind
 

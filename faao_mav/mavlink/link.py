@@ -9,9 +9,9 @@ from typing import TypeAlias, TypeVar
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.messages import Heartbeat, Message
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, Autopilot, State
 from faao_mav.mavlink.tlog import Tlog
-from faao_mav.mavlink.transfer import Machine
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, Autopilot, State
+from faao_mav.mavlink.transfer.transfer import Machine
 from faao_mav.mavlink.transport import Transport, open_transport
 
 T = TypeVar("T")

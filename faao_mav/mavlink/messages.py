@@ -8,7 +8,7 @@ wire, so that what was sent and what was found can be compared without rounding.
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from faao_mav.mavlink.protocol import ARMED, Address
+from faao_mav.mavlink.transfer.protocol import ARMED, Address
 from faao_mav.mission.item import Params
 
 

@@ -11,16 +11,11 @@ from typing import Final
 
 from faao_mav.errors import InputError
 from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.protocol import FIRMWARE_NAMES, Firmware, MissionType
-from faao_mav.mission.command import Frame
-from faao_mav.mission.dialect import as_received, as_sent
+from faao_mav.mavlink.transfer.protocol import FIRMWARE_NAMES, Firmware, MissionType
+from faao_mav.mission.command import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_POINT, Frame
 from faao_mav.mission.fence import Circle, Fence, Place, Polygon, RallyPoint
 from faao_mav.mission.item import Mission, MissionItem
-
-FENCE_RETURN_POINT: Final = 5000
-POLYGON: Final = {True: 5001, False: 5002}
-CIRCLE: Final = {True: 5003, False: 5004}
-RALLY_POINT: Final = 5100
+from faao_mav.vehicle.dialects import as_received, as_sent
 
 GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
 _INT32 = 2**31 - 1

@@ -11,9 +11,9 @@ from faao_mav.mavlink.faults import Channel, Faults
 from faao_mav.mavlink.link import Link
 from faao_mav.mavlink.mock import Fly, MockAutopilot
 from faao_mav.mavlink.transport import Transport, open_transport
-from faao_mav.mission.flight import Track
 from faao_mav.mission.item import Mission
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Track
 
 _PATIENCE = 0.1  # s between two looks at whether to stop
 
@@ -121,7 +121,7 @@ def predicted(vehicle: Vehicle) -> Fly:
     """Return how `vehicle` flies missions, by the flight prediction with its parameters."""
 
     def fly(mission: Mission) -> Track:
-        from faao_mav.mission.flight.predict import predict  # most uses of a mock never fly
+        from faao_mav.vehicle.predict import predict  # most uses of a mock never fly
 
         return predict(mission, vehicle)
 

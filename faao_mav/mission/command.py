@@ -1,6 +1,7 @@
 """The MAVLink commands and frames that missions here use (names of the MAVLink common set)."""
 
 from enum import IntEnum
+from typing import Final
 
 
 class Command(IntEnum):
@@ -45,6 +46,18 @@ FLOWN_TO = frozenset(
     }
 )
 """Commands that fly to the place x, y, z of their item."""
+
+FENCE_RETURN_POINT: Final = 5000
+"""MAV_CMD_NAV_FENCE_RETURN_POINT."""
+
+POLYGON: Final = {True: 5001, False: 5002}
+"""The vertices of a fence's polygon, by whether to stay in it."""
+
+CIRCLE: Final = {True: 5003, False: 5004}
+"""A fence's circle, by whether to stay in it."""
+
+RALLY_POINT: Final = 5100
+"""MAV_CMD_NAV_RALLY_POINT."""
 
 
 class Frame(IntEnum):

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.faao.solution import Solution
-from faao_mav.mission.convert import Conversion
-from faao_mav.mission.prediction import Prediction
+from faao_mav.optimizer.solution import Solution
 from faao_mav.report.route_map import route_map
 from faao_mav.report.style import MUTED, SERIES, label, legend_above, new_figure, styled
 from faao_mav.report.waypoint_numbers import number_waypoints
+from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.prediction import Prediction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

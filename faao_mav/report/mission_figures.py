@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from faao_mav.mission.command import FLOWN_TO
-from faao_mav.mission.flight.track import Track
 from faao_mav.mission.item import Mission
 from faao_mav.report.route_map import draw_fence, outlines_of, show_all
 from faao_mav.report.style import INK, SERIES, label, legend_above, new_figure, styled
+from faao_mav.vehicle.track import Track
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

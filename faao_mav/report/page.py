@@ -7,17 +7,17 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from faao_mav.mission.flight import caveat, modelled
-from faao_mav.mission.flight.track import Track
 from faao_mav.mission.item import Mission
-from faao_mav.mission.validate.finding import Finding
 from faao_mav.report.data import ReportData
 from faao_mav.report.inline_svg import inline_svg
+from faao_mav.validate.finding import Finding
+from faao_mav.vehicle import caveat, modelled
+from faao_mav.vehicle.track import Track
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from faao_mav.faao.solution import Solution
+    from faao_mav.optimizer.solution import Solution
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 _PARTS = ("faao-mav", "numpy", "scipy", "matplotlib")

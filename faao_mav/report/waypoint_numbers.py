@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.faao.solution import Solution
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
-from faao_mav.mission.convert import Conversion
 from faao_mav.mission.item import Mission
+from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
+from faao_mav.schedule.convert import Conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

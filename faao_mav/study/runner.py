@@ -29,8 +29,8 @@ def run_case(case: Case) -> Row:
 
 
 def _solved(case: Case) -> Row:
-    from faao_mav.faao.optimize import optimize
-    from faao_mav.faao.pricing import price
+    from faao_mav.optimizer.optimize import optimize
+    from faao_mav.optimizer.pricing import price
     from faao_mav.plan import parse_plan
 
     plan = parse_plan(case.text, case.source)

@@ -24,14 +24,14 @@ from peer import GAIN, ROUNDS, Model, at_best, at_precoders
 
 from faao_mav.arrays import Real
 from faao_mav.errors import PlanError
-from faao_mav.faao.bound import upper_bound
-from faao_mav.faao.direct import RateField
-from faao_mav.faao.interior import maximize
-from faao_mav.faao.optimize import optimize
-from faao_mav.faao.problem import Problem, build_problem
-from faao_mav.faao.routes import starts
-from faao_mav.faao.slot_rate import FixedRate
-from faao_mav.faao.start import straight_flight
+from faao_mav.optimizer.direct import RateField
+from faao_mav.optimizer.interior.maximize import maximize
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.slot_rate import FixedRate
+from faao_mav.optimizer.search.bound import upper_bound
+from faao_mav.optimizer.search.routes import starts
+from faao_mav.optimizer.search.start import straight_flight
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.radio.best_precoder import best_precoders
 

@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 from recorded import FLIGHTS, Recorded, Row, compared, read, show
 
-from faao_mav.mission.flight.arducopter import ArduCopter
-from faao_mav.mission.flight.path import FlightPath
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle.ardupilot.copter import ArduCopter
+from faao_mav.vehicle.flight_path import FlightPath
 
 FITTED = (
     "line-20m-8ms",

@@ -10,8 +10,8 @@ errors were seen while the model was built, so they are no blind test.
 
 from recorded import FLIGHTS, Row, compared, read, show
 
-from faao_mav.mission.flight.px4 import Px4
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle.px4 import Px4
 
 FITTED = (
     "circle-100m-20m-8ms",

@@ -15,10 +15,10 @@ from typing import Any
 
 import yaml
 
-from faao_mav.faao.optimize import optimize
-from faao_mav.mission.convert import convert
-from faao_mav.mission.prediction import predict_delivery
+from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.schedule.convert import convert
+from faao_mav.schedule.prediction import predict_delivery
 
 SAMPLE = Path(__file__).parents[2] / "missions" / "copter_relay.yaml"
 

@@ -13,8 +13,8 @@ import casadi as ca
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.faao.kinematics import Kinematics, Trajectory
-from faao_mav.faao.problem import Link
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.problem import Link
 
 LENGTH = 100.0
 TOLERANCE = 1e-7

@@ -9,8 +9,8 @@ import numpy as np
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
-from faao_mav.mission.flight.predict import predict
 from faao_mav.mission.vehicle import Autopilot, Vehicle
+from faao_mav.vehicle.predict import predict
 
 HOME = Home(47.4, 8.5, 400.0)
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
-from faao_mav.mission.flight.path import FlightPath, Flown
 from faao_mav.mission.formats.wpl import read_wpl
+from faao_mav.vehicle.flight_path import FlightPath, Flown
 
 FLIGHTS = Path(__file__).parent.parent / "data" / "flights"
 

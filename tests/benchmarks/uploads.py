@@ -28,9 +28,9 @@ from faao_mav.errors import LinkError
 from faao_mav.mavlink import upload
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, manners_of
-from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.runner import running
+from faao_mav.mavlink.transfer.protocol import MissionType
 
 KINDS: tuple[MockKind, ...] = ("px4", "ardupilot")
 

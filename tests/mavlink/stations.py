@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from faao_mav.mavlink.download import Download
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.messages import (
     Envelope,
@@ -14,13 +13,14 @@ from faao_mav.mavlink.messages import (
     Row,
 )
 from faao_mav.mavlink.mock import Manners, MockAutopilot, MockKind, manners_of
-from faao_mav.mavlink.pace import Timeouts
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, Firmware, MissionType
 from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.session import PartReport, upload_parts
-from faao_mav.mavlink.simulate import Station, simulate
-from faao_mav.mavlink.transfer import Machine, Peer, Script
-from faao_mav.mavlink.upload import Upload
+from faao_mav.mavlink.transfer.download import Download
+from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, Firmware, MissionType
+from faao_mav.mavlink.transfer.session import PartReport, upload_parts
+from faao_mav.mavlink.transfer.simulate import Station, simulate
+from faao_mav.mavlink.transfer.transfer import Machine, Peer, Script
+from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 

@@ -1,19 +1,19 @@
 """No packet brings a machine down: whatever is sent, every answer fits into a packet."""
 
 import pytest
-from flights import fly
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mock_flights import fly
 from stations import HOME, KINDS, VEHICLE, a_mission, peer_of, rows_for
 
 from faao_mav.mavlink import messages
 from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.discover import Discovery
-from faao_mav.mavlink.download import Download
 from faao_mav.mavlink.mock import MockAutopilot, manners_of
-from faao_mav.mavlink.protocol import GROUND_STATION, MissionType
 from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.upload import Upload
+from faao_mav.mavlink.transfer.download import Download
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType
+from faao_mav.mavlink.transfer.upload import Upload
 
 bytes_ = st.integers(0, 255)
 shorts = st.one_of(st.integers(0, 5), st.integers(0, 65_535))

@@ -8,7 +8,7 @@ import time
 
 import pytest
 from conftest import free_port
-from flights import fly
+from mock_flights import fly
 from pymavlink import mavutil
 from stations import FENCE, HOME, RALLY, a_mission, places
 
@@ -19,9 +19,9 @@ from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.link import Link
 from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.mock import COUNT, MockAutopilot, ardupilot, manners_of
-from faao_mav.mavlink.protocol import Address, MissionType, Result
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.runner import running
+from faao_mav.mavlink.transfer.protocol import Address, MissionType, Result
 from faao_mav.mavlink.transport import open_transport, parse_connection
 from faao_mav.mission import Mission, MissionItem
 

@@ -3,8 +3,6 @@
 import pytest
 from stations import FOREIGN, Desk, peer_of, rows_for
 
-from faao_mav.mavlink.clear import Clear
-from faao_mav.mavlink.download import Download
 from faao_mav.mavlink.messages import (
     MissionAck,
     MissionClearAll,
@@ -13,8 +11,10 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
 )
-from faao_mav.mavlink.pace import Timeouts
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.transfer.clear import Clear
+from faao_mav.mavlink.transfer.download import Download
+from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.mavlink.transfer.protocol import MissionType, Result
 
 ME = (255, 190)
 ROWS = rows_for("px4", 3)

@@ -22,12 +22,12 @@ from faao_mav.mavlink.faults import Channel, Faults, Lost
 from faao_mav.mavlink.messages import Heartbeat, MissionAck, MissionCount
 from faao_mav.mavlink.mock import COUNT, ardupilot, px4
 from faao_mav.mavlink.mock.lists import Lists
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
 from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.session import clear_lists, download_lists, upload_parts
-from faao_mav.mavlink.simulate import Station, simulate
-from faao_mav.mavlink.transfer import Peer, Script
-from faao_mav.mavlink.upload import Upload
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.transfer.session import clear_lists, download_lists, upload_parts
+from faao_mav.mavlink.transfer.simulate import Station, simulate
+from faao_mav.mavlink.transfer.transfer import Peer, Script
+from faao_mav.mavlink.transfer.upload import Upload
 
 MISSION = MissionType.MISSION
 REQUEST, MISSION_ACK, COUNT_ID, REQUEST_INT, ITEM_INT = 40, 47, 44, 51, 73

@@ -5,7 +5,7 @@ from stations import mock_of, rows_for, there_and_back, upload_to
 
 from faao_mav.mavlink.faults import Faults, Lost
 from faao_mav.mavlink.mock import ardupilot, px4
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.transfer.protocol import MissionType, Result
 
 MISSION = MissionType.MISSION
 KINDS = ["ardupilot", "px4"]

@@ -6,21 +6,21 @@ from collections.abc import Iterator
 
 import pytest
 from conftest import free_port
-from flights import fly
 from mavsdk.component_type import ComponentType
 from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.mission_raw import MissionItem as SdkItem
 from mavsdk.plugins.mission_raw import MissionRaw
 from mavsdk.plugins.mission_raw_server import MissionRawServer
+from mock_flights import fly
 from stations import FENCE, HOME, RALLY, a_mission, places
 
 from faao_mav.mavlink import upload
 from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, manners_of
-from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.runner import running
+from faao_mav.mavlink.transfer.protocol import MissionType
 
 
 def sdk_items(rows: tuple[Row, ...], part: MissionType) -> list[SdkItem]:

@@ -15,7 +15,7 @@ from faao_mav.mavlink.messages import (
     Statustext,
 )
 from faao_mav.mavlink.mock import ardupilot, px4
-from faao_mav.mavlink.protocol import GROUND_STATION, MissionType, Result
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType, Result
 
 MISSION, FENCE, RALLY = MissionType
 TO = (VEHICLE.system, VEHICLE.component)

@@ -3,7 +3,7 @@
 import dataclasses
 
 import pytest
-from flights import fly
+from mock_flights import fly
 from stations import HOME, VEHICLE, Desk, a_mission, rows_for
 
 from faao_mav.mavlink.messages import (
@@ -25,8 +25,8 @@ from faao_mav.mavlink.messages import (
     SetMode,
 )
 from faao_mav.mavlink.mock import MockAutopilot, manners_of
-from faao_mav.mavlink.protocol import GROUND_STATION, MissionType, Result
 from faao_mav.mavlink.rows import rows_of
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType, Result
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faao_mav.mavlink.pace import Pace, Timeouts
+from faao_mav.mavlink.transfer.pace import Pace, Timeouts
 
 TIMES = Timeouts()
 

@@ -23,8 +23,8 @@ from faao_mav.mavlink.messages import (
     Row,
     Statustext,
 )
-from faao_mav.mavlink.protocol import GROUND_STATION, MissionType
 from faao_mav.mavlink.rows import mission_of, rows_of
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import RallyPoint
 

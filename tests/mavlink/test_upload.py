@@ -12,8 +12,8 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     Statustext,
 )
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
-from faao_mav.mavlink.upload import Upload
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.transfer.upload import Upload
 
 ME = (GROUND_STATION.system, GROUND_STATION.component)
 ROWS = rows_for("px4", 3)

@@ -16,9 +16,9 @@ from faao_mav.cli.transfer_progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
 from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
-from faao_mav.mavlink.protocol import MissionType, Result
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.runner import running
+from faao_mav.mavlink.transfer.protocol import MissionType, Result
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import read_mission, write_wpl
 

@@ -6,9 +6,9 @@ import math
 import pytest
 from stations import HOME, rows_for
 
-from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.verify import compare
+from faao_mav.mavlink.transfer.protocol import MissionType
+from faao_mav.mavlink.transfer.verify import compare
 from faao_mav.mission import Mission, MissionItem
 
 MISSION = MissionType.MISSION

@@ -6,12 +6,12 @@ from functools import cache
 from conftest import SMALL, edited
 
 from faao_mav import optimize
-from faao_mav.faao.solution import Solution
-from faao_mav.mission.convert import Conversion, convert
 from faao_mav.mission.fence import Circle, Fence, Polygon
-from faao_mav.mission.prediction import Prediction, predict_delivery
-from faao_mav.mission.validate import Finding, Level
+from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
+from faao_mav.schedule.convert import Conversion, convert
+from faao_mav.schedule.prediction import Prediction, predict_delivery
+from faao_mav.validate import Finding, Level
 
 HOSTILE = "</title><script>alert('x')</script> $\\frac & \" 'π' 中"
 

@@ -12,8 +12,8 @@ from reported import FINDINGS, HOSTILE, flown
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
-from faao_mav.faao.bound import Bound
-from faao_mav.faao.pricing import FreshRates, MutualInformation, Saturation
+from faao_mav.optimizer.pricing import FreshRates, MutualInformation, Saturation
+from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import ReportData, render_report
 
 VOID = {"meta", "br", "link", "img", "input", "hr"}

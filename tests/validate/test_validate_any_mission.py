@@ -9,7 +9,7 @@ from judged import HOME, VEHICLES, having, track
 from faao_mav.mission.command import Command
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.mission.validate import Limits, validate
+from faao_mav.validate import Limits, validate
 
 odd = st.sampled_from([0.0, -0.0, math.nan, 1e-320, 1e300, -1e300, -1.0, 1.0, 2.7, 255.5, 65_536.0])
 values = st.one_of(odd, st.floats(-200, 200), st.floats(allow_infinity=False))

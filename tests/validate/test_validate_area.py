@@ -24,8 +24,8 @@ from judged import (
 )
 
 from faao_mav.mission.command import Command
-from faao_mav.mission.validate.area import areas_of, free_area
-from faao_mav.mission.validate.case import Case
+from faao_mav.validate.area import areas_of, free_area
+from faao_mav.validate.case import Case
 
 metres = st.floats(-500, 500)
 places = st.tuples(metres, metres)

@@ -26,8 +26,8 @@ from judged import (
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
-from faao_mav.mission.validate.case import HOME as HOME_INDEX
-from faao_mav.mission.validate.case import Case
+from faao_mav.validate.case import HOME as HOME_INDEX
+from faao_mav.validate.case import Case
 
 
 def ups(case: Case) -> list[float]:

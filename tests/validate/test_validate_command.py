@@ -15,12 +15,13 @@ from judged import TAKEOFF, at, flown, mission, speed, track
 from typer.testing import CliRunner
 
 import faao_mav
+import faao_mav.validate
 from faao_mav.cli.validate import validate
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.formats import render_mission
 from faao_mav.mission.item import Mission
-from faao_mav.mission.validate import RULES
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.validate import RULES
 
 Run = Callable[..., Any]
 
@@ -41,7 +42,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
             raise InfeasibleError(f"no model of {len(mission.items)} items for {vehicle.autopilot}")
 
         fake = SimpleNamespace(predict=predict)
-        monkeypatch.setitem(sys.modules, "faao_mav.mission.flight.predict", fake)
+        monkeypatch.setitem(sys.modules, "faao_mav.vehicle.predict", fake)
         return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
     return runner
@@ -77,7 +78,7 @@ def test_nothing_wrong(run: Run, sound: Path) -> None:
 
 
 def test_the_python_names() -> None:
-    found = faao_mav.validate(
+    found = faao_mav.validate.validate(
         SOUND, faao_mav.Vehicle("px4"), limits=faao_mav.Limits(max_altitude=20)
     )
     assert isinstance(found[0], faao_mav.Finding)
@@ -199,9 +200,9 @@ def test_a_terminal_gets_tables(broken: Path) -> None:
     from rich.console import Console
 
     from faao_mav.cli.findings import Verdict, show, show_rules
-    from faao_mav.mission.check import Check
     from faao_mav.mission.formats import read_mission
-    from faao_mav.mission.validate import validate as findings_of
+    from faao_mav.validate import validate as findings_of
+    from faao_mav.validate.check import Check
 
     content = read_mission(broken)
     found = findings_of(content, Vehicle())

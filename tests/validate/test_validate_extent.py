@@ -3,8 +3,8 @@
 import pytest
 from judged import COPTER, LAND, PX4, Given, at, check, flown, having, track
 
-from faao_mav.mission.flight.track import Track
-from faao_mav.mission.validate import Limits
+from faao_mav.validate import Limits
+from faao_mav.vehicle.track import Track
 
 
 def flight(*points: tuple[float, float, float]) -> Track:

@@ -17,7 +17,7 @@ from judged import (
     track,
 )
 
-from faao_mav.mission.validate import Limits
+from faao_mav.validate import Limits
 
 OUT_AND_BACK = ((0, 0, 0), (0, 0, 30), (0, 100, 30), (0, 0, 30))
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from judged import LINK, Given, check, flown
 
-from faao_mav.mission.validate import Stretch
+from faao_mav.validate import Stretch
 
 # the rule, what it speaks about, the item that it names, what it lets pass
 CASES = [

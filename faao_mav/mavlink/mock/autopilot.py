@@ -30,12 +30,12 @@ from faao_mav.mavlink.mock.manners import Manners
 from faao_mav.mavlink.mock.modes import Modes, whole
 from faao_mav.mavlink.mock.parameters import Parameters
 from faao_mav.mavlink.mock.px4 import Px4Server
-from faao_mav.mavlink.protocol import ARMED, Address, Autopilot, MissionType, State
 from faao_mav.mavlink.rows import mission_of
-from faao_mav.mission.flight import Track
+from faao_mav.mavlink.transfer.protocol import ARMED, Address, Autopilot, MissionType, State
 from faao_mav.mission.item import Home, Mission
 from faao_mav.mission.vehicle import Autopilot as Family
 from faao_mav.mission.vehicle import Kind, Vehicle
+from faao_mav.vehicle import Track
 
 Fly: TypeAlias = Callable[[Mission], Track]
 

@@ -14,8 +14,8 @@ from faao_mav.mavlink.messages import (
     Message,
     MissionItemReached,
 )
-from faao_mav.mission.flight import Track
 from faao_mav.mission.item import Home, MissionItem
+from faao_mav.vehicle import Track
 
 _FIRST_DO = 176  # below: navigation and conditions, which take time
 _GROUND = 0.5  # m: a flight that ends below has landed

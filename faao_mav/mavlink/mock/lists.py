@@ -5,11 +5,11 @@ import zlib
 from collections.abc import Iterable
 
 from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.rows import item_of, row_of
-from faao_mav.mavlink.storage import as_stored
+from faao_mav.mavlink.transfer.protocol import MissionType
 from faao_mav.mission.item import Home
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle.storage import as_stored
 
 
 class Lists:

@@ -10,9 +10,15 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.protocol import MissionType, Result
-from faao_mav.mavlink.rows import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_POINT
-from faao_mav.mission.command import Command, Frame
+from faao_mav.mavlink.transfer.protocol import MissionType, Result
+from faao_mav.mission.command import (
+    CIRCLE,
+    FENCE_RETURN_POINT,
+    POLYGON,
+    RALLY_POINT,
+    Command,
+    Frame,
+)
 
 MockKind: TypeAlias = Literal["ardupilot", "px4", "px4-legacy-first"]
 

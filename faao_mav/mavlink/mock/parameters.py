@@ -9,7 +9,7 @@ from faao_mav.mavlink.messages import (
     ParamSet,
     ParamValue,
 )
-from faao_mav.mavlink.protocol import Firmware
+from faao_mav.mavlink.transfer.protocol import Firmware
 
 _REAL32 = 9
 

@@ -17,7 +17,7 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock.lists import Lists
 from faao_mav.mavlink.mock.manners import COUNT, Manners, check_row
-from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
+from faao_mav.mavlink.transfer.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
 
 _CRITICAL = 2
 _INFO = 6

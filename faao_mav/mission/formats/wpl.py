@@ -18,8 +18,8 @@ import numpy as np
 
 from faao_mav.errors import MissionFileError
 from faao_mav.mission.command import Command, Frame
-from faao_mav.mission.dialect.rows import home_item
 from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.rows import home_item
 
 HEADER = "QGC WPL 110"
 

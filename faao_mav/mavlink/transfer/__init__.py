@@ -1,0 +1,1 @@
+"""The mission protocol: state machines without sockets or sleeping."""

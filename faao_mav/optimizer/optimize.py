@@ -1,0 +1,24 @@
+"""Plan -> Solution, by the method that the plan asks for."""
+
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.progress import Observer
+from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
+
+
+def optimize(plan: Plan, *, observe: Observer | None = None) -> Solution:
+    """Optimise trajectory and precoders of `plan` by `optimizer.method`.
+
+    `observe` is told the progress. Raises `PlanError` when the plan asks for more than the
+    method can handle, `InfeasibleError` when no flight satisfies it.
+    """
+    problem = build_problem(plan)
+    if plan.optimizer.method == "algorithm1":
+        from faao_mav.optimizer.algorithm1.algorithm1 import (
+            algorithm1,  # with CVXPY, half a second to import
+        )
+
+        return algorithm1(problem, observe=observe)
+    from faao_mav.optimizer.direct import direct
+
+    return direct(problem, observe=observe)

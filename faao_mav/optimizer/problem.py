@@ -1,0 +1,214 @@
+"""Everything that (13) needs, as arrays."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.errors import PlanError
+from faao_mav.optimizer.kinematics import Kinematics, kinematics
+from faao_mav.plan import Plan, Vector
+from faao_mav.radio.channel import (
+    balanced_rayleigh,
+    line_of_sight_all_ones,
+    line_of_sight_ula,
+    path_gain,
+    rayleigh,
+    rician,
+)
+from faao_mav.radio.constellation import (
+    DifferenceClasses,
+    difference_classes,
+    difference_vector_count,
+)
+from faao_mav.radio.rate import cutoff_rate
+
+MAX_DIFFERENCE_VECTORS = 5_000_000
+MAX_CHANNELS = 5_000_000
+"""Channels that are held for each link: draws times slots."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """One hop: (1) or (2) with its share of (13).
+
+    `station` is p_B or p_U (2,), `altitude` H, `power` W_B or W_U (W), `noise` sigma² (W);
+    `receive` and `transmit` are the antenna counts. `nlos` is the Rayleigh part: a known draw per
+    slot (N + 2, N_r, N_t), draws to be averaged over (S, 1, N_r, N_t), or None for the line of
+    sight alone.
+    """
+
+    name: str
+    station: Real
+    altitude: float
+    to_relay: bool
+    power: float
+    noise: float
+    receive: int
+    transmit: int
+    modulation: str
+    reference_gain: float
+    rician_factor: float
+    line_of_sight: str
+    nlos: Complex | None
+
+    @cached_property
+    def classes(self) -> DifferenceClasses:
+        """The differences u_mk of this link's input vectors, merged up to a unit phase."""
+        return difference_classes(self.modulation, self.transmit)
+
+    @property
+    def follows_position(self) -> bool:
+        """Whether H_r changes with w."""
+        return self.line_of_sight == "ula"
+
+    @property
+    def los_share(self) -> float:
+        """The factor of H^LoS in H_r."""
+        return (
+            1.0 if self.nlos is None else math.sqrt(self.rician_factor / (1 + self.rician_factor))
+        )
+
+    def gain(self, w: Real) -> Real:
+        """Return rho_0 d^-2 (N + 2,) at the positions w (N + 2, 2)."""
+        return path_gain(w, self.station, self.altitude, self.reference_gain)
+
+    def small_scale(self, w: Real) -> Complex:
+        """Return H_r, the bracket of (1) or (2), at the positions w (N + 2, 2).
+
+        (N + 2, N_r, N_t); with fading that is averaged over, a leading axis of draws.
+        """
+        away = w - self.station
+        d = np.sqrt(np.sum(away**2, axis=1) + self.altitude**2)
+        return self.fade(self.line_of_sight_at(away[:, 0] / d))
+
+    def line_of_sight_at(self, cosine: Real) -> Complex:
+        """Return H^LoS (..., N_r, N_t) at direction cosines u = (x - x_j) / d (...)."""
+        if not self.follows_position:
+            ones = line_of_sight_all_ones(self.receive, self.transmit)
+            return np.broadcast_to(ones, (*cosine.shape, *ones.shape))
+        across = np.sqrt(np.maximum(0.0, 1 - cosine**2))
+        outward = np.stack([cosine, across, np.zeros_like(cosine)], axis=-1)
+        wave = outward if self.to_relay else -outward
+        return line_of_sight_ula(wave, self.receive, self.transmit)
+
+    def fade(self, los: Complex) -> Complex:
+        """Return H_r for line-of-sight parts `los` (N + 2, N_r, N_t).
+
+        Draws that are averaged over turn with the line of sight. Their distribution does not
+        change by that, and their mean rate depends on the distance alone.
+        """
+        if self.nlos is None:
+            return los
+        if self.nlos.ndim == 4:
+            return los * rician(np.ones_like(self.nlos), self.nlos, self.rician_factor)
+        return rician(los, self.nlos, self.rician_factor)
+
+    def channel(self, w: Real, H_r: Complex) -> Complex:
+        """Return H = sqrt(rho_0 d^-2) H_r, (1) or (2)."""
+        return np.sqrt(self.gain(w))[:, None, None] * H_r
+
+    def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
+        """Return (7) or (8) for every slot, bits (N + 2,), its mean where H_r has draws."""
+        rates = cutoff_rate(self.channel(w, H_r), P, self.classes, self.noise)
+        return np.asarray(rates.mean(axis=0)) if rates.ndim == 2 else rates
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Problem (13) of `plan`: the feasible flights and the two links."""
+
+    plan: Plan
+    kinematics: Kinematics
+    bs_uav: Link
+    uav_user: Link
+
+    @property
+    def links(self) -> tuple[Link, Link]:
+        """BS to UAV, UAV to user."""
+        return self.bs_uav, self.uav_user
+
+
+def build_problem(plan: Plan) -> Problem:
+    """Turn `plan` into arrays; the fading is drawn from its seed.
+
+    Raises `PlanError` when alphabet and antennas make more differences than can be handled.
+    """
+    radio, slots = plan.radio, plan.flight.slots
+    base, relay, user = radio.base_station, radio.relay, radio.ground_user
+    for key, antennas in (("base_station", base.antennas), ("relay", relay.antennas)):
+        _check_size(plan, f"radio.{key}.antennas", antennas)
+    if radio.fading == "ergodic" and radio.fading_samples * slots > MAX_CHANNELS:
+        raise PlanError(
+            f"{plan.source}: radio.fading_samples: {radio.fading_samples:,} draws in {slots:,} "
+            f"slots are {radio.fading_samples * slots:,} channels, at most {MAX_CHANNELS:,} are "
+            "accepted; use fewer draws or a longer flight.time_step"
+        )
+    rng = np.random.default_rng(radio.seed)
+
+    def link(
+        name: str,
+        to_relay: bool,
+        position: Vector,
+        receive: int,
+        transmit: int,
+        power: float,
+        noise: float,
+    ) -> Link:
+        match radio.fading:
+            case "realization":
+                nlos: Complex | None = rayleigh(rng, slots, receive, transmit)
+            case "ergodic":
+                nlos = balanced_rayleigh(rng, radio.fading_samples, receive, transmit)[:, None]
+            case "none":
+                nlos = None
+        return Link(
+            name=name,
+            station=np.array(position),
+            altitude=plan.flight.altitude,
+            to_relay=to_relay,
+            power=power,
+            noise=noise,
+            receive=receive,
+            transmit=transmit,
+            modulation=radio.modulation,
+            reference_gain=radio.reference_gain,
+            rician_factor=radio.rician_factor,
+            line_of_sight=radio.line_of_sight,
+            nlos=nlos,
+        )
+
+    return Problem(
+        plan=plan,
+        kinematics=kinematics(plan),
+        bs_uav=link(
+            "base station to UAV",
+            True,
+            base.position,
+            relay.antennas,
+            base.antennas,
+            base.power,
+            relay.noise,
+        ),
+        uav_user=link(
+            "UAV to ground user",
+            False,
+            user.position,
+            user.antennas,
+            relay.antennas,
+            relay.power,
+            user.noise,
+        ),
+    )
+
+
+def _check_size(plan: Plan, key: str, antennas: int) -> None:
+    count = difference_vector_count(plan.radio.modulation, antennas)
+    if count > MAX_DIFFERENCE_VECTORS:
+        raise PlanError(
+            f"{plan.source}: {key}: {antennas} antennas with {plan.radio.modulation} make "
+            f"{count:,} difference vectors; at most {MAX_DIFFERENCE_VECTORS:,} are accepted: "
+            "use fewer antennas or a smaller alphabet"
+        )

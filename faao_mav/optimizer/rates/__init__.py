@@ -1,0 +1,1 @@
+"""The rate of a link as a function of the place of the UAV."""

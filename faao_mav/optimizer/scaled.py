@@ -1,0 +1,117 @@
+"""The feasible set as CVXPY constraints, in units that suit an interior-point solver.
+
+With metres as the unit Clarabel fails on (27); with lengths in about 100 m, speeds in v_max and
+accelerations in a_max every variable is of the order of one.
+"""
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import SolverError
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+
+LENGTH = 100.0
+"""Unit of length inside the solver, m."""
+
+_INSIDE = 1e-7  # by which the least speed is raised, for what the solver leaves open
+
+# The variables are scaled here already: Clarabel's own equilibration of the many exponential
+# cones more often stalls it than helps. Where it does stall, shorter steps mostly get through.
+_ATTEMPTS: tuple[dict[str, Any], ...] = (
+    {"equilibrate_enable": False},
+    {"equilibrate_enable": False, "max_step_fraction": 0.8},
+    {"equilibrate_enable": True, "max_step_fraction": 0.6},
+)
+
+# A gap of 1e-4 is good enough to go on from; a limit broken by more than 1e-7 is not.
+_REDUCED_TOLERANCES = {
+    "reduced_tol_gap_abs": 1e-4,
+    "reduced_tol_gap_rel": 1e-4,
+    "reduced_tol_feas": 1e-7,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FlightVariables:
+    """w, v, a of (11)-(13f) as scaled variables, with their constraints."""
+
+    kinematics: Kinematics
+    w: cp.Variable
+    v: cp.Variable
+    a: cp.Variable
+    constraints: list[Any]
+
+    def trajectory(self) -> Trajectory:
+        """Return the solved flight in SI units, exact in (11), (12) and (13d)."""
+        kin = self.kinematics
+        start = kin.start_velocity
+        if start is None:
+            start = np.asarray(self.v.value)[0] * kin.max_speed
+        return kin.integrate(start, np.asarray(self.a.value) * kin.max_acceleration)
+
+
+def flight_variables(kin: Kinematics, about: Real | None = None) -> FlightVariables:
+    """Return new variables under (11), (12), (13d)-(13f).
+
+    `about`, feasible velocities (N + 2, 2) in m/s, adds the least speed: v(n) about v_i(n) on the
+    far side of the half-plane v(n)^T v_i(n) >= v_min ||v_i(n)||, which is inside the true set.
+    Without it the least speed is left out.
+    """
+    n, dt = kin.slots, kin.time_step
+    w, v, a = (cp.Variable((n, 2)) for _ in range(3))
+    advance = kin.max_speed * dt / LENGTH
+    bend = kin.max_acceleration * dt**2 / 2 / LENGTH
+    gain = kin.max_acceleration * dt / kin.max_speed
+    constraints = [
+        w[1:] == w[:-1] + advance * v[:-1] + bend * a[:-1],
+        v[1:] == v[:-1] + gain * a[:-1],
+        w[0] == kin.start / LENGTH,
+        w[-1] == kin.end / LENGTH,
+        cp.norm(v, axis=1) <= 1,
+        cp.norm(a[kin.first_bounded_acceleration :], axis=1) <= 1,
+        a[-1] == 0,
+    ]
+    if kin.start_velocity is not None:
+        constraints.append(v[0] == kin.start_velocity / kin.max_speed)
+    if kin.end_velocity is not None:
+        constraints.append(v[-1] == kin.end_velocity / kin.max_speed)
+    if about is not None and kin.min_speed > 0:
+        ahead = about / np.linalg.norm(about, axis=1, keepdims=True)
+        free = slice(
+            0 if kin.start_velocity is None else 1,
+            kin.slots if kin.end_velocity is None else kin.slots - 1,
+        )
+        # given end velocities keep it already: twice said, they would leave no interior
+        least = kin.min_speed / kin.max_speed * (1 + _INSIDE)
+        constraints.append(cp.sum(cp.multiply(ahead, v), axis=1)[free] >= least)
+    return FlightVariables(kin, w, v, a, constraints)
+
+
+def solve(problem: cp.Problem) -> str:
+    """Solve with Clarabel and return the status: usable, or `cp.INFEASIBLE`.
+
+    Raises `SolverError` for every other end of all attempts.
+    """
+    for attempt in _ATTEMPTS:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Solution may be inaccurate")
+            try:
+                problem.solve(
+                    solver=cp.CLARABEL,
+                    ignore_dpp=True,
+                    canon_backend=cp.SCIPY_CANON_BACKEND,
+                    **attempt,
+                    **_REDUCED_TOLERANCES,
+                )
+            except cp.error.SolverError:
+                continue
+        if problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+            return str(problem.status)
+        if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
+            return str(cp.INFEASIBLE)
+    raise SolverError("Clarabel made no progress on a convex problem")

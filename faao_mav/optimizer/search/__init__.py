@@ -1,0 +1,1 @@
+"""Flights to start from, and the bound that no flight exceeds."""

@@ -1,0 +1,212 @@
+"""What an optimiser returns: trajectory, precoders, rates, and the means to check them."""
+
+import io
+import json
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InputError
+from faao_mav.files import write_whole
+from faao_mav.optimizer.kinematics import Trajectory
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.plan import Plan, parse_plan
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """R_U, R_G of (10) and R_avg of (9), bit/s/Hz."""
+
+    R_U: float
+    R_G: float
+
+    @property
+    def R_avg(self) -> float:
+        """min(R_U, R_G), (9)."""
+        return min(self.R_U, self.R_G)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved plan: SI units, local east-north metres, one row per time slot.
+
+    `t` (n,) s; `w`, `v`, `a` (n, 2); `P_B` (n, N_t, N_t) and `P_U` (n, N_u, N_u) in sqrt(W);
+    the fading `H_rB` (n, N_u, N_t) and `H_rU` (n, N_r, N_u) without path gain; `I_U`, `I_G`
+    (n,) of (7), (8) in bits; `history` R_avg of the start and after each iteration.
+    Fading that is averaged over has a leading axis of draws, and so have precoders that know it.
+    `converged` tells whether the method's own stopping rule ended it, `ending` says in words
+    what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
+    those that were not followed to the end.
+    """
+
+    plan: Plan
+    t: Real
+    w: Real
+    v: Real
+    a: Real
+    P_B: Complex
+    P_U: Complex
+    H_rB: Complex
+    H_rU: Complex
+    I_U: Real
+    I_G: Real
+    history: Real
+    converged: bool
+    ending: str
+    starts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def rates(self) -> Rates:
+        """R_U, R_G and R_avg: with T = (N + 2) delta_t, (10) is the mean over the slots."""
+        return Rates(float(self.I_U.mean()), float(self.I_G.mean()))
+
+    @property
+    def iterations(self) -> int:
+        """Iterations that were completed."""
+        return len(self.history) - 1
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """w, v and a."""
+        return Trajectory(self.w, self.v, self.a)
+
+    def recomputed(self, power: float = 1.0) -> Rates:
+        """Return the rates from w, the fading and the precoders alone, all powers times `power`."""
+        problem, scale = build_problem(self.plan), np.sqrt(power)
+        return Rates(
+            float(problem.bs_uav.rates(self.w, self.H_rB, scale * self.P_B).mean()),
+            float(problem.uav_user.rates(self.w, self.H_rU, scale * self.P_U).mean()),
+        )
+
+    def residuals(self) -> dict[str, float]:
+        """Return by how much each constraint of (13) is missed, computed from the arrays alone.
+
+        Metres, m/s, m/s²; the power limits (13b), (13c) relative to W; the fading relative to
+        what the plan's seed draws at w; the rates in bit/s/Hz. 0 where a constraint holds.
+        """
+        problem = build_problem(self.plan)
+        again = self.recomputed()
+        found = problem.kinematics.residuals(self.trajectory)
+        found["(13b) power of the base station"] = _excess(self.P_B, problem.bs_uav.power)
+        found["(13c) power of the relay"] = _excess(self.P_U, problem.uav_user.power)
+        for name, link, H_r in zip(
+            ("(1) fading", "(2) fading"), problem.links, (self.H_rB, self.H_rU), strict=True
+        ):
+            found[name] = float(np.abs(H_r - link.small_scale(self.w)).max())
+        found["(9) rate"] = abs(again.R_avg - self.rates.R_avg)
+        return found
+
+
+def _excess(P: Complex, power: float) -> float:
+    used = np.sum(np.abs(P) ** 2, axis=(-2, -1))
+    return float(max(0.0, used.max() / power - 1))
+
+
+def make_solution(
+    problem: Problem,
+    flight: Trajectory,
+    fading: tuple[Complex, Complex],
+    precoders: tuple[Complex, Complex],
+    history: list[float],
+    *,
+    converged: bool,
+    ending: str,
+    starts: Mapping[str, float] | None = None,
+) -> Solution:
+    """Put an iterate together with its rates."""
+    I_U, I_G = (
+        link.rates(flight.w, H_r, P)
+        for link, H_r, P in zip(problem.links, fading, precoders, strict=True)
+    )
+    return Solution(
+        plan=problem.plan,
+        t=problem.kinematics.time_step * np.arange(len(flight.w), dtype=np.float64),
+        w=flight.w,
+        v=flight.v,
+        a=flight.a,
+        P_B=precoders[0],
+        P_U=precoders[1],
+        H_rB=fading[0],
+        H_rU=fading[1],
+        I_U=I_U,
+        I_G=I_G,
+        history=np.array(history),
+        converged=converged,
+        ending=ending,
+        starts=starts or {},
+    )
+
+
+_ARRAYS = ("t", "w", "v", "a", "P_B", "P_U", "H_rB", "H_rU", "I_U", "I_G", "history")
+
+
+def save_solution(
+    solution: Solution, path: str | Path, extra: Mapping[str, Real] | None = None
+) -> None:
+    """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
+
+    Keys: the arrays of `Solution` by name, `R_avg`, `R_U`, `R_G`, `converged`, `ending`,
+    `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`, which
+    `load_solution` leaves alone. The same solution gives the same bytes.
+    """
+    rates = solution.rates
+    values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}
+    values |= {"R_avg": rates.R_avg, "R_U": rates.R_U, "R_G": rates.R_G}
+    values |= {"converged": solution.converged, "ending": solution.ending}
+    values["starts"] = json.dumps(dict(solution.starts))
+    values["plan"] = solution.plan.text
+    values |= extra or {}
+    buffer = io.BytesIO()
+    np.savez(buffer, **values)
+    write_whole(path, buffer.getvalue())
+
+
+def _lack(error: Exception) -> str:
+    return f": {error.args[0]}" if isinstance(error, KeyError) else ""
+
+
+def _check_arrays(arrays: Mapping[str, Any], plan: Plan, source: str) -> None:
+    """Raise `InputError` for arrays that are not of `plan`'s slots and antennas."""
+    n, radio = plan.flight.slots, plan.radio
+    ends = {
+        "B": (radio.relay.antennas, radio.base_station.antennas),
+        "U": (radio.ground_user.antennas, radio.relay.antennas),
+    }
+    shapes: dict[str, tuple[int, ...]] = {"t": (n,), "I_U": (n,), "I_G": (n,)}
+    shapes |= dict.fromkeys(("w", "v", "a"), (n, 2))
+    for hop, (receiving, sending) in ends.items():
+        shapes[f"P_{hop}"] = (n, sending, sending)
+        shapes[f"H_r{hop}"] = (n, receiving, sending)
+    for name, shape in shapes.items():
+        found = arrays[name]
+        draws = name[0] in "PH" and found.ndim == len(shape) + 1  # a leading axis of draws
+        if found.dtype.kind not in "fc" or found.shape[draws:] != shape:
+            raise InputError(
+                f"{source}: {name}: {found.dtype} {found.shape}; expected numbers {shape}, "
+                "as the plan in the file has them"
+            )
+        if not np.isfinite(found).all():
+            raise InputError(f"{source}: {name}: expected finite numbers")
+
+
+def load_solution(path: str | Path) -> Solution:
+    """Read what `save_solution` wrote. Raises `InputError` for anything else."""
+    try:
+        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in _ARRAYS}
+            text, ending = str(archive["plan"]), str(archive["ending"])
+            converged = bool(archive["converged"])
+            starts = json.loads(str(archive["starts"]))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(f"{path}: not a result of faao-mission --save{_lack(error)}") from None
+    plan = parse_plan(text, f"{path} (plan)")
+    _check_arrays(arrays, plan, str(path))
+    return Solution(plan=plan, converged=converged, ending=ending, starts=starts, **arrays)

@@ -1,0 +1,59 @@
+"""The precoders of every slot as a table that a radio can go by: by time or by position."""
+
+import csv
+import io
+
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.optimizer.solution import Solution
+
+
+def precoder_table(solution: Solution) -> str:
+    """Return a CSV text with a row for each slot.
+
+    Columns: `slot`; `t_s`, when it begins on the plan's clock, s; `east_m`, `north_m`,
+    `latitude_deg`, `longitude_deg`, where the aircraft then is; and the entries of P_B and P_U,
+    row by row, sqrt(W), each as `P_B_1_1_re`, `P_B_1_1_im`. A radio that knows its position takes
+    the row nearest to it (`nearest_slots`), and so stays right when the aircraft is early or late.
+
+    Raises `InputError` for precoders that know the fading's draw: they are no table of slots.
+    """
+    if solution.P_B.ndim != 3 or solution.P_U.ndim != 3:
+        raise InputError(
+            "precoders that know the draw of the fading (radio.csi: instantaneous) have no table; "
+            "use csi: statistical"
+        )
+    origin = solution.plan.origin
+    frame = LocalFrame(origin.latitude, origin.longitude)
+    latitude, longitude = frame.to_geodetic(solution.w)
+    names = ["slot", "t_s", "east_m", "north_m", "latitude_deg", "longitude_deg"]
+    columns = [solution.t, *solution.w.T, latitude, longitude]
+    for name, P in (("P_B", solution.P_B), ("P_U", solution.P_U)):
+        names += _names(name, P)
+        columns += list(_parts(P))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    for slot, row in enumerate(zip(*columns, strict=True)):
+        writer.writerow([slot, *(f"{value:.12g}" for value in row)])
+    return text.getvalue()
+
+
+def _names(name: str, P: Complex) -> list[str]:
+    rows, columns = P.shape[1:]
+    return [
+        f"{name}_{i + 1}_{j + 1}_{part}"
+        for i in range(rows)
+        for j in range(columns)
+        for part in ("re", "im")
+    ]
+
+
+def _parts(P: Complex) -> Real:
+    """Return real and imaginary parts of the entries of `P` (n, r, c), alternating, (2 r c, n)."""
+    flat = P.reshape(len(P), -1)
+    parts: Real = np.stack([flat.real, flat.imag], axis=-1).reshape(len(P), -1)
+    return parts.T

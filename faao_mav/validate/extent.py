@@ -1,0 +1,197 @@
+"""How high, how far and how long the mission goes."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from faao_mav.mission.command import ABOVE_HOME, Command
+from faao_mav.validate import parameters
+from faao_mav.validate.case import HOME, Case, Leg, number
+from faao_mav.validate.finding import Level
+from faao_mav.validate.rule import Issue, Rules
+
+RULES = Rules()
+
+FAR = 10_000.0
+"""Farther than this, m, from home or from item to item is hardly meant."""
+
+COMMON_CEILING = 120.0
+"""What many countries allow without a permission, m above ground."""
+
+_GIVEN = "the limit that was given"
+_LANDINGS = (Command.NAV_LAND, Command.NAV_VTOL_LAND)
+_HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
+_DELAYS = (*_HOLDS, Command.NAV_DELAY)
+
+
+@RULES.add(
+    "below-home",
+    Level.WARNING,
+    "an item at home's height or below",
+    "PX4: Waypoint below home; ArduPilot says nothing and flies there",
+)
+def _below_home(case: Case) -> Iterator[Issue]:
+    home = case.mission.home
+    for place in case.places:
+        item = case.items[place.index]
+        if not place.up <= 0 or item.command in _LANDINGS:
+            continue
+        how = f"{-place.up:g} m below home" if place.up < 0 else "at home's height"
+        if item.frame not in ABOVE_HOME and home is not None:
+            how = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: {how}"
+        yield Issue(
+            place.index,
+            how,
+            "use frame 3, height above home, or raise the item"
+            if item.frame not in ABOVE_HOME
+            else "raise the item, unless the ground there is lower than home",
+        )
+
+
+@RULES.add("above-ceiling", Level.ERROR, "higher than the ceiling that was set", _GIVEN)
+def _above_ceiling(case: Case) -> Iterator[Issue]:
+    ceiling = case.limits.max_altitude
+    if ceiling is None:
+        return
+    high = [place for place in case.places if place.up > ceiling]
+    for place in high:
+        yield Issue(
+            place.index,
+            f"{place.up:g} m above home; the ceiling is {ceiling:g} m",
+            f"lower the item to {ceiling:g} m or less, or raise --max-altitude",
+        )
+    if case.track is not None and len(case.track.t) and not high:
+        up = case.track.position[:, 2]
+        top = int(np.argmax(up))
+        # The aircraft is allowed to wobble.
+        if up[top] > ceiling + 1.0:
+            yield Issue(
+                int(case.track.item[top]),
+                f"the predicted flight gets {up[top]:.1f} m above home; the ceiling is "
+                f"{ceiling:g} m",
+                "plan lower, or raise --max-altitude",
+            )
+
+
+@RULES.add(
+    "above-120-m",
+    Level.NOTE,
+    f"higher than {COMMON_CEILING:g} m above home, what many countries allow",
+    "EU 2019/947 (open category), FAA part 107 (400 ft)",
+)
+def _above_common(case: Case) -> Iterator[Issue]:
+    high = [place for place in case.places if place.up > COMMON_CEILING]
+    if high and case.limits.max_altitude is None:
+        top = max(high, key=lambda place: place.up)
+        yield Issue(
+            top.index,
+            f"{top.up:g} m above home; many countries allow {COMMON_CEILING:g} m above ground",
+            "make sure that you may; --max-altitude sets your ceiling",
+        )
+
+
+@RULES.add(
+    "return-above-ceiling",
+    Level.WARNING,
+    "on a return to launch the aircraft climbs above the ceiling that was set",
+    "RTL_ALT, RTL_ALTITUDE (ArduPilot), RTL_RETURN_ALT (PX4)",
+)
+def _return_above(case: Case) -> Iterator[Issue]:
+    ceiling = case.limits.max_altitude
+    altitude = parameters.return_altitude(case.vehicle)
+    height = altitude.of(case.vehicle)
+    if ceiling is not None and height > ceiling:
+        yield Issue(
+            None,
+            f"a return to launch, also after a failure, goes up to {height:g} m "
+            f"({altitude.name(case.vehicle)}); the ceiling is {ceiling:g} m",
+            f"set {altitude.names[0][0]} to {ceiling:g} m or less",
+        )
+
+
+@RULES.add("beyond-distance", Level.ERROR, "farther from home than was set", _GIVEN)
+def _beyond(case: Case) -> Iterator[Issue]:
+    limit = case.limits.max_distance
+    if limit is None or case.home is None:
+        return
+    far = [place for place in case.places if place.from_origin > limit]
+    for place in far:
+        yield Issue(
+            place.index,
+            f"{place.from_origin:.0f} m from home; the limit is {limit:g} m",
+            "move the item nearer, or raise --max-distance",
+        )
+    positions = case.track_positions
+    if positions is not None and case.track is not None and len(positions) and not far:
+        distance = np.hypot(positions[:, 0], positions[:, 1])
+        worst = int(np.argmax(distance))
+        if distance[worst] > limit + 1.0:
+            yield Issue(
+                int(case.track.item[worst]),
+                f"the predicted flight gets {distance[worst]:.0f} m from home; the limit is "
+                f"{limit:g} m",
+                "plan nearer to home, or raise --max-distance",
+            )
+
+
+@RULES.add(
+    "far-from-home", Level.WARNING, f"farther than {FAR / 1000:g} km from home", "common sense"
+)
+def _far(case: Case) -> Iterator[Issue]:
+    if case.home is None or case.limits.max_distance is not None:
+        return
+    for place in case.places:
+        distance = place.from_origin
+        if distance > FAR:
+            yield Issue(
+                place.index,
+                f"{distance / 1000:.1f} km from home",
+                "check the coordinates and home; --max-distance sets your limit",
+            )
+
+
+@RULES.add("long-leg", Level.WARNING, f"a leg of more than {FAR / 1000:g} km", "common sense")
+def _long(case: Case) -> Iterator[Issue]:
+    for leg in case.legs:
+        if leg.length > FAR and leg.start.index != HOME and leg.end.index != HOME:
+            yield Issue(
+                leg.index,
+                f"{leg.length / 1000:.1f} km from item {number(leg.start.index)} to item "
+                f"{number(leg.end.index)}",
+                "check the coordinates",
+            )
+
+
+@RULES.add(
+    "too-long", Level.ERROR, "the flight takes longer than was set", f"{_GIVEN}; predicted flight"
+)
+def _too_long(case: Case) -> Iterator[Issue]:
+    limit = case.limits.max_duration
+    if limit is None:
+        return
+    if case.track is not None and len(case.track.t):
+        duration, how = float(case.track.t[-1]), "is predicted to take"
+    else:
+        duration, how = least_duration(case), "takes at least"
+    if duration > limit:
+        yield Issue(
+            None,
+            f"the flight {how} {duration:.0f} s; the limit is {limit:g} s",
+            "shorten the mission, or raise --max-duration",
+        )
+
+
+def least_duration(case: Case) -> float:
+    """Return what the legs at the commanded speeds and the holds take, s, without any ramps.
+
+    A DO_JUMP is not followed.
+    """
+    climb = parameters.climb_speed(case.vehicle).of(case.vehicle)
+    flying = sum(_leg_duration(leg, climb) for leg in case.legs if not leg.jump)
+    waiting = sum(item.params[0] for _, item in case.each(*_DELAYS) if item.params[0] > 0)
+    return flying + waiting
+
+
+def _leg_duration(leg: Leg, climb: float) -> float:
+    up = leg.rise / climb if leg.rise > 0 and climb > 0 else 0.0
+    return max(leg.length / leg.speed if leg.speed > 0 else 0.0, up)

@@ -1,0 +1,142 @@
+"""The fence of a case: what of the mission and of the predicted flight leaves it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faao_mav.arrays import Real
+from faao_mav.geodesy import LocalFrame
+from faao_mav.validate import parameters
+from faao_mav.validate.area import Area, areas_of, free_area, lines
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from faao_mav.validate.case import Case
+
+_UNION_OPTION = 2  # bit of FENCE_OPTIONS
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """Which of n paths leave the fence, `any` (n,), and by which of its parts, `by`.
+
+    A part of None stands for several inclusions of which one would be enough.
+    """
+
+    any: NDArray[np.bool_]
+    by: tuple[tuple[Area | None, NDArray[np.bool_]], ...]
+
+    def parts(self, k: int) -> list[Area | None]:
+        """Return the parts that path `k` breaks."""
+        return [part for part, broken in self.by if broken[k]]
+
+
+@dataclass(frozen=True)
+class FenceMap:
+    """The fence of a case in the plane.
+
+    `free` is where the inclusions let the aircraft be, None if there are none. `any_inclusion`:
+    one inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else all have to hold.
+    """
+
+    case: "Case"
+    frame: LocalFrame
+    areas: tuple[Area, ...]
+    free: "BaseGeometry | None"
+    any_inclusion: bool
+
+    @cached_property
+    def legs(self) -> NDArray[np.object_]:
+        """The legs of the case, in order, as geometries."""
+        legs = self.case.legs
+        starts = np.array([[leg.start.east, leg.start.north] for leg in legs]).reshape(-1, 2)
+        ends = np.array([[leg.end.east, leg.end.north] for leg in legs]).reshape(-1, 2)
+        return lines(starts, ends)
+
+    @cached_property
+    def flight(self) -> NDArray[np.object_]:
+        """The predicted flight from sample to sample, as geometries; none without a track."""
+        positions = self.case.track_positions
+        if positions is None or len(positions) < 2:
+            return np.empty(0, dtype=object)
+        return lines(positions[:-1, :2], positions[1:, :2])
+
+    @cached_property
+    def flight_items(self) -> NDArray[np.int_]:
+        """The index of the item of each part of `flight`."""
+        track = self.case.track
+        return track.item[1:] if track is not None and len(self.flight) else np.empty(0, dtype=int)
+
+    @cached_property
+    def broken_legs(self) -> Broken:
+        """Which legs leave the fence."""
+        return self.broken(self.legs)
+
+    @cached_property
+    def broken_flight(self) -> Broken:
+        """Which parts of the predicted flight leave the fence."""
+        return self.broken(self.flight)
+
+    def broken(self, paths: Any) -> Broken:
+        """Return which of `paths` (n,), geometries of the local frame, leave the fence."""
+        import shapely
+
+        by: list[tuple[Area | None, NDArray[np.bool_]]] = []
+        inclusions = [area for area in self.areas if area.inclusion]
+        if self.any_inclusion and len(inclusions) > 1:
+            by.append((None, ~shapely.covers(self.free, paths)))
+        else:
+            by += [(area, ~shapely.covers(area.shape, paths)) for area in inclusions]
+        for area in self.areas:
+            if not area.inclusion:
+                inside = shapely.intersects(area.shape, paths)
+                inside[inside] = ~shapely.touches(area.shape, paths[inside])
+                by.append((area, inside))
+        return Broken(np.logical_or.reduce([broken for _, broken in by]), tuple(by))
+
+    @cached_property
+    def nearest(self) -> tuple[float, int] | None:
+        """The least margin of legs and flight, m, and the index of its item.
+
+        None if there are no legs, or if anything leaves the fence.
+        """
+        if not len(self.legs) or self.broken_legs.any.any() or self.broken_flight.any.any():
+            return None
+        margins = self._margins(np.concatenate([self.legs, self.flight]))
+        items = [*(leg.index for leg in self.case.legs), *self.flight_items.tolist()]
+        nearest = int(np.argmin(margins))
+        return float(margins[nearest]), items[nearest]
+
+    def _margins(self, paths: NDArray[np.object_]) -> Real:
+        import shapely
+
+        margin = np.full(len(paths), np.inf)
+        if self.free is not None:
+            margin = np.minimum(margin, shapely.distance(self.free.boundary, paths))
+        for area in self.areas:
+            if not area.inclusion:
+                margin = np.minimum(margin, shapely.distance(area.shape, paths))
+        return margin
+
+
+def fence_map(case: "Case") -> FenceMap | None:
+    """Return the fence of `case` in the plane, None without a fence."""
+    fence = case.mission.fence
+    if not fence:
+        return None
+    import shapely
+
+    first = fence.polygons[0].vertices[0] if fence.polygons else fence.circles[0].center
+    frame = case.frame or LocalFrame(*first)
+    areas = areas_of(fence, frame)
+    any_inclusion = case.vehicle.autopilot == "px4" or bool(
+        int(parameters.FENCE_OPTIONS.of(case.vehicle)) & _UNION_OPTION
+    )
+    free = free_area(areas, any_inclusion=any_inclusion)
+    shapely.prepare([area.shape for area in areas])
+    shapely.prepare(free)
+    return FenceMap(case, frame, areas, free, any_inclusion)

@@ -1,0 +1,183 @@
+"""Whether the mission delivers the link that was planned."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from faao_mav.validate.finding import Level
+from faao_mav.validate.rule import Issue, Rules
+
+if TYPE_CHECKING:
+    from faao_mav.validate.case import Case
+
+RULES = Rules()
+
+LEAST_SHARE = 0.95
+"""Of the planned rate; below it the mission does not do its job."""
+
+GOOD_SHARE = 0.995
+"""Of the planned rate; below it something can be won back."""
+
+LATE, LATE_SHARE = 3.0, 0.05
+"""Seconds, and share of the planned duration: both exceeded, the plan is not kept."""
+
+PATH_ALLOWANCE = 0.2
+"""Metres beyond the plan's path_tolerance: predictions are no better."""
+
+ALTITUDE_ERROR = 2.0
+"""Metres; from 100 m up that is a tenth of a decibel."""
+
+_SOURCE = "the plan, and the rate along the predicted flight"
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A part of the flight, from `start` to `end` s of the plan, that loses `rate_lost`.
+
+    `rate_lost` is what the average over the whole flight loses there, bit/s/Hz.
+    """
+
+    start: float
+    end: float
+    rate_lost: float
+
+
+@dataclass(frozen=True, slots=True)
+class LinkCheck:
+    """A plan and how the mission is predicted to carry it out.
+
+    Rates in bit/s/Hz, averaged over the flight; durations in s; `rms_position_error` and
+    `max_position_error` m between planned and predicted position at equal times; `path_error` m
+    between planned and predicted path, `path_tolerance` m what the plan allows of it;
+    `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
+    None if none does.
+    """
+
+    planned_rate: float
+    predicted_rate: float
+    planned_duration: float
+    predicted_duration: float
+    rms_position_error: float
+    max_position_error: float
+    path_error: float
+    path_tolerance: float
+    altitude_error: float = 0.0
+    worst: Stretch | None = None
+
+    @property
+    def share(self) -> float:
+        """The part of the planned rate that is predicted to be delivered."""
+        return self.predicted_rate / self.planned_rate if self.planned_rate > 0 else 1.0
+
+
+@RULES.add(
+    "link-rate-lost",
+    Level.ERROR,
+    f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of the planned rate",
+    _SOURCE,
+)
+def _lost(case: "Case") -> Iterator[Issue]:
+    if case.link is not None and case.link.share < LEAST_SHARE:
+        yield _rate_issue(case.link)
+
+
+@RULES.add(
+    "link-rate-reduced",
+    Level.WARNING,
+    f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of the planned rate",
+    _SOURCE,
+)
+def _reduced(case: "Case") -> Iterator[Issue]:
+    if case.link is not None and LEAST_SHARE <= case.link.share < GOOD_SHARE:
+        yield _rate_issue(case.link)
+
+
+def _rate_issue(link: LinkCheck) -> Issue:
+    where = ""
+    if link.worst is not None:
+        where = (
+            f"; {link.worst.rate_lost:.3g} of it between {link.worst.start:.0f} and "
+            f"{link.worst.end:.0f} s"
+        )
+    return Issue(
+        None,
+        f"predicted {link.predicted_rate:.4f} bit/s/Hz of the planned {link.planned_rate:.4f}: "
+        f"{100 * link.share:.1f} %{where}",
+        "make the mission anew for the parameters of this vehicle, or plan with a lower "
+        "vehicle.max_speed or vehicle.max_acceleration",
+    )
+
+
+@RULES.add(
+    "link-path",
+    Level.WARNING,
+    "the predicted path leaves the planned one by more than the plan's path_tolerance",
+    _SOURCE,
+)
+def _path(case: "Case") -> Iterator[Issue]:
+    link = case.link
+    if link is not None and link.path_error > link.path_tolerance + PATH_ALLOWANCE:
+        yield Issue(
+            None,
+            f"the predicted path is up to {link.path_error:.1f} m from the planned one, "
+            f"mission.path_tolerance is {link.path_tolerance:g} m",
+            "use shorter legs or slower corners, or raise mission.path_tolerance if that is "
+            "acceptable",
+        )
+
+
+@RULES.add(
+    "link-late",
+    Level.WARNING,
+    f"the predicted flight ends later than planned by more than {100 * LATE_SHARE:g} % and "
+    f"{LATE:g} s: what the plan has at its end is not done in its time",
+    _SOURCE,
+)
+def _late(case: "Case") -> Iterator[Issue]:
+    link = case.link
+    if link is not None:
+        late = link.predicted_duration - link.planned_duration
+        if late > max(LATE, LATE_SHARE * link.planned_duration):
+            yield Issue(
+                None,
+                f"predicted {link.predicted_duration:.1f} s of flight, {late:.1f} s more than "
+                f"planned; position at equal times {link.rms_position_error:.1f} m rms",
+                "load the parameters that the mission was made for, or make it anew for this "
+                "vehicle's",
+            )
+
+
+@RULES.add(
+    "link-altitude",
+    Level.WARNING,
+    f"the predicted flight is more than {ALTITUDE_ERROR:g} m above or below the planned altitude",
+    _SOURCE,
+)
+def _altitude(case: "Case") -> Iterator[Issue]:
+    link = case.link
+    if link is not None and link.altitude_error > ALTITUDE_ERROR:
+        yield Issue(
+            None,
+            f"the predicted flight is up to {link.altitude_error:.0f} m above or below the plan's "
+            "flight.altitude; the rate is that of the planned altitude",
+            "set the items' altitude to flight.altitude, or plan for theirs",
+        )
+
+
+@RULES.add(
+    "link-timing",
+    Level.NOTE,
+    "where the aircraft is predicted to be, beside where the plan has it at the same time",
+    _SOURCE,
+)
+def _timing(case: "Case") -> Iterator[Issue]:
+    link = case.link
+    if link is not None:
+        late = link.predicted_duration - link.planned_duration
+        yield Issue(
+            None,
+            f"predicted {link.predicted_duration:.1f} s of flight ({late:+.1f} s against the "
+            f"plan); position at equal times {link.rms_position_error:.1f} m rms, at most "
+            f"{link.max_position_error:.1f} m; rate {100 * link.share:.1f} % of the plan",
+            "nothing, if the rate is good enough",
+        )

@@ -1,0 +1,252 @@
+"""Whether the speeds that are asked for can be flown."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.mission.command import Command
+from faao_mav.validate import parameters
+from faao_mav.validate.case import HOME, Case, Leg, number
+from faao_mav.validate.finding import Level
+from faao_mav.validate.rule import Issue, Rules
+from faao_mav.vehicle.legs import ArduCopterLegs, Legs, Px4Legs
+
+RULES = Rules()
+
+REACHED_SHARE = 0.8
+"""Of the commanded speed; a leg that stays below it is reported."""
+
+TIME_LOST = 2.0
+"""Seconds that a run of such legs loses at least: in less, corners are taken and speeds changed."""
+
+HEADROOM = 1.1
+"""Of the vehicle's max_speed: more is an error; up to it speed makes up for corners."""
+
+CRAWL_SHARE = 0.5
+"""Of the commanded speed; a row of legs below it is a crawl."""
+
+CRAWL_LEGS = 5
+"""Legs in a row that make a crawl."""
+
+_LIMIT = "the plan's vehicle.max_speed"
+_MEASURED = "flight models measured on ArduCopter 4.7 and PX4 1.16.1; the predicted flight"
+_SHORTEST = 1.0
+"""Legs shorter than this, m, are corrections, not legs to speed up on."""
+
+_SLOWEST = 0.1  # m/s
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Neighbouring legs that stay below their commanded speed, and what they reach, m/s."""
+
+    legs: list[Leg]
+    reached: list[float]
+
+    @property
+    def crawls(self) -> bool:
+        """Whether the run is long and slow enough to be called a crawl."""
+        commanded = sum(leg.speed for leg in self.legs)
+        return len(self.legs) >= CRAWL_LEGS and sum(self.reached) < CRAWL_SHARE * commanded
+
+    @property
+    def time_lost(self) -> float:
+        """Seconds at least that the run takes longer than at the commanded speeds."""
+        return sum(
+            leg.length * (1 / max(reached, _SLOWEST) - 1 / leg.speed)
+            for leg, reached in zip(self.legs, self.reached, strict=True)
+        )
+
+    @property
+    def last(self) -> int:
+        """The number of the last item."""
+        return number(self.legs[-1].index)
+
+    @property
+    def mean_speed(self) -> float:
+        """The mean of what the legs reach, m/s."""
+        return sum(self.reached) / len(self.reached)
+
+
+@RULES.add(
+    "speed-not-reached",
+    Level.WARNING,
+    f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed and lose "
+    f"{TIME_LOST:g} s or more by it; with a plan its own clock is compared instead",
+    _MEASURED,
+    kind="copter",
+)
+def _not_reached(case: Case) -> Iterator[Issue]:
+    for run in _slow_runs(case):
+        # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
+        if run.crawls or run.time_lost < TIME_LOST or case.link is not None:
+            continue
+        first, low, high = run.legs[0], min(run.reached), max(run.reached)
+        if len(run.legs) == 1:
+            what = f"on this leg of {first.length:.0f} m the aircraft gets to {low:.1f} m/s"
+        else:
+            span = f"{low:.1f}" if high - low < 0.05 else f"{low:.1f} to {high:.1f}"
+            what = (
+                f"on the {len(run.legs)} legs from here to item {run.last} the aircraft gets to "
+                f"{span} m/s"
+            )
+        yield Issue(
+            first.index,
+            f"{what}, not to the commanded {max(leg.speed for leg in run.legs):g} m/s",
+            "ask for what it reaches, or make the legs longer",
+        )
+
+
+@RULES.add(
+    "crawl",
+    Level.WARNING,
+    f"waypoints so dense that {CRAWL_LEGS} legs or more stay below "
+    f"{100 * CRAWL_SHARE:g} % of the commanded speed",
+    _MEASURED,
+    kind="copter",
+)
+def _crawl(case: Case) -> Iterator[Issue]:
+    for run in _slow_runs(case):
+        if run.crawls:
+            spacing = sum(leg.length for leg in run.legs) / len(run.legs)
+            yield Issue(
+                run.legs[0].index,
+                f"the {len(run.legs)} legs from here to item {run.last} are {spacing:.1f} m long "
+                f"on average: the aircraft crawls at about {run.mean_speed:.1f} m/s of the "
+                f"commanded {max(leg.speed for leg in run.legs):g}",
+                "thin the waypoints: keep those that the shape of the path needs",
+            )
+
+
+def _slow_runs(case: Case) -> Iterator[_Run]:
+    """Yield the runs of neighbouring legs that stay below their commanded speed."""
+    pairs = zip(*_reached_speeds(case), strict=True)
+    for slow, run in groupby(pairs, lambda pair: pair[1] < REACHED_SHARE * pair[0].speed):
+        if slow:
+            legs, reached = zip(*run, strict=True)
+            yield _Run(list(legs), list(reached))
+
+
+def _reached_speeds(case: Case) -> tuple[list[Leg], list[float]]:
+    """Return the level legs between waypoints, and the speed that each reaches, m/s.
+
+    That is the greatest speed of the predicted flight towards the leg's end. Without one it is
+    what the leg's length allows by the model of a single leg, of which splines have none.
+    """
+    legs = [
+        leg
+        for leg in case.legs
+        if leg.start.index != HOME
+        and not leg.jump
+        and leg.length >= _SHORTEST
+        and case.items[leg.index].command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+    ]
+    if case.track is not None:
+        fastest = np.full(len(case.items), -np.inf)
+        np.maximum.at(fastest, case.track.item, np.hypot(*case.track.velocity[:, :2].T))
+        legs = [leg for leg in legs if fastest[leg.index] >= 0]  # the others are not flown
+        return legs, [float(fastest[leg.index]) for leg in legs]
+    legs = [leg for leg in legs if not leg.spline]
+    lengths = np.array([leg.length for leg in legs], dtype=float)
+    reachable = reachable_speed(_model(case), lengths)
+    return legs, [min(float(v), leg.speed) for v, leg in zip(reachable, legs, strict=True)]
+
+
+def _model(case: Case) -> Legs:
+    vehicle = case.vehicle
+    if vehicle.autopilot == "px4":
+        return Px4Legs(
+            _positive(parameters.PX4_ACCELERATION, case), _positive(parameters.PX4_JERK, case)
+        )
+    return ArduCopterLegs(
+        _positive(parameters.COPTER_ACCELERATION, case), _positive(parameters.COPTER_JERK, case)
+    )
+
+
+def _positive(parameter: parameters.Parameter, case: Case) -> float:
+    value = parameter.of(case.vehicle)
+    return value if value > 0 else parameter.default
+
+
+def reachable_speed(model: Legs, lengths: Real) -> Real:
+    """Return the greatest speed that legs of `lengths` (n,), m, allow, m/s; same shape.
+
+    The speed whose shortest leg is as long as the leg, by bisection; at most 100 m/s.
+    """
+    low, high = np.zeros_like(lengths), np.full_like(lengths, 100.0)
+    for _ in range(40):
+        middle = (low + high) / 2
+        fits = model.shortest_leg(middle) <= lengths
+        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+    return low
+
+
+@RULES.add(
+    "speed-above-limit",
+    Level.ERROR,
+    f"faster than the vehicle's max_speed by more than {100 * (HEADROOM - 1):.0f} %",
+    _LIMIT,
+)
+def _above_limit(case: Case) -> Iterator[Issue]:
+    limit = case.limits.max_speed
+    if limit is not None:
+        for index, speed in _faster_than(HEADROOM * limit, case):
+            yield Issue(
+                index,
+                f"{speed:g} m/s from here on; the vehicle's max_speed is {limit:g} m/s",
+                f"put a DO_CHANGE_SPEED of {limit:g} m/s or less before this item",
+            )
+
+
+@RULES.add(
+    "speed-headroom",
+    Level.NOTE,
+    f"faster than the vehicle's max_speed by up to {100 * (HEADROOM - 1):.0f} %",
+    _LIMIT,
+)
+def _headroom(case: Case) -> Iterator[Issue]:
+    limit = case.limits.max_speed
+    if limit is None:
+        return
+    above = [found for found in _faster_than(limit, case) if found[1] <= HEADROOM * limit]
+    if above:
+        index, speed = max(above, key=lambda found: found[1])
+        yield Issue(
+            index,
+            f"up to {speed:g} m/s is commanded; the vehicle's max_speed is {limit:g} m/s",
+            "nothing, if the vehicle may; else plan with a lower vehicle.max_speed",
+        )
+
+
+def _faster_than(speed: float, case: Case) -> Iterator[tuple[int, float]]:
+    """Yield the index of each leg on which a speed above `speed` begins, and that speed, m/s."""
+    before = None
+    for leg in (leg for leg in case.legs if leg.length >= _SHORTEST):
+        if leg.speed > speed and leg.speed != before:
+            yield leg.index, leg.speed
+        before = leg.speed
+
+
+@RULES.add(
+    "acceleration-above-limit",
+    Level.WARNING,
+    "the predicted flight accelerates more than the vehicle's max_acceleration",
+    "the plan's vehicle.max_acceleration; the predicted flight",
+)
+def _acceleration(case: Case) -> Iterator[Issue]:
+    limit, track = case.limits.max_acceleration, case.track
+    if limit is None or track is None or len(track.t) < 3:
+        return
+    change = np.gradient(track.velocity[:, :2], track.t, axis=0)
+    acceleration = np.hypot(*change.T)
+    worst = int(np.argmax(acceleration))
+    if acceleration[worst] > 1.05 * limit:
+        yield Issue(
+            int(track.item[worst]),
+            f"the predicted flight accelerates by {acceleration[worst]:.1f} m/s^2 at "
+            f"{track.t[worst]:.0f} s; the vehicle's max_acceleration is {limit:g} m/s^2",
+            "lower the autopilot's acceleration (WPNAV_ACCEL, MPC_ACC_HOR)",
+        )

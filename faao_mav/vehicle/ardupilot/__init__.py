@@ -1,0 +1,1 @@
+"""ArduPilot: ArduCopter and ArduPlane."""

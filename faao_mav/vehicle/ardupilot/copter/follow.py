@@ -1,0 +1,150 @@
+"""How the aircraft follows its target, and how the target waits for the aircraft."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Row, Stop
+
+_MARGIN = 0.05
+"""The target waits for an aircraft that is slower than it by more than this part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Follower:
+    """The position controller and the aircraft, across the ground.
+
+    `position` (1/s), `velocity` (1/s) and `integral` (1/s²) are the gains on the errors of
+    position and velocity and on the integral of the latter. `lean` is the acceleration at the
+    largest lean angle, m/s², `lag` the time constant of leaning, s, and the air takes
+    `linear` v + `quadratic` v², m/s² at v m/s.
+    """
+
+    position: float
+    velocity: float
+    integral: float
+    lean: float
+    lag: float
+    linear: float
+    quadratic: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pursuit:
+    """The flight at the times `t` (k,), s, every `GRID` seconds from 0.
+
+    `clock` (k,), s, is the target's time and `rate` (k,) how fast it runs; `position` and
+    `velocity` (k, 2) are the aircraft's, m and m/s east and north. `arrivals` (stops,), s, are
+    when the target came to the stops.
+    """
+
+    t: Real
+    clock: Real
+    rate: Real
+    position: Real
+    velocity: Real
+    arrivals: Real
+
+
+def pursue(course: Course, table: Sequence[Row], follower: Follower, patience: float) -> Pursuit:
+    """Return the flight along `course`, given as `table`, up to the end of its last hold.
+
+    The target's clock runs at a rate s <= 1 with the time constant `patience`, s: towards the
+    aircraft's speed along the target's, less the position error times its gain, over the target's
+    speed, plus a margin. The aircraft is asked for the target's acceleration plus what the errors
+    call for, up to the lean limit, where the integral stands still.
+    """
+    kp, kv, ki = follower.position, follower.velocity, follower.integral
+    linear, quadratic, lean = follower.linear, follower.quadratic, follower.lean
+    leaning, adapting = 1 - math.exp(-GRID / follower.lag), 1 - math.exp(-GRID / patience)
+    hypot, last = math.hypot, len(table) - 1
+    stops = iter(course.stops)
+    stop: Stop | None = next(stops, None)
+    end = stop.time if stop else 0.0
+    arrivals: list[float] = []
+    now, clock, resume, s = 0.0, 0.0, course.wait, 1.0
+    px, py = table[0][0], table[0][2]
+    vx = vy = ix = iy = ax = ay = 0.0
+    rows = [(clock, s, px, py, vx, vy)]
+    while stop is not None or now < resume:
+        # where the target is now, and how fast its clock runs
+        w = clock / GRID
+        k = int(w)
+        if k > last:
+            k = last
+        w -= k
+        x, dx, y, dy, u, du, v, dv, c, dc, b, db, d, dd = table[k]
+        ux, uy, climb = u + w * du, v + w * dv, c + w * dc
+        ex, ey = x + w * dx - px, y + w * dy - py
+        fx, fy = b + w * db, d + w * dd
+        if GRID * (len(rows) - 1) < resume:  # at rest, though samples on both sides are not
+            ux = uy = climb = fx = fy = 0.0
+        aim = 1.0
+        square = ux * ux + uy * uy + climb
+        if square > 1e-9:
+            aim = _MARGIN + ((vx - kp * ex) * ux + (vy - kp * ey) * uy + climb) / square
+            aim = 1.0 if aim > 1.0 else 0.0 if aim < 0.0 else aim
+        s += (aim - s) * adapting
+
+        # what the controller asks for, and what the aircraft makes of it
+        gx, gy = ux + kp * ex - vx, uy + kp * ey - vy
+        fx, fy = fx + kv * gx + ix, fy + kv * gy + iy
+        jx, jy = ix + ki * gx * GRID, iy + ki * gy * GRID
+        if hypot(fx, fy) > lean:
+            if gx * fx + gy * fy > 0 and (grown := hypot(jx, jy)) > 0:
+                kept = min(1.0, hypot(ix, iy) / grown)
+                jx, jy = kept * jx, kept * jy
+            fx, fy = _leaning_most(fx, fy, ux, uy, lean)
+        ix, iy = jx, jy
+        ax += (fx - ax) * leaning
+        ay += (fy - ay) * leaning
+        drag = linear + quadratic * hypot(vx, vy)
+        hx, hy = (ax - drag * vx) * GRID, (ay - drag * vy) * GRID
+        px += (vx + hx / 2) * GRID
+        py += (vy + hy / 2) * GRID
+        vx += hx
+        vy += hy
+
+        # the clock goes on, unless it stands at a stop for a part of this step or all of it
+        ahead = clock + s * GRID
+        now = GRID * len(rows)
+        if resume <= now - GRID and ahead < end:
+            clock = ahead
+        else:
+            free = max(now - GRID, resume)
+            while stop is not None and free < now:
+                ahead = clock + s * (now - free)
+                if ahead < end:
+                    clock = ahead
+                    break
+                arrivals.append(free + (end - clock) / s if s > 0 else free)
+                clock, resume = end, arrivals[-1] + stop.wait
+                free, stop = resume, next(stops, None)
+                end = stop.time if stop else end
+        rows.append((clock, s, px, py, vx, vy))
+    flight = np.array(rows)
+    return Pursuit(
+        t=GRID * np.arange(len(flight), dtype=float),
+        clock=flight[:, 0],
+        rate=flight[:, 1],
+        position=flight[:, 2:4],
+        velocity=flight[:, 4:],
+        arrivals=np.array(arrivals),
+    )
+
+
+def _leaning_most(fx: float, fy: float, ux: float, uy: float, lean: float) -> tuple[float, float]:
+    """Return (fx, fy), m/s², cut to `lean`: what is across the way (ux, uy) comes first."""
+    speed = math.hypot(ux, uy)
+    if speed < 1e-6:
+        size = math.hypot(fx, fy)
+        return fx * lean / size, fy * lean / size
+    ux, uy = ux / speed, uy / speed
+    along, across = fx * ux + fy * uy, fy * ux - fx * uy
+    across = min(lean, max(-lean, across))
+    most = math.sqrt(lean * lean - across * across)
+    along = min(most, max(-most, along))
+    return along * ux - across * uy, along * uy + across * ux

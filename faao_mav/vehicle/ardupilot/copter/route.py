@@ -1,0 +1,200 @@
+"""The legs of a flight: planned one after the other, as the autopilot does."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faao_mav.arrays import Real
+from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, Direction, half_overlap
+from faao_mav.vehicle.ardupilot.copter.course import Course, Placed, Stop
+from faao_mav.vehicle.ardupilot.copter.leg import Leg, at_speed, planned
+from faao_mav.vehicle.ardupilot.copter.ramp import Limits
+from faao_mav.vehicle.ardupilot.copter.spline import (
+    Curve,
+    CurvedLeg,
+    SplineLimits,
+    flown,
+    hermite,
+)
+
+_POINT = 1e-6
+"""A leg shorter than this, m, is none: its end counts as reached where it begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The autopilot's limits: m/s, m/s², m/s³, s and m, as in `ArduCopter`."""
+
+    up: float
+    down: float
+    acceleration: float
+    vertical: float
+    corner: float
+    jerk: float
+    rise: float
+    radius: float
+
+    def along(self, direction: Direction, speed: float) -> Limits:
+        """Return the limits along `direction` where `speed` across the ground is commanded."""
+        east, north, up = direction
+        ground = math.hypot(east, north)
+        return Limits(
+            min(_over(speed, ground), _over(self.up if up > 0 else self.down, abs(up))),
+            min(_over(self.acceleration, ground), _over(self.vertical, abs(up))),
+            self.jerk,
+            self.rise,
+        )
+
+    def spline(self, speed: float) -> SplineLimits:
+        """Return the limits along a spline where `speed` is commanded."""
+        return SplineLimits(speed, self.up, self.down, self.acceleration, self.vertical)
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A leg, if there is one, and how the flight goes on after it.
+
+    The next leg begins 2 `early` seconds before this one ends, planned at this one's speed if it
+    `overlaps`; a leg that does not begins at the speed `entry`, m/s.
+    """
+
+    leg: Leg | CurvedLeg | None
+    early: float = 0.0
+    overlaps: bool = False
+    entry: float = 0.0
+
+
+class Router:
+    """The legs along points (m, 3) in m, flown at any speeds and with any waits.
+
+    `splines` (m,) marks spline waypoints, `stopping` (m,) the points at which the aircraft stops.
+    A leg is planned when the one before it begins, at the speed in force then. Where the aircraft
+    does not stop, a straight leg begins before the straight leg ahead of it ends; half-way through
+    their overlap the point between them counts as reached, and the next speed comes into force.
+    """
+
+    def __init__(
+        self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_], bounds: Bounds
+    ) -> None:
+        self._points, self._bounds = points, bounds
+        self._marks = np.stack([splines, stopping])
+        self._stopping: list[bool] = stopping.tolist()
+        self._steps = np.diff(points, axis=0)
+        self._lengths: list[float] = np.linalg.norm(self._steps, axis=1).tolist()
+        self._directions = [_direction(step) for step in self._steps.tolist()]
+        self._curves = [self._curve(k, splines) for k in range(len(self._steps))]
+        self._corner = CornerLimits(bounds.radius, bounds.corner, bounds.vertical)
+        # flights that differ in a few speeds have most of their legs in common
+        self._known: dict[tuple[int, float, float | None, float, float], _Step] = {}
+        self._from_rest: dict[tuple[int, float], Leg] = {}
+
+    def leads_along(
+        self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_]
+    ) -> bool:
+        """Tell whether these are the points."""
+        return np.array_equal(points, self._points) and np.array_equal(
+            [splines, stopping], self._marks
+        )
+
+    def course(self, speeds: Sequence[float], waits: Sequence[float]) -> Course:
+        """Return the course at `speeds` (m - 1,), m/s, with `waits` (m,), s, at the stops."""
+        legs: list[Placed] = []
+        stops: list[Stop] = []
+        passed = [0.0]
+        start, planned_at, early, entry = 0.0, None, 0.0, 0.0
+        for k, speed in enumerate(speeds):
+            key = (k, speed, planned_at, early, entry)
+            if (step := self._known.get(key)) is None:
+                step = self._known[key] = self._step(*key)
+            end = start
+            if step.leg is not None:
+                legs.append(Placed(step.leg, start, self._points[k], self._steps[k]))
+                end = legs[-1].end
+            if self._stopping[k + 1]:
+                stops.append(Stop(k + 1, end, waits[k + 1]))
+            early, entry, planned_at = step.early, step.entry, speed if step.overlaps else None
+            passed.append(end - early)
+            start = end - 2 * early
+        return Course(self._points[0], legs, np.array(passed), waits[0], stops)
+
+    def _step(
+        self, k: int, speed: float, planned_at: float | None, elapsed: float, entry: float
+    ) -> _Step:
+        """Leg k at `speed`: if it was planned at another speed it has begun `elapsed` s ago."""
+        leg: Leg | CurvedLeg | None = None
+        if planned_at is not None:
+            begun = self._begun(k, planned_at)
+            leg = at_speed(begun, self._bounds.along(self._directions[k], speed).speed, elapsed)
+        elif self._lengths[k] > _POINT:
+            leg = self._planned(k, speed, entry)
+        if leg is None or self._stopping[k + 1]:
+            return _Step(leg)
+        if isinstance(leg, Leg) and self._is_straight(k + 1):
+            following = self._begun(k + 1, speed)
+            u, w = self._directions[k], self._directions[k + 1]
+            return _Step(leg, half_overlap(leg, u, following, w, self._corner), overlaps=True)
+        return _Step(leg, entry=leg.final)
+
+    def _is_straight(self, k: int) -> bool:
+        return self._curves[k] is None and self._lengths[k] > _POINT
+
+    def _planned(self, k: int, speed: float, entry: float) -> Leg | CurvedLeg:
+        """Leg k, begun at the speed `entry`."""
+        curve = self._curves[k]
+        if curve is None:
+            return self._straight(k, speed, entry)
+        end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
+        return flown(curve, self._bounds.spline(speed), entry, end)
+
+    def _begun(self, k: int, speed: float) -> Leg:
+        """Return the straight leg k that begins at rest, as the one before it ends."""
+        if (leg := self._from_rest.get((k, speed))) is None:
+            leg = self._from_rest[k, speed] = self._straight(k, speed)
+        return leg
+
+    def _straight(self, k: int, speed: float, entry: float = 0.0) -> Leg:
+        limits = self._bounds.along(self._directions[k], speed)
+        end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
+        return planned(self._lengths[k], limits, start=entry, end=end)
+
+    def _final(self, k: int, speed: float) -> float:
+        """The speed at the end of leg k, where a spline goes on: 0 between straight legs."""
+        spline = self._bounds.spline(speed)
+        here, following = self._curves[k], self._curves[k + 1]
+        if following is not None:
+            final = float(following.allowed(spline)[0])
+            return final if here is None else min(final, float(here.allowed(spline)[-1]))
+        if here is not None and self._is_straight(k + 1):
+            limits = self._bounds.along(self._directions[k + 1], speed)
+            straight = planned(self._lengths[k + 1], limits)
+            return min(straight.up.high, float(here.allowed(spline)[-1]))
+        return 0.0
+
+    def _curve(self, k: int, splines: NDArray[np.bool_]) -> Curve | None:
+        """The curve of leg k if it leads to a spline waypoint.
+
+        It leaves along the leg before, or as the spline before arrived, and arrives parallel to
+        the line from its origin to the point after, or, before a straight leg, along that leg;
+        where the aircraft stops it has no tangent.
+        """
+        if not splines[k + 1] or self._lengths[k] <= _POINT:
+            return None
+        leaving, arriving = np.zeros(3), np.zeros(3)
+        if not self._stopping[k]:
+            leaving = self._steps[k - 1] + (self._steps[k] if splines[k] else 0.0)
+        if not self._stopping[k + 1]:
+            arriving = self._steps[k + 1] + (self._steps[k] if splines[k + 2] else 0.0)
+        return hermite(self._points[k], self._points[k + 1], leaving, arriving)
+
+
+def _direction(step: Sequence[float]) -> Direction:
+    east, north, up = step
+    length = math.hypot(east, north, up)
+    return (east / length, north / length, up / length) if length > 0 else (0.0, 0.0, 0.0)
+
+
+def _over(limit: float, share: float) -> float:
+    return limit / share if share > 0 else math.inf

@@ -1,0 +1,215 @@
+"""ArduCopter and ArduPlane: items are squeezed into 15 bytes each."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from faao_mav.mission.command import (
+    ABOVE_HOME,
+    ABOVE_SEA,
+    ABOVE_TERRAIN,
+    FLOWN_TO,
+    Command,
+    Frame,
+)
+from faao_mav.mission.item import MissionItem
+from faao_mav.vehicle.dialect import (
+    Codec,
+    Codecs,
+    Dialect,
+    Limit,
+    SpeedAxis,
+    SpeedChange,
+    degrees,
+    dropped,
+    flag,
+    name_of,
+    single,
+    whole,
+)
+
+_HIGHEST = 83_000.0
+"""Altitudes are refused from here on, m."""
+
+_uint8, _uint16, _int8, _int16 = (
+    whole(0, 255),
+    whole(0, 65_535),
+    whole(-128, 127),
+    whole(-32_768, 32_767),
+)
+
+
+def _direction(value: float) -> float:
+    """Clockwise or not is all that is stored."""
+    return -1.0 if value < 0 else 1.0
+
+
+def _signed_radius(value: float) -> float:
+    return math.copysign(_uint16(abs(value)), value) if abs(value) >= 1 else 0.0
+
+
+def _turning_radius(value: float) -> float:
+    """Eight bits: above 255 m in tens of metres."""
+    radius = abs(value)
+    stored = _uint8(radius) if radius <= 255 else 10 * _uint8(float(np.float32(radius) * 0.1))
+    return math.copysign(stored, value) if stored else 0.0
+
+
+_NOTHING: Codecs = (dropped, dropped, dropped, dropped)
+
+
+def _first(codec: Codec) -> Codecs:
+    return (codec, dropped, dropped, dropped)
+
+
+_COMMON: dict[int, Codecs] = {
+    Command.NAV_LOITER_UNLIM: (dropped, dropped, _signed_radius, dropped),
+    Command.NAV_LOITER_TURNS: (_uint8, dropped, _turning_radius, flag),
+    Command.NAV_LOITER_TIME: (_uint16, dropped, _direction, flag),
+    Command.NAV_RETURN_TO_LAUNCH: _NOTHING,
+    Command.NAV_LAND: (_uint16, dropped, dropped, _direction),
+    Command.NAV_TAKEOFF: _first(_uint16),
+    Command.NAV_LOITER_TO_ALT: (dropped, _signed_radius, dropped, flag),
+    Command.NAV_VTOL_TAKEOFF: _NOTHING,
+    Command.NAV_VTOL_LAND: _first(_uint16),
+    Command.NAV_DELAY: (single, _int8, _int8, _int8),
+    Command.CONDITION_DELAY: _first(single),
+    Command.CONDITION_DISTANCE: _first(single),
+    Command.CONDITION_YAW: (single, single, _int8, _uint8),
+    Command.DO_JUMP: (_uint16, _int16, dropped, dropped),
+    Command.DO_CHANGE_SPEED: (_uint8, single, single, dropped),
+    Command.DO_SET_HOME: _first(_uint16),
+    Command.DO_LAND_START: _NOTHING,
+    Command.DO_SET_ROI_LOCATION: _NOTHING,
+    Command.DO_SET_ROI_NONE: _NOTHING,
+    Command.DO_SET_ROI: _first(_uint16),
+}
+_COPTER: dict[int, Codecs] = {
+    Command.NAV_WAYPOINT: _first(_uint16),
+    Command.NAV_SPLINE_WAYPOINT: _first(_uint16),
+}
+_PLANE: dict[int, Codecs] = {Command.NAV_WAYPOINT: (dropped, _uint8, _uint8, dropped)}
+
+_OTHERS = frozenset(
+    {30, 83, 92, 94, 181, 182, 183, 184, 188, 191, 193, 194, 202, 203, 205, 206, 207, 208, 210}
+    | {211, 212, 213, 215, 216, 217, 218, 222, 223, 531, 532, 534, 600, 601, 1000, 2000, 2001}
+    | {2500, 2501, 3000, 42_600, 42_702, 42_703}
+)
+"""Commands that are taken too; what is stored of them is not written down here."""
+
+_PLACED = FLOWN_TO | {
+    Command.DO_SET_HOME,
+    Command.DO_LAND_START,
+    Command.DO_SET_ROI_LOCATION,
+    Command.DO_SET_ROI,
+    *(30, 92, 94, 188, 191),
+}
+"""Commands that are stored with a place; the others come back at 0, 0, 0 in frame 0."""
+
+_FRAMES = ABOVE_SEA | ABOVE_HOME | ABOVE_TERRAIN | {Frame.MISSION}
+
+_MAY_BE_NAN: dict[int, frozenset[int]] = {
+    Command.NAV_WAYPOINT: frozenset({3}),
+    Command.NAV_LAND: frozenset({3}),
+    Command.NAV_TAKEOFF: frozenset({3}),
+    Command.NAV_VTOL_TAKEOFF: frozenset({3}),
+    Command.NAV_VTOL_LAND: frozenset({2, 3}),
+}
+"""Parameters, counted from 0, that may be "not set"."""
+
+_COPTER_SPEEDS: dict[float, SpeedAxis] = {
+    0: "horizontal",
+    1: "horizontal",
+    2: "climb",
+    3: "descent",
+}
+_PLANE_SPEEDS: dict[float, SpeedAxis] = {0: "airspeed", 1: "least ground speed"}
+_PLANE_DEFAULT = -2.0  # as an airspeed
+
+
+def _refusal(item: MissionItem, known: dict[int, Codecs], kind: str) -> str | None:
+    if item.command not in known and item.command not in _OTHERS:
+        return f"{kind} does not support {name_of(item.command)} in missions"
+    allowed = _MAY_BE_NAN.get(item.command, frozenset())
+    for index, value in enumerate(item.params):
+        if math.isnan(value) and index not in allowed:
+            return f"{kind} takes no NaN in param{index + 1} of {name_of(item.command)}; give 0"
+    if item.command not in _PLACED:
+        return None
+    if item.frame not in _FRAMES:
+        return (
+            f"{kind} does not support frame {item.frame} for {name_of(item.command)}; "
+            f"give one of {', '.join(map(str, sorted(map(int, _FRAMES))))}"
+        )
+    for name, value, limit in (("latitude", item.x, 90), ("longitude", item.y, 180)):
+        if not abs(value) <= limit:
+            return f"{kind} takes no {name} {value:g}; give degrees within {limit}"
+    if not abs(item.z) < _HIGHEST:
+        return f"{kind} takes no altitude {item.z:g}; give metres below {_HIGHEST:g}"
+    return None
+
+
+def _stored(item: MissionItem, known: dict[int, Codecs]) -> MissionItem:
+    codecs = known.get(item.command)
+    result = replace(item, autocontinue=True)
+    if codecs is not None:
+        param1, param2, param3, param4 = (
+            codec(value) for codec, value in zip(codecs, item.params, strict=True)
+        )
+        result = replace(result, params=(param1, param2, param3, param4))
+    if item.command in _PLACED:
+        frame = Frame.GLOBAL
+        if item.frame in ABOVE_HOME:
+            frame = Frame.GLOBAL_RELATIVE_ALT
+        elif item.frame in ABOVE_TERRAIN:
+            frame = Frame.GLOBAL_TERRAIN_ALT
+        centimetres = int(np.float32(item.z) * np.float32(100))
+        altitude = float(np.float32(centimetres) * np.float32(0.01))
+        return replace(result, frame=frame, x=degrees(item.x), y=degrees(item.y), z=altitude)
+    if codecs is not None or item.frame == Frame.MISSION:
+        return replace(result, frame=Frame.GLOBAL, x=0.0, y=0.0, z=0.0)
+    return replace(result, frame=Frame.GLOBAL)
+
+
+def _copter_speed(item: MissionItem) -> SpeedChange | None:
+    axis, speed = _COPTER_SPEEDS.get(_uint8(item.params[0])), item.params[1]
+    return SpeedChange(axis, speed) if axis is not None and speed > 0 else None
+
+
+def _plane_speed(item: MissionItem) -> SpeedChange | None:
+    axis, speed = _PLANE_SPEEDS.get(_uint8(item.params[0])), item.params[1]
+    if axis is None:
+        return None
+    if axis == "airspeed" and speed == _PLANE_DEFAULT:
+        return SpeedChange(axis, None)
+    return SpeedChange(axis, speed) if speed > 0 else None
+
+
+_SURE = 650  # 655 in simulation
+_JUMPS = Limit(15, 100)
+
+ARDUCOPTER = Dialect(
+    name="ArduCopter",
+    home_row=True,
+    items=Limit(_SURE, 718),
+    jumps=_JUMPS,
+    atomic=False,
+    splines=True,
+    refusal=lambda item: _refusal(item, _COMMON | _COPTER, "ArduCopter"),
+    stored=lambda item: _stored(item, _COMMON | _COPTER),
+    speed_change=_copter_speed,
+    known=frozenset(_COMMON | _COPTER),
+)
+ARDUPLANE = Dialect(
+    name="ArduPlane",
+    home_row=True,
+    items=Limit(_SURE, 724),
+    jumps=_JUMPS,
+    atomic=False,
+    splines=False,
+    refusal=lambda item: _refusal(item, _COMMON | _PLANE, "ArduPlane"),
+    stored=lambda item: _stored(item, _COMMON | _PLANE),
+    speed_change=_plane_speed,
+    known=frozenset(_COMMON | _PLANE),
+)

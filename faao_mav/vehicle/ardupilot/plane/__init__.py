@@ -1,0 +1,1 @@
+"""How ArduPlane flies a mission."""

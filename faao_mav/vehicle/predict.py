@@ -1,0 +1,359 @@
+"""How a vehicle will fly a whole mission, from take-off to its end.
+
+Waypoints are flown by the vehicle's model, stretch by stretch from rest to rest; take-off, landing
+and the return are climbs and descents at constant speed with what the autopilot adds to them.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
+from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle.ardupilot.copter import ArduCopter
+from faao_mav.vehicle.dialects import speed_change
+from faao_mav.vehicle.flight_path import FlightModel, FlightPath
+from faao_mav.vehicle.models import flight_model
+from faao_mav.vehicle.track import Track
+from faao_mav.vehicle.vertical import Vertical
+
+LONGEST = 86_400.0
+"""A flight is followed for this long, s: no copter flies for a day."""
+
+_MOST_STEPS = 5000  # items flown, jumps included
+_REPEATS = 20  # of a jump that never ends
+_SAME_PLACE = 0.01  # m
+_SHORTEST = 1e-3  # s
+
+
+def predict(
+    mission: Mission, vehicle: Vehicle, frame: LocalFrame | None = None, *, step: float = 0.1
+) -> Track:
+    """Return the predicted flight of `mission` by `vehicle`, sampled every `step` seconds.
+
+    It begins on the ground at home, or, without a home, below the first place of the mission,
+    about which `frame` then is too. DO_JUMPs are followed, those without end twenty times. An
+    item that never ends (loiter unlimited, a mission without an end) ends the track on arrival.
+    A mission without places gives an empty track.
+
+    Raises `InputError` for places that cannot be flown to (NaN, altitudes above sea level
+    without a home), parameters that are useless, or a flight that takes more than a day.
+    """
+    start = _start(mission)
+    if start is None:
+        empty = np.empty((0, 3))
+        reached = np.full(len(mission.items), np.nan)
+        none = np.empty(0, dtype=int)
+        return Track(np.empty(0), empty, empty, none, reached, frame or LocalFrame(0.0, 0.0))
+    frame = frame or LocalFrame(*start)
+    model = flight_model(vehicle, frame.latitude)
+    walk = _Walk(mission, vehicle, frame, step, model, Vertical.of(vehicle))
+    walk.place = np.append(frame.to_local(*start), 0.0)
+    walk.home = walk.goal = walk.place
+    for index, item in _in_order(mission):
+        walk.take(index, item)
+        if walk.over:
+            break
+    walk.fly()
+    return walk.track()
+
+
+def _start(mission: Mission) -> tuple[float, float] | None:
+    """Return where the flight begins, degrees; None if the mission has no places at all."""
+    places = [item for item in mission.items if item.command in FLOWN_TO]
+    if not places:
+        return None
+    if mission.home is not None:
+        return mission.home.latitude, mission.home.longitude
+    for item in places:
+        if (item.x or item.y) and abs(item.x) <= 90 and abs(item.y) <= 180:
+            return item.x, item.y
+    return 0.0, 0.0
+
+
+def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
+    """Yield the items that are flown, jumps followed; targets count from 1."""
+    left: dict[int, int] = {}
+    index = steps = 0
+    while index < len(mission.items) and steps < _MOST_STEPS:
+        item, steps = mission.items[index], steps + 1
+        if item.command == Command.DO_JUMP:
+            target, repeats = item.params[0], item.params[1]
+            if not (math.isfinite(target) and math.isfinite(repeats)):
+                raise InputError(
+                    f"mission item {index + 1}: DO_JUMP to {target:g}, {repeats:g} times; "
+                    "expected numbers"
+                )
+            more = left.setdefault(index, _REPEATS if repeats < 0 else int(repeats))
+            if more > 0 and 1 <= int(target) <= len(mission.items):
+                left[index] -= 1
+                index = int(target) - 1
+                continue
+        yield index, item
+        index += 1
+
+
+@dataclass
+class _Stretch:
+    """Waypoints to be flown in one go; the first is where the aircraft rests.
+
+    `waits` are items that only make it wait at one of the points, with that point's number.
+    """
+
+    points: list[Real]
+    items: list[int]
+    waits: list[tuple[int, int]] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+    holds: list[float] = field(default_factory=lambda: [0.0])
+    delays: list[float] = field(default_factory=lambda: [0.0])
+    splines: list[bool] = field(default_factory=lambda: [False])
+    radii: list[float] = field(default_factory=lambda: [0.0])
+
+
+@dataclass
+class _Walk:
+    """The flight so far."""
+
+    mission: Mission
+    vehicle: Vehicle
+    frame: LocalFrame
+    step: float
+    model: FlightModel
+    vertical: Vertical
+    place: Real = field(default_factory=lambda: np.zeros(3))
+    goal: Real = field(default_factory=lambda: np.zeros(3))
+    home: Real = field(default_factory=lambda: np.zeros(3))
+    clock: float = 0.0
+    speed: float = math.nan
+    over: bool = False
+    stretch: _Stretch | None = None
+    parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.reached = np.full(len(self.mission.items), np.nan)
+        self.speed = self._own_speed()
+
+    def take(self, index: int, item: MissionItem) -> None:
+        """Fly or obey one item."""
+        hold = item.params[0] if math.isfinite(item.params[0]) else 0.0
+        match item.command:
+            case Command.NAV_TAKEOFF | Command.NAV_VTOL_TAKEOFF:
+                self._take_off(index, item)
+            case Command.NAV_WAYPOINT | Command.NAV_SPLINE_WAYPOINT | Command.NAV_LOITER_TIME:
+                self._waypoint(index, item, max(hold, 0.0))
+            case Command.NAV_LOITER_UNLIM:
+                self._waypoint(index, item, 0.0)
+                self.over = True
+            case Command.NAV_LAND | Command.NAV_VTOL_LAND:
+                self._land(index, item)
+            case Command.NAV_RETURN_TO_LAUNCH:
+                self._return(index)
+            case Command.NAV_DELAY:
+                self._delay(index, max(hold, 0.0))
+            case Command.DO_CHANGE_SPEED:
+                self._change_speed(item)
+            case command if command in FLOWN_TO:
+                self._waypoint(index, item, 0.0)
+
+    def track(self) -> Track:
+        """Return everything flown."""
+        if not self.parts:
+            self.parts.append(_still(self.clock, self.place, 0))
+        t, position, velocity, item = (
+            np.concatenate(part) for part in zip(*self.parts, strict=True)
+        )
+        return Track(t, position, velocity, item.astype(int), self.reached, self.frame)
+
+    def fly(self) -> None:
+        """Fly the waypoints that are waiting."""
+        stretch, self.stretch = self.stretch, None
+        if stretch is None:
+            return
+        if len(stretch.points) == 1:
+            self._go(stretch.items[0], self.place, stretch.delays[0])
+            for index, _ in stretch.waits:
+                self.reached[index] = self.clock
+            return
+        path = FlightPath(
+            points=np.array(stretch.points),
+            speeds=np.array(stretch.speeds),
+            holds=np.array(stretch.holds),
+            splines=np.array(stretch.splines),
+            radii=np.array(stretch.radii),
+            delays=np.array(stretch.delays),
+        )
+        self._check_clock(self._at_least(path))
+        flown = self.model.fly(path, self.step)
+        end = float(flown.departures[-1])
+        kept = flown.t <= end
+        under_way = np.minimum(
+            np.searchsorted(flown.departures[1:], flown.t[kept], side="right"),
+            len(stretch.items) - 2,
+        )
+        items = np.array(stretch.items[1:])[under_way]
+        self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], items)
+        for index, done in zip(stretch.items[1:], flown.departures[1:], strict=True):
+            self.reached[index] = self.clock + done
+        for index, point in stretch.waits:
+            self.reached[index] = self.clock + flown.departures[point]
+        self.clock += end
+        self.place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
+        self.goal = path.points[-1]
+
+    def _at_least(self, path: FlightPath) -> float:
+        """Return how long `path` takes without ramps, s."""
+        ways = np.diff(path.points, axis=0)
+        speeds = np.where(path.speeds > 0, path.speeds, self._own_speed())
+        level, rise = np.hypot(ways[:, 0], ways[:, 1]) / speeds, ways[:, 2]
+        limit = np.where(rise > 0, self.vertical.climb_speed, self.vertical.descent_speed)
+        legs = np.maximum(level, np.abs(rise) / limit)
+        return float(legs.sum() + np.sum(path.holds + path.delays))
+
+    def _take_off(self, index: int, item: MissionItem) -> None:
+        self.fly()
+        here = self.vehicle.autopilot == "ardupilot" and not (item.x or item.y)
+        unset = math.isnan(item.x) or math.isnan(item.y)
+        goal = self._height_over(self.place, item, index)
+        if not (here or unset):
+            goal = self._spot(index, item)
+        if self.vehicle.kind == "copter":
+            climb = np.array([self.place[0], self.place[1], goal[2]])
+            self._go(index, climb, self.vertical.take_off(float(goal[2] - self.place[2])))
+        if np.hypot(*(goal - self.place)[:2]) > _SAME_PLACE or self.vehicle.kind == "plane":
+            self._towards(index, goal, 0.0)
+            self.fly()
+        self.reached[index] = self.clock
+
+    def _waypoint(self, index: int, item: MissionItem, hold: float) -> None:
+        radius = item.params[1] if item.command == Command.NAV_WAYPOINT else 0.0
+        spline = item.command == Command.NAV_SPLINE_WAYPOINT
+        radius = radius if math.isfinite(radius) and radius > 0 else 0.0
+        self._towards(index, self._spot(index, item), hold, spline=spline, radius=radius)
+
+    def _towards(
+        self, index: int, goal: Real, hold: float, *, spline: bool = False, radius: float = 0.0
+    ) -> None:
+        stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
+        if np.abs(goal - stretch.points[-1]).max() <= _SAME_PLACE:
+            stretch.delays[-1] += math.floor(hold) if self._whole() else hold
+            stretch.waits.append((index, len(stretch.points) - 1))
+            return
+        stretch.points.append(goal)
+        stretch.items.append(index)
+        stretch.speeds.append(self.speed)
+        stretch.holds.append(hold)
+        stretch.delays.append(0.0)
+        stretch.splines.append(spline)
+        stretch.radii.append(radius)
+
+    def _delay(self, index: int, seconds: float) -> None:
+        stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
+        stretch.delays[-1] += seconds
+        stretch.waits.append((index, len(stretch.points) - 1))
+
+    def _land(self, index: int, item: MissionItem) -> None:
+        here = self.stretch.points[-1] if self.stretch else self.place
+        goal = self._height_over(here, item, index)
+        if (item.x or item.y) and not (math.isnan(item.x) or math.isnan(item.y)):
+            goal[:2] = self.frame.to_local(item.x, item.y)
+        self._towards(index, np.array([goal[0], goal[1], here[2]]), 0.0)
+        self._descend(index)
+
+    def _return(self, index: int) -> None:
+        self.fly()
+        level = max(float(self.place[2]), self.vertical.return_height)
+        if level > self.place[2] + _SAME_PLACE:
+            up = np.array([self.place[0], self.place[1], level])
+            self._go(index, up, self.vertical.climb(level - float(self.place[2])))
+        own, self.speed = self.speed, self._own_speed()
+        self._towards(index, np.array([self.home[0], self.home[1], level]), 0.0)
+        self._descend(index)
+        self.speed = own
+
+    def _descend(self, index: int) -> None:
+        self.fly()
+        ground = np.array([self.goal[0], self.goal[1], 0.0])
+        self._go(index, ground, self.vertical.descend(float(self.place[2])))
+        self.reached[index] = self.clock
+        self.over = True
+
+    def _go(self, index: int, goal: Real, lasting: float) -> None:
+        """Move to `goal` at constant speed in `lasting` seconds."""
+        if lasting < _SHORTEST:
+            return
+        self._check_clock(lasting)
+        t = np.linspace(0.0, lasting, max(2, math.ceil(lasting / self.step) + 1))
+        way = (goal - self.place) / lasting
+        position = self.place + t[:, None] * way
+        velocity = np.tile(way, (len(t), 1))
+        velocity[[0, -1]] = 0.0
+        self._add(t, position, velocity, np.full(len(t), index))
+        self.clock += lasting
+        self.place = self.goal = goal
+
+    def _add(self, t: Real, position: Real, velocity: Real, item: Real) -> None:
+        first = 1 if self.parts else 0  # the instant that the last part ended with
+        self.parts.append(
+            (t[first:] + self.clock, position[first:], velocity[first:], item[first:])
+        )
+
+    def _change_speed(self, item: MissionItem) -> None:
+        change = speed_change(item, self.vehicle)
+        if change is None:
+            return
+        if change.axis in ("climb", "descent") and isinstance(self.model, ArduCopter):
+            if change.speed is not None:
+                self.fly()
+                if change.axis == "climb":
+                    self.model = replace(self.model, climb_speed=change.speed)
+                else:
+                    self.model = replace(self.model, descent_speed=change.speed)
+        else:
+            self.speed = self._own_speed() if change.speed is None else change.speed
+
+    def _own_speed(self) -> float:
+        """The speed of waypoints before any command, m/s."""
+        return self.model.cruise_speed
+
+    def _whole(self) -> bool:
+        return self.vehicle.autopilot == "ardupilot" and self.vehicle.kind == "copter"
+
+    def _spot(self, index: int, item: MissionItem) -> Real:
+        """Return the place of `item`, (3,) m."""
+        if not (abs(item.x) <= 90 and abs(item.y) <= 180):
+            raise InputError(
+                f"mission item {index + 1}: {item.x}, {item.y} is no place to fly to; "
+                "expected degrees"
+            )
+        return self._height_over(np.append(self.frame.to_local(item.x, item.y), 0.0), item, index)
+
+    def _height_over(self, place: Real, item: MissionItem, index: int) -> Real:
+        """Return `place` at the height of `item` above home."""
+        if not math.isfinite(item.z):
+            raise InputError(f"mission item {index + 1}: altitude {item.z}; expected metres")
+        height = item.z
+        if item.frame in {int(frame) for frame in ABOVE_SEA | {Frame.MISSION}}:
+            if self.mission.home is None:
+                raise InputError(
+                    f"mission item {index + 1}: an altitude above sea level needs the mission's "
+                    "home, which the file does not have"
+                )
+            height -= self.mission.home.altitude
+        return np.array([place[0], place[1], height])
+
+    def _check_clock(self, lasting: float) -> None:
+        if not self.clock + lasting <= LONGEST:
+            raise InputError(
+                f"the flight would take more than {LONGEST / 3600:g} h and is not followed that far"
+            )
+
+
+def _still(clock: float, place: Real, index: int) -> tuple[Real, Real, Real, Real]:
+    """Return a track of one sample, at rest."""
+    return (np.array([clock]), place[None], np.zeros((1, 3)), np.array([index], dtype=float))

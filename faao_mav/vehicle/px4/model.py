@@ -1,0 +1,133 @@
+"""A PX4 multicopter as a flight model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from faao_mav.arrays import Real
+from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle.flight_path import FlightPath, Flown
+from faao_mav.vehicle.limits import Parameter, limits_of
+from faao_mav.vehicle.px4.guidance import Limits
+from faao_mav.vehicle.px4.sampling import grid, sampled
+from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, Simulation
+
+_PARAMETERS = {
+    "cruise_speed": Parameter({"MPC_XY_CRUISE": 1.0}, 0.1),
+    "max_speed": Parameter({"MPC_XY_VEL_MAX": 1.0}, 0.1),
+    "acceleration": Parameter({"MPC_ACC_HOR": 1.0}, 0.1),
+    "jerk": Parameter({"MPC_JERK_AUTO": 1.0}, 0.1),
+    "corner_gain": Parameter({"MPC_XY_TRAJ_P": 1.0}, 0.01),
+    "error_limit": Parameter({"MPC_XY_ERR_MAX": 1.0}, 0.1),
+    "acceptance_radius": Parameter({"NAV_ACC_RAD": 1.0}, 0.05),
+    "height_radius": Parameter({"NAV_MC_ALT_RAD": 1.0}, 0.05),
+    "climb_speed": Parameter({"MPC_Z_V_AUTO_UP": 1.0, "MPC_Z_VEL_MAX_UP": 1.0}, 0.1),
+    "descent_speed": Parameter({"MPC_Z_V_AUTO_DN": 1.0, "MPC_Z_VEL_MAX_DN": 1.0}, 0.1),
+    "climb_acceleration": Parameter({"MPC_ACC_UP_MAX": 1.0}, 0.1),
+    "descent_acceleration": Parameter({"MPC_ACC_DOWN_MAX": 1.0}, 0.1),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Px4:
+    """How a PX4 multicopter flies plain waypoints in mission mode, without wind.
+
+    A simulation of PX4's own chain: guidance with a look at the next waypoint only, smoothing
+    within jerk and acceleration, a clock that runs slower while the aircraft lags behind, a
+    cascaded controller and an aircraft with lag and drag; see the modules of this package for the
+    equations. Four constants are fitted to recorded flights (`response.ATTITUDE_LAG`,
+    `response.DRAG`, `step.WANDER`, `simulation.START_LAG`), the rest is PX4's. Limits are SI:
+    m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
+    """
+
+    calibrated: ClassVar[bool] = True
+
+    cruise_speed: float = 5.0
+    max_speed: float = 12.0
+    acceleration: float = 3.0
+    jerk: float = 4.0
+    corner_gain: float = 0.5
+    error_limit: float = 2.0
+    acceptance_radius: float = 2.0
+    height_radius: float = 0.8
+    climb_speed: float = 3.0
+    descent_speed: float = 1.5
+    climb_acceleration: float = 4.0
+    descent_acceleration: float = 3.0
+
+    _simulations: list[Simulation] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+    """The last one: flights along the same points come one after the other."""
+
+    @classmethod
+    def from_vehicle(cls, vehicle: Vehicle) -> "Px4":
+        """Return the model with the limits that `vehicle.parameters` set.
+
+        Raises `InputError` for a value that is too small to fly with or not finite.
+        """
+        return cls(**limits_of(vehicle, _PARAMETERS))
+
+    def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
+        """Return the predicted flight along `path`, sampled every `step` seconds.
+
+        Holds keep their fractions and count from entering the acceptance radius; speeds of 0 or
+        less mean `cruise_speed`, radii of 0 `acceptance_radius`. Spline waypoints, which PX4
+        refuses, are flown as plain ones. The end is when the last waypoint is done: the aircraft
+        is then within its radius and may still be braking.
+        """
+        return self.fly_many(path, path.speeds[None], (path.holds + path.delays)[None], step)[0]
+
+    def fly_many(
+        self,
+        path: FlightPath,
+        speeds: ArrayLike,
+        waits: ArrayLike,
+        step: float = 0.1,
+        *,
+        rough: bool = False,  # noqa: ARG002
+    ) -> Sequence[Flown]:
+        """Fly variants of `path` with other `speeds` (B, m - 1), m/s, and `waits` (B, m), s.
+
+        All reach the latest end. Results are smooth in speeds and waits to about 1e-3 s, so finite
+        differences of 0.01 m/s and more work. Variants that differ little cost far less together
+        than one by one: see `Simulation`.
+        """
+        speed = np.atleast_2d(np.asarray(speeds, float))
+        hold = np.atleast_2d(np.asarray(waits, float))
+        speed = np.minimum(np.where(speed > 0, speed, self.cruise_speed), self.max_speed)
+        if len(path.points) == 1:
+            return _standing(path.points[0], hold[:, 0], step)
+        radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
+        logs = self._simulation(path.points, radii).fly(speed, hold, beyond=step)
+        return sampled(logs, path.points[0, 2], step)
+
+    def _simulation(self, points: Real, radii: Real) -> Simulation:
+        """Return what has flown legs of this path already, if it is that of the last call."""
+        if not (self._simulations and self._simulations[0].leads_along(points, radii)):
+            self._simulations[:] = [Simulation(self._limits(), points, radii)]
+        return self._simulations[0]
+
+    def _limits(self) -> Limits:
+        return Limits(
+            self.acceleration,
+            self.jerk,
+            self.corner_gain,
+            self.climb_acceleration,
+            self.climb_speed,
+            self.descent_acceleration,
+            self.descent_speed,
+            self.height_radius,
+            self.error_limit,
+        )
+
+
+def _standing(point: Real, holds: Real, step: float) -> list[Flown]:
+    """Return what becomes of a path of one point (3,): `holds` (B,) s there."""
+    ends = np.where(holds > 0, holds + SWITCH_DELAY, 0.0)
+    t = grid(float(ends.max()), step)
+    position = np.tile(point, (len(t), 1))
+    return [Flown(np.zeros(1), end, t, position, np.zeros_like(position)) for end in ends[:, None]]

@@ -1,0 +1,257 @@
+"""Flying variants of one path, leg by leg."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, sqrt
+from typing import TypeAlias
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.vehicle.px4.guidance import Leg, Limits, legs
+from faao_mav.vehicle.px4.step import State, at_rest, moved
+
+STEP = 0.1
+"""Longest step of the simulation, s: what was calibrated."""
+
+SWITCH_DELAY = 0.1
+"""From reaching a waypoint, or from the end of a hold there, to leaving for the next, s."""
+
+START_LAG = 0.12
+"""From the first leg becoming current to the trajectory moving, s. Fitted."""
+
+_SETTLED = 2e-3
+"""Slower than this, m/s, a holding aircraft is taken to stand."""
+
+_ALIKE = 3e-4
+"""States that differ by less, m, m/s, m/s², are taken to be the same.
+
+Variants of a flight take some 20 s to move alike again; ten times less would take 10 s more.
+"""
+
+_STEADY = 1e-5
+"""A velocity off by less, m/s, stays as it is along a leg: a few mm in minutes."""
+
+_TINY = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """A leg as it is flown: `arrival` and `departure` at its end, s, and its `end`.
+
+    `time` (k,) s and `motion` (k, 2, n), position m and velocity m/s, are at the end of each step;
+    n is 3 with east, north, up or 2 on level paths. Times count from the leg's start.
+    """
+
+    arrival: float
+    departure: float
+    time: Real
+    motion: Real
+    end: State
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Log:
+    """A flight: `arrivals`, `departures` (m,) s, and after each step time (k,) s and `motion`.
+
+    `motion` (k, 2, n) is as in `Stretch`. Steps are not uniform: they end when a waypoint is left.
+    """
+
+    arrivals: Real
+    departures: Real
+    time: Real
+    motion: Real
+
+
+_Entered: TypeAlias = dict[Leg, list[tuple[State, Stretch]]]
+"""The legs that variants have flown, with the states in which they were entered."""
+
+
+class Simulation:
+    """Flights of variants of the path through `points` (m, 3), m >= 2, with `radii` (m,).
+
+    A leg that is entered as it was before, with the same command, is flown as it was before. So
+    variants that differ by one speed or hold are flown from there only, and until they move as if
+    it had not changed. From one call of `fly` to the next only legs that are entered in exactly the
+    same state are remembered: what is flown does not depend on what was flown before.
+    """
+
+    def __init__(self, limits: Limits, points: Real, radii: Real) -> None:
+        self._limits, self._points, self._radii = limits, points, radii.tolist()
+        self._known: dict[tuple[Leg, State], Stretch] = {}
+
+    def leads_along(self, points: Real, radii: Real) -> bool:
+        """Tell whether these are the points and radii."""
+        return np.array_equal(points, self._points) and self._radii == radii.tolist()
+
+    def fly(self, speeds: Real, holds: Real, beyond: float) -> list[Log]:
+        """Fly every variant until the last one has ended, and on for `beyond` seconds.
+
+        `speeds` are (B, m - 1), `holds` (B, m).
+        """
+        starts = np.where(holds[:, 0] > 0, holds[:, 0] + SWITCH_DELAY, 0.0).tolist()
+        routes = [
+            legs(self._limits, self._points, self._radii, speed, hold)
+            for speed, hold in zip(speeds.tolist(), holds.tolist(), strict=True)
+        ]
+        alike: _Entered = {}
+        flights = [self._flight(route, alike) for route in routes]
+        ends = [
+            start + START_LAG + sum(stretch.departure for stretch in flight)
+            for start, flight in zip(starts, flights, strict=True)
+        ]
+        last = max(ends) + beyond
+        logs = []
+        for start, route, flight, end in zip(starts, routes, flights, ends, strict=True):
+            after = _stay(self._limits, route[-1], flight[-1].end, last - end)
+            logs.append(self._log(start, [*flight, after]))
+        return logs
+
+    def _start(self) -> State:
+        east, north, up = self._points[0].tolist()
+        return at_rest(complex(east, north), up if np.ptp(self._points[:, 2]) > 0 else None)
+
+    def _flight(self, route: list[Leg], alike: _Entered) -> list[Stretch]:
+        state, result = self._start(), []
+        for leg in route:
+            flown = alike.setdefault(leg, [])
+            stretch = next((after for before, after in flown if _alike(before, state)), None)
+            if stretch is None:
+                if (stretch := self._known.get((leg, state))) is None:
+                    stretch = self._known[leg, state] = _fly(self._limits, leg, state)
+                flown.append((state, stretch))
+            result.append(stretch)
+            state = stretch.end
+        return result
+
+    def _log(self, start: float, stretches: list[Stretch]) -> Log:
+        moving = start + START_LAG
+        begun = moving + np.cumsum([0.0] + [stretch.departure for stretch in stretches[:-1]])
+        arrivals = [stretch.arrival for stretch in stretches[:-1]]
+        times = [at + stretch.time for at, stretch in zip(begun, stretches, strict=True)]
+        return Log(
+            np.concatenate([[0.0], begun[:-1] + arrivals]),
+            np.concatenate([[start], begun[1:]]),
+            np.concatenate([[moving], *times]),
+            np.concatenate([_motion([self._start()]), *(each.motion for each in stretches)]),
+        )
+
+
+def _alike(one: State, other: State) -> bool:
+    if abs(one.remembered - other.remembered) > _ALIKE:
+        return False
+    if one.climb is not None and other.climb is not None:
+        pairs = zip(one.level + one.climb, other.level + other.climb, strict=True)
+    else:
+        pairs = zip(one.level, other.level, strict=True)
+    return all(abs(mine - yours) <= _ALIKE for mine, yours in pairs)
+
+
+def _fly(limits: Limits, leg: Leg, state: State) -> Stretch:
+    """Fly along `leg` until its end is left."""
+    times: list[float] = []
+    states: list[State] = []
+    time, due, arrival = 0.0, inf, inf
+    near = _distances(limits, leg, state)
+    while due - time >= _TINY:
+        before, far = state, near
+        if due < inf and _stands(state):
+            time = due
+        else:
+            dt = min(STEP, due - time)
+            state = moved(limits, leg, state, dt)
+            time += dt
+            if due == inf and (steps := _steady_steps(leg, before, state)) > 0:
+                times.append(time)
+                states.append(state)
+                state = _carried_on(before, state, steps)
+                time += steps * STEP
+        times.append(time)
+        states.append(state)
+        near = _distances(limits, leg, state)
+        if due == inf and max(near) <= 0:
+            arrival = time - dt * (1 - _share(leg, before, dt, far, near))
+            due = arrival + SWITCH_DELAY + max(leg.hold, 0.0)
+    return Stretch(arrival, due, np.array(times), _motion(states), state)
+
+
+def _steady_steps(leg: Leg, before: State, state: State) -> int:
+    """Return how many more steps towards the target will change nothing but places.
+
+    None unless a level flight has settled, and none close to the target.
+    """
+    _, was, _, _, origin, wanted, _ = before.level
+    position, velocity, _, _, place, wants, push = state.level
+    if push or wants != wanted or state.climb is not None or abs(velocity - was) > _STEADY / 10:
+        return 0
+    shift = place - origin
+    if abs(velocity - shift / STEP) > _STEADY or abs(shift) < _STEADY:
+        return 0
+    way = min(abs(leg.target - position), abs(leg.target - place)) - max(leg.braking, leg.radius)
+    return int(way / abs(shift)) - 1
+
+
+def _carried_on(before: State, state: State, steps: int) -> State:
+    """Return `state` after `steps` like the one that led to it."""
+    position, velocity, thrust, integral, place, wanted, push = state.level
+    way = steps * (place - before.level[4])
+    level = (position + way, velocity, thrust, integral, place + way, wanted, push)
+    return State(level, state.climb, state.remembered)
+
+
+def _stay(limits: Limits, leg: Leg, state: State, duration: float) -> Stretch:
+    """Go on for `duration` s after the last waypoint is done."""
+    times: list[float] = [0.0]
+    states = [state]
+    while times[-1] < duration:
+        state = moved(limits, leg, state, STEP)
+        times.append(times[-1] + STEP)
+        states.append(state)
+    return Stretch(inf, inf, np.array(times), _motion(states), state)
+
+
+def _stands(state: State) -> bool:
+    """Tell whether the aircraft and its trajectory have come to rest."""
+    _, velocity, _, _, _, wanted, _ = state.level
+    if abs(velocity) + abs(wanted) >= _SETTLED:
+        return False
+    return state.climb is None or abs(state.climb[1]) + abs(state.climb[5]) < _SETTLED
+
+
+def _distances(limits: Limits, leg: Leg, state: State) -> tuple[float, ...]:
+    """Return how far the aircraft is from being accepted at the target, m: 0 and less is in."""
+    across = abs(state.level[0] - leg.target) - leg.radius
+    if state.climb is None:
+        return (across,)
+    return across, abs(state.climb[0] - leg.height) - limits.height_radius
+
+
+def _share(
+    leg: Leg, before: State, dt: float, far: tuple[float, ...], near: tuple[float, ...]
+) -> float:
+    """Return the share of the step of `dt` s after which the target was accepted."""
+    shares = [
+        start / max(start - end, _TINY) if start > 0 else 0.0
+        for start, end in zip(far, near, strict=True)
+    ]
+    if far[0] > 0:
+        offset = before.level[0] - leg.target
+        closing = (offset.conjugate() * before.level[1]).real / max(abs(offset), _TINY)
+        shares[0] = _crossing(far[0], closing * dt, near[0])
+    return max(shares)
+
+
+def _crossing(start: float, slope: float, end: float) -> float:
+    """Return where in [0, 1] the parabola through `start` > 0 with `slope` to `end` <= 0 is 0."""
+    bend = end - start - slope
+    root = sqrt(max(slope * slope - 4 * bend * start, 0.0))
+    return min(max(2 * start / max(root - slope, _TINY), 0.0), 1.0)
+
+
+def _motion(states: Sequence[State]) -> Real:
+    """Return positions and velocities as in `Stretch`."""
+    level = np.array([state.level[:2] for state in states])
+    axes = [level.real, level.imag]
+    if states[0].climb is not None:
+        axes.append(np.array([state.climb[:2] for state in states if state.climb is not None]))
+    return np.stack(axes, axis=-1)

@@ -1,0 +1,95 @@
+"""One step of a flight along a leg."""
+
+from math import hypot
+from typing import NamedTuple
+
+from faao_mav.vehicle.px4.guidance import Leg, Limits, climb_setpoint, level_setpoint
+from faao_mav.vehicle.px4.response import Motion, Number, advance, step_of
+from faao_mav.vehicle.px4.smoothing import Axis, follow, soon_there
+
+WANDER = 0.08
+"""How far the position estimate strays from the trajectory all the time, m. Fitted."""
+
+_TINY = 1e-9
+
+
+class State(NamedTuple):
+    """How an aircraft moves, horizontally (east + i north) and, where the path climbs, upwards.
+
+    `remembered` is what speed was allowed before a turn, m/s.
+    """
+
+    level: Motion[complex]
+    climb: Motion[float] | None
+    remembered: float
+
+
+def at_rest(place: complex, height: float | None) -> State:
+    """Return the state of an aircraft that hovers; `height` is None for level paths."""
+    climb = None if height is None else (height, 0.0, 0.0, 0.0, height, 0.0, 0.0)
+    return State((place, 0j, 0j, 0j, place, 0j, 0j), climb, 0.0)
+
+
+def moved(limits: Limits, leg: Leg, state: State, dt: float) -> State:
+    """Return `state` after `dt` s on the way along `leg`.
+
+    What is asked for halfway along the step is pursued all along it.
+    """
+    level, climb, remembered = state
+    position, _, _, _, place, velocity, acceleration = level
+    midway = place + velocity * (dt / 2)
+    direction, speed, remembered = level_setpoint(limits, leg, midway, velocity, remembered)
+    clock = dt * _pace(limits.error, place - position, velocity)
+    step = step_of(dt)
+    if climb is None:
+        after, push, _ = _pursued(limits, level, direction * speed, None, clock)
+    else:
+        _, _, _, _, height, rate, lift = climb
+        distance, halfway = abs(leg.target - midway), height + rate * (dt / 2)
+        speed, ascent = climb_setpoint(limits, leg, distance, halfway, speed)
+        most = limits.climb_acceleration if ascent > 0 else limits.descent_acceleration
+        upwards = (rate, lift, ascent, most)
+        after, push, up = _pursued(limits, level, direction * speed, upwards, clock)
+        climb = advance(step, climb, _shift(rate, lift, *up, clock), *up)
+    shift = _shift(velocity, acceleration, after, push, clock)
+    return State(advance(step, level, shift, after, push), climb, remembered)
+
+
+def _pace(limit: float, lag: complex, velocity: complex) -> float:
+    """Return how fast the trajectory's clock runs: 1 less the lag's share of the `limit`.
+
+    Being ahead does not count; the estimate's wander makes that a gradual affair.
+    """
+    ahead = (lag * velocity.conjugate()).real / (abs(velocity) + _TINY)
+    behind = hypot(abs(lag), WANDER) * (1 + ahead / hypot(ahead, WANDER)) / 2
+    return 1 - min(behind / limit, 1.0)
+
+
+def _pursued(
+    limits: Limits, level: Motion[complex], setpoint: complex, upwards: Axis | None, dt: float
+) -> tuple[complex, complex, tuple[float, float]]:
+    """Return horizontal velocity and acceleration after `dt` s, and the two upwards, if any."""
+    _, _, _, _, _, velocity, acceleration = level
+    error, push = abs(setpoint - velocity), abs(acceleration)
+    ascent = 0.0
+    if upwards is not None:
+        rate, lift, ascent, _ = upwards
+        error, push = max(error, abs(ascent - rate)), max(push, abs(lift))
+    if soon_there(error, push, limits.jerk, dt):
+        return setpoint if error > _TINY else velocity, 0j, (ascent, 0.0)
+    most = limits.acceleration
+    axes = [
+        (velocity.real, acceleration.real, setpoint.real, most),
+        (velocity.imag, acceleration.imag, setpoint.imag, most),
+    ]
+    if upwards is not None:
+        axes.append(upwards)
+    (east, east_push), (north, north_push), *up = follow(axes, limits.jerk, dt)
+    return complex(east, north), complex(east_push, north_push), up[0] if up else (0.0, 0.0)
+
+
+def _shift(
+    velocity: Number, acceleration: Number, after: Number, acceleration_after: Number, dt: float
+) -> Number:
+    """Return the displacement during a ramp of `dt` s, m."""
+    return dt / 2 * (velocity + after) - dt * dt / 12 * (acceleration_after - acceleration)

@@ -1,0 +1,176 @@
+"""Algorithm 1, whole."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import MISSIONS, MakePlan
+
+from faao_mav.errors import InfeasibleError, PlanError, SolverError
+from faao_mav.optimizer.algorithm1 import algorithm1 as module
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.progress import Progress
+from faao_mav.plan import read_plan
+from faao_mav.radio.precoder import SCHEMES
+
+
+@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
+@pytest.mark.parametrize("fading", ["realization", "none"])
+def test_a_solution_proves_itself(paper_plan: MakePlan, line_of_sight: str, fading: str) -> None:
+    plan = paper_plan({"radio.line_of_sight": line_of_sight, "radio.fading": fading})
+    solution = optimize(plan)
+    assert solution.converged
+    assert "less than 0.0001" in solution.ending
+    residuals = solution.residuals()
+    assert {"(11) position", "(12) velocity", "(13d) ends", "(13e) speed"} <= set(residuals)
+    assert max(residuals.values()) < 1e-6
+    assert solution.rates.R_avg == pytest.approx(solution.history.max(), abs=1e-12)
+    assert solution.rates.R_avg > solution.history[0] + 0.1
+    assert solution.iterations == len(solution.history) - 1
+
+
+def test_rates_are_7_to_10_by_brute_force(paper_plan: MakePlan) -> None:
+    solution = optimize(paper_plan())
+    radio, altitude = solution.plan.radio, solution.plan.flight.altitude
+    x = np.array([[a, b] for a in (1, -1) for b in (1, -1)])
+    rates = []
+    for position, H_r, precoders, noise in (
+        (radio.base_station.position, solution.H_rB, solution.P_B, radio.relay.noise),
+        (radio.ground_user.position, solution.H_rU, solution.P_U, radio.ground_user.noise),
+    ):
+        bits = []
+        for w, fading, P in zip(solution.w, H_r, precoders, strict=True):
+            d2 = np.sum((w - position) ** 2) + altitude**2
+            H = np.sqrt(radio.reference_gain / d2) * fading
+            total = sum(
+                np.exp(-(np.linalg.norm(H @ P @ (m - k)) ** 2) / (4 * noise)) for m in x for k in x
+            )
+            bits.append(2 * 2 - np.log2(total))
+        rates.append(np.sum(bits) * 0.5 / solution.plan.flight.duration)
+    assert solution.rates.R_U == pytest.approx(rates[0], abs=1e-9)
+    assert solution.rates.R_G == pytest.approx(rates[1], abs=1e-9)
+    assert solution.rates.R_avg == min(solution.rates.R_U, solution.rates.R_G)
+
+
+def test_the_active_paper_plan_gains_more_than_a_quarter() -> None:
+    solution = optimize(read_plan(MISSIONS / "paper_active.yaml"))
+    assert solution.converged
+    assert solution.rates.R_avg > 1.25 * solution.history[0]
+    assert max(solution.residuals().values()) < 1e-6
+
+
+def test_the_paper_plan_is_saturated_and_flies_straight() -> None:
+    solution = optimize(read_plan(MISSIONS / "paper.yaml"))
+    assert solution.converged
+    assert solution.rates.R_avg == pytest.approx(2.0, abs=1e-9)
+    assert solution.w @ np.array([1.0, 1.0]) == pytest.approx(350)
+
+
+def test_same_seed_same_bytes_and_other_seed_other_draw(paper_plan: MakePlan) -> None:
+    first, again = optimize(paper_plan()), optimize(paper_plan())
+    for name in ("w", "v", "a", "P_B", "P_U", "H_rB", "I_U", "history"):
+        assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
+    other = optimize(paper_plan({"radio.seed": 1}))
+    assert not np.allclose(first.H_rB, other.H_rB)
+
+
+def test_ula_fading_belongs_to_the_final_positions(paper_plan: MakePlan) -> None:
+    solution = optimize(paper_plan({"radio.line_of_sight": "ula", "radio.fading": "none"}))
+    d = np.column_stack([solution.w, np.full(20, 40.0)])
+    u = d[:, 0] / np.linalg.norm(d, axis=1)
+    assert solution.H_rB[:, 1, 0] == pytest.approx(np.exp(-1j * np.pi * u))
+    assert np.abs(solution.H_rU) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("scheme", sorted(SCHEMES))
+def test_schemes_keep_their_precoder_and_fly_for_it(paper_plan: MakePlan, scheme: str) -> None:
+    solution = optimize(paper_plan({"optimizer.precoder": scheme}))
+    assert max(solution.residuals().values()) < 1e-6
+    radio = solution.plan.radio
+    gain = radio.reference_gain / (np.sum(solution.w**2, axis=1) + 40.0**2)
+    H = np.sqrt(gain)[:, None, None] * solution.H_rB
+    expected = SCHEMES[scheme](H, radio.base_station.power, radio.relay.noise)
+    assert solution.P_B == pytest.approx(expected, rel=1e-9)
+    assert solution.rates.R_avg > solution.history[0]
+
+
+def test_faao_beats_every_scheme(paper_plan: MakePlan) -> None:
+    best = optimize(paper_plan()).rates.R_avg
+    for scheme in SCHEMES:
+        assert optimize(paper_plan({"optimizer.precoder": scheme})).rates.R_avg < best + 1e-3
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"radio.base_station.antennas": 1, "radio.relay.antennas": 1},
+        {"radio.base_station.antennas": 3, "radio.ground_user.antennas": 1},
+        {"radio.modulation": "qpsk"},
+        {"radio.rician_factor": 0},
+        {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
+        {"flight.start_velocity": [0, 6], "flight.end_velocity": [5, -3]},
+        {"flight.end": [0, 50]},
+        {"flight.start": [0, 0], "flight.end": [0, 0], "radio.fading": "none"},
+        {"radio.base_station.power_dbm": -60, "radio.relay.power_dbm": -60},
+        {"radio.base_station.power_dbm": 60, "radio.relay.power_dbm": -20},
+        {"radio.base_station.power_dbm": 30, "radio.relay.power_dbm": 30},
+        {"flight.duration": 1.5, "flight.end": [0.5, 49.5]},
+    ],
+)
+def test_unusual_plans_are_solved(paper_plan: MakePlan, changes: dict[str, Any]) -> None:
+    solution = optimize(paper_plan(changes))
+    assert max(solution.residuals().values()) < 1e-6
+    assert np.isfinite(solution.history).all()
+    assert solution.rates.R_avg >= solution.history[0]
+
+
+def test_the_iteration_limit_is_kept_and_said(paper_plan: MakePlan) -> None:
+    solution = optimize(paper_plan({"optimizer.max_iterations": 1, "optimizer.tolerance": 1e-9}))
+    assert not solution.converged
+    assert solution.iterations == 1
+    assert solution.ending == "max_iterations (1) reached"
+
+
+def test_a_solver_failure_keeps_the_best_so_far(
+    paper_plan: MakePlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+    original = module.optimize_precoders
+
+    def failing(*arguments: Any, **options: Any) -> Any:
+        calls.append(1)
+        if len(calls) > 2:
+            raise SolverError("no progress")
+        return original(*arguments, **options)
+
+    monkeypatch.setattr(module, "optimize_precoders", failing)
+    solution = optimize(paper_plan())
+    assert not solution.converged
+    assert solution.ending == "stopped in iteration 2, the best so far is kept: no progress"
+    assert solution.iterations == 1
+    assert solution.rates.R_avg == pytest.approx(solution.history[1], abs=1e-12)
+    assert max(solution.residuals().values()) < 1e-6
+
+
+def test_progress_is_told(paper_plan: MakePlan) -> None:
+    told: list[Progress] = []
+    solution = optimize(paper_plan(), observe=told.append)
+    assert {p.iteration for p in told} == set(range(1, solution.iterations + 1))
+    assert {p.stage for p in told} == {"trajectory (27)", "precoders (35)"}
+    assert [p.best_rate for p in told] == sorted(p.best_rate for p in told)
+    assert told[0].best_rate == solution.history[0]
+
+
+def test_what_is_too_large_is_refused_before_it_is_tried(paper_plan: MakePlan) -> None:
+    with pytest.raises(PlanError, match=r"optimizer\.method: algorithm1 would need .* cones"):
+        optimize(paper_plan({"radio.modulation": "64qam"}))
+    with pytest.raises(PlanError, match=r"radio\.relay\.antennas: 64 antennas with bpsk"):
+        optimize(paper_plan({"radio.relay.antennas": 64}))
+
+
+def test_no_flight_is_infeasible(paper_plan: MakePlan) -> None:
+    plan = paper_plan()
+    flight = replace(plan.flight, start_velocity=(20.0, 0.0), duration=2.0, end=(0.0, 50.0))
+    with pytest.raises(InfeasibleError):
+        optimize(replace(plan, flight=flight))

@@ -1,0 +1,157 @@
+"""What no route can exceed: never below anything that can be flown."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import MISSIONS, MakePlan
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.search.bound import (
+    best_rates,
+    majorant_lines,
+    reachable_distances,
+    upper_bound,
+)
+from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.plan import read_plan
+from faao_mav.radio.best_precoder import best_precoders
+
+FAINT = {
+    "radio.fading": "realization",
+    "radio.base_station.power_dbm": 0,
+    "radio.relay.power_dbm": 0,
+}
+
+
+def random_flight(kin: Kinematics, seed: int) -> Trajectory:
+    """A feasible flight: the straight one, bent as far as the limits allow."""
+    rng, straight = np.random.default_rng(seed), straight_flight(kin)
+    bend = rng.uniform(0, 3) * rng.standard_normal(2) + rng.standard_normal(straight.a.shape)
+    size = 1.0
+    while size > 1e-3:
+        flight = kin.integrate(straight.v[0], straight.a + size * bend)
+        if max(kin.residuals(flight).values()) < 1e-9:
+            return flight
+        size *= 0.8
+    return straight
+
+
+def best_rate(problem: Problem, w: Real) -> float:
+    means = []
+    for link in problem.links:
+        H = link.channel(w, link.small_scale(w))
+        found = best_precoders(H, link.power, link.modulation, link.noise)
+        means.append(found.rate.mean())
+    return float(min(means))
+
+
+@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**31))
+def test_no_flight_is_above_the_bound(
+    small_plan: MakePlan, bounds: dict[str, float], line_of_sight: str, seed: int
+) -> None:
+    problem = build_problem(small_plan(FAINT | {"radio.line_of_sight": line_of_sight}))
+    flight = random_flight(problem.kinematics, seed)
+    assert best_rate(problem, flight.w) <= bounds[line_of_sight]
+
+
+@pytest.fixture(scope="module")
+def bounds(small_plan: MakePlan) -> dict[str, float]:
+    return {
+        kind: upper_bound(build_problem(small_plan(FAINT | {"radio.line_of_sight": kind}))).value
+        for kind in ("ula", "all_ones")
+    }
+
+
+@pytest.mark.parametrize(
+    ("changes", "exact"),
+    [
+        ({}, True),
+        ({"radio.line_of_sight": "all_ones"}, True),
+        ({"radio.fading": "none"}, True),
+        ({"radio.fading": "ergodic", "radio.fading_samples": 8}, False),
+        ({"radio.modulation": "qpsk"}, False),
+        ({"radio.base_station.antennas": 1, "radio.relay.antennas": 1}, True),
+        ({"radio.base_station.power_dbm": 30, "radio.relay.power_dbm": 30}, True),
+        ({"flight.duration": 8.5}, True),
+    ],
+)
+def test_a_known_plan_tightens_it_and_stays_below(
+    small_plan: MakePlan, changes: dict[str, Any], exact: bool
+) -> None:
+    plan = small_plan(FAINT | changes)
+    found, problem = optimize(plan).rates.R_avg, build_problem(plan)
+    alone, tightened = upper_bound(problem), upper_bound(problem, found)
+    assert alone.exact is tightened.exact is exact
+    assert found <= tightened.value <= alone.value + 1e-5
+    assert tightened.value <= 2 * problem.bs_uav.transmit * (1 if "qpsk" not in str(changes) else 2)
+
+
+def test_within_a_hundredth_of_the_active_paper_plan() -> None:
+    plan = read_plan(MISSIONS / "paper_active.yaml")
+    plan = replace(plan, optimizer=replace(plan.optimizer, method="direct"))
+    found = optimize(plan).rates.R_avg
+    bound = upper_bound(build_problem(plan), found)
+    assert bound.exact
+    assert found <= bound.value <= 1.01 * found
+
+
+def test_it_is_almost_reached_without_fading(small_plan: MakePlan) -> None:
+    plan = small_plan(FAINT | {"radio.fading": "none", "flight.duration": 20})
+    found = optimize(plan).rates.R_avg
+    assert found <= upper_bound(build_problem(plan), found).value <= 1.4 * found
+
+
+@given(st.integers(0, 2**31))
+def test_lines_lie_above_the_curve(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    r = np.sort(rng.uniform(0, 300, (3, 2)), axis=1)
+    grid = r[:, :1] + (r[:, 1:] - r[:, :1]) * np.linspace(0, 1, 200)
+    width, middle = rng.uniform(5, 100), rng.uniform(0, 200)
+    curve = 1 / (1 + np.exp((grid - middle) / width))
+    slope, offset = majorant_lines(grid, curve)
+    fine = r[:, :1] + (r[:, 1:] - r[:, :1]) * np.linspace(0, 1, 999)
+    true = 1 / (1 + np.exp((fine - middle) / width))
+    above = (slope[:, :, None] * fine[:, None] + offset[:, :, None]).min(axis=1)
+    assert (slope <= 0).all()
+    assert (above >= true - 1e-9).all()
+    assert above.max() <= 1.2 * curve.max() + 1e-3
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**31))
+def test_flights_keep_to_the_reachable_distances(small_plan: MakePlan, seed: int) -> None:
+    for changes in (
+        {},
+        {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
+    ):
+        problem = build_problem(small_plan(changes))
+        flight = random_flight(problem.kinematics, seed)
+        for link in problem.links:
+            nearest, farthest = reachable_distances(problem.kinematics, link.station)
+            away = np.linalg.norm(flight.w - link.station, axis=1)
+            assert (nearest - 1e-6 <= away).all()
+            assert (away <= farthest + 1e-6).all()
+
+
+def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> None:
+    for kind in ("ula", "all_ones"):
+        problem = build_problem(small_plan(FAINT | {"radio.line_of_sight": kind}))
+        link = problem.uav_user
+        w = link.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
+        r = np.linalg.norm(w - link.station, axis=1)
+        bound, exact = best_rates(problem, link, r[:, None])
+        H = link.channel(w, link.small_scale(w))
+        true = best_precoders(H, link.power, link.modulation, link.noise).rate
+        assert exact
+        assert (bound[:, 0] >= true - 1e-12).all()
+        if kind == "all_ones":
+            assert bound[:, 0] == pytest.approx(true, abs=1e-9)

@@ -1,0 +1,269 @@
+"""The direct method, whole."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import MISSIONS, MakePlan
+
+from faao_mav.errors import PlanError
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.direct import rate_field
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.pricing import fresh_rates, price
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.progress import Progress
+from faao_mav.optimizer.solution import load_solution, save_solution
+from faao_mav.optimizer.stationarity import kkt_residual
+from faao_mav.plan import Plan, read_plan
+from faao_mav.radio.best_precoder import best_precoders
+from faao_mav.radio.precoder import bpsk_two_antennas_rate
+
+KNOWN = {"radio.fading": "realization"}
+
+
+@pytest.fixture(scope="module")
+def faint_plan(small_plan: MakePlan) -> MakePlan:
+    """The small plan with 10 dB less power: far from saturation even at the best precoders."""
+
+    def make(changes: dict[str, Any] | None = None) -> Plan:
+        powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
+        return small_plan(powers | (changes or {}))
+
+    return make
+
+
+@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
+@pytest.mark.parametrize(
+    ("fading", "csi"),
+    [
+        ("none", "statistical"),
+        ("realization", "statistical"),
+        ("ergodic", "statistical"),
+        ("ergodic", "instantaneous"),
+    ],
+)
+@pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
+def test_a_solution_proves_itself(
+    faint_plan: MakePlan, line_of_sight: str, fading: str, csi: str, modulation: str
+) -> None:
+    plan = faint_plan(
+        {
+            "radio.line_of_sight": line_of_sight,
+            "radio.fading": fading,
+            "radio.csi": csi,
+            "radio.fading_samples": 6,
+            "radio.modulation": modulation,
+        }
+    )
+    solution = optimize(plan)
+    assert solution.converged
+    assert max(solution.residuals().values()) < 1e-6
+    assert (np.diff(solution.history) >= 0).all()
+    assert solution.history[-1] == solution.rates.R_avg
+    assert solution.rates.R_avg > solution.history[0] + 0.02
+    assert set(solution.starts) <= {"straight", "bs", "user", "bs-user", "user-bs"}
+    draws = (6,) if fading == "ergodic" else ()
+    assert solution.H_rB.shape == (*draws, 20, 2, 2)
+    assert solution.P_B.shape == (*(draws if csi == "instantaneous" else ()), 20, 2, 2)
+
+
+def test_the_closed_form_is_reached_in_every_slot(faint_plan: MakePlan) -> None:
+    solution = optimize(faint_plan(KNOWN))
+    problem = build_problem(solution.plan)
+    for link, H_r, rates in zip(
+        problem.links, (solution.H_rB, solution.H_rU), (solution.I_U, solution.I_G), strict=True
+    ):
+        best = bpsk_two_antennas_rate(link.channel(solution.w, H_r), link.power, link.noise)
+        assert rates == pytest.approx(best, abs=1e-9)
+
+
+@pytest.mark.parametrize("modulation", ["qpsk", "8psk"])
+def test_precoders_are_as_good_as_a_search_from_all_starts(
+    faint_plan: MakePlan, modulation: str
+) -> None:
+    solution = optimize(faint_plan(KNOWN | {"radio.modulation": modulation}))
+    link = build_problem(solution.plan).bs_uav
+    H = link.channel(solution.w, solution.H_rB)
+    found = best_precoders(H, link.power, modulation, link.noise).rate
+    assert (solution.I_U >= found - 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"radio.line_of_sight": "all_ones"},
+        {"radio.modulation": "qpsk"},
+        {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0},
+        {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
+    ],
+)
+def test_it_is_never_below_algorithm_1(faint_plan: MakePlan, changes: dict[str, Any]) -> None:
+    ours = optimize(faint_plan(KNOWN | changes))
+    paper = optimize(faint_plan(KNOWN | changes | {"optimizer.method": "algorithm1"}))
+    assert ours.rates.R_avg >= paper.rates.R_avg - 1e-4
+
+
+def test_floor_and_ceiling_on_a_small_scenario(faint_plan: MakePlan) -> None:
+    """0.64235 is what all of many random flights lead to: much more would be a mistake."""
+    solution = optimize(faint_plan({"radio.fading": "none"}))
+    assert 0.6422 <= solution.rates.R_avg <= 0.6424
+
+
+@pytest.mark.parametrize("fading", ["none", "ergodic"])
+def test_no_first_order_move_improves_the_result(faint_plan: MakePlan, fading: str) -> None:
+    plan = faint_plan({"radio.fading": fading, "optimizer.tolerance": 1e-6})
+    solution, problem = optimize(plan), build_problem(plan)
+    field = rate_field(problem, design(plan))
+    # bit/s/Hz that a move within one metre could gain to first order
+    assert kkt_residual(problem.kinematics, field, solution.trajectory) < 1e-4
+
+
+def mirrored(plan: Plan) -> Plan:
+    """Swap the roles of base station and user, and the ends of the flight."""
+    radio, flight = plan.radio, plan.flight
+    base, user = radio.base_station, radio.ground_user
+    return replace(
+        plan,
+        radio=replace(
+            radio,
+            base_station=replace(base, position=user.position),
+            ground_user=replace(user, position=base.position),
+        ),
+        flight=replace(flight, start=flight.end, end=flight.start),
+    )
+
+
+def test_swapping_the_stations_swaps_the_rates(faint_plan: MakePlan) -> None:
+    plan = faint_plan({"radio.fading": "none", "optimizer.tolerance": 1e-6})
+    one, other = optimize(plan), optimize(mirrored(plan))
+    assert other.rates.R_U == pytest.approx(one.rates.R_G, abs=1e-4)
+    assert other.rates.R_G == pytest.approx(one.rates.R_U, abs=1e-4)
+    assert other.w[::-1] == pytest.approx(one.w, abs=1.0)
+
+
+def test_a_symmetric_plan_has_equal_rates(faint_plan: MakePlan) -> None:
+    rates = optimize(faint_plan({"radio.fading": "none"})).rates
+    assert rates.R_U == pytest.approx(rates.R_G, abs=1e-4)
+
+
+@pytest.mark.parametrize("scheme", ["mmse", "mrt", "zf", "waterfilling"])
+@pytest.mark.parametrize("fading", ["realization", "ergodic"])
+def test_schemes_fly_their_own_route_and_stay_below_faao(
+    faint_plan: MakePlan, scheme: str, fading: str
+) -> None:
+    changes = {"radio.fading": fading, "radio.fading_samples": 6}
+    best = optimize(faint_plan(changes))
+    other = optimize(faint_plan(changes | {"optimizer.precoder": scheme}))
+    assert other.history[0] < other.rates.R_avg < best.rates.R_avg
+    assert max(other.residuals().values()) < 1e-6
+
+
+def test_gaussian_design_costs_rate(faint_plan: MakePlan) -> None:
+    best = optimize(faint_plan(KNOWN))
+    gaussian = optimize(faint_plan(KNOWN | {"optimizer.inputs": "gaussian"}))
+    assert gaussian.rates.R_avg < best.rates.R_avg - 0.05
+    assert max(gaussian.residuals().values()) < 1e-6
+    assert gaussian.history[-1] == gaussian.rates.R_avg
+
+
+@pytest.mark.parametrize("csi", ["statistical", "instantaneous"])
+def test_rates_on_fresh_fading_are_close_to_the_planned(faint_plan: MakePlan, csi: str) -> None:
+    solution = optimize(faint_plan({"radio.fading_samples": 64, "radio.csi": csi}))
+    fresh = fresh_rates(solution)
+    assert fresh is not None
+    assert 0 < fresh.error < 0.05
+    assert fresh.average == pytest.approx(solution.rates.R_avg, abs=0.06 + 4 * fresh.error)
+    assert fresh_rates(solution) == fresh
+    assert fresh_rates(optimize(faint_plan({"radio.fading": "none"}))) is None
+
+
+def test_knowing_the_draw_is_worth_something(faint_plan: MakePlan) -> None:
+    blind = optimize(faint_plan({"radio.csi": "statistical"}))
+    seeing = optimize(faint_plan({"radio.csi": "instantaneous"}))
+    assert seeing.rates.R_avg > blind.rates.R_avg
+    assert price(blind).average > blind.rates.R_avg
+
+
+def test_ergodic_solutions_survive_saving(faint_plan: MakePlan, tmp_path: Any) -> None:
+    solution = optimize(faint_plan({"radio.csi": "instantaneous", "radio.fading_samples": 3}))
+    save_solution(solution, tmp_path / "r.npz")
+    loaded = load_solution(tmp_path / "r.npz")
+    assert loaded.rates == solution.rates
+    assert loaded.starts == solution.starts
+    assert max(loaded.residuals().values()) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"radio.base_station.antennas": 1, "radio.relay.antennas": 1},
+        {"radio.base_station.antennas": 3, "radio.ground_user.antennas": 1},
+        {"radio.base_station.antennas": 3, "radio.relay.antennas": 3, **KNOWN},
+        {"radio.base_station.antennas": 1, **KNOWN},
+        {"radio.rician_factor": 0},
+        {"flight.start_velocity": [0, 6], "flight.end_velocity": [5, -3]},
+        {"flight.start": [0, 0], "flight.end": [0, 0]},
+        {"flight.duration": 1.5, "flight.end": [0.5, 49.5]},
+        {"flight.duration": 8.5},  # hardly time to get there
+        {"radio.base_station.power_dbm": -70, "radio.relay.power_dbm": -70},
+        {"radio.base_station.power_dbm": 60, "radio.relay.power_dbm": -20},
+        {"optimizer.starts": ["user"]},
+        {"optimizer.max_iterations": 1},
+    ],
+)
+def test_unusual_plans_are_solved(faint_plan: MakePlan, changes: dict[str, Any]) -> None:
+    solution = optimize(faint_plan({"radio.fading_samples": 4} | changes))
+    assert max(solution.residuals().values()) < 1e-6
+    assert np.isfinite(solution.history).all()
+    assert solution.rates.R_avg >= solution.history[0] - 1e-9
+
+
+def test_hopeless_links_still_get_a_sensible_route(faint_plan: MakePlan) -> None:
+    powers = {"radio.base_station.power_dbm": -55, "radio.relay.power_dbm": -55}
+    solution = optimize(faint_plan(powers | {"flight.duration": 30}))
+    assert solution.converged
+    assert 1e-8 < solution.rates.R_avg < 1e-4
+    assert solution.rates.R_avg > 1.02 * solution.history[0]
+
+
+def test_saturated_links_get_a_short_route_at_once() -> None:
+    solution = optimize(replace_method(read_plan(MISSIONS / "paper.yaml")))
+    assert solution.converged
+    assert solution.rates.R_avg == pytest.approx(2, abs=1e-9)
+    length = np.linalg.norm(np.diff(solution.w, axis=0), axis=1).sum()
+    assert length == pytest.approx(np.hypot(350, 350), rel=1e-6)
+
+
+def replace_method(plan: Plan) -> Plan:
+    return replace(plan, optimizer=replace(plan.optimizer, method="direct"))
+
+
+def test_same_seed_same_bytes(faint_plan: MakePlan) -> None:
+    first, again = optimize(faint_plan()), optimize(faint_plan())
+    for name in ("w", "v", "a", "P_B", "P_U", "H_rB", "I_U", "history"):
+        assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
+
+
+def test_progress_is_told(faint_plan: MakePlan) -> None:
+    told: list[Progress] = []
+    solution = optimize(faint_plan(), observe=told.append)
+    assert [p.iteration for p in told] == [0, 1, 2]
+    assert [p.stage for p in told] == ["rates over the map", "the starts", "the best start"]
+    assert 0 < told[-1].best_rate <= solution.rates.R_avg
+
+
+def test_more_draws_than_can_be_held_are_refused(small_plan: MakePlan) -> None:
+    changes = {"radio.fading_samples": 10_000, "flight.duration": 500}
+    with pytest.raises(PlanError, match=r"radio\.fading_samples: 10,000 draws in 1,000 slots"):
+        optimize(small_plan(changes))
+
+
+def test_algorithm_1_refuses_what_it_cannot_do(faint_plan: MakePlan) -> None:
+    with pytest.raises(PlanError, match=r"radio\.fading: ergodic is not for algorithm1"):
+        optimize(faint_plan({"optimizer.method": "algorithm1"}))
+    changes = KNOWN | {"optimizer.method": "algorithm1", "optimizer.inputs": "gaussian"}
+    with pytest.raises(PlanError, match=r"optimizer\.inputs: gaussian is not for algorithm1"):
+        optimize(faint_plan(changes))

@@ -1,0 +1,111 @@
+"""Saving, loading, proving and pricing of solutions."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import MakePlan
+
+from faao_mav.errors import InputError
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.pricing import SATURATED, price, saturation
+from faao_mav.optimizer.solution import Solution, load_solution, save_solution
+
+
+@pytest.fixture(scope="module")
+def solution(paper_plan: MakePlan) -> Solution:
+    return optimize(paper_plan({"optimizer.max_iterations": 2}))
+
+
+def test_saved_keys_and_shapes(solution: Solution, tmp_path: Path) -> None:
+    save_solution(solution, tmp_path / "result.npz")
+    with np.load(tmp_path / "result.npz", allow_pickle=False) as archive:
+        shapes = {name: archive[name].shape for name in archive.files}
+        assert str(archive["plan"]) == solution.plan.text
+        assert float(archive["R_avg"]) == solution.rates.R_avg
+    slots, square = (20,), (20, 2, 2)
+    expected = {"t": slots, "w": (20, 2), "v": (20, 2), "a": (20, 2), "P_B": square, "P_U": square,
+                "H_rB": square, "H_rU": square, "I_U": slots, "I_G": slots, "R_avg": (), "R_U": (),
+                "R_G": (), "history": solution.history.shape, "plan": ()}  # fmt: skip
+    assert {name: shapes[name] for name in expected} == expected
+
+
+def test_loaded_is_what_was_saved(solution: Solution, tmp_path: Path) -> None:
+    save_solution(solution, tmp_path / "result.npz")
+    loaded = load_solution(tmp_path / "result.npz")
+    assert loaded.rates == solution.rates
+    assert loaded.w.tobytes() == solution.w.tobytes()
+    assert replace(loaded.plan, source="plan") == solution.plan
+    assert max(loaded.residuals().values()) < 1e-6
+    save_solution(loaded, tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "result.npz").read_bytes()
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 broken", b"\x80\x04N.", b"text"])
+def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "result.npz"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"result\.npz: not a result of faao-mission --save"):
+        load_solution(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        load_solution(tmp_path / "absent.npz")
+    np.savez(path, t=np.arange(3))
+    with pytest.raises(InputError, match="not a result"):
+        load_solution(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("w", np.zeros((3, 2)), r"w: float64 \(3, 2\); expected numbers \(20, 2\)"),
+        ("w", np.full((20, 2), np.nan), "w: expected finite numbers"),
+        ("w", np.array(["a"]), "w: <U1"),
+        ("P_B", np.ones((20, 1, 2)), r"P_B: float64 \(20, 1, 2\); expected numbers \(20, 2, 2\)"),
+        ("H_rU", np.ones((4, 19, 2, 2)), r"H_rU: float64 \(4, 19, 2, 2\); expected"),
+    ],
+)
+def test_arrays_that_are_not_the_plans_are_refused(
+    solution: Solution, tmp_path: Path, name: str, value: "np.ndarray", said: str
+) -> None:
+    path = tmp_path / "result.npz"
+    save_solution(solution, path)
+    with np.load(path) as archive:
+        np.savez(path.with_name("other.npz"), **{**archive, name: value})
+    with pytest.raises(InputError, match=rf"other\.npz: {said}"):
+        load_solution(path.with_name("other.npz"))
+
+
+def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:
+    assert replace(solution, P_B=1.1 * solution.P_B).residuals()[
+        "(13b) power of the base station"
+    ] == pytest.approx(0.21, rel=1e-3)
+    assert replace(solution, I_U=solution.I_U - 0.1).residuals()["(9) rate"] > 0.05
+    assert replace(solution, H_rU=solution.H_rU * 1j).residuals()["(2) fading"] > 0.1
+    assert replace(solution, w=solution.w + 1).residuals()["(13d) ends"] == pytest.approx(1)
+
+
+def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None:
+    information, rates = price(solution), solution.rates
+    assert information.error <= 1e-3
+    assert rates.R_U < information.bs_uav < 2
+    assert rates.R_G < information.uav_user < 2
+    assert information.average == min(information.bs_uav, information.uav_user)
+    assert price(solution) == information
+
+
+def test_spare_power_is_what_could_be_saved(paper_plan: MakePlan) -> None:
+    powers = {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40}
+    found = optimize(paper_plan(powers))
+    limit = saturation(found)
+    assert limit.saturated
+    assert limit.ceiling == 2
+    assert 5 < limit.spare_db < 40
+    at_limit = found.recomputed(10 ** (-limit.spare_db / 10)).R_avg
+    assert at_limit == pytest.approx(SATURATED * 2, abs=1e-6)
+
+
+def test_a_plan_in_the_active_region_has_no_power_to_spare(solution: Solution) -> None:
+    limit = saturation(solution)
+    assert not limit.saturated
+    assert limit.spare_db == 0

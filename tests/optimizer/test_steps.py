@@ -1,0 +1,106 @@
+"""(27) and (35) as convex problems."""
+
+import numpy as np
+import pytest
+from conftest import MakePlan
+
+from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
+from faao_mav.optimizer.algorithm1.trajectory_step import (
+    SumOfExponentials,
+    link_sum,
+    optimize_trajectory,
+    xi,
+)
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.radio.precoder import bpsk_two_antennas_rate
+
+
+def sums_of(problem: Problem) -> tuple[SumOfExponentials, ...]:
+    """Both sums on the straight flight with equal-power precoders."""
+    w = straight_flight(problem.kinematics).w
+    return tuple(
+        link_sum(
+            link,
+            link.small_scale(w),
+            np.tile(np.sqrt(link.power / 2) * np.eye(2, dtype=complex), (len(w), 1, 1)),
+        )
+        for link in problem.links
+    )
+
+
+def test_xi_is_that_of_16(paper_plan: MakePlan) -> None:
+    problem = build_problem(paper_plan())
+    w = straight_flight(problem.kinematics).w
+    found = xi(sums_of(problem), w)
+    xis = []
+    for link in problem.links:
+        H = link.channel(w, link.small_scale(w)) * np.sqrt(link.power / 2)
+        x = np.array([[a, b] for a in (1, -1) for b in (1, -1)])
+        u = (x[:, None] - x).reshape(-1, 2)
+        D = np.sum(np.abs(np.einsum("nrt,kt->nkr", H, u)) ** 2, axis=2) / (4 * link.noise)
+        xis.append(np.exp(-D).sum() - 2 * len(w) * 2)  # O = 2 (N + 2) N_t log2 rho
+    assert found == pytest.approx(max(xis), rel=1e-9)
+
+
+@pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
+@pytest.mark.parametrize("power", [-10, 10, 20])
+def test_xi_never_increases_and_the_flight_stays_feasible(
+    paper_plan: MakePlan, modulation: str, power: float
+) -> None:
+    problem = build_problem(
+        paper_plan(
+            {
+                "radio.modulation": modulation,
+                "radio.base_station.power_dbm": power,
+                "radio.relay.power_dbm": power,
+            }
+        )
+    )
+    sums, start = sums_of(problem), straight_flight(problem.kinematics)
+    seen = [xi(sums, start.w)]
+    flight = optimize_trajectory(problem, sums, start, observe=seen.append)
+    assert len(seen) > 2
+    assert (np.diff(seen) <= 0).all()
+    assert seen[-1] < seen[0]
+    assert xi(sums, flight.w) == pytest.approx(seen[-1], rel=1e-12)
+    assert max(problem.kinematics.residuals(flight).values()) < 1e-6
+
+
+def test_27_reaches_a_stationary_point(paper_plan: MakePlan) -> None:
+    """No feasible move of the whole flight lowers xi: checked without the solver."""
+    problem = build_problem(paper_plan())
+    kin, sums = problem.kinematics, sums_of(problem)
+    flight = optimize_trajectory(problem, sums, straight_flight(kin))
+    best = xi(sums, flight.w)
+    rng = np.random.default_rng(0)
+    gains = []
+    for _ in range(200):
+        other = straight_flight(kin)
+        bump = rng.standard_normal((kin.slots, 2)) * rng.uniform(0, 2)
+        candidate = kin.integrate(kin.start_velocity, flight.a + 0.02 * (bump + other.a - flight.a))
+        if max(kin.residuals(candidate).values()) < 1e-9:
+            gains.append(best - xi(sums, candidate.w))
+    assert len(gains) > 20
+    assert max(gains) < 1e-3 * sum(s.value(flight.w) for s in sums)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_35_reaches_the_closed_form_for_bpsk_and_two_antennas(
+    paper_plan: MakePlan, seed: int
+) -> None:
+    problem = build_problem(paper_plan({"radio.seed": seed, "flight.duration": 20}))
+    w = straight_flight(problem.kinematics).w
+    for link in problem.links:
+        H_r = link.small_scale(w)
+        H = link.channel(w, H_r)
+        start = np.tile(np.sqrt(link.power / 2) * np.eye(2, dtype=complex), (len(w), 1, 1))
+        seen = []
+        P = optimize_precoders(link, H, start, observe=seen.append)
+        assert (np.diff(seen) <= 0).all()
+        assert (np.sum(np.abs(P) ** 2, axis=(1, 2)) <= link.power * (1 + 1e-9)).all()
+        best = bpsk_two_antennas_rate(H, link.power, link.noise)
+        rates = link.rates(w, H_r, P)
+        assert (rates <= best + 1e-9).all()
+        assert rates.mean() == pytest.approx(best.mean(), abs=1e-3)
+        assert link.rates(w, H_r, start).mean() < best.mean() - 0.05

@@ -1,0 +1,139 @@
+"""Plans and trajectories for the tests of missions."""
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any, TypeAlias
+
+import numpy as np
+from hypothesis import settings
+
+from faao_mav.arrays import Real
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import Command, Frame, Mission
+from faao_mav.plan import (
+    BaseStation,
+    Flight,
+    GroundUser,
+    MissionOptions,
+    Optimizer,
+    Origin,
+    Plan,
+    Radio,
+    Relay,
+    Vehicle,
+)
+from faao_mav.schedule import Conversion, assemble, convert, plan_route
+
+STEADY = settings(derandomize=True, deadline=None, max_examples=200)
+"""The same examples on every run."""
+
+Trajectory: TypeAlias = tuple[Real, Real]
+
+
+def plan_with(
+    *,
+    origin: tuple[float, float, float] = (-35.363262, 149.165237, 584.0),
+    autopilot: Any = "ardupilot",
+    max_speed: float = 8.0,
+    parameters: Mapping[str, float] | None = None,
+    takeoff: bool = True,
+    on_finish: Any = "rtl",
+    path_tolerance: float = 2.0,
+    max_items: int = 600,
+    recommend: bool = False,
+) -> Plan:
+    """Return a plan; the radio and the flight's ends play no part in a mission."""
+    return Plan(
+        origin=Origin(*origin),
+        vehicle=Vehicle(
+            max_speed, 1.5, autopilot=autopilot, parameters=parameters if parameters else {}
+        ),
+        flight=Flight((0.0, 350.0), (350.0, 0.0), 100.0, 120.0, 0.2, None, None, True),
+        radio=Radio(
+            BaseStation((0.0, 0.0), 2, 0.1),
+            Relay(2, 0.1, 1e-11),
+            GroundUser((300.0, 300.0), 2, 1e-11),
+            *("bpsk", 1e-5, 3.0, "ula", "none", 1, "statistical", 0, False),
+        ),
+        optimizer=Optimizer("direct", "faao", "alphabet", ("straight",), 1e-4, 50),
+        mission=MissionOptions(
+            takeoff, on_finish, path_tolerance, max_items, "recommend" if recommend else "keep"
+        ),
+    )
+
+
+def dash(begin: float, end: float, top: float, acceleration: float, t: Real) -> Real:
+    """Return positions along a line, from rest to rest, as fast as the limits allow."""
+    length = end - begin
+    top = min(top, float(np.sqrt(length * acceleration)))
+    ramp = top / acceleration
+    cruise = (length - top * ramp) / top
+    speeds = ([0.0, ramp, ramp + cruise, 2 * ramp + cruise], [0.0, top, top, 0.0])
+    fine = np.linspace(0.0, speeds[0][-1], 20_001)
+    v = np.interp(fine, *speeds)
+    s = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2 * np.diff(fine))])
+    return begin + np.interp(t, fine, s)
+
+
+def dash_hover_dash(hover: float = 40.0, step: float = 0.2) -> Trajectory:
+    """Return two dashes of 250 m with a hover of about `hover` seconds between them."""
+    lasting = 250 / 8 + 8 / 1.5
+    t = np.arange(0.0, 2 * lasting + hover + step, step)
+    first = dash(0.0, 250.0, 8.0, 1.5, t)
+    second = dash(0.0, 250.0, 8.0, 1.5, np.maximum(t - lasting - hover, 0.0))
+    w = np.outer(first, [0.6, -0.8]) + np.outer(second, [0.8, 0.6]) + [0.0, 350.0]
+    return t, w
+
+
+def converted(t: Real, w: Real, plan: Plan) -> Conversion:
+    """Return the conversion of a bare trajectory."""
+    return convert(SimpleNamespace(plan=plan, t=t, w=w))  # type: ignore[arg-type]
+
+
+def nearly_there(conversion: Conversion, w: Real, near: float = 2.0) -> float:
+    """Return how much later than planned the flight comes within `near` m of w_F for good, s."""
+    clock, flown = conversion.schedule.clock, conversion.schedule.flown
+
+    def settled(t: Real, positions: Real) -> float:
+        outside = np.flatnonzero(np.hypot(*(positions - w[-1]).T) > near)
+        return float(t[outside[-1] + 1]) if len(outside) else float(t[0])
+
+    return settled(flown.t - clock.start(flown), flown.position[:, :2]) - settled(clock.t, w)
+
+
+def mission_of(t: Real, w: Real, plan: Plan) -> Mission:
+    """Return the mission that flies a bare trajectory."""
+    return assemble(plan_route(t, w, plan), plan)
+
+
+def items_of(mission: Mission, plan: Plan) -> tuple[Real, list[float], list[float]]:
+    """Return positions, speeds and holds of the route that the mission's items make."""
+    assert [item.command for item in mission.items[:2]].count(Command.NAV_TAKEOFF) == int(
+        plan.mission.takeoff
+    )
+    begin = 1 if plan.mission.takeoff else 0
+    speed, before, points, speeds, holds = np.nan, None, [], [], []
+    for item in mission.items[begin:-1]:
+        if item.command == Command.DO_CHANGE_SPEED:
+            assert item.frame == Frame.MISSION
+            assert item.params[0::2] == (1.0, -1.0)
+            assert before != Command.DO_CHANGE_SPEED
+            assert item.params[1] != speed
+            speed = item.params[1]
+        elif item.command == Command.NAV_DELAY:
+            assert item.frame == Frame.MISSION
+            assert before == Command.NAV_WAYPOINT
+            holds[-1] += item.params[0]
+        else:
+            assert item.command == Command.NAV_WAYPOINT
+            assert item.frame == Frame.GLOBAL_RELATIVE_ALT
+            assert item.z == plan.flight.altitude
+            points.append(item)
+            speeds.append(speed)
+            holds.append(item.params[0])
+        before = item.command
+    assert before in (Command.NAV_WAYPOINT, Command.NAV_DELAY)
+    assert speeds[0] == plan.vehicle.max_speed
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    positions = frame.to_local([p.x for p in points], [p.y for p in points])
+    return positions, speeds[1:], holds

@@ -1,0 +1,143 @@
+"""Missions for aeroplanes: curves that they fly although they aim far ahead."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from relay_flights import Trajectory, converted, plan_with
+
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import Command
+from faao_mav.mission.vehicle import vehicle_of
+from faao_mav.plan import Plan
+from faao_mav.schedule import Conversion, plan_route
+from faao_mav.schedule.convert import check_vehicle
+from faao_mav.schedule.plane_scheduler import PlaneScheduler
+from faao_mav.schedule.run_in import with_run_in
+from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
+from faao_mav.vehicle.flight_path import FlightPath
+from faao_mav.vehicle.legs import legs_of
+from faao_mav.vehicle.predict import predict
+from faao_mav.vehicle.track import Track
+
+STEP = 0.2
+
+
+def plane_plan(**changes: float) -> Plan:
+    plan = plan_with(max_speed=16.0, path_tolerance=5.0)
+    vehicle = replace(plan.vehicle, type="plane", min_speed=12.0, parameters=changes)
+    return replace(plan, vehicle=vehicle)
+
+
+def bends() -> Trajectory:
+    """Waves of 100 m across a way of 1500 m, at 14 m/s: radii down to 130 m."""
+    fine = np.linspace(0.0, 1500.0, 3000)
+    path = np.stack([fine, 50 * np.cos(fine / 120)], axis=-1)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    t = np.arange(0.0, way[-1] / 14, STEP)
+    return t, np.stack([np.interp(14 * t, way, axis) for axis in path.T], axis=-1)
+
+
+def circle() -> Trajectory:
+    """A way in, one and a half circles of 90 m radius, a way out, at 14 m/s."""
+    angle = np.arange(0.0, 3 * np.pi, 1 / 90)
+    round_it = 90 * np.stack([np.sin(angle), 1 - np.cos(angle)], axis=-1)
+    path = np.vstack([[[-300.0, 0.0]], round_it, round_it[-1:] - [[300.0, 0.0]]])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    t = np.arange(0.0, way[-1] / 14, STEP)
+    return t, np.stack([np.interp(14 * t, way, axis) for axis in path.T], axis=-1)
+
+
+def followed_unmoved(t: np.ndarray, w: np.ndarray, plan: Plan) -> float:
+    """How far the flight strays whose waypoints lie on the path, m."""
+    vehicle = vehicle_of(plan)
+    legs, model = legs_of(vehicle), ArduPlane.from_vehicle(vehicle)
+    scheduler = PlaneScheduler(t, w, model, legs, 16.0, 5.0, 12.0)
+    route = with_run_in(plan_route(t, w, plan, share=0.4), t, w, legs, 16.0)
+    return scheduler.flight(route).deviation.path
+
+
+@pytest.fixture(scope="module", params=[bends, circle])
+def flight(request: pytest.FixtureRequest) -> tuple[Conversion, Trajectory]:
+    t, w = request.param()
+    return converted(t, w, plane_plan()), (t, w)
+
+
+def test_the_path_is_kept_where_plain_waypoints_would_lose_it(
+    flight: tuple[Conversion, Trajectory],
+) -> None:
+    conversion, (t, w) = flight
+    found = conversion.schedule.deviation
+    assert found.path < 6
+    assert found.path < 0.7 * followed_unmoved(t, w, plane_plan())
+    assert found.rms < 5
+    assert abs(conversion.schedule.clock.late(conversion.schedule.flown)) < 0.5
+
+
+def test_the_whole_mission_flies_like_its_schedule(
+    flight: tuple[Conversion, Trajectory],
+) -> None:
+    """Take-off and the way to the run-in are over before w_I: the run-in is long enough."""
+    conversion, (t, _) = flight
+    plan = plane_plan()
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    track: Track = predict(conversion.mission, conversion.vehicle, frame)
+    schedule = conversion.schedule
+    waypoints = [
+        k for k, item in enumerate(conversion.mission.items) if item.command == Command.NAV_WAYPOINT
+    ]
+    passed = track.reached[waypoints[schedule.route.first]]
+    clock = schedule.clock
+    start = passed + clock.start(schedule.flown) - schedule.flown.arrivals[schedule.route.first]
+    at = np.stack([np.interp(t + start, track.t, x) for x in track.position.T[:2]], axis=-1)
+    assert np.hypot(*(at - schedule.positions(t)).T).max() < 3
+
+
+def test_items_are_an_aeroplanes(flight: tuple[Conversion, Trajectory]) -> None:
+    items = flight[0].mission.items
+    assert items[0].command == Command.NAV_TAKEOFF
+    assert items[0].params[0] == 15
+    speeds = [item.params for item in items if item.command == Command.DO_CHANGE_SPEED]
+    assert {params[0] for params in speeds} == {0.0}
+    assert all(12 <= params[1] <= 16 for params in speeds)
+    waypoints = [item for item in items if item.command == Command.NAV_WAYPOINT]
+    assert all(item.params == (0, 0, 0, 0) for item in waypoints)
+    kinds = {item.command for item in items}
+    assert kinds == {
+        Command.NAV_TAKEOFF,
+        Command.DO_CHANGE_SPEED,
+        Command.NAV_WAYPOINT,
+        Command.NAV_RETURN_TO_LAUNCH,
+    }
+    assert flight[0].parameters == {}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "key"),
+    [
+        ({"AIRSPEED_MIN": 12.5}, "min_speed: 12 m/s; the plane flies 12.5 to 22 m/s"),
+        ({"AIRSPEED_MAX": 15}, "max_speed: 16 m/s; the plane flies 9 to 15 m/s"),
+        ({"NAVL1_PERIOD": 0}, "NAVL1_PERIOD: 0"),
+    ],
+)
+def test_a_plane_that_cannot_fly_the_plans_speeds_is_refused(
+    parameters: dict[str, float], key: str
+) -> None:
+    with pytest.raises(InputError, match=key):
+        check_vehicle(plane_plan(**parameters))
+
+
+def test_a_plane_at_its_limits_is_taken() -> None:
+    check_vehicle(plane_plan(AIRSPEED_MIN=12, AIRSPEED_MAX=16))
+
+
+def test_variants_fly_as_paths_of_their_own() -> None:
+    plane = ArduPlane()
+    points = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [300.0, 300.0, 0.0]])
+    path = FlightPath(points, np.full(2, 15.0), np.zeros(3), np.zeros(3, bool), np.zeros(3))
+    speeds, waits = np.array([[12.0, 15.0], [15.0, 18.0]]), np.zeros((2, 3))
+    for speed, flown in zip(speeds, plane.fly_many(path, speeds, waits), strict=True):
+        np.testing.assert_array_equal(
+            flown.position, plane.fly(replace(path, speeds=speed)).position
+        )

@@ -1,0 +1,416 @@
+"""Whole missions, from take-off to their end."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
+from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import modelled
+from faao_mav.vehicle.predict import predict
+from faao_mav.vehicle.track import Track
+
+HOME = Home(47.4, 8.5, 400.0)
+FRAME = LocalFrame(47.4, 8.5)
+ARRIVED = 1.0
+"""Metres: a copter is still braking when its waypoint counts as reached."""
+
+COPTER = Vehicle()
+PX4 = Vehicle("px4")
+VEHICLES = [COPTER, PX4, Vehicle("ardupilot", "plane")]
+
+
+def at(
+    command: int,
+    east: float = 0.0,
+    north: float = 0.0,
+    up: float = 30.0,
+    *params: float,
+    frame: int = Frame.GLOBAL_RELATIVE_ALT,
+) -> MissionItem:
+    latitude, longitude = FRAME.to_geodetic([east, north])
+    padded = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return MissionItem(command, frame, padded, float(latitude), float(longitude), up)  # type: ignore[arg-type]
+
+
+def do(command: int, *params: float) -> MissionItem:
+    padded = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return MissionItem(command, Frame.MISSION, padded)  # type: ignore[arg-type]
+
+
+def waypoint(east: float, north: float, hold: float = 0.0, up: float = 30.0) -> MissionItem:
+    return at(Command.NAV_WAYPOINT, east, north, up, hold)
+
+
+TAKEOFF = at(Command.NAV_TAKEOFF)
+RTL = do(Command.NAV_RETURN_TO_LAUNCH)
+
+
+def flown(*items: MissionItem, vehicle: Vehicle = COPTER, home: Home | None = HOME) -> Track:
+    mission = Mission(items, home)
+    track = predict(mission, vehicle, FRAME)
+    check(mission, track)
+    return track
+
+
+def check(mission: Mission, track: Track) -> None:
+    """What holds of every track."""
+    assert (np.diff(track.t) > 0).all()
+    assert len(track.t) == len(track.position) == len(track.velocity) == len(track.item)
+    assert np.isfinite(track.position).all()
+    assert np.isfinite(track.velocity).all()
+    assert len(track.reached) == len(mission.items)
+    assert len(track.t) == 0 or track.t[0] >= 0
+    if len(track.t):
+        assert 0 <= track.item.min() <= track.item.max() < max(len(mission.items), 1)
+        known = track.reached[np.isfinite(track.reached)]
+        assert (known >= 0).all()
+        assert (known <= track.t[-1] + 0.2).all()
+    if any(item.command == Command.DO_JUMP for item in mission.items):
+        return
+    assert (np.diff(track.item) >= 0).all()
+    assert (np.diff(track.reached[np.isfinite(track.reached)]) >= -1e-9).all()
+    for index, done in enumerate(track.reached):
+        during = track.t[track.item == index]
+        if math.isfinite(done) and len(during):
+            assert during[-1] <= done + 1e-6
+            assert done - during[-1] <= 0.2
+
+
+def when(track: Track, index: int) -> float:
+    return float(track.reached[index])
+
+
+def place(track: Track, t: float) -> list[float]:
+    return [float(np.interp(t, track.t, x)) for x in track.position.T]
+
+
+def test_a_take_off_of_100_m_takes_46_s() -> None:
+    track = flown(at(Command.NAV_TAKEOFF, up=100.0))
+    assert when(track, 0) == pytest.approx(46, abs=2)
+    assert track.position[0] == pytest.approx([0, 0, 0])
+    assert track.position[-1] == pytest.approx([0, 0, 100])
+
+
+def test_a_take_off_is_here_where_arducopter_gets_no_place() -> None:
+    here = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, z=20.0)
+    track = flown(here, waypoint(50, 0))
+    assert place(track, when(track, 0)) == pytest.approx([0, 0, 20], abs=0.1)
+    unset = replace(here, x=math.nan, y=math.nan)
+    assert flown(unset, vehicle=PX4).position[-1] == pytest.approx([0, 0, 20], abs=0.1)
+    with pytest.raises(InputError, match="more than 24 h"):  # PX4 sets out for 0, 0
+        flown(here, vehicle=PX4)
+
+
+def test_a_take_off_elsewhere_climbs_first() -> None:
+    track = flown(at(Command.NAV_TAKEOFF, 40, 0, 20))
+    climbing = track.position[:, 2] < 19.9
+    assert abs(track.position[climbing, 0]).max() < 0.1
+    assert track.position[-1] == pytest.approx([40, 0, 20], abs=ARRIVED)
+
+
+def test_the_return_ends_at_home_on_the_ground() -> None:
+    track = flown(TAKEOFF, waypoint(100, 50), RTL)
+    assert track.position[-1] == pytest.approx([0, 0, 0], abs=0.1)
+    assert when(track, 2) == pytest.approx(track.t[-1])
+    level = math.hypot(100, 50) / 10 + 10 / 2.5 + 2.5 + 0.3  # the way and a ramp
+    down = 10 / 0.5 + 20 / 1.5 + 1.5
+    assert when(track, 2) - when(track, 1) == pytest.approx(level + down, abs=2)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "height"),
+    [
+        (COPTER, 15),
+        (Vehicle(parameters={"RTL_ALT": 4000}), 40),
+        (Vehicle(parameters={"RTL_ALT_M": 25}), 25),
+        (PX4, 60),
+        (Vehicle("px4", parameters={"RTL_RETURN_ALT": 20}), 20),
+    ],
+)
+def test_a_return_climbs_to_its_height_first(vehicle: Vehicle, height: float) -> None:
+    track = flown(at(Command.NAV_TAKEOFF, up=5), waypoint(100, 0, up=5), RTL, vehicle=vehicle)
+    assert track.position[:, 2].max() == pytest.approx(height, abs=0.5)
+    up = track.position[:, 2] > height - 0.5
+    assert track.position[up][0, 0] == pytest.approx(100, abs=2.5)
+
+
+def test_what_comes_after_the_end_is_not_flown() -> None:
+    for end in (RTL, at(Command.NAV_LAND, 60, 0, 0), at(Command.NAV_LOITER_UNLIM, 60, 0)):
+        track = flown(TAKEOFF, end, waypoint(500, 0))
+        assert track.position[:, 0].max() < 65
+        assert math.isnan(when(track, 2))
+
+
+def test_a_landing_is_below_its_place() -> None:
+    track = flown(TAKEOFF, waypoint(60, 0), at(Command.NAV_LAND, 80, 20, 0))
+    assert track.position[-1] == pytest.approx([80, 20, 0], abs=0.1)
+    high = track.position[np.hypot(*(track.position[:, :2] - [80, 20]).T) > 3]
+    assert high[high[:, 0] > 10, 2].min() > 29
+
+
+def test_a_landing_without_a_place_is_here() -> None:
+    track = flown(TAKEOFF, waypoint(60, 0), MissionItem(Command.NAV_LAND, 3))
+    assert track.position[-1] == pytest.approx([60, 0, 0], abs=0.1)
+
+
+def test_a_hover_ends_the_track_on_arrival() -> None:
+    track = flown(TAKEOFF, waypoint(60, 0), at(Command.NAV_LOITER_UNLIM, 60, 40))
+    assert track.position[-1] == pytest.approx([60, 40, 30], abs=ARRIVED)
+    assert track.t[-1] - when(track, 1) < 40 / 10 + 10
+
+
+def test_a_mission_without_an_end_ends_at_its_last_waypoint() -> None:
+    track = flown(TAKEOFF, waypoint(60, 0), waypoint(60, 40))
+    assert track.t[-1] == pytest.approx(when(track, 2), abs=0.2)
+    assert track.position[-1] == pytest.approx([60, 40, 30], abs=ARRIVED)
+
+
+def visits(track: Track, east: float, north: float) -> int:
+    """How often the track comes within 5 m."""
+    near = np.hypot(*(track.position[:, :2] - [east, north]).T) < 5
+    return int(np.count_nonzero(np.diff(near.astype(int)) == 1))
+
+
+@pytest.mark.parametrize(("repeats", "expected"), [(0, 1), (1, 2), (3, 4), (-1, 21)])
+def test_jumps_are_followed(repeats: int, expected: int) -> None:
+    items = (TAKEOFF, waypoint(60, 0), waypoint(60, 60), do(Command.DO_JUMP, 2, repeats), RTL)
+    track = flown(*items)
+    assert visits(track, 60, 60) == expected
+    assert track.position[-1] == pytest.approx([0, 0, 0], abs=0.1)
+
+
+def test_jumps_to_nowhere_are_passed_over() -> None:
+    for target in (0, 9, -3):
+        track = flown(TAKEOFF, waypoint(60, 0), do(Command.DO_JUMP, target, 2), waypoint(60, 60))
+        assert visits(track, 60, 0) == 1
+        assert track.position[-1] == pytest.approx([60, 60, 30], abs=ARRIVED)
+
+
+def test_jumps_within_jumps_end() -> None:
+    jumps = [do(Command.DO_JUMP, 1, -1)] * 4
+    track = flown(waypoint(20, 0), waypoint(0, 0), *jumps)
+    assert track.t[-1] < 86_400
+
+
+def test_a_jump_that_is_no_number_is_refused() -> None:
+    with pytest.raises(InputError, match="mission item 2: DO_JUMP to nan"):
+        flown(TAKEOFF, do(Command.DO_JUMP, math.nan, 2))
+
+
+def test_a_delay_is_waited_out_with_its_fraction() -> None:
+    items = (TAKEOFF, waypoint(100, 0), do(Command.NAV_DELAY, 7.6, -1, -1, -1), waypoint(200, 0))
+    whole = flown(TAKEOFF, waypoint(100, 0, hold=7), waypoint(200, 0))
+    assert when(flown(*items), 3) - when(whole, 2) == pytest.approx(0.6, abs=0.05)
+
+
+@pytest.mark.parametrize(("vehicle", "kept"), [(COPTER, 7.0), (PX4, 7.6)])
+def test_a_hold_of_a_fraction(vehicle: Vehicle, kept: float) -> None:
+    def end(hold: float) -> float:
+        track = flown(TAKEOFF, waypoint(100, 0, hold), waypoint(200, 0), vehicle=vehicle)
+        return when(track, 2)
+
+    assert end(7.6) - end(5.0) == pytest.approx(kept - 5.0, abs=0.1)
+
+
+def test_waiting_where_the_aircraft_is_already() -> None:
+    for wait in (waypoint(0, 0, hold=9), at(Command.NAV_LOITER_TIME, 0, 0, 30, 9)):
+        track = flown(TAKEOFF, wait)
+        assert when(track, 1) - when(track, 0) == pytest.approx(9, abs=0.2)
+        land = flown(TAKEOFF, wait, at(Command.NAV_LAND, 0, 0, 0))
+        down = flown(TAKEOFF, at(Command.NAV_LAND, 0, 0, 0))
+        assert land.t[-1] - down.t[-1] == pytest.approx(9, abs=0.2)
+
+
+def test_two_waits_at_one_place_add_up() -> None:
+    wait = (waypoint(50, 0, hold=4), waypoint(50, 0, hold=6))
+    track = flown(TAKEOFF, *wait, waypoint(100, 0))
+    once = flown(TAKEOFF, waypoint(50, 0, hold=10), waypoint(100, 0))
+    assert when(track, 3) == pytest.approx(when(once, 2), abs=0.05)
+    assert when(track, 2) >= when(track, 1)
+
+
+def top_speed(vehicle: Vehicle, *changes: MissionItem) -> float:
+    track = flown(TAKEOFF, *changes, waypoint(300, 0), vehicle=vehicle)
+    return float(track.velocity[:, 0].max())
+
+
+def speed(kind: float, value: float) -> MissionItem:
+    return do(Command.DO_CHANGE_SPEED, kind, value, -1)
+
+
+def test_speed_changes_of_arducopter() -> None:
+    assert top_speed(COPTER) == pytest.approx(10, abs=0.1)
+    assert top_speed(Vehicle(parameters={"WPNAV_SPEED": 700})) == pytest.approx(7, abs=0.1)
+    for kind in (0, 1):
+        assert top_speed(COPTER, speed(kind, 6)) == pytest.approx(6, abs=0.1)
+    for ignored in (speed(2, 6), speed(3, 6), speed(1, -1), speed(1, 0), speed(1, math.nan)):
+        assert top_speed(COPTER, ignored) == pytest.approx(10, abs=0.1)
+
+
+def test_climb_and_descent_speeds_of_arducopter() -> None:
+    def lasting(*changes: MissionItem) -> tuple[float, float]:
+        track = flown(TAKEOFF, *changes, waypoint(0, 0, up=80), waypoint(0, 0, up=30))
+        up, down = (when(track, len(changes) + k) for k in (1, 2))
+        return up - when(track, 0), down - up
+
+    up, down = lasting()
+    faster = lasting(speed(2, 5))
+    assert faster[0] < up - 5
+    assert faster[1] == pytest.approx(down, abs=1e-6)
+    slower = lasting(speed(3, 0.5))
+    assert slower[0] == pytest.approx(up, abs=1)
+    assert slower[1] == pytest.approx(50 / 0.5, abs=8)
+
+
+def test_speed_changes_of_px4_are_horizontal_whatever_their_type() -> None:
+    for kind in (0, 1, 2, 3):
+        assert top_speed(PX4, speed(kind, 3)) == pytest.approx(3, abs=0.4)
+    for restoring in (0, -1, -2):
+        changes = speed(1, 3), speed(1, restoring)
+        assert top_speed(PX4, *changes) == pytest.approx(5, abs=0.3)
+
+
+def test_a_speed_change_counts_from_the_next_waypoint_on() -> None:
+    track = flown(TAKEOFF, waypoint(150, 0), speed(1, 4), waypoint(300, 0))
+    first = track.item == 1
+    assert track.velocity[first, 0].max() == pytest.approx(10, abs=0.1)
+    middle = place(track, (when(track, 1) + when(track, 3)) / 2)
+    assert 150 < middle[0] < 300
+    assert when(track, 3) - when(track, 1) == pytest.approx(150 / 4, abs=5)
+
+
+def test_heights_above_the_sea() -> None:
+    high = at(Command.NAV_WAYPOINT, 50, 0, 430, frame=Frame.GLOBAL)
+    track = flown(TAKEOFF, high)
+    assert track.position[-1] == pytest.approx([50, 0, 30], abs=ARRIVED)
+    with pytest.raises(InputError, match=r"mission item 2: an altitude above sea level needs"):
+        flown(TAKEOFF, high, home=None)
+
+
+@pytest.mark.parametrize(
+    ("item", "part"),
+    [
+        (replace(waypoint(50, 0), x=math.nan), "mission item 2: nan, .* is no place to fly to"),
+        (replace(waypoint(50, 0), x=91.0), "mission item 2: 91.0"),
+        (replace(waypoint(50, 0), z=math.nan), "mission item 2: altitude nan; expected metres"),
+    ],
+)
+def test_what_is_no_place_is_refused(item: MissionItem, part: str) -> None:
+    with pytest.raises(InputError, match=part):
+        flown(TAKEOFF, item)
+
+
+def test_without_a_home_the_flight_begins_below_its_first_place() -> None:
+    mission = Mission((waypoint(0, 0), waypoint(70, 0)))
+    track = predict(mission, COPTER)
+    assert track.position[0] == pytest.approx([0, 0, 0], abs=1e-6)
+    assert (track.frame.latitude, track.frame.longitude) == pytest.approx((47.4, 8.5))
+    assert track.position[-1] == pytest.approx([70, 0, 30], abs=ARRIVED)
+
+
+@pytest.mark.parametrize("home", [None, HOME])
+def test_a_mission_without_places_has_no_track(home: Home | None) -> None:
+    for items in ((), (speed(1, 5), do(Command.DO_JUMP, 1, -1))):
+        track = predict(Mission(items, home), COPTER)
+        assert len(track.t) == len(track.position) == len(track.item) == 0
+        assert np.isnan(track.reached).all()
+        assert len(track.reached) == len(items)
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_flights_without_end_are_refused(vehicle: Vehicle) -> None:
+    for long in (
+        waypoint(5_000_000, 0),
+        waypoint(100, 0, up=1e7),
+        waypoint(100, 0, hold=1e9),
+        do(Command.NAV_DELAY, 1e9, -1, -1, -1),
+    ):
+        with pytest.raises(InputError, match="more than 24 h"):
+            flown(TAKEOFF, waypoint(50, 0), long, waypoint(60, 0), vehicle=vehicle)
+
+
+def test_useless_parameters_are_named() -> None:
+    vehicle = Vehicle(parameters={"LAND_SPEED": 0.0}, source="quad.param")
+    with pytest.raises(InputError, match=r"quad\.param: LAND_SPEED: 0"):
+        flown(TAKEOFF, RTL, vehicle=vehicle)
+
+
+def test_the_step_only_samples() -> None:
+    mission = Mission((TAKEOFF, waypoint(80, 0, 3), waypoint(80, 80), RTL), HOME)
+    fine, coarse = (predict(mission, COPTER, FRAME, step=step) for step in (0.05, 0.5))
+    assert coarse.reached == pytest.approx(fine.reached, abs=5e-3)
+    assert len(fine.t) > 8 * len(coarse.t)
+
+
+metres = st.floats(-300, 300)
+numbers = st.one_of(st.floats(-5, 60), st.sampled_from([math.nan, 0.0, -1.0, 1e9]))
+
+
+@st.composite
+def any_items(draw: st.DrawFn) -> MissionItem:
+    """Items at valid places, with any parameters."""
+    params = draw(st.tuples(*[numbers] * 4))
+    if draw(st.booleans()):
+        commands = [Command.NAV_WAYPOINT] * 3 + list(Command)
+        frame = draw(st.sampled_from([Frame.GLOBAL_RELATIVE_ALT] * 4 + [Frame.GLOBAL, 10, 6]))
+        height = draw(st.floats(0, 60)) + (400 if frame == Frame.GLOBAL else 0)
+        command = draw(st.sampled_from(commands))
+        return at(command, draw(metres), draw(metres), height, *params, frame=frame)
+    command = draw(st.sampled_from([*Command, 183, 206]))
+    return do(command, *params)
+
+
+@settings(max_examples=150)
+@given(
+    st.lists(any_items(), max_size=8),
+    st.sampled_from([None, HOME]),
+    st.sampled_from([COPTER, COPTER, Vehicle("ardupilot", "plane")]),
+)
+def test_any_mission_is_predicted_or_refused(
+    items: list[MissionItem], home: Home | None, vehicle: Vehicle
+) -> None:
+    mission = Mission(tuple(items), home)
+    try:
+        track = predict(mission, vehicle, FRAME, step=0.5)
+    except InputError as refused:
+        assert str(refused)
+        return
+    assert (np.diff(track.t) > 0).all()
+    assert np.isfinite(track.position).all()
+    assert np.isfinite(track.velocity).all()
+    assert track.position.shape == track.velocity.shape == (len(track.t), 3)
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(
+        st.one_of(
+            st.builds(waypoint, metres, metres, st.floats(0, 20), st.floats(5, 60)),
+            st.builds(speed, st.sampled_from([1, 2, 3]), st.floats(1, 15)),
+            st.builds(lambda s: do(Command.NAV_DELAY, s, -1, -1, -1), st.floats(0, 20)),
+        ),
+        max_size=8,
+    ),
+    st.sampled_from([RTL, at(Command.NAV_LAND, 20, 20, 0), at(Command.NAV_LOITER_UNLIM, 9, 9)]),
+)
+def test_items_are_flown_in_order(items: list[MissionItem], end: MissionItem) -> None:
+    track = flown(TAKEOFF, *items, end)
+    assert (np.diff(track.t) <= 0.2 + 1e-9).all()
+    moved = np.linalg.norm(np.diff(track.position, axis=0), axis=1)
+    fastest = 2 * max([10.0, *(i.params[1] for i in items if i.command == Command.DO_CHANGE_SPEED)])
+    assert (moved <= fastest * np.diff(track.t) + 0.05).all()
+
+
+def test_px4_planes_are_not_predicted_as_copters() -> None:
+    vehicle = Vehicle("px4", "plane")
+    assert not modelled(vehicle)
+    with pytest.raises(InputError, match="no model of how PX4 flies planes"):
+        predict(Mission((at(Command.NAV_WAYPOINT, 100),)), vehicle)
+    assert all(map(modelled, VEHICLES))
