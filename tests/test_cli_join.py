@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import SMALL, edited, free_port
+from conftest import MISSIONS, SMALL, edited, free_port
 from typer.testing import CliRunner
 
 from faao_mav import download, upload
@@ -251,3 +251,39 @@ def test_the_mock_flies_by_its_parameters(
     refused = run("autopilot", *listen, "--parameters", slow)
     assert refused.exit_code == 2
     assert "WPNAV_ACCEL" in refused.stderr
+
+
+def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
+    plan: Path, out: Path, tmp_path: Path
+) -> None:
+    save, page = tmp_path / "r.npz", tmp_path / "r.html"
+    paper = MISSIONS / "paper_fig3.yaml"  # 100 m/s
+    told = run(paper, "--save", save, "--report", page)
+    assert (told.exit_code, told.stderr) == (0, "")
+    assert re.search(r"^checked      1 error, ", told.stdout, re.M)
+    assert "error: predicted" in told.stdout
+    assert save.exists()
+    assert page.exists()
+    flown = run(paper, "--out", out)
+    assert flown.exit_code == 1
+    assert "the mission does not pass validation; do not fly it" in flown.stderr
+
+
+def test_without_a_mission_there_is_a_result_where_none_is_asked_for(
+    plan: Path, out: Path, tmp_path: Path
+) -> None:
+    plan.write_text(edited(GENTLE, {"mission.max_items": 4}))
+    save, page, figure = (tmp_path / name for name in ("r.npz", "r.html", "r.png"))
+    told = run(plan, "--save", save, "--report", page, "--figure", figure)
+    assert (told.exit_code, told.stderr) == (0, "")
+    assert re.search(r"^mission      none: .*mission\.max_items", told.stdout, re.M)
+    assert save.exists()
+    assert "mission.max_items" in page.read_text()
+    assert figure.exists()
+    data = json.loads(run(plan, "--json").stdout)
+    assert data["mission"] is data["predicted"] is None
+    assert "mission.max_items" in data["no_mission"]
+    asked = run(plan, "--upload", "udpout:127.0.0.1:14550")
+    assert asked.exit_code == 1
+    assert "mission.max_items" in asked.stderr
+    assert asked.stdout == ""

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.options import SigningKey
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.shared import SigningKey, exit_status
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:

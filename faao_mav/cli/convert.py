@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from faao_mav.cli.outcome import exit_status, note
+from faao_mav.cli.shared import AsJson, exit_status, note
 from faao_mav.files import check_apart, check_writable, write_whole
 
 Autopilot = Literal["ardupilot", "px4"]
@@ -25,9 +25,7 @@ def convert(
         Autopilot | None,
         typer.Option(help="Whom a .plan is for; else whom the mission read says it is for."),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object instead of the summary.")
-    ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a mission in another format, and say what that cannot hold.
 

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from faao_mav.cli.options import Component, Log, SigningKey, System, Wait
-from faao_mav.cli.outcome import exit_status, note
+from faao_mav.cli.shared import Component, Log, SigningKey, System, Wait, exit_status, note
 
 
 def download(
@@ -32,7 +31,7 @@ def download(
     arguments.
     """
     with exit_status():
-        from faao_mav.cli.transfer_progress import transfer_progress
+        from faao_mav.cli.progress import transfer_progress
         from faao_mav.files import check_writable, write_whole
         from faao_mav.mavlink.client import download as run
         from faao_mav.mission.formats import check_suffix, losses_in, render_mission

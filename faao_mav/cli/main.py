@@ -14,8 +14,8 @@ from typer.core import TyperGroup
 from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.convert import convert
 from faao_mav.cli.download import download
-from faao_mav.cli.outcome import note
 from faao_mav.cli.plan import plan
+from faao_mav.cli.shared import note
 from faao_mav.cli.study import study
 from faao_mav.cli.upload import upload
 from faao_mav.cli.validate import validate

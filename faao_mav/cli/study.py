@@ -2,19 +2,18 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.outcome import exit_status, note
+from faao_mav.cli.shared import AsJson, exit_status, note
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
-    from faao_mav.study import Case, Row
+    from faao_mav.study import StudyCase, StudyRow
 
 _INTERRUPTED = 130  # as a shell reports it
 
@@ -45,9 +44,7 @@ def study(
         Path | None,
         typer.Option(metavar="DIR", help="Keep rows there as they finish; go on where it ended."),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object instead of the table.")
-    ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Optimise a plan with many values, schemes and seeds, and compare.
 
@@ -71,6 +68,7 @@ def _run(
     out: Path | None,
     as_json: bool,
 ) -> None:
+    from faao_mav.cli.progress import study_progress
     from faao_mav.plan import read_plan
     from faao_mav.plan.keys import POWER
     from faao_mav.plan.model import Study
@@ -94,7 +92,7 @@ def _run(
     )
     _check_cases(cases)
     try:
-        with _progress(len(cases), shown=sys.stderr.isatty()) as observe:
+        with study_progress(len(cases), shown=sys.stderr.isatty()) as observe:
             rows = run_study(cases, jobs=jobs, cluster=cluster, directory=out, observe=observe)
     except KeyboardInterrupt:
         kept = (
@@ -110,7 +108,7 @@ def _run(
         raise typer.Exit(1)
 
 
-def _draw(rows: "Sequence[Row]", plan: "Plan", kind: str, out: Path) -> list[Path]:
+def _draw(rows: "Sequence[StudyRow]", plan: "Plan", kind: str, out: Path) -> list[Path]:
     """Add the figure to what the study has written, where there is something to draw."""
     from faao_mav.report.style import save_figure
     from faao_mav.study.figure import can_draw, study_figure
@@ -124,7 +122,7 @@ def _draw(rows: "Sequence[Row]", plan: "Plan", kind: str, out: Path) -> list[Pat
     return written
 
 
-def _check_cases(cases: "Sequence[Case]") -> None:
+def _check_cases(cases: "Sequence[StudyCase]") -> None:
     """Refuse values that no case can use, before any work; some may fail and become rows."""
     from faao_mav.errors import PlanError
     from faao_mav.plan import parse_plan
@@ -141,27 +139,7 @@ def _check_cases(cases: "Sequence[Case]") -> None:
         raise first
 
 
-@contextmanager
-def _progress(total: int, *, shown: bool) -> "Iterator[Callable[[Row], None] | None]":
-    """Give an observer that draws a bar on standard error, or None where nothing is `shown`."""
-    if not shown:
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-    from rich.progress import TimeRemainingColumn as Remaining
-
-    columns = (BarColumn(), MofNCompleteColumn(), Remaining(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total)
-
-        def observe(row: "Row") -> None:
-            bar.update(task, advance=1, description=row.scheme)
-
-        yield observe
-
-
-def _tell(rows: "Sequence[Row]", written: Sequence[Path], as_json: bool) -> None:
+def _tell(rows: "Sequence[StudyRow]", written: Sequence[Path], as_json: bool) -> None:
     from faao_mav.study.rows import as_dict
 
     if as_json:
@@ -169,7 +147,7 @@ def _tell(rows: "Sequence[Row]", written: Sequence[Path], as_json: bool) -> None
         found["written"] = [str(path) for path in written]
         typer.echo(json.dumps(found, allow_nan=False))
         return
-    from faao_mav.study.compare import comparison
+    from faao_mav.study.rows import comparison
 
     typer.echo(comparison(rows))
     for path in written:

@@ -7,8 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.options import AllowArmed, AsJson, Component, Log, SigningKey, System, Wait
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.shared import (
+    AllowArmed,
+    AsJson,
+    Component,
+    Log,
+    SigningKey,
+    System,
+    Wait,
+    exit_status,
+)
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
@@ -39,7 +47,7 @@ def upload(
     unusable arguments or input.
     """
     with exit_status():
-        from faao_mav.cli.transfer_progress import transfer_progress
+        from faao_mav.cli.progress import transfer_progress
         from faao_mav.mavlink.client import upload as run
         from faao_mav.mission.formats import read_mission
 

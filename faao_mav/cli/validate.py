@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.shared import AsJson, exit_status
 from faao_mav.errors import InputError
+from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.cli.findings import Verdict
-    from faao_mav.mission.item import Mission
     from faao_mav.mission.vehicle import Autopilot, Kind
     from faao_mav.optimizer.solution import Solution
-    from faao_mav.plan import Plan
 
 
 def validate(
@@ -67,9 +66,7 @@ def validate(
         typer.Option(metavar="PAGE.html", help="One page with map and findings."),
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Warnings fail as well.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object instead of the text.")
-    ] = False,
+    as_json: AsJson = False,
     rules: Annotated[bool, typer.Option("--rules", help="List the rules and stop.")] = False,
 ) -> None:
     """Check a mission before anyone walks to the field.
@@ -92,16 +89,14 @@ def validate(
             raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
         if plan_file is not None and solution_file is not None:
             raise InputError("--plan and --solution: give one; the solution has its plan in it")
+        _check_options((max_duration, max_distance, max_altitude), report)
+        read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
+        check_apart({"--report": report}, read)
+        solution = _planned(plan_file, solution_file)
+        limits = (max_duration, max_distance, max_altitude)
+        verdict = _judge(mission_file, solution, (autopilot, kind, parameters), limits)
         if report is not None:
-            _check_report(report, mission_file, plan_file, solution_file)
-        verdict, mission, solution = _judge(
-            mission_file,
-            (plan_file, solution_file),
-            (autopilot, kind, parameters),
-            (max_duration, max_distance, max_altitude),
-        )
-        if report is not None:
-            _write_report(report, verdict, mission, solution)
+            _write_report(report, verdict, solution)
         _show(verdict, as_json)
         if verdict.check.of(Level.ERROR) or (strict and verdict.check.of(Level.WARNING)):
             raise typer.Exit(1)
@@ -119,12 +114,41 @@ def _list_rules(as_json: bool) -> None:
         show_rules(RULES, Console())
 
 
+def _check_options(
+    limits: "tuple[float | None, float | None, float | None]", report: Path | None
+) -> None:
+    """Refuse limits that are none, and a page that cannot be written, before the work."""
+    for option, value in zip(("duration", "distance", "altitude"), limits, strict=True):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise InputError(f"--max-{option} {value:g}: expected a number above 0")
+    check_ending(report, "--report", *PAGES)
+    if report is not None:
+        check_writable(report)
+
+
+def _planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | None":
+    """Return what the flight is to be: the solution saved, or that of the plan."""
+    if solution_file is not None:
+        from faao_mav.optimizer.solution import load_solution
+
+        return load_solution(solution_file)
+    if plan_file is None:
+        return None
+    from faao_mav.cli.progress import optimizer_progress
+    from faao_mav.optimizer.optimize import optimize
+    from faao_mav.plan import read_plan
+
+    plan = read_plan(plan_file)
+    with optimizer_progress(shown=sys.stderr.isatty()) as observe:
+        return optimize(plan, observe=observe)
+
+
 def _judge(
     mission_file: Path,
-    plans: tuple[Path | None, Path | None],
+    solution: "Solution | None",
     asked: "tuple[Autopilot | None, Kind | None, Path | None]",
     given: tuple[float | None, float | None, float | None],
-) -> "tuple[Verdict, Mission, Solution | None]":
+) -> "Verdict":
     from faao_mav.cli.findings import Verdict
     from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.mission.formats import read_mission_file
@@ -132,58 +156,22 @@ def _judge(
     from faao_mav.validate.check import check
     from faao_mav.vehicle import flight_model, modelled
 
-    for option, value in zip(("duration", "distance", "altitude"), given, strict=True):
-        if value is not None and not (math.isfinite(value) and value > 0):
-            raise InputError(f"--max-{option} {value:g}: expected a number above 0")
-    plan, solution = _planned(*plans)
-    max_duration, max_distance, max_altitude = given
-    limits = Limits(
-        max_duration,
-        max_distance,
-        max_altitude,
-        max_speed=plan.vehicle.max_speed if plan else None,
-    )
+    plan = solution.plan if solution is not None else None
+    limits = Limits(*given, max_speed=plan.vehicle.max_speed if plan is not None else None)
     file = read_mission_file(mission_file)
     vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
     if modelled(vehicle):
         flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
     found = check(file.mission, vehicle, limits=limits, solution=solution)
-    verdict = Verdict(mission_file, len(file.mission.items), vehicle, chosen_by, found)
-    return verdict, file.mission, solution
+    return Verdict(mission_file, chosen_by, found)
 
 
-def _check_report(
-    report: Path, mission_file: Path, plan_file: Path | None, solution_file: Path | None
-) -> None:
-    """Refuse a page that cannot be written before the work, and one over an input."""
-    from faao_mav.cli.report import check_names
-    from faao_mav.files import check_apart, check_writable
+def _write_report(report: Path, verdict: "Verdict", solution: "Solution | None") -> None:
+    from faao_mav.report import render_report
+    from faao_mav.workflow import Result
 
-    check_names(report, None)
-    check_writable(report)
-    read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
-    check_apart({"--report": report}, read)
-
-
-def _write_report(
-    report: Path, verdict: "Verdict", mission: "Mission", solution: "Solution | None"
-) -> None:
-    from faao_mav.files import write_whole
-    from faao_mav.report import ReportData, render_report
-
-    found = verdict.check
-    page = render_report(
-        ReportData(
-            solution=solution,
-            findings=found.findings,
-            mission=mission,
-            track=found.track,
-            link=found.link,
-            vehicle=verdict.vehicle,
-            title=verdict.source.name,
-        )
-    )
-    write_whole(report, page.encode())
+    about = Result(solution, check=verdict.check) if solution is not None else verdict.check
+    write_whole(report, render_report(about, title=verdict.source.name).encode())
 
 
 def _show(verdict: "Verdict", as_json: bool) -> None:
@@ -195,23 +183,3 @@ def _show(verdict: "Verdict", as_json: bool) -> None:
         typer.echo(json.dumps(as_dict(verdict), allow_nan=False))
     else:
         show(verdict, Console())
-
-
-def _planned(
-    plan_file: Path | None, solution_file: Path | None
-) -> "tuple[Plan | None, Solution | None]":
-    """Return the plan and what its flight is to be; a plan alone is solved for that."""
-    if solution_file is not None:
-        from faao_mav.optimizer.solution import load_solution
-
-        solution = load_solution(solution_file)
-        return solution.plan, solution
-    if plan_file is None:
-        return None, None
-    from faao_mav.cli.progress import progress
-    from faao_mav.optimizer.optimize import optimize
-    from faao_mav.plan import read_plan
-
-    plan = read_plan(plan_file)
-    with progress(shown=sys.stderr.isatty()) as observe:
-        return plan, optimize(plan, observe=observe)

@@ -1,26 +1,28 @@
-"""The figures of one flight, as matplotlib figures: metres, seconds, m/s, bit/s/Hz, watts."""
+"""The figures of one flight, of a plan or of a mission alone: m, s, m/s, bit/s/Hz, watts."""
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.mission.command import FLOWN_TO
+from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
-from faao_mav.report.route_map import route_map
-from faao_mav.report.style import MUTED, SERIES, label, legend_above, new_figure, styled
-from faao_mav.report.waypoint_numbers import number_waypoints
+from faao_mav.report.route_map import draw_fence, number_waypoints, outlines_of, route_map, show_all
+from faao_mav.report.style import INK, MUTED, SERIES, label, legend_above, new_figure, styled
 from faao_mav.schedule.convert import Conversion
 from faao_mav.schedule.prediction import Prediction
+from faao_mav.vehicle.track import Track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["convergence", "flight_figure", "motion", "precoder_power", "rates", "route"]
-
 _PLAN, _PREDICTED = SERIES[0], SERIES[1]
 _WIDTH = 4.2
 """Inches: a page makes it as wide as a phone, where 9 points must still be read."""
+_MAX_NUMBERS = 40
+"""Items whose numbers are written beside them, at most, evenly chosen."""
 _BENEATH: dict[str, Any] = {"color": _PLAN, "linewidth": 3.6, "alpha": 0.45}
 """How a curve looks that another one may cover."""
 
@@ -124,6 +126,47 @@ def convergence(solution: Solution) -> "Figure":
         plot.xaxis.set_major_locator(MaxNLocator(integer=True))
         plot.ticklabel_format(axis="y", useOffset=False)
         label(plot, "", "iteration", "rate R_avg, bit/s/Hz")
+        return figure
+
+
+def mission_map(mission: Mission, track: Track) -> "Figure":
+    """Return the map: the predicted flight, the places of the items with numbers, the fence.
+
+    East and north in metres about the origin of the track's frame; items count from 1.
+    """
+    found = [
+        (number, *track.frame.to_local(item.x, item.y))
+        for number, item in enumerate(mission.items, 1)
+        if item.command in FLOWN_TO and (item.x or item.y)
+    ]
+    places = np.array([place for _, *place in found], dtype=float).reshape(-1, 2)
+    with styled():
+        figure = new_figure(_WIDTH, 4.2)
+        plot = figure.subplots()
+        outlines = list(outlines_of(mission.fence, track.frame))
+        draw_fence(plot, outlines)
+        plot.plot(*track.position[:, :2].T, color=SERIES[0], label="predicted")
+        plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label="item")
+        for number, east, north in found[:: 1 + len(found) // _MAX_NUMBERS]:
+            plot.annotate(
+                str(number), (east, north), (3, 3), textcoords="offset points", fontsize=7
+            )
+        legend_above(plot, 2)
+        plot.set_aspect("equal", adjustable="datalim")
+        show_all(plot, np.concatenate([track.position[:, :2], places]), outlines)
+        label(plot, "", "east, m", "north, m")
+        return figure
+
+
+def mission_motion(track: Track) -> "Figure":
+    """Return ground speed, m/s, and height above home, m, over time, s."""
+    with styled():
+        figure = new_figure(_WIDTH, 4.4)
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        upper.plot(track.t, np.hypot(*track.velocity[:, :2].T), color=SERIES[0])
+        label(upper, "", "", "ground speed, m/s")
+        lower.plot(track.t, track.position[:, 2], color=SERIES[0])
+        label(lower, "", "time, s", "height above home, m")
         return figure
 
 

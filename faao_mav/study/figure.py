@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.report.style import MARKERS, SERIES, label, mark_stations, new_figure, styled
-from faao_mav.study.compare import spreads
-from faao_mav.study.rows import Row
+from faao_mav.study.rows import StudyRow, spreads
 from faao_mav.study.sweep import OVERRIDES, Value
 
 if TYPE_CHECKING:
@@ -41,14 +40,14 @@ _ALPHABETS = {
 _LOOKS = {name: k for k, name in enumerate(("faao", "gaussian", "mrt", "mmse", "zf"))}
 
 
-def can_draw(rows: Sequence[Row], kind: str) -> bool:
+def can_draw(rows: Sequence[StudyRow], kind: str) -> bool:
     """Tell whether there is something to draw: results, and for rates an axis of numbers."""
     if all(row.R_avg is None for row in rows):
         return False
     return kind == "trajectories" or _axis(rows) is not None
 
 
-def study_figure(rows: Sequence[Row], plan: Plan, kind: str) -> "Figure":
+def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     """Return the figure `kind` of `rows`, `rate` or `trajectories`.
 
     Raises `InputError` where `can_draw` says no.
@@ -59,7 +58,7 @@ def study_figure(rows: Sequence[Row], plan: Plan, kind: str) -> "Figure":
         return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan)
 
 
-def _axis(rows: Sequence[Row]) -> str | None:
+def _axis(rows: Sequence[StudyRow]) -> str | None:
     """Return the varied key with the most numbers, at least two."""
     counts = {}
     for key in rows[0].values:
@@ -70,12 +69,12 @@ def _axis(rows: Sequence[Row]) -> str | None:
     return best if best is not None and counts[best] > 1 else None
 
 
-def _rates(rows: Sequence[Row], plan: Plan) -> "Figure":
+def _rates(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
     """Draw R_avg over the axis: a line for each scheme, a panel for each of the other values."""
     axis = _axis(rows)
     assert axis is not None
     others = [key for key in rows[0].values if key != axis]
-    panels: dict[str, list[Row]] = {}
+    panels: dict[str, list[StudyRow]] = {}
     for row in rows:
         panels.setdefault(_named({key: row.values[key] for key in others}), []).append(row)
     across = min(len(panels), 3)
@@ -96,7 +95,7 @@ def _rates(rows: Sequence[Row], plan: Plan) -> "Figure":
     return figure
 
 
-def _lines(plot: "Axes", rows: Sequence[Row], axis: str) -> None:
+def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str) -> None:
     """Draw mean and spread over seeds."""
     at = list(rows[0].values).index(axis)
     found = spreads(rows)
@@ -116,7 +115,7 @@ def _lines(plot: "Axes", rows: Sequence[Row], axis: str) -> None:
     plot.set_ylim(bottom=0)
 
 
-def _routes(rows: Sequence[Row], plan: Plan) -> "Figure":
+def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
     """Draw the routes on a map, a colour for each combination of values and scheme.
 
     Each is thinner than those before it, which can so be seen where they run together.

@@ -33,7 +33,7 @@ OVERRIDES: Mapping[str, Mapping[str, str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class StudyCase:
     """One row of a study before it has run.
 
     `values` are the varied keys in order, `text` the plan with them, the scheme and the seed put
@@ -132,7 +132,7 @@ def make_cases(
     schemes: Sequence[str] = ("faao",),
     seeds: int = 1,
     source: str = "plan",
-) -> tuple[Case, ...]:
+) -> tuple[StudyCase, ...]:
     """Return the grid of all values, schemes and seeds, in this order, the seeds fastest.
 
     `text` is a sound plan, `source` names it. Seeds count up from its `radio.seed`. Raises
@@ -153,7 +153,7 @@ def make_cases(
             # what is varied goes before what the scheme would have
             changed = _changed(data, chosen | changes | seeded)
             plan = yaml.safe_dump(changed, sort_keys=False)
-            made.append(Case(pairs, scheme, seed, plan, source))
+            made.append(StudyCase(pairs, scheme, seed, plan, source))
     return tuple(made)
 
 

@@ -207,7 +207,7 @@ def test_a_terminal_gets_tables(broken: Path) -> None:
     content = read_mission(broken)
     found = findings_of(content, Vehicle())
     console = Console(force_terminal=True, width=100, record=True, file=sys.stderr)
-    show(Verdict(broken, 3, Vehicle(), "asked", Check(LEVEL, "", None, found)), console)
+    show(Verdict(broken, "asked", Check(content, Vehicle(), LEVEL, findings=found)), console)
     show_rules(RULES, console)
     shown = console.export_text()
     assert "refused-on-upload" in shown
