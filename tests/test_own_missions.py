@@ -48,7 +48,7 @@ def complaints(found: Check) -> list[str]:
 @pytest.mark.parametrize("name", ["copter_relay", "paper", "paper_active"])
 def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
     text = (MISSIONS / f"{name}.yaml").read_text()
-    changes = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
+    changes: dict[str, Any] = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
     if name == "copter_relay":
         changes["radio.fading_samples"] = 4
     _, found = checked(text, SHORT | changes)

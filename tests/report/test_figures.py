@@ -128,9 +128,8 @@ def test_the_map_has_stations_waypoints_and_fence() -> None:
     numbers = {str(number) for number, item in items if item.command == 16}
     assert len(numbers) > 1
     assert {"base station", "user"} < names <= {"base station", "user"} | numbers
-    ring = next(line for line in axes.lines if line.get_linestyle() == "-" and
-                len(line.get_xdata()) > 20)  # fmt: skip
-    east, north = np.asarray(ring.get_xdata()), np.asarray(ring.get_ydata())
+    drawn = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "-"]
+    (east, north), *_ = [np.asarray(line).T for line in drawn if np.size(line) > 40]
     np.testing.assert_allclose(np.ptp(east), 10.0, rtol=1e-3)
     np.testing.assert_allclose(north.mean(), 0.0002 * 110_950, rtol=0.05)  # m per degree
 

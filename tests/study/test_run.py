@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -93,7 +93,8 @@ def test_processes_do_not_change_the_result(whole: tuple[Path, tuple[StudyRow, .
 
 def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     local = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": None}
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, **local) as cluster:
+    start: Any = LocalCluster
+    with start(n_workers=1, threads_per_worker=1, processes=False, **local) as cluster:
         rows = run_study(CASES, cluster=cluster.scheduler_address)
     assert timeless(rows) == timeless(whole[1])
 
@@ -194,7 +195,11 @@ def test_there_are_no_more_processes_than_cases(monkeypatch: pytest.MonkeyPatch)
     def undo(work: Iterable[tuple[Any, Any, Any]]) -> list[StudyRow]:
         return [call(*arguments, **named) for call, arguments, named in work]
 
-    monkeypatch.setattr("joblib.Parallel", lambda n_jobs, **_: asked.append(n_jobs) or undo)
+    def parallel(n_jobs: int, **_: object) -> Callable[..., list[StudyRow]]:
+        asked.append(n_jobs)
+        return undo
+
+    monkeypatch.setattr("joblib.Parallel", parallel)
     run_study(CASES, jobs=100_000)
     assert asked == [len(CASES)]
 
