@@ -2,12 +2,11 @@
 
 import math
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.shared import SigningKey, exit_status
+from faao_mav.cli.shared import File, SigningKey, exit_status, option
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,9 +22,9 @@ _REST = 0.5  # s without a change, after which a list is told
 def autopilot(
     listen: Annotated[
         str,
-        typer.Option(
-            metavar="CONNECTION",
-            help="Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
+        option(
+            "CONNECTION",
+            "Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
             "udpout:HOST:PORT to call one.",
         ),
     ] = "udpin:127.0.0.1:14550",
@@ -37,32 +36,22 @@ def autopilot(
         Literal["copter", "plane"],
         typer.Option("--type", help="What it flies: a copter, or with ardupilot a plane."),
     ] = "copter",
-    system: Annotated[int, typer.Option(min=1, max=255, metavar="N", help="Its number.")] = 1,
+    system: Annotated[int, option("N", "Its number.", min=1, max=255)] = 1,
     home: Annotated[
-        str, typer.Option(metavar="LAT,LON,ALT", help="Where it stands: degrees, m AMSL.")
+        str, option("LAT,LON,ALT", "Where it stands: degrees, m AMSL.")
     ] = "-35.363262,149.165237,584",
     parameters: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Its parameters: it flies by them; without: defaults."),
+        File, option("FILE", "Its parameters: it flies by them; without: defaults.")
     ] = None,
-    speedup: Annotated[
-        float, typer.Option(min=0.01, metavar="X", help="Fly X times as fast as predicted.")
-    ] = 1.0,
-    boot: Annotated[float, typer.Option(min=0.0, metavar="S", help="Boot for S seconds.")] = 0.0,
-    drop: Annotated[
-        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Lose packets, both ways.")
-    ] = 0.0,
-    duplicate: Annotated[
-        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Repeat packets.")
-    ] = 0.0,
-    corrupt: Annotated[
-        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Damage packets.")
-    ] = 0.0,
+    speedup: Annotated[float, option("X", "Fly X times as fast as predicted.", min=0.01)] = 1.0,
+    boot: Annotated[float, option("S", "Boot for S seconds.", min=0)] = 0.0,
+    drop: Annotated[float, option("P", "Lose packets, both ways.", min=0, max=1)] = 0.0,
+    duplicate: Annotated[float, option("P", "Repeat packets.", min=0, max=1)] = 0.0,
+    corrupt: Annotated[float, option("P", "Damage packets.", min=0, max=1)] = 0.0,
     delay: Annotated[
-        float,
-        typer.Option(min=0.0, metavar="S", help="Delay every other packet by up to S seconds."),
+        float, option("S", "Delay every other packet by up to S seconds.", min=0)
     ] = 0.0,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of what the link does.")] = 0,
+    seed: Annotated[int, option("N", "Of what the link does.")] = 0,
     signing_key: SigningKey = None,
 ) -> None:
     """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.

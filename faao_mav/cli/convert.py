@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from faao_mav.cli.shared import AsJson, exit_status, note
+from faao_mav.cli.shared import AsJson, exit_status, note, option
 from faao_mav.files import check_apart, check_writable, write_whole
 
 Autopilot = Literal["ardupilot", "px4"]
@@ -19,7 +19,7 @@ def convert(
     ],
     out: Annotated[
         Path,
-        typer.Option(metavar="OTHER", help="What to write: .waypoints, .txt, .plan or .kml."),
+        option("OTHER", "What to write: .waypoints, .txt, .plan or .kml."),
     ],
     autopilot: Annotated[
         Autopilot | None,

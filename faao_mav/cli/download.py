@@ -6,19 +6,22 @@ from typing import Annotated
 
 import typer
 
-from faao_mav.cli.shared import Component, Log, SigningKey, System, Wait, exit_status, note
+from faao_mav.cli.shared import (
+    VEHICLE,
+    Component,
+    Log,
+    SigningKey,
+    System,
+    Wait,
+    exit_status,
+    note,
+    option,
+)
 
 
 def download(
-    source: Annotated[
-        str,
-        typer.Option(
-            "--from",
-            metavar="CONNECTION",
-            help="The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD.",
-        ),
-    ],
-    out: Annotated[Path, typer.Option(metavar="MISSION", help="Write the mission.")],
+    source: Annotated[str, option("CONNECTION", VEHICLE, "--from")],
+    out: Annotated[Path, option("MISSION", "Write the mission.")],
     system: System = None,
     component: Component = None,
     log: Log = None,

@@ -85,7 +85,8 @@ def show(verdict: Verdict, console: Console) -> None:
         f"parameters: {vehicle.source if vehicle.parameters else 'defaults'}",
     )
     for label, text in check_lines(check):
-        _line(console, f"{label}: {text}" if label else f"    {text}")
+        if label:  # what goes on without one stands in the findings too
+            _line(console, f"{label}: {text}")
     groups = list(by_rule(check.findings))
     if groups and console.is_terminal:
         table = _table("item", "rule", "what is the case, and what to do")

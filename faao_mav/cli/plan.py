@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from faao_mav.cli.shared import AllowArmed, AsJson, System, exit_status, note
+from faao_mav.cli.shared import AllowArmed, AsJson, File, System, exit_status, flag, note, option
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
@@ -22,43 +22,25 @@ if TYPE_CHECKING:
 def plan(
     plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
     out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MISSION",
-            help="Write the mission: .waypoints, .txt, .plan or .kml.",
-        ),
+        File, option("MISSION", "Write the mission: .waypoints, .txt, .plan or .kml.")
     ] = None,
-    save: Annotated[
-        Path | None,
-        typer.Option(metavar="RESULT.npz", help="Write trajectory, precoders and rates."),
-    ] = None,
+    save: Annotated[File, option("RESULT.npz", "Write trajectory, precoders and rates.")] = None,
     precoders: Annotated[
-        Path | None,
-        typer.Option(metavar="TABLE.csv", help="Write the precoders by time and position."),
+        File, option("TABLE.csv", "Write the precoders by time and position.")
     ] = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.html", help="Write a page about the flight."),
-    ] = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw the flight: .png, .svg or .pdf."),
-    ] = None,
+    report: Annotated[File, option("FILE.html", "Write a page about the flight.")] = None,
+    figure: Annotated[File, option("FILE", "Draw the flight: .png, .svg or .pdf.")] = None,
     upload: Annotated[
-        str | None,
-        typer.Option(metavar="CONNECTION", help="Upload the mission to a vehicle, and verify it."),
+        str | None, option("CONNECTION", "Upload the mission to a vehicle, and verify it.")
     ] = None,
     system: System = None,
     allow_armed: AllowArmed = False,
     method: Annotated[
-        str | None,
-        typer.Option(metavar="M", help="Replace optimizer.method: direct or algorithm1."),
+        str | None, option("M", "Replace optimizer.method: direct or algorithm1.")
     ] = None,
-    bound: Annotated[
-        bool, typer.Option("--bound", help="Also compute what no route can exceed.")
-    ] = False,
+    bound: Annotated[bool, flag("--bound", "Also compute what no route can exceed.")] = False,
     as_json: AsJson = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
 ) -> None:
     """Optimise a radio-relay flight and write it as a MAVLink mission.
 

@@ -3,34 +3,42 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import typer
 
 from faao_mav.errors import FaaoError, InputError
 
+
+def option(value: str, text: str, *names: str, **limits: Any) -> Any:
+    """Return an option: what its value is called in the help, and what the option does."""
+    return typer.Option(*names, metavar=value, help=text, **limits)
+
+
+def flag(name: str, text: str) -> Any:
+    """Return an option without a value: its name, and what it does."""
+    return typer.Option(name, help=text)
+
+
+VEHICLE = "The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD."
+
+Number: TypeAlias = float | None
+File: TypeAlias = Path | None
 System: TypeAlias = Annotated[
-    int | None, typer.Option(metavar="N", min=1, max=255, help="The vehicle's system number.")
+    int | None, option("N", "The vehicle's system number.", min=1, max=255)
 ]
 AllowArmed: TypeAlias = Annotated[
-    bool, typer.Option("--allow-armed", help="Replace the mission of an armed vehicle too.")
+    bool, flag("--allow-armed", "Replace the mission of an armed vehicle too.")
 ]
 Component: TypeAlias = Annotated[
-    int | None, typer.Option(metavar="N", min=1, max=255, help="The autopilot's component number.")
+    int | None, option("N", "The autopilot's component number.", min=1, max=255)
 ]
-Log: TypeAlias = Annotated[
-    Path | None, typer.Option(metavar="F.tlog", help="Write a log of the exchange.")
-]
-Wait: TypeAlias = Annotated[
-    float, typer.Option(metavar="S", min=0.1, help="How long to wait for the vehicle, s.")
-]
+Log: TypeAlias = Annotated[File, option("F.tlog", "Write a log of the exchange.")]
+Wait: TypeAlias = Annotated[float, option("S", "How long to wait for the vehicle, s.", min=0.1)]
 SigningKey: TypeAlias = Annotated[
-    Path | None,
-    typer.Option(metavar="F", help="File with the key for signed packets: 32 bytes, or in hex."),
+    File, option("F", "File with the key for signed packets: 32 bytes, or in hex.")
 ]
-AsJson: TypeAlias = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object instead of the text.")
-]
+AsJson: TypeAlias = Annotated[bool, flag("--json", "Print one JSON object instead of the text.")]
 
 
 @contextmanager

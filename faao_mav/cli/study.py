@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.shared import AsJson, exit_status, note
+from faao_mav.cli.shared import AsJson, File, exit_status, note, option
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,28 +21,21 @@ _INTERRUPTED = 130  # as a shell reports it
 def study(
     plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
     vary: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KEY=VALUES", help="start:stop:step or a,b,c; several make a grid."),
+        list[str] | None, option("KEY=VALUES", "start:stop:step or a,b,c; several make a grid.")
     ] = None,
-    power: Annotated[
-        str | None,
-        typer.Option(metavar="VALUES", help="Both powers, dBm: -40:0:5 or a,b,c."),
-    ] = None,
+    power: Annotated[str | None, option("VALUES", "Both powers, dBm: -40:0:5 or a,b,c.")] = None,
     schemes: Annotated[
-        str | None,
-        typer.Option(metavar="S,S", help="Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian."),
+        str | None, option("S,S", "Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian.")
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Draws of the fading, from radio.seed.")
+        int | None, option("N", "Draws of the fading, from radio.seed.", min=1)
     ] = None,
-    jobs: Annotated[int, typer.Option(metavar="N", help="Processes; -1: one a core.")] = -1,
+    jobs: Annotated[int, option("N", "Processes; -1: one a core.")] = -1,
     cluster: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="A Dask scheduler, tcp://host:port, not processes."),
+        str | None, option("ADDRESS", "A Dask scheduler, tcp://host:port, not processes.")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Keep rows there as they finish; go on where it ended."),
+        File, option("DIR", "Keep rows there as they finish; go on where it ended.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:

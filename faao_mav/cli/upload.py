@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from faao_mav.cli.shared import (
+    VEHICLE,
     AllowArmed,
     AsJson,
     Component,
@@ -16,6 +17,7 @@ from faao_mav.cli.shared import (
     System,
     Wait,
     exit_status,
+    option,
 )
 
 if TYPE_CHECKING:
@@ -26,13 +28,7 @@ if TYPE_CHECKING:
 
 def upload(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
-    to: Annotated[
-        str,
-        typer.Option(
-            metavar="CONNECTION",
-            help="The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD.",
-        ),
-    ],
+    to: Annotated[str, option("CONNECTION", VEHICLE)],
     as_json: AsJson = False,
     system: System = None,
     component: Component = None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.shared import AsJson, exit_status
+from faao_mav.cli.shared import AsJson, File, Number, exit_status, flag, option
 from faao_mav.errors import InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
 
 def validate(
     mission_file: Annotated[
-        Path | None, typer.Argument(metavar="MISSION", help="The mission: .waypoints or .plan.")
+        File, typer.Argument(metavar="MISSION", help="The mission: .waypoints or .plan.")
     ] = None,
     plan_file: Annotated[
-        Path | None,
-        typer.Option(
+        File,
+        option(
+            "PLAN.yaml",
+            "The plan: its vehicle, its limits, and the link that it is to deliver.",
             "--plan",
-            metavar="PLAN.yaml",
-            help="The plan: its vehicle, its limits, and the link that it is to deliver.",
         ),
     ] = None,
     solution_file: Annotated[
-        Path | None,
-        typer.Option(
+        File,
+        option(
+            "RESULT.npz",
+            "Instead of --plan: what --save wrote, with the plan in it, already solved.",
             "--solution",
-            metavar="RESULT.npz",
-            help="Instead of --plan: what --save wrote, with the plan in it, already solved.",
         ),
     ] = None,
     autopilot: Annotated[
@@ -45,29 +45,20 @@ def validate(
         Literal["copter", "plane"] | None, typer.Option("--type", help="What flies it.")
     ] = None,
     parameters: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.param",
-            help="The vehicle's parameters; without: those of the file of parameters beside "
-            "MISSION, if there is one.",
+        File,
+        option(
+            "FILE.param",
+            "The vehicle's parameters; without: those of the file of parameters beside MISSION, "
+            "if there is one.",
         ),
     ] = None,
-    max_duration: Annotated[
-        float | None, typer.Option(metavar="S", help="The longest flight, seconds.")
-    ] = None,
-    max_distance: Annotated[
-        float | None, typer.Option(metavar="M", help="The farthest from home, metres.")
-    ] = None,
-    max_altitude: Annotated[
-        float | None, typer.Option(metavar="M", help="The highest above home, metres.")
-    ] = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(metavar="PAGE.html", help="One page with map and findings."),
-    ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Warnings fail as well.")] = False,
+    max_duration: Annotated[Number, option("S", "The longest flight, seconds.")] = None,
+    max_distance: Annotated[Number, option("M", "The farthest from home, metres.")] = None,
+    max_altitude: Annotated[Number, option("M", "The highest above home, metres.")] = None,
+    report: Annotated[File, option("PAGE.html", "One page with map and findings.")] = None,
+    strict: Annotated[bool, flag("--strict", "Warnings fail as well.")] = False,
     as_json: AsJson = False,
-    rules: Annotated[bool, typer.Option("--rules", help="List the rules and stop.")] = False,
+    rules: Annotated[bool, flag("--rules", "List the rules and stop.")] = False,
 ) -> None:
     """Check a mission before anyone walks to the field.
 
@@ -118,9 +109,9 @@ def _check_options(
     limits: "tuple[float | None, float | None, float | None]", report: Path | None
 ) -> None:
     """Refuse limits that are none, and a page that cannot be written, before the work."""
-    for option, value in zip(("duration", "distance", "altitude"), limits, strict=True):
+    for name, value in zip(("duration", "distance", "altitude"), limits, strict=True):
         if value is not None and not (math.isfinite(value) and value > 0):
-            raise InputError(f"--max-{option} {value:g}: expected a number above 0")
+            raise InputError(f"--max-{name} {value:g}: expected a number above 0")
     check_ending(report, "--report", *PAGES)
     if report is not None:
         check_writable(report)
