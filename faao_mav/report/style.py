@@ -69,14 +69,16 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float = 5.4, height: float = 3.4) -> "Figure":
-    """Return an empty figure of so many inches."""
+@contextmanager
+def drawing(width: float, height: float) -> Iterator["Figure"]:
+    """Give an empty figure of `width` by `height` inches, to be drawn within this."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+    with styled():
+        figure = Figure(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
 
 
 def label(axes: "Axes", title: str, x: str, y: str) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
-from faao_mav.report.style import MARKERS, SERIES, label, mark_stations, new_figure, styled
+from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
 from faao_mav.study.rows import StudyRow, spreads
 from faao_mav.study.sweep import OVERRIDES, Value
 
@@ -54,8 +54,7 @@ def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     """
     if not can_draw(rows, kind):
         raise InputError("nothing to draw: no result, or no key varied over two numbers or more")
-    with styled():
-        return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan)
+    return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan)
 
 
 def _axis(rows: Sequence[StudyRow]) -> str | None:
@@ -80,18 +79,19 @@ def _rates(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
     across = min(len(panels), 3)
     down = -(-len(panels) // across)
     width = 5.4 if across == 1 else 3.3 * across
-    figure = new_figure(width, 0.5 + (3.4 if across == 1 else 2.9) * down)
-    grid = figure.subplots(down, across, squeeze=False, sharex=True)
-    plots = list(grid.flat)
-    for plot, (name, inside) in zip(plots, panels.items(), strict=False):
-        _lines(plot, inside, axis)
-        title = name or plan.name or "rate by scheme"
-        label(plot, title, _AXES.get(axis, axis), "rate R_avg, bit/s/Hz")
-        plot.tick_params(labelbottom=True)  # the plot beneath may be none
-    for plot in plots[len(panels) :]:
-        plot.remove()
-    handles, labels = plots[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
+    height = 0.5 + (3.4 if across == 1 else 2.9) * down
+    with drawing(width, height) as figure:
+        grid = figure.subplots(down, across, squeeze=False, sharex=True)
+        plots = list(grid.flat)
+        for plot, (name, inside) in zip(plots, panels.items(), strict=False):
+            _lines(plot, inside, axis)
+            title = name or plan.name or "rate by scheme"
+            label(plot, title, _AXES.get(axis, axis), "rate R_avg, bit/s/Hz")
+            plot.tick_params(labelbottom=True)  # the plot beneath may be none
+        for plot in plots[len(panels) :]:
+            plot.remove()
+        handles, labels = plots[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
     return figure
 
 
@@ -120,33 +120,33 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
 
     Each is thinner than those before it, which can so be seen where they run together.
     """
-    figure = new_figure(5.4, 4.9)
-    plot = figure.subplots()
-    several = len({row.scheme for row in rows}) > 1
-    colours: dict[str, str] = {}
-    for row in rows:
-        if not row.route:
-            continue
-        name = _named(row.values)
-        if several or not name:
-            name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
-        east, north = zip(*row.route, strict=True)
-        new = name not in colours
-        colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
-        width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
-        plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
-    radio, flight = plan.radio, plan.flight
-    places = (
-        ("base station", radio.base_station.position, "s"),
-        ("user", radio.ground_user.position, "^"),
-        ("start", flight.start, "o"),
-        ("end", flight.end, "o"),
-    )
-    mark_stations(plot, places)
-    plot.set_aspect("equal", adjustable="datalim")
-    plot.margins(0.1)
-    label(plot, plan.name or "routes", "east, m", "north, m")
-    figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
+    with drawing(5.4, 4.9) as figure:
+        plot = figure.subplots()
+        several = len({row.scheme for row in rows}) > 1
+        colours: dict[str, str] = {}
+        for row in rows:
+            if not row.route:
+                continue
+            name = _named(row.values)
+            if several or not name:
+                name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
+            east, north = zip(*row.route, strict=True)
+            new = name not in colours
+            colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
+            width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
+            plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
+        radio, flight = plan.radio, plan.flight
+        places = (
+            ("base station", radio.base_station.position, "s"),
+            ("user", radio.ground_user.position, "^"),
+            ("start", flight.start, "o"),
+            ("end", flight.end, "o"),
+        )
+        mark_stations(plot, places)
+        plot.set_aspect("equal", adjustable="datalim")
+        plot.margins(0.1)
+        label(plot, plan.name or "routes", "east, m", "north, m")
+        figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
     return figure
 
 
