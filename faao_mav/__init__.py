@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from faao_mav.mission import MissionItem as MissionItem
     from faao_mav.mission.formats import read_mission as read_mission
     from faao_mav.mission.formats import render_mission as render_mission
-    from faao_mav.mission.vehicle import Vehicle as Vehicle
     from faao_mav.optimizer.optimize import optimize as optimize
     from faao_mav.optimizer.pricing import price as price
     from faao_mav.optimizer.pricing import saturation as saturation
@@ -34,10 +33,11 @@ if TYPE_CHECKING:
     from faao_mav.validate import LinkCheck as LinkCheck
     from faao_mav.validate.check import Check as Check
     from faao_mav.validate.check import check as check
+    from faao_mav.vehicle import Track as Track
+    from faao_mav.vehicle import Vehicle as Vehicle
     from faao_mav.vehicle.parameter_file import read_parameters as read_parameters
     from faao_mav.vehicle.parameter_file import render_parameters as render_parameters
     from faao_mav.vehicle.predict import predict as predict
-    from faao_mav.vehicle.track import Track as Track
     from faao_mav.workflow import Result as Result
     from faao_mav.workflow import plan_mission as plan_mission
 
@@ -46,7 +46,6 @@ _HOMES = {
     "mavlink": "download upload",
     "mission": "Mission MissionItem",
     "mission.formats": "read_mission render_mission",
-    "mission.vehicle": "Vehicle",
     "optimizer.optimize": "optimize",
     "optimizer.pricing": "price saturation",
     "optimizer.solution": "Solution load_solution save_solution",
@@ -54,9 +53,9 @@ _HOMES = {
     "schedule": "Conversion convert",
     "validate": "Finding Limits LinkCheck",
     "validate.check": "Check check",
+    "vehicle": "Track Vehicle",
     "vehicle.parameter_file": "read_parameters render_parameters",
     "vehicle.predict": "predict",
-    "vehicle.track": "Track",
     "workflow": "Result plan_mission",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}

@@ -30,7 +30,6 @@ from faao_mav.schedule.convert import Conversion, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
-from faao_mav.vehicle import caveat
 from faao_mav.vehicle.parameter_file import parameter_path, render_parameters
 from faao_mav.vehicle.predict import predict
 from faao_mav.vehicle.recommend import candidates
@@ -159,7 +158,7 @@ class Result:
                 "max_path_error": flown.max_path_error,
                 "max_position_error": flown.max_position_error,
                 "rms_position_error": flown.rms_position_error,
-                "calibrated": not caveat(conversion.vehicle),
+                "calibrated": not conversion.vehicle.type.caveat,
             }
             if conversion and flown
             else None,

@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from faao_mav.mission.vehicle import AUTOPILOT_NAMES
 from faao_mav.report.summary import (
     by_rule,
     check_lines,
@@ -20,7 +19,6 @@ from faao_mav.report.summary import (
 )
 from faao_mav.validate import Level, Rule
 from faao_mav.validate.check import Check
-from faao_mav.vehicle import caveat
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
 
@@ -42,7 +40,7 @@ def as_dict(verdict: Verdict) -> dict[str, Any]:
     check, vehicle = verdict.check, verdict.check.vehicle
     predicted = None
     if check.track is not None:
-        predicted = {"duration": float(check.track.t[-1]), "calibrated": not caveat(vehicle)}
+        predicted = {"duration": float(check.track.t[-1]), "calibrated": not vehicle.type.caveat}
     return {
         "mission": str(verdict.source),
         "items": len(check.mission.items),
@@ -81,7 +79,7 @@ def show(verdict: Verdict, console: Console) -> None:
     _line(
         console,
         f"{verdict.source}: {len(check.mission.items)} items, for "
-        f"{AUTOPILOT_NAMES[vehicle.autopilot]} and a {vehicle.kind} ({verdict.chosen_by}); "
+        f"{vehicle.type.family.name} and a {vehicle.kind} ({verdict.chosen_by}); "
         f"parameters: {vehicle.source if vehicle.parameters else 'defaults'}",
     )
     for label, text in check_lines(check):

@@ -14,8 +14,8 @@ from faao_mav.files import PAGES, check_apart, check_ending, check_writable, wri
 
 if TYPE_CHECKING:
     from faao_mav.cli.findings import Verdict
-    from faao_mav.mission.vehicle import Autopilot, Kind
     from faao_mav.optimizer.solution import Solution
+    from faao_mav.plan.autopilots import Autopilot, Kind
 
 
 def validate(
@@ -145,14 +145,13 @@ def _judge(
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.validate import Limits
     from faao_mav.validate.check import check
-    from faao_mav.vehicle import flight_model, modelled
 
     plan = solution.plan if solution is not None else None
     limits = Limits(*given, max_speed=plan.vehicle.max_speed if plan is not None else None)
     file = read_mission_file(mission_file)
     vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
-    if modelled(vehicle):
-        flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement
+    if vehicle.type.flight_model is not None:
+        vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement
     found = check(file.mission, vehicle, limits=limits, solution=solution)
     return Verdict(mission_file, chosen_by, found)
 

@@ -21,7 +21,7 @@ from faao_mav.report.style import MUTED, SERIES, drawing, label, legend_above
 from faao_mav.schedule.convert import Conversion
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.vector import lengths
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,6 @@ from typing import TypeAlias
 
 from faao_mav.validate.check import Check
 from faao_mav.validate.finding import Finding, Level
-from faao_mav.vehicle import caveat
 from faao_mav.workflow import Result
 
 Line: TypeAlias = tuple[str, str]
@@ -90,7 +89,7 @@ def _flown(result: Result) -> Iterator[Line]:
         f"{flown.duration:.1f} s (planned: {result.solution.plan.flight.duration:g} s)",
     )
     yield "", _apart(flown.rms_position_error, flown.max_position_error, flown.max_path_error)
-    if doubt := caveat(conversion.vehicle):
+    if doubt := conversion.vehicle.type.caveat:
         yield "", doubt
 
 
@@ -99,7 +98,7 @@ def check_lines(check: Check) -> Iterator[Line]:
     if check.track is None:
         yield "flight not predicted", check.unpredicted
     else:
-        doubt = caveat(check.vehicle)
+        doubt = check.vehicle.type.caveat
         lasting = f"{check.track.t[-1]:.0f} s"
         yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
     if link := check.link:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.track import Track
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def check(
     be predicted is judged by its items alone; nothing is raised.
 
     >>> from faao_mav.mission import Mission, MissionItem
-    >>> from faao_mav.mission.vehicle import Vehicle
+    >>> from faao_mav.vehicle import Vehicle
     >>> land = MissionItem(command=21, frame=3, x=47.4, y=8.5)
     >>> found = check(Mission(items=(land,)), Vehicle("px4"))
     >>> [finding.rule for finding in found.of(Level.ERROR)]
