@@ -26,7 +26,7 @@ from faao_mav.optimizer.progress import Observer, Progress
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
-from faao_mav.schedule.convert import Conversion, convert
+from faao_mav.schedule.convert import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
@@ -229,6 +229,7 @@ def _with_mission(result: Result) -> Result:
     """Return `result` with its mission, or with why there is none."""
     solution = result.solution
     try:
+        check_vehicle(solution.plan)
         conversion = convert(solution)
     except FaaoError as error:
         return replace(result, no_mission=error)
@@ -262,7 +263,7 @@ def mission_files(path: str | Path, plan: Plan) -> tuple[Path, ...]:
         if beginning != f"# {_HEADER}".encode():
             raise InputError(
                 f"{beside}: the mission's parameters are to go there, but it is not of an earlier "
-                "run; rename it, or give --out another name"
+                "run; rename it, or give the mission another name"
             )
     return mission, beside
 

@@ -19,6 +19,7 @@ from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.plan.autopilots import autopilots, types
 from faao_mav.vehicle.parameter_file import read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -289,3 +290,25 @@ def test_without_a_mission_there_is_a_result_where_none_is_asked_for(
     assert asked.exit_code == 1
     assert "mission.max_items" in asked.stderr
     assert asked.stdout == ""
+
+
+def test_a_plane_that_flies_at_no_such_speed_is_planned_but_gets_no_mission(
+    plan: Path, out: Path
+) -> None:
+    text = (MISSIONS / "plane_relay.yaml").read_text()
+    changes = {"vehicle.max_speed": 60, "radio.fading": "none", "flight.time_step": 1}
+    plan.write_text(edited(text, changes))
+    refused = run(plan, "--out", out)
+    assert refused.exit_code == 2
+    assert "vehicle.max_speed: 60 m/s; the plane flies" in refused.stderr
+    told = run(plan)
+    assert told.exit_code == 0
+    assert "mission      none: " in told.stdout
+    assert "vehicle.max_speed: 60 m/s; the plane flies" in told.stdout
+    plan.write_text(edited(text, {"vehicle.parameters": {"AIRSPEED_MIN": -1}}))
+    assert run(plan).exit_code == 2  # a value of no use is not information
+
+
+def test_the_help_names_every_autopilot_and_type_that_is_known() -> None:
+    shown = run("validate", "--help").stdout
+    assert all(name in shown for name in (*autopilots(), *types()))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.shared import File, SigningKey, exit_status, option
+from faao_mav.cli.shared import File, SigningKey, check_known, exit_status, option
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.mock import MockAutopilot
     from faao_mav.mavlink.transfer.protocol import MissionType
     from faao_mav.mission.item import Home
-    from faao_mav.plan.autopilots import Autopilot
 
 _REST = 0.5  # s without a change, after which a list is told
 
@@ -33,8 +32,7 @@ def autopilot(
         typer.Option(help="Whose manners it has."),
     ] = "ardupilot",
     aircraft: Annotated[
-        Literal["copter", "plane"],
-        typer.Option("--type", help="What it flies: a copter, or with ardupilot a plane."),
+        str, option("NAME", "What it flies: a copter, or with ardupilot a plane.", "--type")
     ] = "copter",
     system: Annotated[int, option("N", "Its number.", min=1, max=255)] = 1,
     home: Annotated[
@@ -65,14 +63,14 @@ def autopilot(
         from faao_mav.mavlink.runner import predicted, serve
         from faao_mav.mavlink.transfer.protocol import Address
         from faao_mav.mavlink.transport import open_transport
-        from faao_mav.vehicle import Vehicle, flight_model
+        from faao_mav.vehicle import Vehicle
         from faao_mav.vehicle.parameter_file import read_parameters
 
         values = {} if parameters is None else read_parameters(parameters)
-        flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"
-        source = str(parameters or "parameters")
-        vehicle = Vehicle(flown_by, aircraft, values, source)
-        flight_model(vehicle)  # useless parameters are refused here, not in flight
+        check_known(None, aircraft)
+        flown_by = kind.partition("-")[0]  # whose manners, in whatever mood
+        vehicle = Vehicle(flown_by, aircraft, values, str(parameters or "parameters"))
+        vehicle.flight_model()  # useless parameters are refused here, not in flight
         mock = MockAutopilot(
             manners_of(kind),
             aircraft=aircraft,

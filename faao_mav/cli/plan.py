@@ -139,11 +139,15 @@ def _solve(
     from faao_mav.cli.progress import optimizer_progress
     from faao_mav.plan import read_plan
     from faao_mav.schedule.convert import check_vehicle
+    from faao_mav.vehicle import vehicle_of
     from faao_mav.workflow import plan_mission
 
     started = time.perf_counter()
     plan = read_plan(plan_file, method=method)
-    check_vehicle(plan)
+    if files.out is not None or upload is not None:
+        check_vehicle(plan)
+    else:
+        vehicle_of(plan).flight_model()  # what is useless is refused, what is not flown is told
     files.check(plan, plan_file)
     if upload is not None:
         from faao_mav.mavlink.transport import parse_connection

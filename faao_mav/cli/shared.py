@@ -38,6 +38,12 @@ Wait: TypeAlias = Annotated[float, option("S", "How long to wait for the vehicle
 SigningKey: TypeAlias = Annotated[
     File, option("F", "File with the key for signed packets: 32 bytes, or in hex.")
 ]
+Whose: TypeAlias = Annotated[
+    str | None, option("NAME", "Whose mission it is: ardupilot or px4.", "--autopilot")
+]
+Aircraft: TypeAlias = Annotated[
+    str | None, option("NAME", "What flies it: copter or plane.", "--type")
+]
 AsJson: TypeAlias = Annotated[bool, flag("--json", "Print one JSON object instead of the text.")]
 
 
@@ -52,6 +58,15 @@ def exit_status() -> Iterator[None]:
     except FaaoError as error:
         note(str(error))
         raise typer.Exit(2 if isinstance(error, InputError) else 1) from None
+
+
+def check_known(autopilot: str | None, kind: str | None) -> None:
+    """Raise `InputError` for --autopilot or --type of which no vehicle is known."""
+    from faao_mav.plan.autopilots import autopilots, types
+
+    for name, value, known in (("autopilot", autopilot, autopilots()), ("type", kind, types())):
+        if value is not None and value not in known:
+            raise InputError(f"--{name} {value}: expected {' or '.join(known)}")
 
 
 def note(message: str) -> None:

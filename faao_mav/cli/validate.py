@@ -4,11 +4,21 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from faao_mav.cli.shared import AsJson, File, Number, exit_status, flag, option
+from faao_mav.cli.shared import (
+    Aircraft,
+    AsJson,
+    File,
+    Number,
+    Whose,
+    check_known,
+    exit_status,
+    flag,
+    option,
+)
 from faao_mav.errors import InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
@@ -38,12 +48,8 @@ def validate(
             "--solution",
         ),
     ] = None,
-    autopilot: Annotated[
-        Literal["ardupilot", "px4"] | None, typer.Option(help="Whose mission it is.")
-    ] = None,
-    kind: Annotated[
-        Literal["copter", "plane"] | None, typer.Option("--type", help="What flies it.")
-    ] = None,
+    autopilot: Whose = None,
+    kind: Aircraft = None,
     parameters: Annotated[
         File,
         option(
@@ -80,6 +86,7 @@ def validate(
             raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
         if plan_file is not None and solution_file is not None:
             raise InputError("--plan and --solution: give one; the solution has its plan in it")
+        check_known(autopilot, kind)
         _check_options((max_duration, max_distance, max_altitude), report)
         read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
         check_apart({"--report": report}, read)
