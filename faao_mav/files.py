@@ -4,7 +4,7 @@ import contextlib
 import os
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from faao_mav.errors import InputError
@@ -61,9 +61,9 @@ PAGES = (".html", ".htm")
 """What the name of a page may end in."""
 
 
-def check_ending(path: Path | None, option: str, *endings: str) -> None:
+def check_ending(path: Path, option: str, endings: Sequence[str] | None) -> None:
     """Raise `InputError` where `option` has a `path` that ends in none of `endings`."""
-    if path is not None and path.suffix not in endings:
+    if endings is not None and path.suffix not in endings:
         raise InputError(f"{option} {path}: give a name that ends in {', '.join(endings)}")
 
 

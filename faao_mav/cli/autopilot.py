@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _REST = 0.5  # s without a change, after which a list is told
 
 
+@exit_status()
 def autopilot(
     listen: Annotated[
         str,
@@ -56,49 +57,48 @@ def autopilot(
 
     It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
     """
-    with exit_status():
-        from faao_mav.mavlink.codec import read_key
-        from faao_mav.mavlink.faults import Faults
-        from faao_mav.mavlink.mock import MockAutopilot, manners_of
-        from faao_mav.mavlink.runner import predicted, serve
-        from faao_mav.mavlink.transfer.protocol import Address
-        from faao_mav.mavlink.transport import open_transport
-        from faao_mav.vehicle import Vehicle
-        from faao_mav.vehicle.parameter_file import read_parameters
+    from faao_mav.mavlink.codec import read_key
+    from faao_mav.mavlink.faults import Faults
+    from faao_mav.mavlink.mock import MockAutopilot, manners_of
+    from faao_mav.mavlink.runner import predicted, serve
+    from faao_mav.mavlink.transfer.protocol import Address
+    from faao_mav.mavlink.transport import open_transport
+    from faao_mav.vehicle import Vehicle
+    from faao_mav.vehicle.parameter_file import read_parameters
 
-        values = {} if parameters is None else read_parameters(parameters)
-        check_known(None, aircraft)
-        flown_by = kind.partition("-")[0]  # whose manners, in whatever mood
-        vehicle = Vehicle(flown_by, aircraft, values, str(parameters or "parameters"))
-        vehicle.flight_model()  # useless parameters are refused here, not in flight
-        mock = MockAutopilot(
-            manners_of(kind),
-            aircraft=aircraft,
-            address=Address(system, 1),
-            home=read_home(home),
-            fly=predicted(vehicle),
-            parameters=values,
-            speedup=speedup,
-            boot=boot,
-        )
-        faults = Faults(
-            loss=drop,
-            duplication=duplicate,
-            corruption=corrupt,
-            reordering=0.5 if delay else 0.0,
-            delay=delay,
-            latency=0.0,
-            seed=seed,
-        )
-        key = None if signing_key is None else read_key(signing_key)
-        transport = open_transport(listen)
-        typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
-        diary = Diary()
-        try:
-            serve(mock, transport, faults=faults, key=key, observe=diary)
-        except KeyboardInterrupt:
-            diary.finish()
-            typer.echo("ended")
+    values = {} if parameters is None else read_parameters(parameters)
+    check_known(None, aircraft)
+    flown_by = kind.partition("-")[0]  # whose manners, in whatever mood
+    vehicle = Vehicle(flown_by, aircraft, values, str(parameters or "parameters"))
+    vehicle.flight_model()  # useless parameters are refused here, not in flight
+    mock = MockAutopilot(
+        manners_of(kind),
+        aircraft=aircraft,
+        address=Address(system, 1),
+        home=read_home(home),
+        fly=predicted(vehicle),
+        parameters=values,
+        speedup=speedup,
+        boot=boot,
+    )
+    faults = Faults(
+        loss=drop,
+        duplication=duplicate,
+        corruption=corrupt,
+        reordering=0.5 if delay else 0.0,
+        delay=delay,
+        latency=0.0,
+        seed=seed,
+    )
+    key = None if signing_key is None else read_key(signing_key)
+    transport = open_transport(listen)
+    typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
+    diary = Diary()
+    try:
+        serve(mock, transport, faults=faults, key=key, observe=diary)
+    except KeyboardInterrupt:
+        diary.finish()
+        typer.echo("ended")
 
 
 class Diary:

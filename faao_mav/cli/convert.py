@@ -10,6 +10,7 @@ from faao_mav.cli.shared import AsJson, Whose, check_known, exit_status, note, o
 from faao_mav.files import check_apart, check_writable, write_whole
 
 
+@exit_status()
 def convert(
     mission_file: Annotated[
         Path, typer.Argument(metavar="MISSION", help="The mission: .waypoints, .txt or .plan.")
@@ -24,11 +25,6 @@ def convert(
 
     Exit status: 0 done; 2 unusable arguments or input.
     """
-    with exit_status():
-        _run(mission_file, out, autopilot, as_json)
-
-
-def _run(mission_file: Path, out: Path, autopilot: str | None, as_json: bool) -> None:
     from faao_mav.mission.formats import (
         check_readable,
         check_suffix,

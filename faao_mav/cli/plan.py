@@ -3,7 +3,7 @@
 import json
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from faao_mav.workflow import Result
 
 
+@exit_status()
 def plan(
     plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
     out: Annotated[
@@ -52,88 +53,37 @@ def plan(
     validation found errors, or it is not known to be on the vehicle; 2 unusable arguments or
     input.
     """
-    with exit_status():
-        if upload is None and (system is not None or allow_armed):
-            option = "--allow-armed" if system is None else f"--system {system}"
-            raise InputError(f"{option}: is for an upload; give --upload CONNECTION too")
-        files = _Files(out, save, precoders, report, figure)
-        shown = sys.stderr.isatty() and not quiet
-        result, written = _solve(plan_file, files, upload, method, bound, shown)
-        to_fly = out is not None or upload is not None
-        if to_fly and result.no_mission is not None:
-            raise result.no_mission
-        sound = not to_fly or _sound(result)
-        uploaded, failure = None, None
-        if upload is not None and sound:
-            try:
-                uploaded = _upload(result, upload, system, allow_armed, shown)
-            except FaaoError as error:  # told after the result
-                failure = error
-        if not quiet or as_json:
-            _show(result, written, uploaded, as_json)
-        if failure is not None:
-            raise failure
-        if not sound or (uploaded is not None and not uploaded.verified):
-            raise typer.Exit(1)
-
-
-@dataclass(frozen=True, slots=True)
-class _Files:
-    """What is to be written; None: nothing."""
-
-    out: Path | None
-    save: Path | None
-    precoders: Path | None
-    report: Path | None
-    figure: Path | None
-
-    def check(self, plan: "Plan", plan_file: Path) -> None:
-        """Raise `InputError` for a file that cannot be written, before the work."""
-        from faao_mav.report.style import FORMATS
-        from faao_mav.workflow import mission_files
-
-        beside = mission_files(self.out, plan)[1:] if self.out is not None else ()
-        check_ending(self.save, "--save", ".npz")
-        check_ending(self.report, "--report", *PAGES)
-        check_ending(self.figure, "--figure", *FORMATS)
-        named = {
-            "--out": self.out,
-            "the parameters of --out,": next(iter(beside), None),
-            "--save": self.save,
-            "--precoders": self.precoders,
-            "--report": self.report,
-            "--figure": self.figure,
-        }
-        for path in filter(None, named.values()):
-            check_writable(path)
-        check_apart(named, {"PLAN.yaml": plan_file})
-
-    def write(self, result: "Result") -> list[Path]:
-        """Write all files and return their paths; a mission that there is not raises."""
-        solution, conversion = result.solution, result.conversion
-        if self.save is not None:
-            from faao_mav.optimizer.solution import save_solution
-
-            save_solution(solution, self.save, conversion.schedule.track() if conversion else None)
-        if self.precoders is not None:
-            from faao_mav.schedule.precoder_table import precoder_table
-
-            write_whole(self.precoders, precoder_table(solution).encode())
-        if self.report is not None:
-            from faao_mav.report import render_report
-
-            write_whole(self.report, render_report(result).encode())
-        if self.figure is not None:
-            from faao_mav.report.figures import flight_figure
-            from faao_mav.report.style import save_figure
-
-            save_figure(flight_figure(solution, conversion, result.prediction), self.figure)
-        mission = result.write(self.out) if self.out is not None else ()
-        return [*mission, *filter(None, (self.save, self.precoders, self.report, self.figure))]
+    if upload is None and (system is not None or allow_armed):
+        given = "--allow-armed" if system is None else f"--system {system}"
+        raise InputError(f"{given}: is for an upload; give --upload CONNECTION too")
+    files = {"--save": save, "--precoders": precoders, "--report": report, "--figure": figure}
+    shown = sys.stderr.isatty() and not quiet
+    to_fly = out is not None or upload is not None
+    result, written = _solve(plan_file, (out, files), upload, method, bound, shown)
+    if to_fly and result.no_mission is not None:
+        raise result.no_mission
+    sound = not to_fly or _sound(result)
+    uploaded, failure = None, None
+    if upload is not None and sound:
+        try:
+            uploaded = _upload(result, upload, system, allow_armed, shown)
+        except FaaoError as error:  # told after the result
+            failure = error
+    if not quiet or as_json:
+        _show(result, written, uploaded, as_json)
+    if failure is not None:
+        raise failure
+    if not sound or (uploaded is not None and not uploaded.verified):
+        raise typer.Exit(1)
 
 
 def _solve(
-    plan_file: Path, files: _Files, upload: str | None, method: str | None, bound: bool, shown: bool
+    plan_file: Path,
+    targets: tuple[Path | None, dict[str, Path | None]],
+    upload: str | None,
+    method: str | None,
+    bound: bool,
+    shown: bool,
 ) -> "tuple[Result, list[Path]]":
     """Return the result of the plan, and the files that are written."""
     from faao_mav.cli.progress import optimizer_progress
@@ -144,19 +94,65 @@ def _solve(
 
     started = time.perf_counter()
     plan = read_plan(plan_file, method=method)
-    if files.out is not None or upload is not None:
+    out, files = targets
+    if out is not None or upload is not None:
         check_vehicle(plan)
     else:
         vehicle_of(plan).flight_model()  # what is useless is refused, what is not flown is told
-    files.check(plan, plan_file)
+    _check_files(plan, plan_file, out, files)
     if upload is not None:
         from faao_mav.mavlink.transport import parse_connection
 
         parse_connection(upload)
     with optimizer_progress(shown=shown) as observe:
         result = plan_mission(plan, bound=bound, observe=observe)
-        written = files.write(result)
-    return replace(result, seconds_total=time.perf_counter() - started), written
+        for name, path in files.items():
+            if path is not None:
+                _write(result, name, path)
+        mission = result.write(out) if out is not None else ()
+    result = replace(result, seconds_total=time.perf_counter() - started)
+    return result, [*mission, *filter(None, files.values())]
+
+
+def _check_files(
+    plan: "Plan", plan_file: Path, out: Path | None, files: dict[str, Path | None]
+) -> None:
+    """Raise `InputError` for a file that cannot be written, before the work."""
+    from faao_mav.report.style import FORMATS
+    from faao_mav.workflow import mission_files
+
+    beside = mission_files(out, plan)[1:] if out is not None else ()
+    endings = {"--save": (".npz",), "--report": PAGES, "--figure": FORMATS}
+    for name, path in files.items():
+        if path is not None:
+            check_ending(path, name, endings.get(name))
+            check_writable(path)
+    parameters = next(iter(beside), None)
+    named = {"--out": out, "the parameters of --out,": parameters, **files}
+    check_apart(named, {"PLAN.yaml": plan_file})
+
+
+def _write(result: "Result", option: str, path: Path) -> None:
+    """Write what `option` asks for to `path`."""
+    solution, conversion = result.solution, result.conversion
+    match option:
+        case "--save":
+            from faao_mav.optimizer.solution import save_solution
+
+            save_solution(solution, path, conversion.schedule.track() if conversion else None)
+        case "--precoders":
+            from faao_mav.schedule.precoder_table import precoder_table
+
+            write_whole(path, precoder_table(solution).encode())
+        case "--report":
+            from faao_mav.report import render_report
+
+            write_whole(path, render_report(result).encode())
+        case "--figure":
+            from faao_mav.report.figures import flight_figure
+            from faao_mav.report.style import save_figure
+
+            save_figure(flight_figure(solution, conversion, result.prediction), path)
 
 
 def _sound(result: "Result") -> bool:

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _INTERRUPTED = 130  # as a shell reports it
 
 
+@exit_status()
 def study(
     plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
     vary: Annotated[
@@ -46,21 +47,6 @@ def study(
 
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
-    with exit_status():
-        _run(plan_file, vary or [], power, schemes, seeds, jobs, cluster, out, as_json)
-
-
-def _run(
-    plan_file: Path,
-    vary: Sequence[str],
-    power: str | None,
-    schemes: str | None,
-    seeds: int | None,
-    jobs: int,
-    cluster: str | None,
-    out: Path | None,
-    as_json: bool,
-) -> None:
     from faao_mav.cli.progress import study_progress
     from faao_mav.plan import read_plan
     from faao_mav.plan.keys import POWER
@@ -72,7 +58,7 @@ def _run(
         raise InputError("--jobs 0: give a number of processes, or -1 for one a core")
     plan = read_plan(plan_file)
     asked = plan.study or Study({}, ("faao",), 1, "rate")
-    options = [parse_vary(text) for text in vary]
+    options = [parse_vary(text) for text in vary or []]
     if power is not None:
         options.append((POWER, parse_values(power, "--power")))
     grid = join_grid(options)
@@ -88,11 +74,9 @@ def _run(
         with study_progress(len(cases), shown=sys.stderr.isatty()) as observe:
             rows = run_study(cases, jobs=jobs, cluster=cluster, directory=out, observe=observe)
     except KeyboardInterrupt:
-        kept = (
-            f"finished rows are in {out}; the same command goes on there"
-            if out
-            else ("nothing was kept; give --out DIR to go on where it ended")
-        )
+        kept = "nothing was kept; give --out DIR to go on where it ended"
+        if out is not None:
+            kept = f"finished rows are in {out}; the same command goes on there"
         note(f"interrupted; {kept}")
         raise typer.Exit(_INTERRUPTED) from None
     written = _draw(rows, plan, asked.figure, out) if out is not None else []
@@ -120,28 +104,24 @@ def _check_cases(cases: "Sequence[StudyCase]") -> None:
     from faao_mav.errors import PlanError
     from faao_mav.plan import parse_plan
 
-    first: PlanError | None = None
+    errors = []
     for case in cases:
         try:
             parse_plan(case.text, case.source)
         except PlanError as error:
-            first = first or error
+            errors.append(error)
         else:
             return
-    if first is not None:
-        raise first
+    if errors:
+        raise errors[0]
 
 
 def _tell(rows: "Sequence[StudyRow]", written: Sequence[Path], as_json: bool) -> None:
-    from faao_mav.study.rows import as_dict
+    from faao_mav.study.rows import as_dict, comparison
 
+    files = [str(path) for path in written]
     if as_json:
-        found: dict[str, Any] = {"rows": [as_dict(row) for row in rows]}
-        found["written"] = [str(path) for path in written]
+        found = {"rows": [as_dict(row) for row in rows], "written": files}
         typer.echo(json.dumps(found, allow_nan=False))
-        return
-    from faao_mav.study.rows import comparison
-
-    typer.echo(comparison(rows))
-    for path in written:
-        typer.echo(f"written      {path}")
+    else:
+        typer.echo("\n".join([comparison(rows), *(f"written      {path}" for path in files)]))

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.transfer.verify import Difference
 
 
+@exit_status()
 def upload(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
     to: Annotated[str, option("CONNECTION", VEHICLE)],
@@ -42,24 +43,23 @@ def upload(
     Exit status: 0 it is on the vehicle, whole and equal; 1 it is not, or that is not known; 2
     unusable arguments or input.
     """
-    with exit_status():
-        from faao_mav.cli.progress import transfer_progress
-        from faao_mav.mavlink.client import upload as run
-        from faao_mav.mission.formats import read_mission
+    from faao_mav.cli.progress import transfer_progress
+    from faao_mav.mavlink.client import upload as run
+    from faao_mav.mission.formats import read_mission
 
-        mission = read_mission(mission_file)
-        with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
-            report = run(
-                mission,
-                to,
-                system=system,
-                component=component,
-                allow_armed=allow_armed,
-                log=log,
-                signing_key=signing_key,
-                wait=timeout,
-                observe=observe,
-            )
+    mission = read_mission(mission_file)
+    with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
+        report = run(
+            mission,
+            to,
+            system=system,
+            component=component,
+            allow_armed=allow_armed,
+            log=log,
+            signing_key=signing_key,
+            wait=timeout,
+            observe=observe,
+        )
     typer.echo(json.dumps(as_dict(report), allow_nan=False) if as_json else as_text(report))
     if not report.verified:
         if not as_json:

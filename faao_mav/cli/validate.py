@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from faao_mav.plan.autopilots import Autopilot, Kind
 
 
+@exit_status()
 def validate(
     mission_file: Annotated[
         File, typer.Argument(metavar="MISSION", help="The mission: .waypoints or .plan.")
@@ -76,28 +77,27 @@ def validate(
     Exit status: 0 nothing is wrong; 1 errors, with --strict also warnings; 2 unusable arguments
     or a file that cannot be read.
     """
-    with exit_status():
-        from faao_mav.validate.finding import Level
+    from faao_mav.validate.finding import Level
 
-        if rules:
-            _list_rules(as_json)
-            return
-        if mission_file is None:
-            raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
-        if plan_file is not None and solution_file is not None:
-            raise InputError("--plan and --solution: give one; the solution has its plan in it")
-        check_known(autopilot, kind)
-        _check_options((max_duration, max_distance, max_altitude), report)
-        read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
-        check_apart({"--report": report}, read)
-        solution = _planned(plan_file, solution_file)
-        limits = (max_duration, max_distance, max_altitude)
-        verdict = _judge(mission_file, solution, (autopilot, kind, parameters), limits)
-        if report is not None:
-            _write_report(report, verdict, solution)
-        _show(verdict, as_json)
-        if verdict.check.of(Level.ERROR) or (strict and verdict.check.of(Level.WARNING)):
-            raise typer.Exit(1)
+    if rules:
+        _list_rules(as_json)
+        return
+    if mission_file is None:
+        raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
+    if plan_file is not None and solution_file is not None:
+        raise InputError("--plan and --solution: give one; the solution has its plan in it")
+    check_known(autopilot, kind)
+    _check_options((max_duration, max_distance, max_altitude), report)
+    read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
+    check_apart({"--report": report}, read)
+    solution = _planned(plan_file, solution_file)
+    limits = (max_duration, max_distance, max_altitude)
+    verdict = _judge(mission_file, solution, (autopilot, kind, parameters), limits)
+    if report is not None:
+        _write_report(report, verdict, solution)
+    _show(verdict, as_json)
+    if verdict.check.of(Level.ERROR) or (strict and verdict.check.of(Level.WARNING)):
+        raise typer.Exit(1)
 
 
 def _list_rules(as_json: bool) -> None:
@@ -119,8 +119,8 @@ def _check_options(
     for name, value in zip(("duration", "distance", "altitude"), limits, strict=True):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"--max-{name} {value:g}: expected a number above 0")
-    check_ending(report, "--report", *PAGES)
     if report is not None:
+        check_ending(report, "--report", PAGES)
         check_writable(report)
 
 

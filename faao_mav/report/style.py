@@ -132,7 +132,7 @@ def render(figure: "Figure", suffix: str) -> bytes:
 
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write `figure` to `path`, whole or not at all, in the format of its ending."""
-    check_ending(path, "figure", *FORMATS)
+    check_ending(path, "figure", FORMATS)
     write_whole(path, render(figure, path.suffix))
 
 
