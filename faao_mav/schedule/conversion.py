@@ -8,10 +8,10 @@ from faao_mav.errors import InputError
 from faao_mav.mission.item import Mission
 from faao_mav.mission.vehicle import Vehicle, vehicle_of
 from faao_mav.schedule.assemble import assemble
-from faao_mav.schedule.outline import Splines, plan_route
+from faao_mav.schedule.copter_scheduler import CopterScheduler
+from faao_mav.schedule.initial_route import Splines, initial_route, with_run_in
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.run_in import with_run_in
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
 from faao_mav.vehicle import copter_model, flight_model
@@ -83,12 +83,12 @@ def convert(solution: "Solution") -> Conversion:
     top = min(plan.vehicle.max_speed, FASTEST)
     trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
     share = _PLANE_SHARE if plan.vehicle.type == "plane" else 1.0
-    straight = plan_route(t, w, plan, share=share)
+    straight = initial_route(t, w, plan, share=share)
     firsts = [trial.first(straight) for trial in trials]
     best = min(_refined(firsts), key=lambda each: each[0].cost)
     liveliest = trials[-1]
     if best[0].cost > _GOOD and isinstance(liveliest.legs, ArduCopterLegs):
-        bent = [plan_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
+        bent = [initial_route(t, w, plan, splines=s) for s in _splines(liveliest.legs, top)]
         new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
         firsts = [liveliest.first(route) for route in new.values()]
         best = min([best, *_refined(firsts)], key=lambda each: each[0].cost)
@@ -127,7 +127,7 @@ def _scheduler(solution: "Solution", vehicle: Vehicle, legs: Legs, top: float) -
         plane = ArduPlane.from_vehicle(vehicle)
         least, most = plane.min_speed, min(plan.vehicle.max_speed, plane.max_speed)
         return PlaneScheduler(t, w, plane, legs, most, near, max(plan.vehicle.min_speed, least))
-    return Scheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top, near)
+    return CopterScheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top, near)
 
 
 def _refined(firsts: list[tuple[Schedule, _Trial]]) -> list[tuple[Schedule, _Trial]]:
@@ -147,8 +147,3 @@ def _splines(straight: ArduCopterLegs, speed: float) -> Iterator[Splines]:
         spacing = max(_SPLINE_SPACING, seconds * speed)
         yield Splines(spacing, braking)
         yield Splines(spacing, braking, straight)
-
-
-def to_mission(solution: "Solution") -> Mission:
-    """Return the mission for `solution`: that of `convert`."""
-    return convert(solution).mission
