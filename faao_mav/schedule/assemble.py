@@ -6,10 +6,8 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.mission.vehicle import vehicle_of
 from faao_mav.schedule.route import Route
-from faao_mav.vehicle.legs import legs_of
-from faao_mav.vehicle.recommend import FASTEST
+from faao_mav.vehicle import vehicle_of
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
@@ -44,16 +42,17 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         for x, y in zip(latitudes, longitudes, strict=True)
     ]
 
-    plane = plan.vehicle.type == "plane"
-    axis = _AIRSPEED if plane else _GROUND_SPEED
+    vehicle = vehicle_of(plan).type
+    axis = _GROUND_SPEED if vehicle.hovers else _AIRSPEED
     items = []
     if plan.mission.takeoff:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
         here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
-        items.append(_at(Command.NAV_TAKEOFF, here, altitude, _PITCH if plane else 0.0))
-    commanded = float(route.speeds[0]) if plane else min(plan.vehicle.max_speed, FASTEST)
+        items.append(_at(Command.NAV_TAKEOFF, here, altitude, 0.0 if vehicle.hovers else _PITCH))
+    fastest = min(plan.vehicle.max_speed, vehicle.fastest)
+    commanded = fastest if vehicle.hovers else float(route.speeds[0])
     items.append(_change_speed(commanded, axis))
-    holds, delays = route.holds_and_delays(whole_seconds=legs_of(vehicle_of(plan)).whole_seconds)
+    holds, delays = route.holds_and_delays(whole_seconds=vehicle.whole_second_holds)
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
         if speed != commanded:

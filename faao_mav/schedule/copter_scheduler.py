@@ -52,7 +52,7 @@ class CopterScheduler(Scheduler):
     Where it would not keep up, speeds are up to a tenth above `max_speed`.
     """
 
-    def first(self, route: Route) -> Schedule:
+    def _first(self, route: Route) -> Schedule:
         """Return `route` with the speeds and waits that fit best."""
         waits = route.waits.copy()
         waits[0] = max(waits[0], _FIRST_WAIT)
@@ -126,7 +126,7 @@ class CopterScheduler(Scheduler):
         """
         planned_speed = lengths(self.w[inside + 1] - self.w[inside - 1])
         planned_speed /= self.t[inside + 1] - self.t[inside - 1]
-        result = np.ones(len(inside), dtype=bool)
+        legs, result = self.vehicle.legs, np.ones(len(inside), dtype=bool)
         parts = (
             (route.positions[k], self.t[inside] - route.departures[k]),
             (route.positions[k + 1], route.arrivals[k + 1] - self.t[inside]),
@@ -134,7 +134,7 @@ class CopterScheduler(Scheduler):
         for end, duration in parts:
             length = lengths(self.w[inside] - end)
             speed = np.maximum(length / duration, _SPEED_SHARE * planned_speed)
-            result &= length >= np.maximum(self.legs.shortest_leg(speed), self.legs.least)
+            result &= length >= np.maximum(legs.shortest_leg(speed), legs.least)
         return result
 
     def _with_moves(self, schedule: Schedule, top_speed: float) -> Schedule:

@@ -23,7 +23,7 @@ from faao_mav.schedule.waypoints import (
     simplify,
 )
 from faao_mav.vector import lengths
-from faao_mav.vehicle.legs import Legs
+from faao_mav.vehicle import LegLimits
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
@@ -43,7 +43,7 @@ class Splines:
 
     spacing: float
     braking: float = 0.0
-    straight: Legs | None = None
+    straight: LegLimits | None = None
 
 
 def initial_route(
@@ -83,7 +83,7 @@ def initial_route(
     return _timed(times, waypoints, curved, plan.vehicle.max_speed)
 
 
-def with_run_in(route: Route, t: Real, w: Real, legs: Legs, max_speed: float) -> Route:
+def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: float) -> Route:
     """Return `route` with a leg on which the aircraft reaches the plan's first speed before w_I.
 
     Likewise with one after w_F, so that the aircraft does not brake before it. Ends at which the
@@ -199,7 +199,7 @@ def _end_velocities(t: Real, w: Real) -> tuple[Real, Real]:
 
 
 def _with_leg_outside(
-    route: Route, velocity: Real, legs: Legs, max_speed: float, *, first: bool
+    route: Route, velocity: Real, legs: LegLimits, max_speed: float, *, first: bool
 ) -> Route:
     """Return `route` with a leg before its `first` waypoint, or after its last.
 

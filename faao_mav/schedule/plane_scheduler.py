@@ -28,7 +28,7 @@ With more, neighbouring waypoints correct the same offset and overdo it.
 class PlaneScheduler(Scheduler):
     """As `Scheduler`, for an aircraft that neither waits nor turns on the spot."""
 
-    def first(self, route: Route) -> Schedule:
+    def _first(self, route: Route) -> Schedule:
         """Return `route` with the waypoints that keep the path best, at the plan's speeds."""
         points = np.arange(route.first + 1, route.last + 1)
         positions = route.positions.copy()

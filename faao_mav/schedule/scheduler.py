@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Clock, Schedule
 from faao_mav.schedule.timing import SHORTEST_HOLD, fit
-from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vector import lengths
-from faao_mav.vehicle import CopterModel, FlightPath
-from faao_mav.vehicle.legs import Legs
+from faao_mav.vehicle import CopterModel, FlightPath, Vehicle
 
 ALLOWED_ERROR = 0.8
 """The position error at equal times, m, that is left as it is.
@@ -46,22 +45,25 @@ class Scheduler(ABC):
     Lifecycle: `first` is called for each set of parameters and each initial route, and is quick;
     `refined` for the most promising of the schedules that it returns.
 
-    The plan is at `w` (n, 2), m, at `t` (n,), s. `legs` says how short a leg may be for its speed,
-    and how wide its acceptance radius. Speeds are within `min_speed` and `max_speed`, m/s. The
-    flight is over when the aircraft is within `tolerance` m of w_F.
+    The plan is at `w` (n, 2), m, at `t` (n,), s. `model` predicts the flights of `vehicle`. Speeds
+    are within `min_speed` and `max_speed`, m/s. The flight is over when the aircraft is within
+    `tolerance` m of w_F.
     """
 
     t: Real
     w: Real
+    vehicle: Vehicle
     model: CopterModel
-    legs: Legs
+    min_speed: float
     max_speed: float
     tolerance: float
-    min_speed: float = SLOWEST
+
+    def first(self, route: Route) -> Schedule:
+        """Return `route`, with the run-in that the plan needs, in its first fit to the plan."""
+        return self._first(with_run_in(route, self.t, self.w, self.vehicle.legs, self.max_speed))
 
     @abstractmethod
-    def first(self, route: Route) -> Schedule:
-        """Return `route` with its first fit to the plan."""
+    def _first(self, route: Route) -> Schedule: ...
 
     @abstractmethod
     def refined(self, first: Schedule) -> Schedule:
@@ -143,11 +145,11 @@ class Scheduler(ABC):
         stops = route.waits > 0
         stops[[0, -1]] = True
         leg_lengths = np.concatenate([[np.inf], route.leg_lengths, [np.inf]])
-        radii = self.legs.radii(np.minimum(leg_lengths[:-1], leg_lengths[1:]), route.turns)
+        radii = self.vehicle.legs.radii(np.minimum(leg_lengths[:-1], leg_lengths[1:]), route.turns)
         return replace(route, radii=np.where(stops, 0.0, np.round(radii, 1)))
 
     def _path(self, route: Route) -> FlightPath:
-        return route.path(whole_seconds=self.legs.whole_seconds)
+        return route.path(whole_seconds=self.vehicle.type.whole_second_holds)
 
     def _clock(self, route: Route) -> Clock:
         """Return the clock by which the plan and the flight of `route` meet at w_I."""

@@ -14,7 +14,7 @@ from faao_mav.schedule.initial_route import Splines, initial_route
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.waypoints import find_hovers
 from faao_mav.vector import distances_to_segment, lengths
-from faao_mav.vehicle.legs import ArduCopterLegs
+from faao_mav.vehicle import Vehicle
 
 STEP = 0.2
 
@@ -256,7 +256,7 @@ def test_splines_everywhere_are_closer_in_bends() -> None:
 
 def test_splines_only_where_legs_are_too_short() -> None:
     t, w = bent_at_45_degrees()
-    route = initial_route(t, w, plan_with(), splines=Splines(15.0, 40.0, ArduCopterLegs()))
+    route = initial_route(t, w, plan_with(), splines=Splines(15.0, 40.0, Vehicle().legs))
     assert route.splines.any()
     assert not route.splines.all()
     straight = ~route.splines[1:]
@@ -272,7 +272,7 @@ def test_any_flight_can_have_splines(
     trajectory: Trajectory, spacing: float, braking: float, everywhere: bool
 ) -> None:
     t, w = trajectory
-    straight = None if everywhere else ArduCopterLegs()
+    straight = None if everywhere else Vehicle().legs
     route = initial_route(t, w, plan_with(), splines=Splines(spacing, braking, straight))
     assert len(route.splines) == len(route.positions)
     assert not route.splines[0]
