@@ -26,7 +26,7 @@ from faao_mav.optimizer.progress import Observer, Progress
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
-from faao_mav.schedule.convert import Conversion, check_vehicle, convert
+from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check

@@ -88,7 +88,7 @@ def _solve(
     """Return the result of the plan, and the files that are written."""
     from faao_mav.cli.progress import optimizer_progress
     from faao_mav.plan import read_plan
-    from faao_mav.schedule.convert import check_vehicle
+    from faao_mav.schedule.conversion import check_vehicle
     from faao_mav.vehicle import vehicle_of
     from faao_mav.workflow import plan_mission
 

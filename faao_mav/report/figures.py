@@ -18,7 +18,7 @@ from faao_mav.report.route_map import (
     write_numbers,
 )
 from faao_mav.report.style import MUTED, SERIES, drawing, label, legend_above
-from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.vector import lengths
 from faao_mav.vehicle import Track
