@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.transfer.protocol import MissionType
     from faao_mav.mission.item import Home
 
-_REST = 0.5  # s without a change, after which a list is told
+_REST = 0.5
+"""Seconds without a change after which a list is told; chosen: longer than between two items."""
 
 
 @exit_status()

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from faao_mav.plan import Plan
     from faao_mav.study import StudyCase, StudyRow
 
-_INTERRUPTED = 130  # as a shell reports it
+_INTERRUPTED = 130
+"""The exit status of an interrupted study, as a shell reports SIGINT: 128 + 2."""
 
 
 @exit_status()

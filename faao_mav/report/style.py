@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
 SERIES = ("#1769aa", "#c2500a", "#16825d", "#9a3d9c", "#8a6d00", "#c03352", "#54606e")
-"""Colours in fixed order, apart for the colour-blind and on both papers."""
+"""Colours of curves in fixed order: the colour-blind tell them apart, on light and dark paper."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 FORMATS = (".png", ".svg", ".pdf")

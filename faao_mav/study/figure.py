@@ -20,7 +20,11 @@ _AXES = {
     "flight.altitude": "height H, m",
     "radio.rician_factor": "Rician factor K",
 }
+"""The label of the axis along which a key is varied; other keys are their own labels."""
+
 _SHORT = {"power_dbm": ("W", " dBm"), "flight.duration": ("T", " s"), "radio.modulation": ("", "")}
+"""The symbol and the unit of a varied key in legends; an empty symbol leaves the value alone."""
+
 _SCHEMES = {
     "faao": "FAAO",
     "algorithm1": "FAAO, Algorithm 1",
@@ -30,6 +34,8 @@ _SCHEMES = {
     "waterfilling": "water-filling",
     "gaussian": "designed for Gaussian inputs",
 }
+"""The names of the schemes in legends."""
+
 _ALPHABETS = {
     "bpsk": "BPSK",
     "qpsk": "QPSK",
@@ -37,7 +43,10 @@ _ALPHABETS = {
     "16qam": "16-QAM",
     "64qam": "64-QAM",
 }
+"""The names of the alphabets in legends."""
+
 _LOOKS = {name: k for k, name in enumerate(("faao", "gaussian", "mrt", "mmse", "zf"))}
+"""The place of a scheme in `SERIES` and `MARKERS`, the same in every figure."""
 
 
 def can_draw(rows: Sequence[StudyRow], kind: str) -> bool:

@@ -14,15 +14,17 @@ from faao_mav.files import write_whole
 from faao_mav.study.sweep import StudyCase, Value
 
 ROWS, TABLE = "rows.jsonl", "table.csv"
-_BEGINNING = b'{"key": "'  # of every row: what is cut off must not be somebody's text
+_BEGINNING = b'{"key": "'
+"""How the line of every row begins: a last line without an end that does not is no row cut off."""
 
 
 @dataclass(frozen=True, slots=True)
 class StudyRow:
-    """What one case of a study led to: rates in bit/s/Hz, `seconds` of the optimiser.
+    """What one case of a study led to.
 
-    Without a result `error` says why and the numbers are None. `route` is w (n, 2), m, one pair
-    for each slot.
+    Rates and mutual information are bit/s/Hz, `seconds` is the time of the optimiser. Where there
+    is no result `error` says why and the numbers are None. `route` is w (n, 2), m, one pair for
+    each slot.
     """
 
     key: str
@@ -44,10 +46,11 @@ _RESULTS = (
     *("scheme", "seed", "R_avg", "R_U", "R_G", "mutual_information"),
     *("seconds", "iterations", "converged", "error"),
 )
+"""The fields of a row that are columns of the table."""
 
 
 def as_dict(row: StudyRow) -> dict[str, Any]:
-    """Return `row` for people's programs: varied keys, then the columns of the table."""
+    """Return `row` as an object of `--json`: varied keys, then the columns of the table."""
     return {**row.values, **{name: getattr(row, name) for name in _RESULTS}}
 
 

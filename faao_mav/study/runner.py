@@ -11,7 +11,7 @@ from faao_mav.study.rows import TABLE, StudyRow, append_row, in_order, load_rows
 from faao_mav.study.sweep import StudyCase
 
 _CONNECTING = 10
-"""Seconds that a cluster has to answer."""
+"""Seconds that a cluster has to answer; chosen: a scheduler that runs answers in one."""
 
 
 def run_case(case: StudyCase) -> StudyRow:
