@@ -8,6 +8,7 @@ from types import ModuleType
 import pytest
 from conftest import MISSIONS, SMALL, MakePlan, edited
 
+import faao_mav.study.sweep
 import faao_mav.validate.check
 import faao_mav.workflow
 from faao_mav import parse_plan, plan_mission, read_mission, read_parameters, read_plan
@@ -114,7 +115,9 @@ def test_flyable_is_without_errors(result: Result) -> None:
     assert gentle.flyable
 
 
-@pytest.mark.parametrize("module", [faao_mav.workflow, faao_mav.validate.check])
+@pytest.mark.parametrize(
+    "module", [faao_mav.workflow, faao_mav.validate.check, faao_mav.study.sweep]
+)
 def test_the_examples_run(module: ModuleType, small_plan: MakePlan) -> None:
     slow = {"vehicle.max_speed": 8, "vehicle.max_acceleration": 1.5, "flight.duration": 16}
     plan = small_plan(QUICK | slow)

@@ -27,7 +27,7 @@ Modules and short-lived arrays leave hardly any cycles. Chosen; what a change co
 measured.
 """
 
-DEFAULT = "plan"
+DEFAULT = plan.__name__
 """The command of an argument list that names none."""
 
 
@@ -62,13 +62,8 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command(DEFAULT)(plan)
-app.command("validate")(validate)
-app.command("upload")(upload)
-app.command("download")(download)
-app.command("convert")(convert)
-app.command("autopilot")(autopilot)
-app.command("study")(study)
+for command in (plan, validate, upload, download, convert, autopilot, study):
+    app.command(command.__name__)(command)
 
 
 def _version(asked: bool) -> None:
