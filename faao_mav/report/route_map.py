@@ -14,16 +14,14 @@ from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.report.style import INK, MUTED, SERIES, label, legend_above, mark_stations
 from faao_mav.schedule.conversion import Conversion
+from faao_mav.schedule.schedule import positions_at
+from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.transforms import Bbox
 
 Outline: TypeAlias = tuple[Real, bool]
 """Corners (k, 2), m, closed, and whether the aircraft has to stay inside."""
-
-Box: TypeAlias = tuple[float, float, float, float]
-"""Left, bottom, right and top, points."""
 
 WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 """The commands of a relay route, whose items are numbered on its map."""
@@ -47,7 +45,7 @@ _CLEAR = 2.5
 """Points between a number and the middle of a line: half the width that routes are drawn with."""
 _MARK = 4.0
 """Half of a station's mark, points."""
-_SIDES = ((1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0))
+_SIDES = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0)])
 """Where a number may stand beside its waypoint, right and up of it, the first that is free."""
 
 
@@ -146,7 +144,7 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     step = max(1, -(-(len(solution.w) - 1) // _PIECES))
     ends = np.unique(np.append(np.arange(0, len(solution.w), step), len(solution.w) - 1))
     pieces = [solution.w[a : b + 1] for a, b in itertools.pairwise(ends)]
-    speeds = np.hypot(*solution.v.T)
+    speeds = lengths(solution.v)
     means = np.array([speeds[a : b + 1].mean() for a, b in itertools.pairwise(ends)])
     colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
     lines = LineCollection(pieces, cmap=colours, linewidths=5, capstyle="round")
@@ -187,29 +185,31 @@ def write_numbers(
     figure = plot.get_figure(root=True)
     if figure is None or not numbers:
         return
+    from matplotlib.transforms import Bbox
+
     figure.draw_without_rendering()  # the scale of the map is known only now
     points = 72.0 / figure.dpi
 
     def on_paper(at: Real) -> Real:
         return np.asarray(plot.transData.transform(at) * points)
 
+    paper = Bbox(plot.get_window_extent().get_points() * points)
+    taken = [Bbox(text.get_window_extent().get_points() * points) for text in plot.texts]
+    taken += [Bbox([mark - _MARK, mark + _MARK]) for mark in on_paper(marks)]
     occupied = np.concatenate([_dense(on_paper(line)) for line in lines])
-    paper = _box(plot.get_window_extent(), points)
-    taken = [_box(text.get_window_extent(), points) for text in plot.texts]
-    taken += [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in on_paper(marks).tolist()]
     for number, place, at in zip(numbers, places.tolist(), on_paper(places), strict=True):
-        width, height = _DIGIT * _SIZE * len(str(number)), _SIZE
-        for across, up in _SIDES:
-            gap = _GAP if 0 in (across, up) else 0.6 * _GAP
-            x = at[0] + across * (width / 2 + gap)
-            y = at[1] + up * (height / 2 + gap)
-            box = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
-            if _within(box, paper) and not _covers(box, occupied) and not _meets(box, taken):
+        size = np.array([_DIGIT * _SIZE * len(str(number)), _SIZE])
+        for side in _SIDES:
+            shift = side * (size / 2 + (_GAP if 0 in side else 0.6 * _GAP))
+            box = Bbox([at + shift - size / 2, at + shift + size / 2])
+            inside = paper.contains(*box.min) and paper.contains(*box.max)
+            crossed = box.padded(_CLEAR).count_contains(occupied) > 0
+            if inside and not crossed and not any(map(box.overlaps, taken)):
                 taken.append(box)
                 written = plot.annotate(
                     str(number),
                     place,
-                    xytext=(x - at[0], y - at[1]),
+                    xytext=shift,
                     textcoords="offset points",
                     ha="center",
                     va="center",
@@ -221,28 +221,5 @@ def write_numbers(
 
 def _dense(line: Real) -> Real:
     """Return points of `line` (n, 2) that are at most about a point apart."""
-    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
-    at = np.linspace(0.0, along[-1], int(along[-1]) + 2)
-    return np.stack([np.interp(at, along, x) for x in line.T], axis=-1)
-
-
-def _box(extent: "Bbox", points: float) -> Box:
-    left, bottom, right, top = (points * float(edge) for edge in extent.extents)
-    return left, bottom, right, top
-
-
-def _within(box: Box, paper: Box) -> bool:
-    return box[0] >= paper[0] and box[1] >= paper[1] and box[2] <= paper[2] and box[3] <= paper[3]
-
-
-def _covers(box: Box, points: Real) -> bool:
-    x, y = points.T
-    across = (x > box[0] - _CLEAR) & (x < box[2] + _CLEAR)
-    return bool(np.any(across & (y > box[1] - _CLEAR) & (y < box[3] + _CLEAR)))
-
-
-def _meets(box: Box, others: Sequence[Box]) -> bool:
-    return any(
-        box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
-        for other in others
-    )
+    along = np.append(0.0, np.cumsum(lengths(np.diff(line, axis=0))))
+    return positions_at(np.linspace(0.0, along[-1], int(along[-1]) + 2), along, line)
