@@ -12,14 +12,9 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design, design
-from faao_mav.optimizer.interior.maximize import (
-    FAR,
-    NEAR,
-    Optimum,
-    StageValues,
-    maximize,
-    maximize_all,
-)
+from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximize_all
+from faao_mav.optimizer.interior.rewards import StageValues
+from faao_mav.optimizer.interior.search import COLD_START, WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.progress import Observer, Progress
@@ -91,7 +86,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     history = np.maximum.accumulate([counted[0], *counted[len(routes) :]]).tolist()
     tell(2, "the best start", history[-1])
 
-    def finished(near: list[Trajectory]) -> list[Optimum]:
+    def finished(near: list[Trajectory]) -> list[LocalOptimum]:
         # the half-planes of a least speed turn too fast for short steps to follow
         begun_afresh = kin.min_speed > 0 or any(flight in routes.values() for flight in near)
         return maximize_all(
@@ -100,7 +95,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             near,
             tolerance=options.tolerance,
             max_iterations=options.max_iterations,
-            opening=FAR if begun_afresh else NEAR,
+            strategy=COLD_START if begun_afresh else WARM_START,
         )
 
     ends = finished([rough.flights[name] for name in rough.hopeful])
@@ -113,7 +108,9 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     return _solution(problem, wanted, field, final, history, spread)
 
 
-def _polished(problem: Problem, wanted: Design, field: RateField, found: Optimum) -> Optimum:
+def _polished(
+    problem: Problem, wanted: Design, field: RateField, found: LocalOptimum
+) -> LocalOptimum:
     """Take `found` a little further at exact rates where it was found in a table of searches.
 
     With the precoders held, the rates are exact, and whatever they gain the best ones gain too.
@@ -159,7 +156,7 @@ def _solution(
     problem: Problem,
     wanted: Design,
     field: RateField,
-    final: Optimum,
+    final: LocalOptimum,
     history: list[float],
     spread: dict[str, float],
 ) -> Solution:
