@@ -79,9 +79,14 @@ class Scaling:
         stiffness[::2] += per_square
         return cls(pair[:, 1], w, per_square, stretch, stiffness)
 
-    def compliance(self) -> Real:
-        """Return the inverse of `stiffness`, exact where a limit is active too, (3, flights, m)."""
-        inverted = self.stiffness[::-1] / (self.per_square * self.per_square * self.stretch)
+    def compliance(self, chosen: slice = slice(None)) -> Real:
+        """Return the inverse of `stiffness` for the `chosen` cones, (3, flights, their number).
+
+        It is exact where a limit is active too.
+        """
+        per_square = self.per_square[..., chosen]
+        size = per_square * per_square * self.stretch[..., chosen]
+        inverted = self.stiffness[::-1, :, chosen] / size
         inverted[1] *= -1
         return np.asarray(inverted)
 

@@ -43,7 +43,7 @@ class Forces:
 
     def less(self, other: "Forces") -> "Forces":
         """Return the forces on v and a without those of `other`."""
-        return Forces(v=added([self.v, -other.v]), a=added([self.a, -other.a]))
+        return Forces(v=self.v - other.v, a=self.a - other.a)
 
 
 @dataclass(frozen=True, slots=True)

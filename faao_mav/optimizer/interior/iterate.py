@@ -6,6 +6,7 @@ belongs to a flight as a whole in (flights, 1).
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -98,7 +99,7 @@ class Direction:
         """Return the share at which a slack, a multiplier or a weight vanishes, (flights, 1)."""
         falls = (-self.weights / at.weights).max(axis=0)
         shares = [state.reach(step) for state, step in zip(at.states, self.steps, strict=True)]
-        return np.asarray(np.minimum.reduce([*shares, 1 / np.maximum(falls, TINY)]))
+        return np.asarray(reduce(np.minimum, shares, 1 / np.maximum(falls, TINY)))
 
 
 def only(record: Record, flights: Flags) -> Record:

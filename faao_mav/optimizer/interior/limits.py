@@ -87,8 +87,12 @@ class LimitsState:
     def stiffness(self) -> Stiffness:
         """Return the blocks of W^-2 on x, and their inverse on the accelerations."""
         n = self.flight.matrix.slots
-        on_v, on_a = self.scaling.stiffness[..., :n], self.scaling.stiffness[..., n:]
-        return Stiffness(v=on_v, a=on_a, compliance=self.scaling.compliance()[..., n:])
+        scaling = self.scaling
+        return Stiffness(
+            v=scaling.stiffness[..., :n],
+            a=scaling.stiffness[..., n:],
+            compliance=scaling.compliance(slice(n, None)),
+        )
 
     def push(self, target: Real | None) -> Forces:
         """Return -W^-2 (-margin, 0) for x, or `target` for x."""

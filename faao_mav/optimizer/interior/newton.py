@@ -148,14 +148,15 @@ class Newton:
         on_a = q * flight.per_gain
         rest, move = Forces(v=flight.forces_asked(y, on_a), a=on_a), Move(dw, dv, unknowns)
         steps: list[Any] = []
-        for state, target in zip(reversed(at.states), reversed(targets), strict=True):
+        for state, target in zip(at.states[:0:-1], targets[:0:-1], strict=True):
             step, supplied = state.solved(move, target, rest)
             rest = rest.less(supplied)
-            steps.insert(0, step)
+            steps.append(step)
+        steps.append(at.states[0].solved(move, targets[0], rest)[0])
         return Direction(
             move=move,
             y=y - at.y,
-            steps=tuple(steps),
+            steps=tuple(reversed(steps)),
             weights=weights - at.weights,
             total=np.einsum("cjbn,cbn->jb", at.gradient, dw)[..., None],
             floor=floor,
@@ -176,12 +177,12 @@ class Newton:
 
 
 def _load(right: Real, flight: ScaledFlight, compliance: Real, pushes: list[Forces]) -> None:
-    """Add what the forces `pushes` of the constraints make of the right-hand side."""
+    """Enter what the forces `pushes` of the constraints make of the right-hand side."""
     matrix = flight.matrix
     on_w, on_v, on_a = (added(getattr(push, part) for push in pushes) for part in "wva")
-    if np.ndim(on_w):
-        right[..., W] += (on_w * matrix.moves_w).transpose(1, 2, 0)
-    right[..., V] += (on_v * matrix.moves_v).transpose(1, 2, 0)
+    if isinstance(on_w, np.ndarray):
+        right[..., W] = (on_w * matrix.moves_w).transpose(1, 2, 0)
+    right[..., V] = (on_v * matrix.moves_v).transpose(1, 2, 0)
     x, y = flight.gains * on_a
     xx, xy, yy = compliance[..., :-1]
     right[:, :-1, Q.start] = xx * x + xy * y

@@ -197,7 +197,9 @@ class Search:
         n = matrix.slots
         forces = [state.forces() for state in at.states]
         on_w = matrix.pull(at.y) - np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.gradient)
-        on_w -= added(force.w for force in forces) * matrix.moves_w
+        of_constraints = added(force.w for force in forces)
+        if isinstance(of_constraints, np.ndarray):
+            on_w -= of_constraints * matrix.moves_w
         on_v = self.flight.forces_asked(at.y, np.asarray(added(force.a for force in forces)))
         on_v -= added(force.v for force in forces) * matrix.moves_v
         slope = np.maximum(_largest(on_w), _largest(on_v))
