@@ -1,10 +1,10 @@
-"""What an optimiser returns: trajectory, precoders, rates, and the means to check them."""
+"""What an optimiser tells and returns, and how a solution is checked, saved and loaded."""
 
 import io
 import json
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,20 @@ from faao_mav.files import write_whole
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where an optimiser stands: R_avg of the best iterate so far, and what runs now."""
+
+    iteration: int
+    max_iterations: int
+    stage: str
+    best_rate: float
+
+
+Observer = Callable[[Progress], None]
+"""What an optimiser tells its progress to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +115,26 @@ class Solution:
             found[name] = float(np.abs(H_r - link.small_scale(self.w)).max())
         found["(9) rate"] = abs(again.R_avg - self.rates.R_avg)
         return found
+
+    def is_feasible(self, tolerance: float = 1e-6) -> bool:
+        """Tell whether every one of the `residuals` is below `tolerance`, each in its own unit."""
+        return max(self.residuals().values()) < tolerance
+
+    def kkt_residual(self, reach: float = 1.0) -> float:
+        """Return how much R_avg can still gain per metre, to first order, bit/s/Hz/m.
+
+        The gain is that of the best feasible move by at most `reach` metres in x and in y of every
+        slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
+        found from the arrays by CVXPY, without the multipliers of the method that solved the plan.
+        Raises `SolverError` where the trajectory breaks its limits.
+        """
+        from faao_mav.optimizer.design import design
+        from faao_mav.optimizer.rates.field import rate_field
+        from faao_mav.optimizer.scaled import kkt_residual
+
+        problem = build_problem(self.plan)
+        rates = rate_field(problem, design(self.plan))
+        return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach)
 
 
 def _excess(P: Complex, power: float) -> float:

@@ -22,8 +22,8 @@ from faao_mav.optimizer.interior.constraint import (
 )
 from faao_mav.optimizer.interior.half_planes import HalfPlanes, Slacks
 from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.scaled import LENGTH, FlightVariables, flight_variables
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+from faao_mav.optimizer.scaled import FlightVariables, flight_variables
 from faao_mav.optimizer.search.start import straight_flight
 
 STAGE = links(bowl, 1e-5, 3e-5)

@@ -22,10 +22,9 @@ from faao_mav.optimizer.interior.maximize import maximize, maximize_all
 from faao_mav.optimizer.interior.min_speed import MinSpeedConstraint
 from faao_mav.optimizer.interior.newton import Newton
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.scaled import LENGTH, flight_variables
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+from faao_mav.optimizer.scaled import flight_variables, kkt_residual
 from faao_mav.optimizer.search.start import straight_flight
-from faao_mav.optimizer.stationarity import kkt_residual
 
 STATIONS = np.array([[0.0, 0.0], [300.0, 300.0]])
 HEIGHT = 100.0

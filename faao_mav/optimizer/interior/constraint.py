@@ -25,8 +25,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.banded import SIZE, Entry, FlightMatrix
-from faao_mav.optimizer.interior.rewards import LENGTH
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 
 @dataclass(frozen=True, slots=True)

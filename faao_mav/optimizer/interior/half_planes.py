@@ -30,8 +30,7 @@ from faao_mav.optimizer.interior.constraint import (
     Start,
     Stiffness,
 )
-from faao_mav.optimizer.interior.rewards import LENGTH
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 
 @dataclass(frozen=True)

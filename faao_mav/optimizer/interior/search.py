@@ -21,8 +21,8 @@ from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.optimizer.interior.constraint import Constraint, ScaledFlight, added
 from faao_mav.optimizer.interior.iterate import Direction, Iterate, best_floor, merged, only
 from faao_mav.optimizer.interior.newton import Newton
-from faao_mav.optimizer.interior.rewards import LENGTH, ScaledRewards
-from faao_mav.optimizer.kinematics import Kinematics
+from faao_mav.optimizer.interior.rewards import ScaledRewards
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 
 # All of these were chosen by trials on the plans of tests/benchmarks/direct_against_ipopt.py;
 # what a change costs is recorded only where it says so.
