@@ -34,6 +34,11 @@ class Kinematics:
 
     An end velocity of None is free. `bound_first_acceleration` extends (13f) to n = 0. Beyond the
     paper, every sample of the speed is at least `min_speed`, m/s: fixed wings do not hover.
+
+    >>> kin = Kinematics(np.zeros(2), np.array([40.0, 0.0]), 9, 1.0, 6.0, 3.0, None, None, True)
+    >>> flight = kin.follow(np.full((9, 2), [4.0, 0.0]))  # 4 m/s do not get there in 8 s: 5 m/s do
+    >>> flight.w[-1].round(6).tolist()
+    [40.0, 0.0]
     """
 
     start: Real

@@ -48,7 +48,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solved plan: SI units, local east-north metres, one row per time slot.
+    '''A solved plan: SI units, local east-north metres, one row per time slot.
 
     `t` (n,) s; `w`, `v`, `a` (n, 2); `P_B` (n, N_t, N_t) and `P_U` (n, N_u, N_u) in sqrt(W);
     the fading `H_rB` (n, N_u, N_t) and `H_rU` (n, N_r, N_u) without path gain; `I_U`, `I_G`
@@ -57,7 +57,23 @@ class Solution:
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end.
-    """
+
+    >>> from faao_mav import optimize, parse_plan
+    >>> solution = optimize(parse_plan("""
+    ... site: {origin: {latitude: -35.36, longitude: 149.17, elevation: 584}}
+    ... vehicle: {max_speed: 20, max_acceleration: 5}
+    ... flight: {start: [0, 50], end: [50, 0], altitude: 40, duration: 10, time_step: 0.5}
+    ... radio:
+    ...   fading: none
+    ...   base_station: {position: [0, 0], power_dbm: 0}
+    ...   relay: {power_dbm: 0, noise_dbm: -80}
+    ...   ground_user: {position: [60, 60], noise_dbm: -80}
+    ... """))
+    >>> round(solution.rates.R_avg, 3), solution.is_feasible(1e-6)
+    (0.642, True)
+    >>> solution.kkt_residual() < 1e-3
+    True
+    '''
 
     plan: Plan
     t: Real

@@ -9,8 +9,7 @@ many. Flights stand one after the other in the band and do not touch.
 
 Vectors are (2, flights, slots), symmetric 2x2 matrices (3, flights, slots): xx, xy, yy.
 
-Measured at 250 slots on one core: 0.6 ms a factorisation, against 4 ms an iteration of Clarabel on
-the same flight, which knows only that the matrix is sparse.
+Measured on one core, a flight: 0.18 ms a factorisation at 250 slots, 1.9 ms at 2,500.
 """
 
 from collections.abc import Sequence

@@ -48,6 +48,18 @@ def maximize(
     `constraints` are kept beside those of `kin`, by `start` too. Where no gain is to be had, as in
     saturation, or none was found, the optimum is the start itself. `stage` is called once for the
     start, once per trial step and once for the result.
+
+    >>> from faao_mav.optimizer.interior.rewards import StageValues
+    >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
+    >>> def near(w):  # the reward falls with the squared distance from (50, 40), as 1 / km^2
+    ...     away = (w - np.array([50.0, 40.0]).reshape(2, *[1] * (w.ndim - 1)))[:, None]
+    ...     packed = np.array([-2e-6, 0, -2e-6]).reshape(3, *[1] * w.ndim)
+    ...     value = -1e-6 * (away * away).sum(axis=0)
+    ...     return StageValues(value, -2e-6 * away, np.broadcast_to(packed, (3, *value.shape)))
+    >>> start = kin.follow(np.full((41, 2), [5.0, 0.0]))
+    >>> best = maximize(kin, near, start)
+    >>> best.converged, best.trajectory.w[20].round().tolist()
+    (True, [50.0, 40.0])
     """
     (optimum,) = maximize_all(
         kin,
