@@ -181,7 +181,8 @@ class BudgetState(Slacks):
     missed: Real
 
     def violation(self) -> Real:
-        return np.maximum(super().violation(), np.abs(self.missed).max(axis=-1, keepdims=True))
+        missed = np.abs(self.missed).max(axis=-1, keepdims=True)
+        return np.asarray(np.maximum(super().violation(), missed))
 
     def _forces(self, z: Real, multiplier: Real) -> Forces:
         """By the multipliers alone, those on w held by the matrix when a direction is sought."""

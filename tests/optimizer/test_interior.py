@@ -300,14 +300,8 @@ def test_a_small_problem_agrees_with_slsqp(law: Law) -> None:
 
     x: Any = np.concatenate([start.v[0], start.a[:-1].ravel(), [reward(stage, start)]])
     limits: Any = [{"type": "ineq", "fun": room}, {"type": "eq", "fun": ends}]
-    peer = minimize(
-        lambda x: float(-x[-1]),
-        x,
-        method="SLSQP",
-        constraints=limits,
-        options={"maxiter": 500},
-        tol=1e-12,
-    )
+    how: dict[str, Any] = {"constraints": limits, "options": {"maxiter": 500}, "tol": 1e-12}
+    peer = minimize(lambda x: float(-x[-1]), x, method="SLSQP", **how)
     assert peer.success
     assert best.value == pytest.approx(float(peer.x[-1]), rel=1e-5)
 
@@ -556,7 +550,7 @@ def test_a_newton_step_solves_the_linearised_conditions(
     assert newton.factors.sound.all()
     correction = 0.01 * rng.standard_normal((3, 1, m)) * real
     target = mu * cones.inverse(limits.pair[:, 0]) - correction
-    of_slow = rng.standard_normal((1, n)) * slow.on if slow else None
+    of_slow = rng.standard_normal((1, n)) * (slow.on if slow else 0)
     for direction, goal, slow_goal, barrier in (
         (newton.predictor(), 0 * target, np.zeros((1, n)), 0 * mu),
         (newton.aimed(mu, (target, of_slow) if least else (target,)), target, of_slow, mu),

@@ -19,7 +19,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -141,7 +141,7 @@ class Start:
 class Constraint(ABC):
     """A limit on flights, apart from any iterate."""
 
-    unknowns: int = 0
+    unknowns: ClassVar[int] = 0
     """How many unknowns per slot it brings into the Newton system."""
 
     def entries(self, slots: int, first: int) -> Sequence[Entry]:  # noqa: ARG002
