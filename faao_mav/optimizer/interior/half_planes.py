@@ -177,11 +177,9 @@ class HalfPlanes(Constraint):
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:
         """Return the largest -g of the flight, 0 where there is none."""
-        match self.quantity:
-            case "w":
-                x = flight.w / LENGTH
-            case "v":
-                x = flight.v / kin.max_speed
-            case "a":
-                x = flight.a[kin.first_bounded_acceleration : -1] / kin.max_acceleration
+        x = {
+            "w": flight.w / LENGTH,
+            "v": flight.v / kin.max_speed,
+            "a": flight.a[kin.first_bounded_acceleration : -1] / kin.max_acceleration,
+        }[self.quantity]
         return max(0.0, -float(self.slack(x.T[:, None])[0].min()))

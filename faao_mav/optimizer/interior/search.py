@@ -36,58 +36,34 @@ Half or twice as much costs 3 to 4 % more iterations, five times as much 0.3 % o
 """
 
 _TO_BOUNDARY = 0.99
-"""The share of the way to the boundary of slacks and multipliers that a step may go.
-
-0.9 costs 5 % more iterations, 0.995 changes nothing.
-"""
+"""The share of the way to the boundary that a step may go; 0.9 costs 5 % more iterations."""
 
 _MISFIT = 0.25
-"""The largest shortfall of the rewards that a step may have, in shares of the model's decrease.
-
-0.1 to 1 make no difference.
-"""
+"""The shortfall of rewards allowed, in shares of the model's decrease; 0.1 to 1 do as well."""
 
 _SHORT_STEP = 0.2
 """Steps below this share of the direction are short. 0.1 and 0.3 lose 0.1 % of the value."""
 
 _PATIENCE = 2
-"""The number of short steps in a row after which the multipliers are centred anew.
-
-1 costs 3 % more iterations; 3 and 4 lose 0.1 % of the value.
-"""
+"""The short steps in a row after which the multipliers are centred; 3 lose 0.1 % of the value."""
 
 _MAX_CENTRINGS = 8
-"""The number of centrings after which a search that needs more is given up.
-
-4 loses 0.1 % of the value, 16 gains nothing.
-"""
+"""The centrings after which a search is given up; 4 lose 0.1 % of the value, 16 gain nothing."""
 
 _CENTRING_FACTOR = 1000.0
 """mu after a centring, in mean gaps before it. 100 and 10,000 lose up to 0.1 % of the value."""
 
 _MAX_ATTEMPTS = 6
-"""The number of directions tried at one iterate before its multipliers are centred anew.
-
-3 to 12 make no difference.
-"""
+"""The directions tried at one iterate before its multipliers are centred; 3 to 12 do as well."""
 
 _FIRST_PROXIMAL = 1e-3
-"""The proximal term of the second attempt, in solver units; each later one has eight times it.
-
-1e-4 to 1e-2 make no difference.
-"""
+"""The second attempt's proximal term, then eight times as much; 1e-4 to 1e-2 do as well."""
 
 _STEPS_CUT = 2
-"""The number of steps for which the curvature stays cut once it had to be.
-
-1 loses 0.1 % of the value, 4 makes no difference.
-"""
+"""The steps for which the curvature stays cut once it had to be; 1 loses 0.1 % of the value."""
 
 _MU_PER_TOLERANCE = 1 / 20
-"""The least mu, in tolerances: the gap at the end is well below the tolerance.
-
-A quarter to four times as much makes no difference; with ten times as much nothing converges.
-"""
+"""The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
 
 
 @dataclass(frozen=True, slots=True)
