@@ -66,7 +66,7 @@ def places(rows: Sequence[Row]) -> list[tuple[int, int, int, float]]:
 class Desk:
     """A machine on a table: told things by hand, one at a time."""
 
-    def __init__(self, machine: Machine[Any], sender: Address = VEHICLE) -> None:
+    def __init__(self, machine: Any, sender: Address = VEHICLE) -> None:
         self.machine, self.sender = machine, sender
         self.now = 0.0
         self.sent: list[Message] = []

@@ -1,5 +1,7 @@
 """No packet brings a machine down: whatever is sent, every answer fits into a packet."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,10 +11,10 @@ from stations import HOME, KINDS, VEHICLE, a_mission, peer_of, rows_for
 from faao_mav.mavlink import messages
 from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.discover import Discovery
-from faao_mav.mavlink.mock import MockAutopilot, manners_of
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, manners_of
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.transfer.download import Download
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, Firmware, MissionType
 from faao_mav.mavlink.transfer.upload import Upload
 
 bytes_ = st.integers(0, 255)
@@ -39,7 +41,7 @@ rows = st.builds(
 )
 
 
-def anything(target):
+def anything(target: tuple[int, int]):
     """Return a strategy for messages to `target`."""
     return st.one_of(
         st.builds(messages.MissionCount, *target, shorts, types, st.integers(0, 2**32 - 1)),
@@ -64,7 +66,7 @@ def anything(target):
     )
 
 
-def converse(machine, address, partner, said):
+def converse(machine: Any, address: Address, partner: Address, said: str):
     """Tell `machine` all of `said`, a second apart, by way of real packets."""
     here, there = Codec(address), Codec(partner)
     out = [here.pack(message) for message in machine.start(0.0)]
@@ -77,7 +79,7 @@ def converse(machine, address, partner, said):
 
 @settings(max_examples=150)
 @given(st.sampled_from(KINDS), st.lists(anything(to_vehicle), max_size=30))
-def test_the_mock_bears_everything(kind, said):
+def test_the_mock_bears_everything(kind: MockKind, said: str) -> None:
     mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly)
     firmware = mock.lists.vehicle.autopilot
     mock.lists.replace(MissionType.MISSION, rows_of(a_mission(4), MissionType.MISSION, firmware))
@@ -87,14 +89,14 @@ def test_the_mock_bears_everything(kind, said):
 @pytest.mark.parametrize("firmware", ["ardupilot", "px4", "generic"])
 @settings(max_examples=60)
 @given(st.lists(anything(to_station), max_size=30))
-def test_the_client_bears_everything(firmware, said):
+def test_the_client_bears_everything(firmware: Firmware, said: str) -> None:
     peer = peer_of(firmware)
     for machine in (Upload(rows_for(firmware, 3), peer), Download(peer), Discovery()):
         converse(machine, GROUND_STATION, VEHICLE, said)
 
 
 @given(st.binary(max_size=300))
-def test_the_codec_bears_noise(data):
+def test_the_codec_bears_noise(data: bytes) -> None:
     codec = Codec(GROUND_STATION)
     codec.parse(data)
     codec.parse(b"\xfd" + data)

@@ -1,5 +1,7 @@
 """The downloading and the clearing client."""
 
+from typing import Any
+
 import pytest
 from stations import FOREIGN, Desk, peer_of, rows_for
 
@@ -14,28 +16,28 @@ from faao_mav.mavlink.messages import (
 from faao_mav.mavlink.transfer.clear import Clear
 from faao_mav.mavlink.transfer.download import Download
 from faao_mav.mavlink.transfer.pace import Timeouts
-from faao_mav.mavlink.transfer.protocol import MissionType, Result
+from faao_mav.mavlink.transfer.protocol import Firmware, MissionType, Result
 
 ME = (255, 190)
 ROWS = rows_for("px4", 3)
 MANY = rows_for("ardupilot", 12)[:12]
 
 
-def desk_for(firmware="generic", **timeouts):
+def desk_for(firmware: Firmware = "generic", **timeouts: Any):
     desk = Desk(Download(peer_of(firmware), timeouts=Timeouts(**timeouts)))
     desk.start()
     return desk
 
 
-def item(seq, *, target=ME, mission_type=0):
+def item(seq: int, *, target: tuple[int, int] = ME, mission_type: int = 0):
     return MissionItemInt(*target, seq, mission_type, ROWS[seq])
 
 
-def wants(seq, *, legacy=False):
+def wants(seq: int, *, legacy: bool = False):
     return MissionRequestInt(1, 1, seq, 0, legacy)
 
 
-def test_a_whole_download():
+def test_a_whole_download() -> None:
     desk = desk_for()
     assert desk.sent == [MissionRequestList(1, 1, 0)]
     assert desk.tell(MissionCount(*ME, 3, 0, 99)) == [wants(0)]
@@ -46,18 +48,18 @@ def test_a_whole_download():
     assert desk.machine.outcome.opaque_id == 99
 
 
-def test_an_empty_list_is_acknowledged_too():
+def test_an_empty_list_is_acknowledged_too() -> None:
     desk = desk_for()
     assert desk.tell(MissionCount(*ME, 0, 0)) == [MissionAck(1, 1, Result.ACCEPTED, 0)]
     assert (desk.machine.outcome.status, desk.machine.outcome.rows) == ("accepted", ())
 
 
-def test_px4_is_told_of_the_end_twice():
+def test_px4_is_told_of_the_end_twice() -> None:
     desk = desk_for("px4")
     assert desk.tell(MissionCount(*ME, 0, 0)) == [MissionAck(1, 1, Result.ACCEPTED, 0)] * 2
 
 
-def test_the_list_is_asked_for_again_and_given_up():
+def test_the_list_is_asked_for_again_and_given_up() -> None:
     desk = desk_for()
     assert desk.wait(3.1) == [MissionRequestList(1, 1, 0)] * 2
     desk.wait(120)
@@ -67,7 +69,7 @@ def test_the_list_is_asked_for_again_and_given_up():
 
 
 @pytest.mark.parametrize("seq", [0, 1])
-def test_an_item_is_asked_for_again(seq):
+def test_an_item_is_asked_for_again(seq: int) -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 3, 0))
     for before in range(seq):
@@ -78,7 +80,7 @@ def test_an_item_is_asked_for_again(seq):
     assert desk.tell(item(seq)) == [wants(seq + 1)]
 
 
-def test_questions_come_less_often_the_longer_none_is_answered():
+def test_questions_come_less_often_the_longer_none_is_answered() -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 3, 0))
     assert len(desk.wait(0.26)) == 1
@@ -86,7 +88,7 @@ def test_questions_come_less_often_the_longer_none_is_answered():
     assert len(desk.wait(6.0)) == 4
 
 
-def test_a_slow_link_is_not_flooded_once_it_is_known():
+def test_a_slow_link_is_not_flooded_once_it_is_known() -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 3, 0))
     desk.wait(0.24)
@@ -94,7 +96,7 @@ def test_a_slow_link_is_not_flooded_once_it_is_known():
     assert desk.wait(0.4) == []
 
 
-def test_duplicates_and_items_ahead_are_ignored():
+def test_duplicates_and_items_ahead_are_ignored() -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 3, 0))
     desk.tell(item(0))
@@ -106,7 +108,7 @@ def test_duplicates_and_items_ahead_are_ignored():
     assert desk.machine.outcome.rows == ROWS
 
 
-def test_what_is_for_others_is_ignored():
+def test_what_is_for_others_is_ignored() -> None:
     desk = desk_for()
     assert desk.tell(MissionCount(250, 190, 7, 0)) == []
     assert desk.tell(MissionCount(*ME, 7, 1)) == []
@@ -117,7 +119,7 @@ def test_what_is_for_others_is_ignored():
     assert desk.tell(item(0)) == [wants(1)]
 
 
-def test_a_list_that_changes_meanwhile_is_read_anew():
+def test_a_list_that_changes_meanwhile_is_read_anew() -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 2, 0))
     desk.tell(item(0))
@@ -137,11 +139,11 @@ def wide_desk():
     return desk
 
 
-def row(seq):
+def row(seq: int):
     return MissionItemInt(*ME, seq, 0, MANY[seq])
 
 
-def test_ardupilot_is_asked_for_five_rows_at_once():
+def test_ardupilot_is_asked_for_five_rows_at_once() -> None:
     desk = wide_desk()
     for seq in range(1, 7):
         assert desk.tell(row(seq)) == [wants(seq + 5)]
@@ -151,7 +153,7 @@ def test_ardupilot_is_asked_for_five_rows_at_once():
     assert desk.machine.outcome.rows == MANY
 
 
-def test_px4_is_asked_for_one_row_after_the_other():
+def test_px4_is_asked_for_one_row_after_the_other() -> None:
     desk = desk_for("px4")
     desk.tell(MissionCount(*ME, 3, 0))
     for seq in range(2):
@@ -159,7 +161,7 @@ def test_px4_is_asked_for_one_row_after_the_other():
         assert desk.tell(item(seq)) == [wants(seq + 1)]
 
 
-def test_a_row_is_asked_for_again_when_a_later_one_has_come():
+def test_a_row_is_asked_for_again_when_a_later_one_has_come() -> None:
     desk = wide_desk()
     assert desk.tell(row(3)) == [wants(1), wants(2), wants(6)]
     # Answers to requests that were made before those say nothing more.
@@ -169,7 +171,7 @@ def test_a_row_is_asked_for_again_when_a_later_one_has_come():
     assert desk.machine.outcome.rows == MANY
 
 
-def test_it_is_not_on_a_link_that_changes_the_order():
+def test_it_is_not_on_a_link_that_changes_the_order() -> None:
     desk = wide_desk()
     assert desk.tell(row(3)) == [wants(1), wants(2), wants(6)]
     desk.tell(row(1))
@@ -178,7 +180,7 @@ def test_it_is_not_on_a_link_that_changes_the_order():
     assert desk.tell(row(6)) == [wants(9)]
 
 
-def test_what_is_due_of_five_is_asked_for_again_and_less_often():
+def test_what_is_due_of_five_is_asked_for_again_and_less_often() -> None:
     desk = wide_desk()
     five = [wants(seq) for seq in (1, 2, 3, 4, 5)]
     assert desk.wait(0.29) == []
@@ -188,7 +190,7 @@ def test_what_is_due_of_five_is_asked_for_again_and_less_often():
     assert desk.wait(0.02) == five
 
 
-def test_a_link_that_is_not_known_is_asked_for_one_row():
+def test_a_link_that_is_not_known_is_asked_for_one_row() -> None:
     desk = desk_for("ardupilot")
     desk.tell(MissionCount(*ME, 12, 0))
     desk.wait(0.3)  # asked for again: the answer measures nothing
@@ -197,14 +199,14 @@ def test_a_link_that_is_not_known_is_asked_for_one_row():
     assert len(desk.tell(row(1))) == 5
 
 
-def test_one_refusal_of_five_requests_is_one():
+def test_one_refusal_of_five_requests_is_one() -> None:
     desk = wide_desk()
     for _ in range(5):
         assert desk.tell(MissionAck(*ME, Result.DENIED, 0)) == []
     assert desk.wait(0.3) == [MissionRequestList(1, 1, 0)]
 
 
-def test_unsupported_changes_to_the_old_request():
+def test_unsupported_changes_to_the_old_request() -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 3, 0))
     assert desk.tell(MissionAck(*ME, Result.UNSUPPORTED, 0)) == [wants(0, legacy=True)]
@@ -212,7 +214,7 @@ def test_unsupported_changes_to_the_old_request():
 
 
 @pytest.mark.parametrize("result", [Result.DENIED, Result.ERROR, Result.UNSUPPORTED])
-def test_a_refusal_that_is_repeated_is_final(result):
+def test_a_refusal_that_is_repeated_is_final(result: Result) -> None:
     desk = desk_for()
     for _ in range(Timeouts().attempts):
         assert desk.machine.outcome is None
@@ -221,7 +223,7 @@ def test_a_refusal_that_is_repeated_is_final(result):
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", result)
 
 
-def test_one_stray_refusal_is_survived():
+def test_one_stray_refusal_is_survived() -> None:
     desk = desk_for()
     desk.tell(MissionAck(*ME, Result.ERROR, 0))
     assert desk.wait(0.3) == [MissionRequestList(1, 1, 0)]
@@ -231,27 +233,27 @@ def test_one_stray_refusal_is_survived():
     assert desk.machine.outcome.status == "accepted"
 
 
-def test_a_vehicle_that_falls_silent_is_asked_from_the_beginning():
+def test_a_vehicle_that_falls_silent_is_asked_from_the_beginning() -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 3, 0))
     desk.tell(item(0))
     assert MissionRequestList(1, 1, 0) in desk.wait(11)
 
 
-def test_who_gives_up_tells_the_vehicle():
+def test_who_gives_up_tells_the_vehicle() -> None:
     desk = desk_for()
     desk.tell(MissionCount(*ME, 3, 0))
     assert desk.machine.cancel(desk.now) == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
     assert desk.machine.outcome.status == "cancelled"
 
 
-def clearing(part=MissionType.FENCE):
+def clearing(part: MissionType = MissionType.FENCE):
     desk = Desk(Clear(peer_of("ardupilot"), part))
     desk.start()
     return desk
 
 
-def test_clearing():
+def test_clearing() -> None:
     desk = clearing()
     assert desk.sent == [MissionClearAll(1, 1, 1)]
     desk.tell(MissionAck(*ME, Result.ACCEPTED, 0))
@@ -260,14 +262,14 @@ def test_clearing():
     assert desk.machine.outcome.status == "accepted"
 
 
-def test_clearing_is_repeated_then_given_up():
+def test_clearing_is_repeated_then_given_up() -> None:
     desk = clearing()
     desk.wait(60)
     assert desk.sent == [MissionClearAll(1, 1, 1)] * 6
     assert desk.machine.outcome.status == "silent"
 
 
-def test_clearing_may_be_refused():
+def test_clearing_may_be_refused() -> None:
     desk = clearing()
     desk.tell(MissionAck(*ME, Result.DENIED, 1))
     assert desk.machine.outcome.status == "refused"

@@ -1,5 +1,8 @@
 """Whatever the link does: an upload is verified and right, or reported as failed, and ends."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,8 +22,8 @@ from stations import (
 )
 
 from faao_mav.mavlink.faults import Channel, Faults, Lost
-from faao_mav.mavlink.messages import Heartbeat, MissionAck, MissionCount
-from faao_mav.mavlink.mock import COUNT, ardupilot, px4
+from faao_mav.mavlink.messages import Heartbeat, MissionAck, MissionCount, Row
+from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, ardupilot, px4
 from faao_mav.mavlink.mock.lists import Lists
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, MissionType, Result
@@ -48,14 +51,16 @@ bad_links = st.builds(
 )
 
 
-def vehicle_holds(mock, rows, part=MISSION):
+def vehicle_holds(mock: MockAutopilot, rows: Sequence[Row], part: MissionType = MISSION):
     """Tell whether the list of the vehicle is `rows`, by its own storage."""
     return places(mock.lists.rows(part)) == places(rows)
 
 
 @settings(max_examples=400)
 @given(st.sampled_from([*KINDS, "px4-late-items"]), st.integers(2, 12), bad_links, st.booleans())
-def test_no_wrong_mission_is_ever_called_verified(kind, count, faults, occupied):
+def test_no_wrong_mission_is_ever_called_verified(
+    kind: MockKind, count: int, faults: Faults, occupied: float
+) -> None:
     manners = px4(complete_only=False) if kind == "px4-late-items" else kind
     mock = mock_of(manners)
     firmware = firmware_of(mock.manners.kind)
@@ -72,7 +77,7 @@ def test_no_wrong_mission_is_ever_called_verified(kind, count, faults, occupied)
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("loss", [0.05, 0.2, 0.4])
-def test_plain_loss_is_overcome(kind, loss):
+def test_plain_loss_is_overcome(kind: MockKind, loss: float) -> None:
     for seed in range(15):
         mock = mock_of(kind)
         rows = rows_for(firmware_of(kind), 12)
@@ -82,7 +87,7 @@ def test_plain_loss_is_overcome(kind, loss):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_link_that_dies_for_3_s_is_overcome(kind):
+def test_a_link_that_dies_for_3_s_is_overcome(kind: MockKind) -> None:
     for begin in (0.0, 0.05, 0.2, 0.5, 1.0):
         mock, rows = mock_of(kind), rows_for(firmware_of(kind), 30)
         faults = Faults(latency=0.01, outages=((begin, begin + 3.0),))
@@ -91,7 +96,7 @@ def test_a_link_that_dies_for_3_s_is_overcome(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_link_that_dies_for_a_minute_is_reported(kind):
+def test_a_link_that_dies_for_a_minute_is_reported(kind: MockKind) -> None:
     mock, rows = mock_of(kind), rows_for(firmware_of(kind), 30)
     report, _ = upload_to(mock, rows, Faults(latency=0.01, outages=((0.2, 90.0),)))
     assert report.verdict == "silent"
@@ -113,14 +118,14 @@ def test_a_link_that_dies_for_a_minute_is_reported(kind):
         ("px4", Lost(MISSION_ACK, 1)),
     ],
 )
-def test_any_one_packet_may_be_lost(kind, lost):
+def test_any_one_packet_may_be_lost(kind: MockKind, lost: object) -> None:
     mock, rows = mock_of(kind), rows_for(kind, 4)
     report, took = upload_to(mock, rows, Faults(lost=(lost,)))
     assert (report.verified, report.attempts) == (True, 1)
     assert took < 4
 
 
-def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way():
+def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way() -> None:
     for kind, answer in (("px4", Result.ACCEPTED), ("ardupilot", Result.ERROR)):
         mock, rows = mock_of(kind), rows_for(kind, 4)
         upload = Upload(rows, peer_of(kind))
@@ -139,7 +144,7 @@ def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way():
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_what_was_asked_about_a_lost_answer_is_no_refusal(kind):
+def test_what_was_asked_about_a_lost_answer_is_no_refusal(kind: MockKind) -> None:
     mock, rows = mock_of(kind), rows_for(kind, 4)
     report, took = upload_to(mock, rows, Faults(lost=(Lost(MISSION_ACK, 1),)))
     assert (report.verified, report.attempts) == (True, 1)
@@ -150,7 +155,7 @@ def test_what_was_asked_about_a_lost_answer_is_no_refusal(kind):
 @pytest.mark.parametrize("make", [ardupilot, px4])
 @pytest.mark.parametrize("result", sorted(set(Result) - {Result.ACCEPTED, Result.INVALID_SEQUENCE}))
 @pytest.mark.parametrize("seq", [COUNT, 0, 3, 5])
-def test_refusals_of_every_kind_are_reported(make, result, seq):
+def test_refusals_of_every_kind_are_reported(make: Any, result: Result, seq: int) -> None:
     if make is ardupilot and seq == 0:
         seq = 1
     mock = mock_of(make(refusals={(MISSION, seq): result}))
@@ -164,7 +169,7 @@ def test_refusals_of_every_kind_are_reported(make, result, seq):
         assert report.item == (None if seq == COUNT else seq)
 
 
-def test_a_refused_mission_leaves_px4_as_it_was():
+def test_a_refused_mission_leaves_px4_as_it_was() -> None:
     mock = mock_of(px4(refusals={(MISSION, 3): Result.INVALID_PARAM1}))
     old = rows_for("px4", 7, shift=0.1)
     mock.lists.replace(MISSION, old)
@@ -174,7 +179,7 @@ def test_a_refused_mission_leaves_px4_as_it_was():
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 @pytest.mark.parametrize("when", [0.03, 0.1, 0.2])
-def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind, when):
+def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind: MockKind, when: object) -> None:
     mock, rows = mock_of(kind, boot=4.0), rows_for(kind, 40)
     faults = Faults(latency=0.005)
     report, _ = upload_to(mock, rows, faults, events=[(4.5 + when, mock.reboot)])
@@ -183,7 +188,7 @@ def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind, when):
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_another_ground_station_uploads_something_else_at_the_same_time(kind):
+def test_another_ground_station_uploads_something_else_at_the_same_time(kind: MockKind) -> None:
     """One of the two is refused, or both come in turn: nobody is told a wrong thing."""
     for head_start in range(4):
         mock = mock_of(kind)
@@ -197,7 +202,7 @@ def test_another_ground_station_uploads_something_else_at_the_same_time(kind):
             assert report.verdict in ("refused", "different", "unread")
 
 
-def test_another_vehicle_with_the_same_list_does_not_mix_in():
+def test_another_vehicle_with_the_same_list_does_not_mix_in() -> None:
     mock, rows = mock_of("px4"), rows_for("px4", 6)
     other = mock_of("px4", address=Address(2, 1))
     report, _ = upload_to(mock, rows, others=[Station(other, other.address)])
@@ -205,7 +210,7 @@ def test_another_vehicle_with_the_same_list_does_not_mix_in():
     assert other.lists.rows(MISSION) == ()
 
 
-def test_all_three_lists_of_a_mission():
+def test_all_three_lists_of_a_mission() -> None:
     for kind in KINDS:
         firmware, mock = firmware_of(kind), mock_of(kind)
         mission = a_mission(6, fence=FENCE, rally=RALLY)
@@ -227,7 +232,7 @@ def test_all_three_lists_of_a_mission():
         assert mock.mission().items == ()
 
 
-def test_an_upload_stops_at_the_list_that_fails():
+def test_an_upload_stops_at_the_list_that_fails() -> None:
     mock = mock_of(px4(refusals={(MissionType.FENCE, COUNT): Result.NO_SPACE}))
     mission = a_mission(6, fence=FENCE, rally=RALLY)
     parts = [(part, rows_of(mission, part, "px4")) for part in MissionType]
@@ -237,9 +242,9 @@ def test_an_upload_stops_at_the_list_that_fails():
     assert mock.lists.rows(MissionType.RALLY) == ()
 
 
-def test_a_vehicle_that_stores_something_else_is_found_out():
+def test_a_vehicle_that_stores_something_else_is_found_out() -> None:
     class Forgetful(Lists):
-        def kept(self, part, seq, row):
+        def kept(self, part: MissionType, seq: int, row: Row):
             kept = super().kept(part, seq, row)
             return super().kept(part, seq, rows_for("px4", 8)[3]) if seq == 5 else kept
 
@@ -251,7 +256,7 @@ def test_a_vehicle_that_stores_something_else_is_found_out():
     assert report.attempts == 2  # the same again: no third
 
 
-def test_650_items_over_a_bad_link():
+def test_650_items_over_a_bad_link() -> None:
     for kind in ("ardupilot", "px4"):
         mock, rows = mock_of(kind), rows_for(kind, 650)
         report, took = upload_to(mock, rows, Faults(loss=0.2, latency=0.01), until=2000)
@@ -259,13 +264,13 @@ def test_650_items_over_a_bad_link():
         assert took < 400
 
 
-def test_who_is_interrupted_frees_the_vehicle():
+def test_who_is_interrupted_frees_the_vehicle() -> None:
     mock, rows = mock_of("px4"), rows_for("px4", 30)
     script = Script(upload_parts([(MISSION, rows)], peer_of("px4")))
     client = Station(script, GROUND_STATION)
     out = []
 
-    def interrupt(now):
+    def interrupt(now: float):
         out.extend(script.cancel(now))
 
     simulate(client, Station(mock, VEHICLE), Faults(latency=0.01), events=[(0.1, interrupt)])
@@ -273,7 +278,7 @@ def test_who_is_interrupted_frees_the_vehicle():
     assert out == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
 
 
-def test_clearing_over_a_bad_link():
+def test_clearing_over_a_bad_link() -> None:
     for kind in KINDS:
         for seed in range(10):
             mock = mock_of(kind)
@@ -287,11 +292,11 @@ def test_clearing_over_a_bad_link():
             assert mock.lists.rows(MissionType.RALLY) == ()
 
 
-def test_the_same_seed_gives_the_same_link():
+def test_the_same_seed_gives_the_same_link() -> None:
     faults = Faults(loss=0.3, duplication=0.3, reordering=0.5, delay=1.0, corruption=0.2, seed=4)
     packets = [bytes([0xFD, index]) * 8 for index in range(50)]
 
-    def carried(name, seed=4):
+    def carried(name: str, seed: int = 4):
         channel = Channel(Faults(**{**vars_of(faults), "seed": seed}), name)
         return [channel.carry(packet, 1.0) for packet in packets]
 
@@ -300,11 +305,11 @@ def test_the_same_seed_gives_the_same_link():
     assert carried("a") != carried("a", seed=5)
 
 
-def vars_of(faults):
+def vars_of(faults: Faults):
     return {name: getattr(faults, name) for name in faults.__slots__}
 
 
-def test_what_a_channel_does():
+def test_what_a_channel_does() -> None:
     assert Channel(Faults(latency=0.5), "x").carry(b"abc", 1.0) == [(1.5, b"abc")]
     assert Channel(Faults(loss=1.0), "x").carry(b"abc", 1.0) == []
     assert Channel(Faults(outages=((0.5, 1.5),)), "x").carry(b"abc", 1.0) == []
@@ -320,7 +325,7 @@ def test_what_a_channel_does():
     assert [len(channel.carry(packet, 0.0)) for _ in range(3)] == [1, 0, 1]
 
 
-def test_messages_used_here_are_what_the_numbers_say():
+def test_messages_used_here_are_what_the_numbers_say() -> None:
     from faao_mav.mavlink.codec import Codec
 
     codec = Codec(VEHICLE)

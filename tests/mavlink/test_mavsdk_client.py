@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from conftest import free_port
@@ -20,7 +21,7 @@ from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, manners_of
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import MissionType
+from faao_mav.mavlink.transfer.protocol import MissionType, Result
 
 
 def sdk_items(rows: tuple[Row, ...], part: MissionType) -> list[SdkItem]:
@@ -63,7 +64,7 @@ def flown(request: pytest.FixtureRequest) -> Iterator[tuple[MockAutopilot, Missi
         sdk.destroy()
 
 
-def test_mavsdk_uploads_downloads_and_clears_a_mission(flown):
+def test_mavsdk_uploads_downloads_and_clears_a_mission(flown: Any) -> None:
     mock, client = flown
     rows = rows_of(a_mission(8), MissionType.MISSION, mock.lists.vehicle.autopilot)
     client.upload_mission(sdk_items(rows, MissionType.MISSION))
@@ -73,7 +74,7 @@ def test_mavsdk_uploads_downloads_and_clears_a_mission(flown):
     assert mock.mission().items == ()
 
 
-def test_mavsdk_uploads_and_downloads_a_fence(flown):
+def test_mavsdk_uploads_and_downloads_a_fence(flown: Any) -> None:
     mock, client = flown
     rows = rows_of(a_mission(3, fence=FENCE), MissionType.FENCE, mock.lists.vehicle.autopilot)
     client.upload_geofence(sdk_items(rows, MissionType.FENCE))
@@ -81,7 +82,7 @@ def test_mavsdk_uploads_and_downloads_a_fence(flown):
     assert found_places(client.download_geofence()) == places(rows)
 
 
-def test_mavsdk_uploads_and_downloads_rally_points(flown):
+def test_mavsdk_uploads_and_downloads_rally_points(flown: Any) -> None:
     mock, client = flown
     rows = rows_of(a_mission(3, rally=RALLY), MissionType.RALLY, mock.lists.vehicle.autopilot)
     client.upload_rally_points(sdk_items(rows, MissionType.RALLY))
@@ -89,13 +90,13 @@ def test_mavsdk_uploads_and_downloads_rally_points(flown):
     assert found_places(client.download_rallypoints()) == places(rows)
 
 
-def test_mavsdk_arms_and_flies_the_mission(flown):
+def test_mavsdk_arms_and_flies_the_mission(flown: Any) -> None:
     mock, client = flown
     rows = rows_of(a_mission(8), MissionType.MISSION, mock.lists.vehicle.autopilot)
     client.upload_mission(sdk_items(rows, MissionType.MISSION))
     reached = threading.Event()
 
-    def progress(now, _):
+    def progress(now: float, _: object):
         if now.current == len(rows) - 1:
             reached.set()
 
@@ -112,12 +113,12 @@ def test_mavsdk_arms_and_flies_the_mission(flown):
     assert not mock.armed, "it has not landed"
 
 
-def test_our_client_uploads_to_mavsdks_server():
+def test_our_client_uploads_to_mavsdks_server() -> None:
     port = free_port()
     received: list[list[SdkItem]] = []
     arrived = threading.Event()
 
-    def incoming(result, plan, _):
+    def incoming(result: Result, plan, _: object):
         received.append(plan.mission_items)
         arrived.set()
 

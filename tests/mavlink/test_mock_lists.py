@@ -1,9 +1,13 @@
 """The mock autopilots' side of the mission protocol, as the real ones have it."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import pytest
 from stations import FOREIGN, HOME, VEHICLE, Desk, mock_of, places, rows_for
 
 from faao_mav.mavlink.messages import (
+    Message,
     MissionAck,
     MissionClearAll,
     MissionCount,
@@ -14,8 +18,8 @@ from faao_mav.mavlink.messages import (
     Row,
     Statustext,
 )
-from faao_mav.mavlink.mock import ardupilot, px4
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType, Result
+from faao_mav.mavlink.mock import MockKind, ardupilot, px4
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, MissionType, Result
 
 MISSION, FENCE, RALLY = MissionType
 TO = (VEHICLE.system, VEHICLE.component)
@@ -23,33 +27,35 @@ PLACE = (-353_000_000, 1_491_000_000)
 RALLY_ROW = Row(5100, 3, (0.0, 0.0, 0.0, 0.0), *PLACE, 30.0)
 
 
-def desk_for(kind, **options):
+def desk_for(kind: MockKind, **options: Any):
     desk = Desk(mock_of(kind, **options), GROUND_STATION)
     desk.start()
     return desk
 
 
-def count(n, part=MISSION):
+def count(n: int, part: MissionType = MISSION):
     return MissionCount(*TO, n, part)
 
 
-def item(seq, row, part=MISSION):
+def item(seq: int, row: Row, part: MissionType = MISSION):
     return MissionItemInt(*TO, seq, part, row)
 
 
-def answers(messages, kind):
+def answers(messages: Sequence[Message], kind: MockKind):
     return [message for message in messages if isinstance(message, kind)]
 
 
-def results(messages):
+def results(messages: Sequence[Message]):
     return [message.type for message in answers(messages, MissionAck)]
 
 
-def asked(messages):
+def asked(messages: Sequence[Message]):
     return [message.seq for message in answers(messages, MissionRequestInt)]
 
 
-def upload(desk, rows, part=MISSION, sender=GROUND_STATION):
+def upload(
+    desk: Desk, rows: Sequence[Row], part: MissionType = MISSION, sender: Address = GROUND_STATION
+):
     """Upload without a fault and return the last answer's results."""
     out = desk.tell(count(len(rows), part), sender)
     for seq, row in enumerate(rows):
@@ -58,20 +64,20 @@ def upload(desk, rows, part=MISSION, sender=GROUND_STATION):
     return results(out)
 
 
-def stored(desk, part=MISSION):
+def stored(desk: Desk, part: MissionType = MISSION):
     return places(desk.machine.lists.rows(part))
 
 
 @pytest.mark.parametrize(
     ("kind", "legacy"), [("ardupilot", True), ("px4", False), ("px4-legacy-first", True)]
 )
-def test_who_asks_with_which_message(kind, legacy):
+def test_who_asks_with_which_message(kind: MockKind, legacy: bool) -> None:
     (request,) = desk_for(kind).tell(count(3))
     assert request.legacy is legacy
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_what_is_uploaded_can_be_downloaded(kind):
+def test_what_is_uploaded_can_be_downloaded(kind: MockKind) -> None:
     desk, rows = desk_for(kind), rows_for(kind, 4)
     assert upload(desk, rows) == [Result.ACCEPTED]
     (found,) = desk.tell(MissionRequestList(*TO, 0))
@@ -82,7 +88,7 @@ def test_what_is_uploaded_can_be_downloaded(kind):
     desk.tell(MissionAck(*TO, Result.ACCEPTED, 0))
 
 
-def test_ardupilot_keeps_its_own_home_in_row_0():
+def test_ardupilot_keeps_its_own_home_in_row_0() -> None:
     desk = desk_for("ardupilot")
     rows = rows_for("ardupilot", 3)
     elsewhere = Row(16, 0, (0.0, 0.0, 0.0, 0.0), *PLACE, 1.0)
@@ -91,7 +97,7 @@ def test_ardupilot_keeps_its_own_home_in_row_0():
     assert (home.x, home.y, home.z) == (round(HOME.latitude * 1e7), 1_491_652_370, 584.0)
 
 
-def test_storage_loses_what_the_real_one_loses():
+def test_storage_loses_what_the_real_one_loses() -> None:
     fussy = Row(16, 6, (2.75, 5.0, 1.0, 30.0), *PLACE, 20.123)
     for kind, params, frame in (
         ("ardupilot", (2.0, 0.0, 0.0, 0.0), 3),
@@ -104,7 +110,7 @@ def test_storage_loses_what_the_real_one_loses():
         assert (found.params, found.frame) == (params, frame)
 
 
-def test_ardupilot_asks_again_after_1_s_and_gives_up_after_8():
+def test_ardupilot_asks_again_after_1_s_and_gives_up_after_8() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
     assert asked(desk.wait(0.99)) == []
@@ -116,7 +122,7 @@ def test_ardupilot_asks_again_after_1_s_and_gives_up_after_8():
     assert upload(desk, rows_for("ardupilot")) == [Result.ACCEPTED]
 
 
-def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5():
+def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5() -> None:
     desk = desk_for("px4")
     desk.tell(count(3))
     assert asked(desk.wait(1.01)) == [0] * 4
@@ -126,7 +132,7 @@ def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5():
     assert asked(desk.wait(6)) == []
 
 
-def test_ardupilot_says_so_of_a_wrong_item_and_goes_on():
+def test_ardupilot_says_so_of_a_wrong_item_and_goes_on() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     desk.tell(count(4))
     assert results(desk.tell(item(2, rows[2]))) == [Result.INVALID_SEQUENCE]
@@ -134,20 +140,20 @@ def test_ardupilot_says_so_of_a_wrong_item_and_goes_on():
         assert asked(desk.tell(item(seq, rows[seq]))) == [seq + 1]
 
 
-def test_px4_passes_over_a_wrong_item():
+def test_px4_passes_over_a_wrong_item() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 3)
     desk.tell(count(3))
     assert desk.tell(item(2, rows[2])) == []
     assert asked(desk.tell(item(0, rows[0]))) == [1]
 
 
-def test_the_last_item_again_is_an_error_for_ardupilot():
+def test_the_last_item_again_is_an_error_for_ardupilot() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     upload(desk, rows)
     assert results(desk.tell(item(len(rows) - 1, rows[-1]))) == [Result.ERROR]
 
 
-def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error():
+def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 3)
     upload(desk, rows)
     assert results(desk.tell(item(2, rows[2]))) == [Result.ACCEPTED]
@@ -155,7 +161,7 @@ def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error():
 
 
 @pytest.mark.parametrize("complete_only", [True, False])
-def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only):
+def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only: bool) -> None:
     desk, rows = desk_for(px4(complete_only=complete_only)), rows_for("px4", 3)
     desk.tell(count(3))
     desk.tell(item(0, rows[0]))
@@ -165,7 +171,7 @@ def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only):
     assert stored(desk) == []
 
 
-def test_ardupilot_is_left_with_old_and_new_items_px4_is_not():
+def test_ardupilot_is_left_with_old_and_new_items_px4_is_not() -> None:
     for kind, mixed in (("ardupilot", True), ("px4", False)):
         desk = desk_for(kind)
         old, new = rows_for(kind, 4), rows_for(kind, 4, shift=0.1)
@@ -178,7 +184,7 @@ def test_ardupilot_is_left_with_old_and_new_items_px4_is_not():
         assert stored(desk) == expected
 
 
-def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4():
+def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4() -> None:
     for kind, refusal in (("ardupilot", Result.DENIED), ("px4", Result.ERROR)):
         desk, rows = desk_for(kind), rows_for(kind, 3)
         desk.tell(count(len(rows)))
@@ -189,14 +195,14 @@ def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4():
         assert asked(out) == [1]
 
 
-def test_a_count_again_begins_anew_for_ardupilot():
+def test_a_count_again_begins_anew_for_ardupilot() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     desk.tell(count(4))
     desk.tell(item(0, rows[0]))
     assert asked(desk.tell(count(4))) == [0]
 
 
-def test_a_count_again_is_an_error_for_px4_once_it_has_an_item():
+def test_a_count_again_is_an_error_for_px4_once_it_has_an_item() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 3)
     desk.tell(count(3))
     assert asked(desk.tell(count(3))) == [0]
@@ -205,7 +211,7 @@ def test_a_count_again_is_an_error_for_px4_once_it_has_an_item():
     assert asked(desk.tell(item(1, rows[1]))) == [2]
 
 
-def test_downloading_during_an_upload():
+def test_downloading_during_an_upload() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
     assert results(desk.tell(MissionRequestList(*TO, 0))) == [Result.DENIED]
@@ -216,7 +222,7 @@ def test_downloading_during_an_upload():
     assert answers(out, MissionCount) == []
 
 
-def test_ardupilot_takes_two_lists_at_once_px4_does_not():
+def test_ardupilot_takes_two_lists_at_once_px4_does_not() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
     assert asked(desk.tell(count(1, RALLY))) == [0]
@@ -230,7 +236,7 @@ def test_ardupilot_takes_two_lists_at_once_px4_does_not():
     assert results(desk.tell(count(1, RALLY))) == [Result.ERROR]
 
 
-def test_too_many_items():
+def test_too_many_items() -> None:
     for kind, limit in (("ardupilot", 655), ("px4", 1000)):
         desk = desk_for(kind)
         assert results(desk.tell(count(16_000))) == [Result.NO_SPACE]
@@ -238,19 +244,19 @@ def test_too_many_items():
         assert asked(desk.tell(count(limit))) == [0]
 
 
-def test_an_unknown_list():
+def test_an_unknown_list() -> None:
     assert results(desk_for("ardupilot").tell(count(1, 230))) == [Result.UNSUPPORTED]
     assert results(desk_for("px4").tell(count(1, 230))) == [Result.INVALID]
 
 
-def test_ardupilot_has_no_space_while_it_boots():
+def test_ardupilot_has_no_space_while_it_boots() -> None:
     desk = desk_for("ardupilot", boot=5.0)
     assert results(desk.tell(count(3))) == [Result.NO_SPACE]
     desk.wait(5.1)
     assert asked(desk.tell(count(3))) == [0]
 
 
-def test_partial_lists():
+def test_partial_lists() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 4)
     upload(desk, rows)
     wrong = MissionWritePartialList(*TO, 2, 99, 0)
@@ -262,7 +268,7 @@ def test_partial_lists():
     assert stored(desk) == places((*rows[:2], *other[2:4], *rows[4:]))
 
 
-def test_clearing_one_list_leaves_the_others():
+def test_clearing_one_list_leaves_the_others() -> None:
     for kind in ("ardupilot", "px4"):
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
@@ -274,7 +280,7 @@ def test_clearing_one_list_leaves_the_others():
         assert stored(desk, RALLY) == []
 
 
-def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothing():
+def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothing() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
     assert results(desk.tell(MissionClearAll(*TO, 0))) == [Result.ERROR]
@@ -283,7 +289,7 @@ def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothin
     assert results(desk.tell(MissionClearAll(*TO, 0))) == []
 
 
-def test_a_count_of_none_clears():
+def test_a_count_of_none_clears() -> None:
     for kind in ("ardupilot", "px4"):
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
@@ -291,7 +297,7 @@ def test_a_count_of_none_clears():
         assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
 
 
-def test_px4_changes_its_request_when_told_unsupported():
+def test_px4_changes_its_request_when_told_unsupported() -> None:
     desk = desk_for("px4-legacy-first")
     (request,) = desk.tell(count(3))
     (other,) = desk.tell(MissionAck(*TO, Result.UNSUPPORTED, 0))
@@ -299,7 +305,7 @@ def test_px4_changes_its_request_when_told_unsupported():
     assert other.seq == 0
 
 
-def test_px4_is_freed_by_a_cancellation():
+def test_px4_is_freed_by_a_cancellation() -> None:
     desk = desk_for("px4")
     desk.tell(count(3))
     desk.tell(MissionAck(*TO, Result.OPERATION_CANCELLED, 0))
@@ -307,7 +313,7 @@ def test_px4_is_freed_by_a_cancellation():
     assert asked(desk.tell(count(3), FOREIGN)) == [0]
 
 
-def test_px4_downloads_in_order_only():
+def test_px4_downloads_in_order_only() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 4)
     upload(desk, rows)
     assert desk.tell(MissionRequestInt(*TO, 0, 0)) == []
@@ -319,7 +325,7 @@ def test_px4_downloads_in_order_only():
     assert desk.tell(MissionRequestInt(*TO, 1, 0)) == []
 
 
-def test_ardupilot_downloads_in_any_order():
+def test_ardupilot_downloads_in_any_order() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     upload(desk, rows)
     for seq in (3, 0, 2):
@@ -354,13 +360,13 @@ NAN = float("nan")
         ("px4", Row(16, 3, (0.0,) * 4, 0, 1_810_000_000, 9.0), Result.INVALID_PARAM6_Y),
     ],
 )
-def test_which_items_are_refused(kind, row, result):
+def test_which_items_are_refused(kind: MockKind, row: Row, result: Result) -> None:
     desk = desk_for(kind)
     first = rows_for(kind, 2)[:1]
     assert upload(desk, (*first, row)) == [result]
 
 
-def test_a_fence_is_checked_and_replaced_as_a_whole():
+def test_a_fence_is_checked_and_replaced_as_a_whole() -> None:
     desk = desk_for("ardupilot")
     corner = Row(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
     upload(desk, (corner,) * 3, FENCE)
@@ -373,14 +379,14 @@ def test_a_fence_is_checked_and_replaced_as_a_whole():
         assert upload(desk_for(kind), (thin,), FENCE) == [result]
 
 
-def test_refusals_can_be_prescribed():
+def test_refusals_can_be_prescribed() -> None:
     manners = ardupilot(refusals={(MISSION, 1): Result.INVALID_PARAM3})
     desk = desk_for(manners)
     rows = rows_for("ardupilot", 2)
     assert upload(desk, rows[:2]) == [Result.INVALID_PARAM3]
 
 
-def test_numbers_tell_px4_lists_apart():
+def test_numbers_tell_px4_lists_apart() -> None:
     desk = desk_for("px4")
     numbers = []
     for shift in (0.0, 0.1, 0.0):

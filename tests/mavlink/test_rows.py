@@ -3,6 +3,8 @@
 import dataclasses
 import math
 import struct
+from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -24,19 +26,19 @@ from faao_mav.mavlink.messages import (
     Statustext,
 )
 from faao_mav.mavlink.rows import mission_of, rows_of
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType
+from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Firmware, MissionType
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import RallyPoint
 
 MISSION = MissionType.MISSION
 
 
-def there_and_back(mission, firmware):
+def there_and_back(mission: Mission, firmware: Firmware):
     rows = [rows_of(mission, part, firmware) for part in MissionType]
     return mission_of(*rows, firmware)
 
 
-def test_home_is_row_0_of_ardupilot_and_no_row_of_px4():
+def test_home_is_row_0_of_ardupilot_and_no_row_of_px4() -> None:
     mission = a_mission(3)
     first, *rest = rows_of(mission, MISSION, "ardupilot")
     assert (first.command, first.frame, first.z) == (16, 0, 584.0)
@@ -47,13 +49,13 @@ def test_home_is_row_0_of_ardupilot_and_no_row_of_px4():
     assert [first.current, *(row.current for row in rest)] == [1, 0, 0, 0]
 
 
-def test_degrees_are_rounded_not_cut():
+def test_degrees_are_rounded_not_cut() -> None:
     item = MissionItem(16, 3, x=-35.36326199999999, y=149.16523709999999, z=1.0)
     (row,) = rows_of(Mission((item,)), MISSION, "px4")
     assert (row.x, row.y) == (-353_632_620, 1_491_652_371)
 
 
-def test_jumps_count_with_the_home_row_where_there_is_one():
+def test_jumps_count_with_the_home_row_where_there_is_one() -> None:
     jump = MissionItem(177, 2, (1.0, 3.0, 0.0, 0.0))
     mission = Mission((*a_mission(3).items, jump), HOME)
     assert rows_of(mission, MISSION, "ardupilot")[-1].params[0] == 1
@@ -62,7 +64,7 @@ def test_jumps_count_with_the_home_row_where_there_is_one():
         assert there_and_back(mission, firmware).items[-1] == jump
 
 
-def test_what_is_not_set():
+def test_what_is_not_set() -> None:
     yaw = MissionItem(16, 3, (0.0, 0.0, 0.0, math.nan), -35.0, 149.0, 20.0)
     nowhere = dataclasses.replace(yaw, x=math.nan)
     (row,) = rows_of(Mission((yaw,)), MISSION, "px4")
@@ -80,13 +82,13 @@ def test_what_is_not_set():
         (MissionItem(16, 3, (1e39, 0.0, 0.0, 0.0)), "single-precision"),
     ],
 )
-def test_what_the_wire_does_not_carry(item, told):
+def test_what_the_wire_does_not_carry(item: Any, told: str) -> None:
     with pytest.raises(InputError, match=told):
         rows_of(Mission((item,)), MISSION, "px4")
 
 
 @pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
-def test_fence_and_rally_points_there_and_back(firmware):
+def test_fence_and_rally_points_there_and_back(firmware: Firmware) -> None:
     return_point = RallyPoint(-35.35, 149.15, 60.0)
     fence = dataclasses.replace(FENCE, breach_return=return_point)
     mission = a_mission(3, fence=fence, rally=RALLY)
@@ -97,7 +99,7 @@ def test_fence_and_rally_points_there_and_back(firmware):
 
 
 @pytest.mark.parametrize("kept", [slice(0, 2), slice(1, 4)])
-def test_a_fence_with_part_of_a_polygon_is_refused(kept):
+def test_a_fence_with_part_of_a_polygon_is_refused(kept: Any) -> None:
     rows = rows_of(a_mission(3, fence=FENCE), MissionType.FENCE, "px4")
     with pytest.raises(InputError, match="a polygon stops after 2 of its vertices"):
         mission_of((), rows[kept], (), "px4")
@@ -118,12 +120,12 @@ items = st.builds(
 
 
 @given(st.lists(items, min_size=1, max_size=5), st.sampled_from(["ardupilot", "px4"]))
-def test_rows_hold_all_of_an_item(items, firmware):
+def test_rows_hold_all_of_an_item(items: Any, firmware: Firmware) -> None:
     mission = Mission(tuple(items), Home(47.0, 8.5, 400.0))
     assert there_and_back(mission, firmware).items == mission.items
 
 
-def packets(*messages):
+def packets(*messages: Any):
     codec = Codec(VEHICLE)
     return [codec.pack(message) for message in messages]
 
@@ -142,14 +144,14 @@ MESSAGES = [
 ]
 
 
-def test_messages_survive_the_wire():
+def test_messages_survive_the_wire() -> None:
     codec = Codec(GROUND_STATION)
     found = [packet for data in packets(*MESSAGES) for packet in codec.parse(data)]
     assert [packet.envelope.message for packet in found] == MESSAGES
     assert {packet.envelope.sender for packet in found} == {VEHICLE}
 
 
-def test_items_survive_the_wire_to_the_last_digit():
+def test_items_survive_the_wire_to_the_last_digit() -> None:
     item = MissionItemInt(255, 190, 3, 0, ROW)
     (packet,) = Codec(GROUND_STATION).parse(packets(item)[0])
     found = packet.envelope.message.row
@@ -158,7 +160,7 @@ def test_items_survive_the_wire_to_the_last_digit():
     assert (found.current, found.autocontinue) == (1, 0)
 
 
-def test_the_old_item_has_single_precision():
+def test_the_old_item_has_single_precision() -> None:
     item = MissionItemInt(255, 190, 3, 0, ROW, legacy=True)
     (packet,) = Codec(GROUND_STATION).parse(packets(item)[0])
     found = packet.envelope.message
@@ -166,7 +168,7 @@ def test_the_old_item_has_single_precision():
     assert 0 < abs(found.row.y - ROW.y) < 100
 
 
-def test_pymavlink_reads_the_packets():
+def test_pymavlink_reads_the_packets() -> None:
     reader = common.MAVLink(None)
     count, item = packets(MissionCount(255, 190, 700, 1, 5), MissionItemInt(255, 190, 3, 2, ROW))
     (message,) = reader.parse_buffer(count)
@@ -176,7 +178,7 @@ def test_pymavlink_reads_the_packets():
     assert message.get_msgbuf()[0] == 0xFD
 
 
-def test_damaged_and_unknown_packets_are_passed_over():
+def test_damaged_and_unknown_packets_are_passed_over() -> None:
     codec = Codec(GROUND_STATION)
     good, other = packets(MESSAGES[0], MESSAGES[1])
     damaged = bytearray(good)
@@ -190,14 +192,14 @@ def test_damaged_and_unknown_packets_are_passed_over():
     assert packet.raw == unknown
 
 
-def test_packets_may_come_in_pieces():
+def test_packets_may_come_in_pieces() -> None:
     codec = Codec(GROUND_STATION)
     stream = b"".join(packets(*MESSAGES))
     found = [packet for byte in stream for packet in codec.parse(bytes([byte]))]
     assert [packet.envelope.message for packet in found] == MESSAGES
 
 
-def test_signed_packets_need_the_key():
+def test_signed_packets_need_the_key() -> None:
     key = key_of_phrase("open sesame")
     signed = Codec(VEHICLE, key).pack(MESSAGES[0])
     assert len(signed) > len(packets(MESSAGES[0])[0])
@@ -207,7 +209,7 @@ def test_signed_packets_need_the_key():
     assert Codec(GROUND_STATION, key).parse(packets(MESSAGES[0])[0]) == []
 
 
-def test_a_signed_packet_is_taken_once():
+def test_a_signed_packet_is_taken_once() -> None:
     key = key_of_phrase("open sesame")
     signed = Codec(VEHICLE, key).pack(MESSAGES[0])
     codec = Codec(GROUND_STATION, key)
@@ -215,7 +217,7 @@ def test_a_signed_packet_is_taken_once():
     assert codec.parse(signed) == []
 
 
-def test_keys_in_files(tmp_path):
+def test_keys_in_files(tmp_path: Path) -> None:
     key = key_of_phrase("x")
     path = tmp_path / "key"
     path.write_bytes(key)

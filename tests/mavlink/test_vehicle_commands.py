@@ -3,6 +3,8 @@
 import json
 import threading
 import time
+from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -15,7 +17,7 @@ from faao_mav.cli.download import download
 from faao_mav.cli.transfer_progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
-from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, ardupilot, manners_of
 from faao_mav.mavlink.rows import rows_of
 from faao_mav.mavlink.runner import running
 from faao_mav.mavlink.transfer.protocol import MissionType, Result
@@ -28,12 +30,12 @@ app.command()(download)
 app.command()(autopilot)
 
 
-def run(*arguments):
+def run(*arguments: Any):
     return CliRunner().invoke(app, [str(each) for each in arguments])
 
 
 @pytest.fixture
-def mission_file(tmp_path):
+def mission_file(tmp_path: Path):
     path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(a_mission(6)))
     return path
@@ -44,12 +46,12 @@ def port():
     return free_port()
 
 
-def a_mock(kind="ardupilot", **options):
+def a_mock(kind: MockKind = "ardupilot", **options: Any):
     manners = manners_of(kind) if isinstance(kind, str) else kind
     return MockAutopilot(manners, home=HOME, beat=0.1, **options)
 
 
-def test_upload_and_download(mission_file, port, tmp_path):
+def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> None:
     with running(a_mock(), f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
         assert result.exit_code == 0, result.output
@@ -68,7 +70,7 @@ def test_upload_and_download(mission_file, port, tmp_path):
     assert places(rows) == places(sent_rows)
 
 
-def test_json_is_one_object(mission_file, port):
+def test_json_is_one_object(mission_file: Path, port: int) -> None:
     with running(a_mock("px4"), f"udpin:127.0.0.1:{port}"):
         connection = f"udpout:127.0.0.1:{port}"
         result = run("upload", mission_file, "--to", connection, "--json", "--system", 1)
@@ -83,7 +85,7 @@ def test_json_is_one_object(mission_file, port):
     assert mission["opaque_id"] > 0
 
 
-def test_json_has_no_nan(tmp_path, port):
+def test_json_has_no_nan(tmp_path: Path, port: int) -> None:
     item = MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36, 149.16, 20.0)
     path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(Mission((item,), HOME)))
@@ -100,7 +102,7 @@ def test_json_has_no_nan(tmp_path, port):
     }
 
 
-def test_what_is_not_kept_is_told_once_for_each_field(tmp_path, port):
+def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path, port: int) -> None:
     items = tuple(
         MissionItem(16, 3, (2.5, 0.0, 0.0, 0.0), -35.36 + k * 1e-4, 149.16, 20.0) for k in range(4)
     )
@@ -114,7 +116,7 @@ def test_what_is_not_kept_is_told_once_for_each_field(tmp_path, port):
     ]
 
 
-def test_a_refused_upload_is_status_1(mission_file, port):
+def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
     mock = a_mock(ardupilot(refusals={(0, 3): Result.INVALID_PARAM7}))
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
@@ -125,7 +127,7 @@ def test_a_refused_upload_is_status_1(mission_file, port):
     assert "verified     " not in result.stdout
 
 
-def test_no_vehicle_is_status_1(mission_file, port):
+def test_no_vehicle_is_status_1(mission_file: Path, port: int) -> None:
     result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--timeout", 0.3)
     assert result.exit_code == 1
     assert result.stdout == ""
@@ -147,28 +149,30 @@ def test_no_vehicle_is_status_1(mission_file, port):
         (["autopilot", "--home", "91,2,3"], "latitude"),
     ],
 )
-def test_unusable_input_is_status_2(arguments, told, mission_file):
+def test_unusable_input_is_status_2(arguments: list[str], told: str, mission_file: Path) -> None:
     result = run(*(mission_file if each == "FILE" else each for each in arguments))
     assert result.exit_code == 2
     assert told in result.stderr
     assert "Traceback" not in result.output
 
 
-def test_a_port_in_use_is_status_1(port):
+def test_a_port_in_use_is_status_1(port: int) -> None:
     with running(a_mock(), f"udpin:127.0.0.1:{port}"):
         result = run("autopilot", "--listen", f"udpin:127.0.0.1:{port}")
     assert result.exit_code == 1
     assert "the port is in use" in result.stderr
 
 
-def test_the_mock_autopilot_as_a_command(mission_file, port, monkeypatch):
+def test_the_mock_autopilot_as_a_command(
+    mission_file: Path, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its diary tells what it was given; it ends by the keyboard."""
     from faao_mav.mavlink import runner
 
     ended = threading.Event()
     serve = runner.serve
 
-    def until_ended(mock, connection, **options):
+    def until_ended(mock: MockAutopilot, connection: str, **options: Any):
         serve(mock, connection, **options, stop=ended.is_set)
         raise KeyboardInterrupt
 
@@ -197,7 +201,7 @@ def test_the_mock_autopilot_as_a_command(mission_file, port, monkeypatch):
     assert lines[1:] == ["mission: 6 rows", "fence: 4 rows", "ended"]
 
 
-def test_progress_is_drawn_on_a_terminal_only(capsys):
+def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]) -> None:
     with transfer_progress(shown=False) as nothing:
         assert nothing is None
     with transfer_progress(shown=True) as observe:
@@ -206,7 +210,7 @@ def test_progress_is_drawn_on_a_terminal_only(capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_homes_are_read():
+def test_homes_are_read() -> None:
     home = read_home("47.397742, 8.545594, 488")
     assert (home.latitude, home.longitude, home.altitude) == (47.397742, 8.545594, 488.0)
     with pytest.raises(InputError, match="finite"):
