@@ -12,19 +12,18 @@ import pytest
 from conftest import free_port
 from mock_flights import fly
 from pymavlink import mavutil
-from stations import FENCE, HOME, RALLY, a_mission, places
+from stations import FENCE, HOME, RALLY, a_mission, places, signing_key, vehicle_of
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink import Timeouts, clear, download, upload
-from faao_mav.mavlink.codec import key_of_phrase
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.link import Link
-from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, ardupilot, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import Address, MissionType, Result
+from faao_mav.mavlink.messages import WireItem
+from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import Address, MissionType, Result
 from faao_mav.mavlink.transport import open_transport, parse_connection
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 
 MISSION = MissionType.MISSION
@@ -37,7 +36,7 @@ def port():
 
 
 def mock_of(kind: MockKind, **options: Any):
-    manners = manners_of(kind) if isinstance(kind, str) else kind
+    manners = behaviour_of(kind) if isinstance(kind, str) else kind
     return MockAutopilot(manners, home=HOME, fly=fly, beat=0.1, **options)
 
 
@@ -50,9 +49,13 @@ def test_a_mission_there_and_back(kind: MockKind, loss: float, port: int) -> Non
         connection, timeouts = f"udpout:127.0.0.1:{port}", Timeouts(response=0.4)
         report = upload(mission, connection, system=1, timeouts=timeouts)
         assert report.verified, report.problems
-        assert places(mock.lists.rows(MISSION)) == places(rows_of(mission, MISSION, kind))
+        assert places(mock.lists.items(MISSION)) == places(
+            wire_items(mission, MISSION, vehicle_of(kind))
+        )
         found = download(connection, system=1, timeouts=timeouts)
-    assert places(rows_of(found, MISSION, kind)) == places(rows_of(mission, MISSION, kind))
+    assert places(wire_items(found, MISSION, vehicle_of(kind))) == places(
+        wire_items(mission, MISSION, vehicle_of(kind))
+    )
     assert found.home == HOME
 
 
@@ -106,7 +109,7 @@ def test_what_storage_drops_is_in_the_report(port: int) -> None:
     ],
 )
 def test_a_refusal_says_what_is_wrong_and_where(refusals: Any, told: str, port: int) -> None:
-    with running(mock_of(ardupilot(refusals=refusals)), f"udpin:127.0.0.1:{port}"):
+    with running(mock_of(behaviour_of("ardupilot", refusals=refusals)), f"udpin:127.0.0.1:{port}"):
         report = upload(a_mission(5), f"udpout:127.0.0.1:{port}", system=1)
     assert not report.verified
     (problem,) = report.problems
@@ -168,7 +171,7 @@ def test_several_vehicles_and_other_ground_stations(port: int) -> None:
 
 
 def test_a_vehicle_that_holds_nonsense(port: int) -> None:
-    vertex = Row(5001, 0, (4.0, 0.0, 0.0, 0.0), -350_000_000, 1_490_000_000, 0.0)
+    vertex = WireItem(5001, 0, (4.0, 0.0, 0.0, 0.0), -350_000_000, 1_490_000_000, 0.0)
     mock = mock_of("px4")
     mock.lists.replace(MissionType.FENCE, [vertex] * 3)
     with (
@@ -230,7 +233,7 @@ def test_a_log_that_cannot_be_written_is_an_error_before_anything_is_sent(
 
 
 def test_signed(port: int, tmp_path: Path) -> None:
-    key = key_of_phrase("open sesame")
+    key = signing_key("open sesame")
     path = tmp_path / "key"
     path.write_bytes(key)
     connection = f"udpout:127.0.0.1:{port}"

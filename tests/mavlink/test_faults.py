@@ -1,11 +1,11 @@
 """Whatever the link does: an upload is verified and right, or reported as failed, and ends."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from simulate import Station, simulate
 from stations import (
     FENCE,
     FOREIGN,
@@ -13,24 +13,24 @@ from stations import (
     RALLY,
     VEHICLE,
     a_mission,
-    firmware_of,
     mock_of,
     peer_of,
     places,
     rows_for,
     upload_to,
+    vehicle_of,
 )
 
 from faao_mav.mavlink.faults import Channel, Faults, Lost
-from faao_mav.mavlink.messages import Heartbeat, MissionAck, MissionCount, Row
-from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, ardupilot, px4
-from faao_mav.mavlink.mock.lists import Lists
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.machine import Script
+from faao_mav.mavlink.messages import Heartbeat, MissionAck, MissionCount, WireItem
+from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.lists import StoredLists
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.session import clear_lists, download_lists, upload_parts
-from faao_mav.mavlink.transfer.simulate import Station, simulate
-from faao_mav.mavlink.transfer.transfer import Peer, Script
 from faao_mav.mavlink.transfer.upload import Upload
+from faao_mav.mavlink.wire_items import wire_items
 
 MISSION = MissionType.MISSION
 REQUEST, MISSION_ACK, COUNT_ID, REQUEST_INT, ITEM_INT = 40, 47, 44, 51, 73
@@ -51,9 +51,9 @@ bad_links = st.builds(
 )
 
 
-def vehicle_holds(mock: MockAutopilot, rows: Sequence[Row], part: MissionType = MISSION):
+def vehicle_holds(mock: MockAutopilot, rows: Sequence[WireItem], part: MissionType = MISSION):
     """Tell whether the list of the vehicle is `rows`, by its own storage."""
-    return places(mock.lists.rows(part)) == places(rows)
+    return places(mock.lists.items(part)) == places(rows)
 
 
 @settings(max_examples=400)
@@ -61,9 +61,9 @@ def vehicle_holds(mock: MockAutopilot, rows: Sequence[Row], part: MissionType = 
 def test_no_wrong_mission_is_ever_called_verified(
     kind: MockKind, count: int, faults: Faults, occupied: float
 ) -> None:
-    manners = px4(complete_only=False) if kind == "px4-late-items" else kind
+    manners = behaviour_of("px4", complete_only=False) if kind == "px4-late-items" else kind
     mock = mock_of(manners)
-    firmware = firmware_of(mock.manners.kind)
+    firmware = mock.behaviour.autopilot
     if occupied:
         mock.lists.replace(MISSION, rows_for(firmware, 7, shift=0.1))
     rows = rows_for(firmware, count)
@@ -80,7 +80,7 @@ def test_no_wrong_mission_is_ever_called_verified(
 def test_plain_loss_is_overcome(kind: MockKind, loss: float) -> None:
     for seed in range(15):
         mock = mock_of(kind)
-        rows = rows_for(firmware_of(kind), 12)
+        rows = rows_for(kind, 12)
         report, _ = upload_to(mock, rows, Faults(loss=loss, latency=0.03, seed=seed))
         assert report.verified, (seed, report)
         assert vehicle_holds(mock, rows)
@@ -89,7 +89,7 @@ def test_plain_loss_is_overcome(kind: MockKind, loss: float) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_link_that_dies_for_3_s_is_overcome(kind: MockKind) -> None:
     for begin in (0.0, 0.05, 0.2, 0.5, 1.0):
-        mock, rows = mock_of(kind), rows_for(firmware_of(kind), 30)
+        mock, rows = mock_of(kind), rows_for(kind, 30)
         faults = Faults(latency=0.01, outages=((begin, begin + 3.0),))
         report, _ = upload_to(mock, rows, faults)
         assert (report.verified, report.attempts) == (True, 1)
@@ -97,7 +97,7 @@ def test_a_link_that_dies_for_3_s_is_overcome(kind: MockKind) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_link_that_dies_for_a_minute_is_reported(kind: MockKind) -> None:
-    mock, rows = mock_of(kind), rows_for(firmware_of(kind), 30)
+    mock, rows = mock_of(kind), rows_for(kind, 30)
     report, _ = upload_to(mock, rows, Faults(latency=0.01, outages=((0.2, 90.0),)))
     assert report.verdict == "silent"
     assert report.attempts == 3
@@ -152,14 +152,14 @@ def test_what_was_asked_about_a_lost_answer_is_no_refusal(kind: MockKind) -> Non
     assert took < 1
 
 
-@pytest.mark.parametrize("make", [ardupilot, px4])
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 @pytest.mark.parametrize("result", sorted(set(Result) - {Result.ACCEPTED, Result.INVALID_SEQUENCE}))
 @pytest.mark.parametrize("seq", [COUNT, 0, 3, 5])
-def test_refusals_of_every_kind_are_reported(make: Any, result: Result, seq: int) -> None:
-    if make is ardupilot and seq == 0:
+def test_refusals_of_every_kind_are_reported(kind: MockKind, result: Result, seq: int) -> None:
+    if kind == "ardupilot" and seq == 0:
         seq = 1
-    mock = mock_of(make(refusals={(MISSION, seq): result}))
-    rows = rows_for(firmware_of(mock.manners.kind), 6)[:6]
+    mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): result}))
+    rows = rows_for(mock.behaviour.autopilot, 6)[:6]
     report, _ = upload_to(mock, rows)
     assert not report.verified
     assert report.result == result
@@ -170,7 +170,7 @@ def test_refusals_of_every_kind_are_reported(make: Any, result: Result, seq: int
 
 
 def test_a_refused_mission_leaves_px4_as_it_was() -> None:
-    mock = mock_of(px4(refusals={(MISSION, 3): Result.INVALID_PARAM1}))
+    mock = mock_of(behaviour_of("px4", refusals={(MISSION, 3): Result.INVALID_PARAM1}))
     old = rows_for("px4", 7, shift=0.1)
     mock.lists.replace(MISSION, old)
     upload_to(mock, rows_for("px4", 6))
@@ -193,7 +193,7 @@ def test_another_ground_station_uploads_something_else_at_the_same_time(kind: Mo
     for head_start in range(4):
         mock = mock_of(kind)
         ours, theirs = rows_for(kind, 8), rows_for(kind, 9, shift=0.1)
-        rival = Upload(theirs, Peer(FOREIGN, VEHICLE, kind))
+        rival = Upload(theirs, Peer(FOREIGN, VEHICLE, vehicle_of(kind)))
         faults = Faults(latency=0.004 * (1 + head_start), reordering=0.5, delay=0.05)
         report, _ = upload_to(mock, ours, faults, others=[Station(rival, FOREIGN)])
         if report.verified:
@@ -207,14 +207,14 @@ def test_another_vehicle_with_the_same_list_does_not_mix_in() -> None:
     other = mock_of("px4", address=Address(2, 1))
     report, _ = upload_to(mock, rows, others=[Station(other, other.address)])
     assert report.verified
-    assert other.lists.rows(MISSION) == ()
+    assert other.lists.items(MISSION) == ()
 
 
 def test_all_three_lists_of_a_mission() -> None:
     for kind in KINDS:
-        firmware, mock = firmware_of(kind), mock_of(kind)
+        firmware, mock = kind, mock_of(kind)
         mission = a_mission(6, fence=FENCE, rally=RALLY)
-        parts = [(part, rows_of(mission, part, firmware)) for part in MissionType]
+        parts = [(part, wire_items(mission, part, vehicle_of(firmware))) for part in MissionType]
         script = Script(upload_parts(parts, peer_of(firmware)))
         simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
         assert [report.verdict for report in script.outcome] == ["verified"] * 3
@@ -224,7 +224,7 @@ def test_all_three_lists_of_a_mission() -> None:
         lists = Script(download_lists(tuple(MissionType), peer_of(firmware)))
         simulate(Station(lists, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
         for part, rows in parts:
-            assert places(lists.outcome.rows[part]) == places(rows)
+            assert places(lists.outcome.items[part]) == places(rows)
 
         cleared = Script(clear_lists(tuple(MissionType), peer_of(firmware)))
         simulate(Station(cleared, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
@@ -233,18 +233,18 @@ def test_all_three_lists_of_a_mission() -> None:
 
 
 def test_an_upload_stops_at_the_list_that_fails() -> None:
-    mock = mock_of(px4(refusals={(MissionType.FENCE, COUNT): Result.NO_SPACE}))
+    mock = mock_of(behaviour_of("px4", refusals={(MissionType.FENCE, COUNT): Result.NO_SPACE}))
     mission = a_mission(6, fence=FENCE, rally=RALLY)
-    parts = [(part, rows_of(mission, part, "px4")) for part in MissionType]
+    parts = [(part, wire_items(mission, part, vehicle_of("px4"))) for part in MissionType]
     script = Script(upload_parts(parts, peer_of("px4")))
     simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE))
     assert [report.verdict for report in script.outcome] == ["verified", "refused"]
-    assert mock.lists.rows(MissionType.RALLY) == ()
+    assert mock.lists.items(MissionType.RALLY) == ()
 
 
 def test_a_vehicle_that_stores_something_else_is_found_out() -> None:
-    class Forgetful(Lists):
-        def kept(self, part: MissionType, seq: int, row: Row):
+    class Forgetful(StoredLists):
+        def kept(self, part: MissionType, seq: int, row: WireItem):
             kept = super().kept(part, seq, row)
             return super().kept(part, seq, rows_for("px4", 8)[3]) if seq == 5 else kept
 
@@ -275,7 +275,7 @@ def test_who_is_interrupted_frees_the_vehicle() -> None:
 
     simulate(client, Station(mock, VEHICLE), Faults(latency=0.01), events=[(0.1, interrupt)])
     assert script.outcome[0].verdict == "cancelled"
-    assert out == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
+    assert out == [MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)]
 
 
 def test_clearing_over_a_bad_link() -> None:
@@ -283,13 +283,13 @@ def test_clearing_over_a_bad_link() -> None:
         for seed in range(10):
             mock = mock_of(kind)
             mock.lists.replace(MissionType.RALLY, rows_for("px4", 3))
-            steps = clear_lists([MissionType.RALLY], peer_of(firmware_of(kind)))
+            steps = clear_lists([MissionType.RALLY], peer_of(kind))
             script = Script(steps)
             client = Station(script, GROUND_STATION)
             simulate(client, Station(mock, VEHICLE), Faults(loss=0.4, seed=seed))
             (report,) = script.outcome
             assert report.verified
-            assert mock.lists.rows(MissionType.RALLY) == ()
+            assert mock.lists.items(MissionType.RALLY) == ()
 
 
 def test_the_same_seed_gives_the_same_link() -> None:
@@ -331,6 +331,10 @@ def test_messages_used_here_are_what_the_numbers_say() -> None:
     codec = Codec(VEHICLE)
     numbers = [
         int.from_bytes(codec.pack(message)[7:10], "little")
-        for message in (MissionAck(1, 1, 0, 0), MissionCount(1, 1, 0, 0), Heartbeat(0, 0, 0, 0, 0))
+        for message in (
+            MissionAck(VEHICLE, 0, 0),
+            MissionCount(VEHICLE, 0, 0),
+            Heartbeat(0, 0, 0, 0, 0),
+        )
     ]
     assert numbers == [MISSION_ACK, COUNT_ID, 0]

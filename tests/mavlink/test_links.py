@@ -1,15 +1,14 @@
 """How long transfers take over links of all kinds, and how much they send: on a simulated clock."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import pytest
 from stations import mock_of, rows_for, there_and_back, upload_to
 
 from faao_mav.mavlink.faults import Faults, Lost
 from faao_mav.mavlink.messages import Message
-from faao_mav.mavlink.mock import MockKind, ardupilot, px4
-from faao_mav.mavlink.transfer.protocol import MissionType, Result
+from faao_mav.mavlink.mock import MockKind, behaviour_of
+from faao_mav.mavlink.protocol import MissionType, Result
 
 MISSION = MissionType.MISSION
 KINDS = ["ardupilot", "px4"]
@@ -84,12 +83,12 @@ def test_a_request_that_px4_lost_is_not_waited_for() -> None:
     assert plain < lost < plain + 0.1
 
 
-@pytest.mark.parametrize("make", [ardupilot, px4])
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 @pytest.mark.parametrize("seq", [5, 6, 7])
-def test_the_item_that_is_refused_is_named_whatever_is_lost(make: Any, seq: int) -> None:
+def test_the_item_that_is_refused_is_named_whatever_is_lost(kind: MockKind, seq: int) -> None:
     for loss in (0.0, 0.2, 0.4):
         for seed in range(10):
-            mock = mock_of(make(refusals={(MISSION, seq): Result.INVALID_PARAM2}))
+            mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): Result.INVALID_PARAM2}))
             rows = rows_for(mock.lists.vehicle.autopilot, 12)[:12]
             report, _ = upload_to(mock, rows, Faults(loss=loss, seed=seed))
             assert not report.verified

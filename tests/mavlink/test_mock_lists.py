@@ -15,16 +15,16 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
     MissionWritePartialList,
-    Row,
     Statustext,
+    WireItem,
 )
-from faao_mav.mavlink.mock import MockKind, ardupilot, px4
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.mock import MockKind, behaviour_of
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
 
 MISSION, FENCE, RALLY = MissionType
-TO = (VEHICLE.system, VEHICLE.component)
+TO = VEHICLE
 PLACE = (-353_000_000, 1_491_000_000)
-RALLY_ROW = Row(5100, 3, (0.0, 0.0, 0.0, 0.0), *PLACE, 30.0)
+RALLY_ROW = WireItem(5100, 3, (0.0, 0.0, 0.0, 0.0), *PLACE, 30.0)
 
 
 def desk_for(kind: MockKind, **options: Any):
@@ -34,11 +34,11 @@ def desk_for(kind: MockKind, **options: Any):
 
 
 def count(n: int, part: MissionType = MISSION):
-    return MissionCount(*TO, n, part)
+    return MissionCount(TO, part, n)
 
 
-def item(seq: int, row: Row, part: MissionType = MISSION):
-    return MissionItemInt(*TO, seq, part, row)
+def item(seq: int, row: WireItem, part: MissionType = MISSION):
+    return MissionItemInt(TO, part, seq, row)
 
 
 def answers(messages: Sequence[Message], kind: MockKind):
@@ -54,7 +54,10 @@ def asked(messages: Sequence[Message]):
 
 
 def upload(
-    desk: Desk, rows: Sequence[Row], part: MissionType = MISSION, sender: Address = GROUND_STATION
+    desk: Desk,
+    rows: Sequence[WireItem],
+    part: MissionType = MISSION,
+    sender: Address = GROUND_STATION,
 ):
     """Upload without a fault and return the last answer's results."""
     out = desk.tell(count(len(rows), part), sender)
@@ -65,7 +68,7 @@ def upload(
 
 
 def stored(desk: Desk, part: MissionType = MISSION):
-    return places(desk.machine.lists.rows(part))
+    return places(desk.machine.lists.items(part))
 
 
 @pytest.mark.parametrize(
@@ -80,25 +83,25 @@ def test_who_asks_with_which_message(kind: MockKind, legacy: bool) -> None:
 def test_what_is_uploaded_can_be_downloaded(kind: MockKind) -> None:
     desk, rows = desk_for(kind), rows_for(kind, 4)
     assert upload(desk, rows) == [Result.ACCEPTED]
-    (found,) = desk.tell(MissionRequestList(*TO, 0))
+    (found,) = desk.tell(MissionRequestList(TO, 0))
     assert found.count == len(rows)
     for seq, row in enumerate(rows):
-        (answer,) = desk.tell(MissionRequestInt(*TO, seq, 0))
-        assert places([answer.row]) == places([row])
-    desk.tell(MissionAck(*TO, Result.ACCEPTED, 0))
+        (answer,) = desk.tell(MissionRequestInt(TO, 0, seq))
+        assert places([answer.item]) == places([row])
+    desk.tell(MissionAck(TO, 0, Result.ACCEPTED))
 
 
 def test_ardupilot_keeps_its_own_home_in_row_0() -> None:
     desk = desk_for("ardupilot")
     rows = rows_for("ardupilot", 3)
-    elsewhere = Row(16, 0, (0.0, 0.0, 0.0, 0.0), *PLACE, 1.0)
+    elsewhere = WireItem(16, 0, (0.0, 0.0, 0.0, 0.0), *PLACE, 1.0)
     upload(desk, (elsewhere, *rows[1:]))
-    home = desk.machine.lists.rows(MISSION)[0]
+    home = desk.machine.lists.items(MISSION)[0]
     assert (home.x, home.y, home.z) == (round(HOME.latitude * 1e7), 1_491_652_370, 584.0)
 
 
 def test_storage_loses_what_the_real_one_loses() -> None:
-    fussy = Row(16, 6, (2.75, 5.0, 1.0, 30.0), *PLACE, 20.123)
+    fussy = WireItem(16, 6, (2.75, 5.0, 1.0, 30.0), *PLACE, 20.123)
     for kind, params, frame in (
         ("ardupilot", (2.0, 0.0, 0.0, 0.0), 3),
         ("px4", (2.75, 5.0, 0.0, 30.0), 6),
@@ -106,7 +109,7 @@ def test_storage_loses_what_the_real_one_loses() -> None:
         desk = desk_for(kind)
         first = rows_for(kind, 2)[:1]
         upload(desk, (*first, fussy))
-        found = desk.machine.lists.rows(MISSION)[1]
+        found = desk.machine.lists.items(MISSION)[1]
         assert (found.params, found.frame) == (params, frame)
 
 
@@ -162,7 +165,7 @@ def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error() -> None:
 
 @pytest.mark.parametrize("complete_only", [True, False])
 def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only: bool) -> None:
-    desk, rows = desk_for(px4(complete_only=complete_only)), rows_for("px4", 3)
+    desk, rows = desk_for(behaviour_of("px4", complete_only=complete_only)), rows_for("px4", 3)
     desk.tell(count(3))
     desk.tell(item(0, rows[0]))
     desk.wait(6)
@@ -214,10 +217,10 @@ def test_a_count_again_is_an_error_for_px4_once_it_has_an_item() -> None:
 def test_downloading_during_an_upload() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
-    assert results(desk.tell(MissionRequestList(*TO, 0))) == [Result.DENIED]
+    assert results(desk.tell(MissionRequestList(TO, 0))) == [Result.DENIED]
     desk = desk_for("px4")
     desk.tell(count(3))
-    out = desk.tell(MissionRequestList(*TO, 0))
+    out = desk.tell(MissionRequestList(TO, 0))
     assert results(out) == []
     assert answers(out, MissionCount) == []
 
@@ -259,9 +262,9 @@ def test_ardupilot_has_no_space_while_it_boots() -> None:
 def test_partial_lists() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 4)
     upload(desk, rows)
-    wrong = MissionWritePartialList(*TO, 2, 99, 0)
+    wrong = MissionWritePartialList(TO, 0, 2, 99)
     assert results(desk.tell(wrong)) == [Result.ERROR]
-    assert asked(desk.tell(MissionWritePartialList(*TO, 2, 3, 0))) == [2]
+    assert asked(desk.tell(MissionWritePartialList(TO, 0, 2, 3))) == [2]
     other = rows_for("ardupilot", 4, shift=0.1)
     desk.tell(item(2, other[2]))
     assert results(desk.tell(item(3, other[3]))) == [Result.ACCEPTED]
@@ -273,20 +276,20 @@ def test_clearing_one_list_leaves_the_others() -> None:
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
         upload(desk, (RALLY_ROW,), RALLY)
-        assert results(desk.tell(MissionClearAll(*TO, 0))) == [Result.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(TO, 0))) == [Result.ACCEPTED]
         assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
         assert len(stored(desk, RALLY)) == 1
-        assert results(desk.tell(MissionClearAll(*TO, 255))) == [Result.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(TO, 255))) == [Result.ACCEPTED]
         assert stored(desk, RALLY) == []
 
 
 def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothing() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
-    assert results(desk.tell(MissionClearAll(*TO, 0))) == [Result.ERROR]
+    assert results(desk.tell(MissionClearAll(TO, 0))) == [Result.ERROR]
     desk = desk_for("px4")
     desk.tell(count(3))
-    assert results(desk.tell(MissionClearAll(*TO, 0))) == []
+    assert results(desk.tell(MissionClearAll(TO, 0))) == []
 
 
 def test_a_count_of_none_clears() -> None:
@@ -300,7 +303,7 @@ def test_a_count_of_none_clears() -> None:
 def test_px4_changes_its_request_when_told_unsupported() -> None:
     desk = desk_for("px4-legacy-first")
     (request,) = desk.tell(count(3))
-    (other,) = desk.tell(MissionAck(*TO, Result.UNSUPPORTED, 0))
+    (other,) = desk.tell(MissionAck(TO, 0, Result.UNSUPPORTED))
     assert (request.legacy, other.legacy) == (True, False)
     assert other.seq == 0
 
@@ -308,7 +311,7 @@ def test_px4_changes_its_request_when_told_unsupported() -> None:
 def test_px4_is_freed_by_a_cancellation() -> None:
     desk = desk_for("px4")
     desk.tell(count(3))
-    desk.tell(MissionAck(*TO, Result.OPERATION_CANCELLED, 0))
+    desk.tell(MissionAck(TO, 0, Result.OPERATION_CANCELLED))
     assert asked(desk.wait(3)) == []
     assert asked(desk.tell(count(3), FOREIGN)) == [0]
 
@@ -316,23 +319,23 @@ def test_px4_is_freed_by_a_cancellation() -> None:
 def test_px4_downloads_in_order_only() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 4)
     upload(desk, rows)
-    assert desk.tell(MissionRequestInt(*TO, 0, 0)) == []
-    desk.tell(MissionRequestList(*TO, 0))
+    assert desk.tell(MissionRequestInt(TO, 0, 0)) == []
+    desk.tell(MissionRequestList(TO, 0))
     for seq in (0, 0, 1):
-        (answer,) = desk.tell(MissionRequestInt(*TO, seq, 0))
+        (answer,) = desk.tell(MissionRequestInt(TO, 0, seq))
         assert answer.seq == seq
-    assert results(desk.tell(MissionRequestInt(*TO, 3, 0))) == [Result.ERROR]
-    assert desk.tell(MissionRequestInt(*TO, 1, 0)) == []
+    assert results(desk.tell(MissionRequestInt(TO, 0, 3))) == [Result.ERROR]
+    assert desk.tell(MissionRequestInt(TO, 0, 1)) == []
 
 
 def test_ardupilot_downloads_in_any_order() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     upload(desk, rows)
     for seq in (3, 0, 2):
-        (answer,) = desk.tell(MissionRequestInt(*TO, seq, 0, legacy=True))
+        (answer,) = desk.tell(MissionRequestInt(TO, 0, seq, legacy=True))
         assert (answer.seq, answer.legacy) == (seq, True)
-    assert results(desk.tell(MissionRequestInt(*TO, 9, 0))) == [Result.ERROR]
-    assert results(desk.tell(MissionRequestInt(*TO, 9, 2))) == [Result.INVALID_SEQUENCE]
+    assert results(desk.tell(MissionRequestInt(TO, 0, 9))) == [Result.ERROR]
+    assert results(desk.tell(MissionRequestInt(TO, 2, 9))) == [Result.INVALID_SEQUENCE]
 
 
 NAN = float("nan")
@@ -341,26 +344,26 @@ NAN = float("nan")
 @pytest.mark.parametrize(
     ("kind", "row", "result"),
     [
-        ("ardupilot", Row(16, 1, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
-        ("ardupilot", Row(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("ardupilot", Row(1, 3, (0.0,) * 4, *PLACE, 9.0), Result.INVALID),
-        ("ardupilot", Row(16, 3, (0.0, NAN, 0.0, 0.0), *PLACE, 9.0), Result.INVALID_PARAM2),
-        ("ardupilot", Row(16, 3, (0.0,) * 4, 910_000_000, 0, 9.0), Result.INVALID_PARAM5_X),
-        ("ardupilot", Row(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("ardupilot", Row(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
-        ("px4", Row(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
-        ("px4", Row(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED),
-        ("px4", Row(178, 2, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
-        ("px4", Row(178, 10, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED_FRAME),
-        ("px4", Row(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
-        ("px4", Row(16, 2, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
-        ("px4", Row(16, 3, (NAN,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("px4", Row(20, 3, (0.0,) * 4, 0, 0, 0.0), Result.UNSUPPORTED),
-        ("px4", Row(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0), Result.ERROR),
-        ("px4", Row(16, 3, (0.0,) * 4, 0, 1_810_000_000, 9.0), Result.INVALID_PARAM6_Y),
+        ("ardupilot", WireItem(16, 1, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
+        ("ardupilot", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
+        ("ardupilot", WireItem(1, 3, (0.0,) * 4, *PLACE, 9.0), Result.INVALID),
+        ("ardupilot", WireItem(16, 3, (0.0, NAN, 0.0, 0.0), *PLACE, 9.0), Result.INVALID_PARAM2),
+        ("ardupilot", WireItem(16, 3, (0.0,) * 4, 910_000_000, 0, 9.0), Result.INVALID_PARAM5_X),
+        ("ardupilot", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
+        ("ardupilot", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
+        ("px4", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
+        ("px4", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED),
+        ("px4", WireItem(178, 2, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
+        ("px4", WireItem(178, 10, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED_FRAME),
+        ("px4", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
+        ("px4", WireItem(16, 2, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
+        ("px4", WireItem(16, 3, (NAN,) * 4, *PLACE, 9.0), Result.ACCEPTED),
+        ("px4", WireItem(20, 3, (0.0,) * 4, 0, 0, 0.0), Result.UNSUPPORTED),
+        ("px4", WireItem(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0), Result.ERROR),
+        ("px4", WireItem(16, 3, (0.0,) * 4, 0, 1_810_000_000, 9.0), Result.INVALID_PARAM6_Y),
     ],
 )
-def test_which_items_are_refused(kind: MockKind, row: Row, result: Result) -> None:
+def test_which_items_are_refused(kind: MockKind, row: WireItem, result: Result) -> None:
     desk = desk_for(kind)
     first = rows_for(kind, 2)[:1]
     assert upload(desk, (*first, row)) == [result]
@@ -368,19 +371,19 @@ def test_which_items_are_refused(kind: MockKind, row: Row, result: Result) -> No
 
 def test_a_fence_is_checked_and_replaced_as_a_whole() -> None:
     desk = desk_for("ardupilot")
-    corner = Row(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
+    corner = WireItem(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
     upload(desk, (corner,) * 3, FENCE)
     desk.tell(count(3, FENCE))
-    desk.tell(item(0, Row(5003, 0, (9.0, 0.0, 0.0, 0.0), *PLACE, 0.0), FENCE))
+    desk.tell(item(0, WireItem(5003, 0, (9.0, 0.0, 0.0, 0.0), *PLACE, 0.0), FENCE))
     desk.wait(10)
     assert stored(desk, FENCE) == places((corner,) * 3)
-    thin = Row(5001, 0, (2.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
+    thin = WireItem(5001, 0, (2.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
     for kind, result in (("ardupilot", Result.INVALID_PARAM1), ("px4", Result.ERROR)):
         assert upload(desk_for(kind), (thin,), FENCE) == [result]
 
 
 def test_refusals_can_be_prescribed() -> None:
-    manners = ardupilot(refusals={(MISSION, 1): Result.INVALID_PARAM3})
+    manners = behaviour_of("ardupilot", refusals={(MISSION, 1): Result.INVALID_PARAM3})
     desk = desk_for(manners)
     rows = rows_for("ardupilot", 2)
     assert upload(desk, rows[:2]) == [Result.INVALID_PARAM3]
@@ -391,7 +394,7 @@ def test_numbers_tell_px4_lists_apart() -> None:
     numbers = []
     for shift in (0.0, 0.1, 0.0):
         upload(desk, rows_for("px4", 3, shift))
-        (found,) = desk.tell(MissionRequestList(*TO, 0))
-        desk.tell(MissionAck(*TO, Result.ACCEPTED, 0))
+        (found,) = desk.tell(MissionRequestList(TO, 0))
+        desk.tell(MissionAck(TO, 0, Result.ACCEPTED))
         numbers.append(found.opaque_id)
     assert numbers[0] == numbers[2] != numbers[1]

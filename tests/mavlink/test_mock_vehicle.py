@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from mock_flights import fly
-from stations import HOME, VEHICLE, Desk, a_mission, rows_for
+from stations import HOME, VEHICLE, Desk, a_mission, rows_for, vehicle_of
 
 from faao_mav.mavlink.messages import (
     AutopilotVersion,
@@ -27,30 +27,30 @@ from faao_mav.mavlink.messages import (
     ParamValue,
     SetMode,
 )
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType, Result
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 
-TO = (VEHICLE.system, VEHICLE.component)
-MISSION = (MissionType.MISSION, "ardupilot")
+TO = VEHICLE
+MISSION = (MissionType.MISSION, vehicle_of("ardupilot"))
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
 
 
 def desk_for(kind: MockKind, mission: Mission = None, **options: Any):
-    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, **options)
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, **options)
     desk = Desk(mock, GROUND_STATION)
     desk.start()
     if mission is not None:
-        rows = rows_of(mission, MissionType.MISSION, kind)
+        rows = wire_items(mission, MissionType.MISSION, vehicle_of(kind))
         mock.lists.replace(MissionType.MISSION, rows)
     return desk
 
 
 def command(number: int, *params: Any):
-    return CommandLong(*TO, number, 0, *map(float, params))
+    return CommandLong(TO, number, 0, *map(float, params))
 
 
 def result(messages: Sequence[Message]):
@@ -108,9 +108,9 @@ def test_a_plane_has_its_own_number_modes_and_storage() -> None:
     assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt > 0
     assert only(desk.wait(1.5), Heartbeat)[-1].type == 1
     desk.machine.lists.put(
-        MissionType.MISSION, 3, rows_of(Mission(tuple(items), HOME), *MISSION)[3]
+        MissionType.MISSION, 3, wire_items(Mission(tuple(items), HOME), *MISSION)[3]
     )
-    kept = desk.machine.lists.rows(MissionType.MISSION)[3]
+    kept = desk.machine.lists.items(MissionType.MISSION)[3]
     assert kept.params[:2] == (0.0, 40.0)
 
 
@@ -175,7 +175,7 @@ def test_px4_takes_what_it_will_not_fly() -> None:
 def test_ardupilot_does_not_clear_what_it_flies() -> None:
     desk = desk_for("ardupilot", a_mission(5))
     take_off(desk, "ardupilot")
-    (ack,) = desk.tell(MissionClearAll(*TO, 0))
+    (ack,) = desk.tell(MissionClearAll(TO, 0))
     assert ack.type == Result.ERROR
 
 
@@ -224,15 +224,15 @@ def test_no_command_brings_it_down(kind: MockKind, number: int) -> None:
 @BOTH
 def test_parameters(kind: MockKind) -> None:
     desk = desk_for(kind)
-    values = desk.tell(ParamRequestList(*TO))
+    values = desk.tell(ParamRequestList(TO))
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
     second = values[1]
-    assert desk.tell(ParamRequestRead(*TO, "", 1)) == [second]
-    assert desk.tell(ParamRequestRead(*TO, second.param_id, -1)) == [second]
-    assert desk.tell(ParamRequestRead(*TO, "NO_SUCH", -1)) == []
-    assert desk.tell(ParamRequestRead(*TO, "", 999)) == []
-    (changed,) = desk.tell(ParamSet(*TO, second.param_id, 7.0, 9))
+    assert desk.tell(ParamRequestRead(TO, "", 1)) == [second]
+    assert desk.tell(ParamRequestRead(TO, second.param_id, -1)) == [second]
+    assert desk.tell(ParamRequestRead(TO, "NO_SUCH", -1)) == []
+    assert desk.tell(ParamRequestRead(TO, "", 999)) == []
+    (changed,) = desk.tell(ParamSet(TO, second.param_id, 7.0, 9))
     assert isinstance(changed, ParamValue)
     assert changed.param_value == 7.0
 
@@ -240,9 +240,9 @@ def test_parameters(kind: MockKind) -> None:
 @BOTH
 def test_the_current_item(kind: MockKind) -> None:
     desk = desk_for(kind, a_mission(5))
-    (current,) = desk.tell(MissionSetCurrent(*TO, 3))
+    (current,) = desk.tell(MissionSetCurrent(TO, 3))
     assert (current.seq, current.total) == (3, 5)
-    assert desk.tell(MissionSetCurrent(*TO, 99)) == []
+    assert desk.tell(MissionSetCurrent(TO, 99)) == []
     assert result(desk.tell(command(224, 2))) == 0
     assert result(desk.tell(command(224, 99))) == 2
 
@@ -254,15 +254,15 @@ def test_a_reboot_keeps_what_is_stored() -> None:
     assert result(desk.tell(command(246, 1))) == 0
     assert not desk.machine.armed
     assert result(desk.tell(command(400, 1))) == 1
-    assert len(desk.machine.lists.rows(MissionType.MISSION)) == 5
+    assert len(desk.machine.lists.items(MissionType.MISSION)) == 5
     desk.wait(2.5)
     assert result(desk.tell(command(400, 1))) == 0
 
 
 def test_commands_to_others_are_not_obeyed() -> None:
     desk = desk_for("px4")
-    assert desk.tell(CommandLong(2, 1, 400, 0, 1.0)) == []
-    assert desk.tell(CommandLong(1, 154, 400, 0, 1.0)) == []
+    assert desk.tell(CommandLong(Address(2, 1), 400, 0, 1.0)) == []
+    assert desk.tell(CommandLong(Address(1, 154), 400, 0, 1.0)) == []
     assert not desk.machine.armed
 
 
@@ -272,4 +272,4 @@ def test_what_it_holds_as_a_mission() -> None:
         held = desk_for(kind, mission).machine.mission()
         assert [item.x for item in held.items] == pytest.approx([i.x for i in mission.items])
         assert held.fence == Fence()
-    assert rows_for("px4", 5) == rows_of(mission, MissionType.MISSION, "px4")
+    assert rows_for("px4", 5) == wire_items(mission, MissionType.MISSION, vehicle_of("px4"))

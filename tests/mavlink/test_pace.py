@@ -144,7 +144,7 @@ def test_a_question_put_once_more_on_request_measures_nothing() -> None:
     asker = settled(0.1)
     wait = asker.pace.wait
     question = asker.pace.ask(asker.now)
-    question.put_again(asker.now)
+    question.send_again(asker.now)
     asker.pace.answer(question, asker.now + 0.001)
     assert asker.pace.wait == pytest.approx(wait)
 

@@ -14,40 +14,39 @@ from faao_mav.mavlink.messages import (
     MissionCount,
     MissionItemInt,
     MissionRequestInt,
-    Row,
     Statustext,
+    WireItem,
 )
-from faao_mav.mavlink.transfer.protocol import (
+from faao_mav.mavlink.protocol import (
     GROUND_STATION,
     Address,
-    Firmware,
     MissionType,
     Result,
 )
 from faao_mav.mavlink.transfer.upload import Upload
 
-ME = (GROUND_STATION.system, GROUND_STATION.component)
+ME = GROUND_STATION
 ROWS = rows_for("px4", 3)
 BOTH = pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 
 
-def request(seq: int, *, legacy: bool = False, target: tuple[int, int] = ME, mission_type: int = 0):
-    return MissionRequestInt(*target, seq, mission_type, legacy)
+def request(seq: int, *, legacy: bool = False, target: Address = ME, mission_type: int = 0):
+    return MissionRequestInt(target, mission_type, seq, legacy)
 
 
-def ack(result: Result, *, target: tuple[int, int] = ME, mission_type: int = 0, opaque_id: int = 0):
-    return MissionAck(*target, result, mission_type, opaque_id)
+def ack(result: Result, *, target: Address = ME, mission_type: int = 0, opaque_id: int = 0):
+    return MissionAck(target, mission_type, result, opaque_id)
 
 
 def desk_for(
-    firmware: Firmware, rows: Sequence[Row] = ROWS, part: MissionType = MissionType.MISSION
+    firmware: str, rows: Sequence[WireItem] = ROWS, part: MissionType = MissionType.MISSION
 ):
     desk = Desk(Upload(rows, peer_of(firmware), part))
     desk.start()
     return desk
 
 
-def asked_for_all(firmware: Firmware):
+def asked_for_all(firmware: str):
     desk = desk_for(firmware)
     for seq in range(3):
         desk.tell(request(seq))
@@ -55,11 +54,11 @@ def asked_for_all(firmware: Firmware):
 
 
 @BOTH
-def test_a_whole_upload(firmware: Firmware) -> None:
+def test_a_whole_upload(firmware: str) -> None:
     desk = desk_for(firmware)
-    assert desk.sent == [MissionCount(1, 1, 3, 0)]
+    assert desk.sent == [MissionCount(VEHICLE, 0, 3)]
     for seq in range(3):
-        assert desk.tell(request(seq)) == [MissionItemInt(1, 1, seq, 0, ROWS[seq])]
+        assert desk.tell(request(seq)) == [MissionItemInt(VEHICLE, 0, seq, ROWS[seq])]
     desk.tell(ack(Result.ACCEPTED, opaque_id=77))
     assert desk.machine.outcome.status == "accepted"
     assert desk.machine.outcome.opaque_id == 77
@@ -72,7 +71,7 @@ def test_an_empty_list_is_not_uploaded() -> None:
 
 
 @BOTH
-def test_both_requests_are_answered_with_the_precise_item(firmware: Firmware) -> None:
+def test_both_requests_are_answered_with_the_precise_item(firmware: str) -> None:
     desk = desk_for(firmware)
     (item,) = desk.tell(request(0, legacy=True))
     assert isinstance(item, MissionItemInt)
@@ -80,20 +79,20 @@ def test_both_requests_are_answered_with_the_precise_item(firmware: Firmware) ->
 
 
 @BOTH
-def test_any_row_is_sent_as_often_as_asked_for_in_any_order(firmware: Firmware) -> None:
+def test_any_row_is_sent_as_often_as_asked_for_in_any_order(firmware: str) -> None:
     desk = desk_for(firmware)
     for seq in (0, 0, 2, 1, 1, 0, 2):
-        assert desk.tell(request(seq)) == [MissionItemInt(1, 1, seq, 0, ROWS[seq])]
+        assert desk.tell(request(seq)) == [MissionItemInt(VEHICLE, 0, seq, ROWS[seq])]
     assert desk.tell(request(3)) == []
 
 
 @BOTH
-def test_the_count_is_repeated_then_given_up(firmware: Firmware) -> None:
+def test_the_count_is_repeated_then_given_up(firmware: str) -> None:
     desk = desk_for(firmware)
     assert desk.wait(1.49) == []
-    assert desk.wait(1.51) == [MissionCount(1, 1, 3, 0)] * 2
+    assert desk.wait(1.51) == [MissionCount(VEHICLE, 0, 3)] * 2
     desk.wait(60)
-    assert desk.sent == [MissionCount(1, 1, 3, 0)] * 6
+    assert desk.sent == [MissionCount(VEHICLE, 0, 3)] * 6
     assert desk.machine.outcome.status == "silent"
 
 
@@ -105,19 +104,19 @@ def test_a_slow_vehicle_is_no_silent_one() -> None:
     desk.wait(0.8 * 1.5)
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
-    assert desk.sent.count(MissionCount(1, 1, 3, 0)) == 1
+    assert desk.sent.count(MissionCount(VEHICLE, 0, 3)) == 1
 
 
 @BOTH
-def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware: Firmware) -> None:
+def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware: str) -> None:
     desk = desk_for(firmware)
     desk.tell(request(0))
     desk.wait(8.9)
     assert desk.machine.outcome is None
     sent = desk.wait(2.0)
-    assert sent[-1] == MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)
+    assert sent[-1] == MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)
     assert desk.machine.outcome.status == "silent"
-    assert desk.machine.outcome.item == 0
+    assert desk.machine.outcome.last_requested == 0
 
 
 def seqs(messages: Sequence[Message]):
@@ -168,14 +167,14 @@ def test_which_item_px4_refuses_is_found_out(result: Result) -> None:
     desk.tell(request(0))
     desk.wait(0.3)
     desk.tell(ack(result))  # of item 0, or of item 1
-    assert MissionCount(1, 1, 9, 0) in desk.wait(1.6)
+    assert MissionCount(VEHICLE, 0, 9) in desk.wait(1.6)
     desk.tell(request(0))
     desk.tell(request(1))
     assert set(seqs(desk.wait(0.6))) == {1}
     desk.tell(ack(result))
     desk.wait(1.6)
     outcome = desk.machine.outcome
-    assert (outcome.status, outcome.result, outcome.item) == ("refused", result, 1)
+    assert (outcome.status, outcome.result, outcome.last_requested) == ("refused", result, 1)
 
 
 def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that() -> None:
@@ -211,29 +210,29 @@ def test_invalid_sequence_from_ardupilot_ends_nothing() -> None:
 
 def test_a_lost_last_answer_of_px4_is_asked_for_by_the_last_item() -> None:
     desk = asked_for_all("px4")
-    assert desk.wait(0.3) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
+    assert desk.wait(0.3) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])]
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
 
 def test_without_any_last_answer_of_px4_it_is_unknown_what_it_holds() -> None:
     desk = asked_for_all("px4")
-    assert desk.wait(60) == [MissionItemInt(1, 1, 2, 0, ROWS[2])] * 5
+    assert desk.wait(60) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])] * 5
     assert desk.machine.outcome.status == "unknown"
 
 
 def test_ardupilot_is_never_sent_the_last_item_unasked() -> None:
     desk = asked_for_all("ardupilot")
-    assert desk.wait(60) == [MissionItemInt(1, 1, 1, 0, ROWS[1])] * 5
+    assert desk.wait(60) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])] * 5
     assert desk.machine.outcome.status == "unknown"
 
 
 def test_ardupilot_tells_by_the_item_before_whether_it_waits_for_the_last() -> None:
     desk = asked_for_all("ardupilot")
     assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []  # of something earlier
-    assert desk.wait(0.3) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
-    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
-    assert desk.wait(0.6) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
+    assert desk.wait(0.3) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])]
+    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])]
+    assert desk.wait(0.6) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])]
     desk.tell(ack(Result.ERROR))
     desk.wait(0.6)
     outcome = desk.machine.outcome
@@ -273,9 +272,7 @@ FINAL = sorted(
 @BOTH
 @pytest.mark.parametrize("result", FINAL)
 @pytest.mark.parametrize("requests", [0, 1, 3])
-def test_a_refusal_is_final_at_any_moment(
-    firmware: Firmware, result: Result, requests: int
-) -> None:
+def test_a_refusal_is_final_at_any_moment(firmware: str, result: Result, requests: int) -> None:
     desk = desk_for(firmware)
     for seq in range(requests):
         desk.tell(request(seq))
@@ -285,7 +282,7 @@ def test_a_refusal_is_final_at_any_moment(
     desk.wait(0.5)
     outcome = desk.machine.outcome
     assert (outcome.status, outcome.result, outcome.said) == ("refused", result, ("because",))
-    assert outcome.item == (requests - 1 if requests else None)
+    assert outcome.last_requested == (requests - 1 if requests else None)
     assert desk.tell(request(0)) == []
 
 
@@ -311,8 +308,8 @@ def test_a_busy_px4_is_asked_again_until_it_is_free() -> None:
     desk = desk_for("px4")
     for _ in range(3):
         desk.tell(ack(Result.ERROR))
-        assert desk.wait(1.5) == [MissionCount(1, 1, 3, 0)]
-    assert desk.tell(request(0)) == [MissionItemInt(1, 1, 0, 0, ROWS[0])]
+        assert desk.wait(1.5) == [MissionCount(VEHICLE, 0, 3)]
+    assert desk.tell(request(0)) == [MissionItemInt(VEHICLE, 0, 0, ROWS[0])]
 
 
 def test_a_px4_that_stays_busy_has_refused() -> None:
@@ -328,7 +325,7 @@ def test_no_space_while_booting_means_not_yet() -> None:
     desk.tell(ack(Result.NO_SPACE))
     assert desk.wait(20) == []
     desk.tell(Heartbeat(2, 3, 0, 0, 2))
-    assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(1, 1, 3, 0)]
+    assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(VEHICLE, 0, 3)]
     desk.tell(ack(Result.NO_SPACE))
     desk.wait(0.5)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
@@ -351,13 +348,13 @@ def test_booting_for_ever_ends_too() -> None:
         (request(0), FOREIGN),
         (request(0), Address(2, 1)),
         (request(0), Address(1, 2)),
-        (request(0, target=(250, 190)), VEHICLE),
-        (request(0, target=(255, 1)), VEHICLE),
+        (request(0, target=FOREIGN), VEHICLE),
+        (request(0, target=Address(255, 1)), VEHICLE),
         (request(0, mission_type=1), VEHICLE),
         (ack(Result.DENIED), FOREIGN),
-        (ack(Result.DENIED, target=(250, 190)), VEHICLE),
+        (ack(Result.DENIED, target=FOREIGN), VEHICLE),
         (ack(Result.DENIED, mission_type=2), VEHICLE),
-        (MissionCount(*ME, 3, 0), VEHICLE),
+        (MissionCount(ME, 0, 3), VEHICLE),
         (Heartbeat(2, 3, 128, 0, 4), VEHICLE),
     ],
 )
@@ -371,10 +368,10 @@ def test_what_is_said_to_others_or_about_other_lists_is_ignored(
 
 
 @BOTH
-def test_acceptance_by_another_vehicle_is_none(firmware: Firmware) -> None:
+def test_acceptance_by_another_vehicle_is_none(firmware: str) -> None:
     desk = asked_for_all(firmware)
     desk.tell(ack(Result.ACCEPTED), Address(2, 1))
-    desk.tell(ack(Result.ACCEPTED, target=(250, 190)))
+    desk.tell(ack(Result.ACCEPTED, target=FOREIGN))
     desk.tell(ack(Result.ACCEPTED, mission_type=1))
     assert desk.machine.outcome is None
 
@@ -382,7 +379,7 @@ def test_acceptance_by_another_vehicle_is_none(firmware: Firmware) -> None:
 def test_who_gives_up_tells_the_vehicle() -> None:
     desk = desk_for("px4")
     desk.tell(request(0))
-    assert desk.machine.cancel(desk.now) == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
+    assert desk.machine.cancel(desk.now) == [MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)]
     assert desk.machine.outcome.status == "cancelled"
     assert desk.machine.cancel(desk.now) == ()
 
@@ -407,6 +404,6 @@ def test_progress_counts_rows() -> None:
 @pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
 def test_other_lists_go_the_same_way(part: MissionType) -> None:
     desk = desk_for("px4", part=part)
-    assert desk.sent == [MissionCount(1, 1, 3, part)]
+    assert desk.sent == [MissionCount(VEHICLE, part, 3)]
     assert desk.tell(request(0)) == []
-    assert desk.tell(request(0, mission_type=part)) == [MissionItemInt(1, 1, 0, part, ROWS[0])]
+    assert desk.tell(request(0, mission_type=part)) == [MissionItemInt(VEHICLE, part, 0, ROWS[0])]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import typer
 from conftest import free_port
-from stations import FENCE, HOME, a_mission, places
+from stations import FENCE, HOME, a_mission, places, vehicle_of
 from typer.testing import CliRunner
 
 from faao_mav.cli.autopilot import autopilot, read_home
@@ -17,10 +17,10 @@ from faao_mav.cli.download import download
 from faao_mav.cli.transfer_progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, ardupilot, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import MissionType, Result
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import read_mission, write_wpl
 
@@ -47,7 +47,7 @@ def port():
 
 
 def a_mock(kind: MockKind = "ardupilot", **options: Any):
-    manners = manners_of(kind) if isinstance(kind, str) else kind
+    manners = behaviour_of(kind) if isinstance(kind, str) else kind
     return MockAutopilot(manners, home=HOME, beat=0.1, **options)
 
 
@@ -66,7 +66,9 @@ def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> N
     assert "mission      6 items, 0 fence areas, 0 rally points" in result.stdout
     found, sent = read_mission(out), read_mission(mission_file)
     assert found.home == sent.home
-    rows, sent_rows = (rows_of(each, MissionType.MISSION, "ardupilot") for each in (found, sent))
+    rows, sent_rows = (
+        wire_items(each, MissionType.MISSION, vehicle_of("ardupilot")) for each in (found, sent)
+    )
     assert places(rows) == places(sent_rows)
 
 
@@ -117,7 +119,7 @@ def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path, port: int)
 
 
 def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
-    mock = a_mock(ardupilot(refusals={(0, 3): Result.INVALID_PARAM7}))
+    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): Result.INVALID_PARAM7}))
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
     assert result.exit_code == 1
@@ -167,16 +169,16 @@ def test_the_mock_autopilot_as_a_command(
     mission_file: Path, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its diary tells what it was given; it ends by the keyboard."""
-    from faao_mav.mavlink import runner
+    from faao_mav.mavlink.mock import serve as serving
 
     ended = threading.Event()
-    serve = runner.serve
+    serve = serving.serve
 
     def until_ended(mock: MockAutopilot, connection: str, **options: Any):
         serve(mock, connection, **options, stop=ended.is_set)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runner, "serve", until_ended)
+    monkeypatch.setattr(serving, "serve", until_ended)
     results = []
 
     def serve_it():

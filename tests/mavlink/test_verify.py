@@ -6,35 +6,35 @@ from collections.abc import Sequence
 from typing import Any
 
 import pytest
-from stations import HOME, rows_for
+from stations import HOME, rows_for, vehicle_of
 
-from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.transfer.protocol import Firmware, MissionType
+from faao_mav.mavlink.messages import WireItem
+from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.transfer.verify import compare
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 
 MISSION = MissionType.MISSION
 
 
 def kinds(
-    sent: Sequence[Row], found: Sequence[Row], firmware: Firmware, part: MissionType = MISSION
+    sent: Sequence[WireItem], found: Sequence[WireItem], firmware: str, part: MissionType = MISSION
 ):
-    return {(d.item, d.field): d.kind for d in compare(sent, found, part, firmware)}
+    return {(d.item, d.field): d.kind for d in compare(sent, found, part, vehicle_of(firmware))}
 
 
-def rows_with(firmware: Firmware, *items: Any):
-    return rows_of(Mission(items, HOME), MISSION, firmware)
+def rows_with(firmware: str, *items: Any):
+    return wire_items(Mission(items, HOME), MISSION, vehicle_of(firmware))
 
 
-def changed(rows: Sequence[Row], index: int, **changes: Any):
+def changed(rows: Sequence[WireItem], index: int, **changes: Any):
     return (*rows[:index], dataclasses.replace(rows[index], **changes), *rows[index + 1 :])
 
 
 @pytest.mark.parametrize("firmware", ["ardupilot", "px4", "generic"])
-def test_equal_is_equal(firmware: Firmware) -> None:
+def test_equal_is_equal(firmware: str) -> None:
     rows = rows_for(firmware, 5)
-    assert compare(rows, rows, MISSION, firmware) == ()
+    assert compare(rows, rows, MISSION, vehicle_of(firmware)) == ()
 
 
 WAYPOINT = MissionItem(16, 3, (2.7, 5.0, 1.5, 30.0), -35.0, 149.0, 20.0)
@@ -47,9 +47,7 @@ WAYPOINT = MissionItem(16, 3, (2.7, 5.0, 1.5, 30.0), -35.0, 149.0, 20.0)
         ("px4", (2.7, 5.0, 0.0, 30.0), {"param3"}),
     ],
 )
-def test_what_storage_loses_is_told_and_no_error(
-    firmware: Firmware, params: Any, dropped: Any
-) -> None:
+def test_what_storage_loses_is_told_and_no_error(firmware: str, params: Any, dropped: Any) -> None:
     sent = rows_with(firmware, WAYPOINT)
     found = changed(sent, len(sent) - 1, params=params)
     assert kinds(sent, found, firmware) == {(0, field): "dropped" for field in dropped}
@@ -67,7 +65,7 @@ def test_what_storage_loses_is_told_and_no_error(
         {"frame": 0},
     ],
 )
-def test_anything_else_is_wrong(firmware: Firmware, change: Any) -> None:
+def test_anything_else_is_wrong(firmware: str, change: Any) -> None:
     sent = rows_with(firmware, WAYPOINT)
     assert "wrong" in kinds(sent, changed(sent, len(sent) - 1, **change), firmware).values()
 
@@ -76,7 +74,7 @@ def test_anything_else_is_wrong(firmware: Firmware, change: Any) -> None:
 @pytest.mark.parametrize(
     "change", [{"x": -349_999_999}, {"z": 20.009}, {"frame": 6}, {"current": 1}]
 )
-def test_the_same_in_other_words(firmware: Firmware, change: Any) -> None:
+def test_the_same_in_other_words(firmware: str, change: Any) -> None:
     sent = rows_with(firmware, MissionItem(16, 3, (2.0, 0.0, 0.0, 0.0), -35.0, 149.0, 20.0))
     assert kinds(sent, changed(sent, len(sent) - 1, **change), firmware) == {}
 
@@ -108,18 +106,18 @@ def test_single_precision_is_precise_enough() -> None:
 def test_missing_and_surplus_items() -> None:
     sent = rows_for("ardupilot", 5)
     for found in (sent[:-1], (*sent, sent[-1]), ()):
-        (difference,) = compare(sent, found, MISSION, "ardupilot")
+        (difference,) = compare(sent, found, MISSION, vehicle_of("ardupilot"))
         assert (difference.field, difference.kind) == ("count", "wrong")
         assert difference.sent == 5
-    assert compare(sent, (), MISSION, "ardupilot")[0].found == 0
+    assert compare(sent, (), MISSION, vehicle_of("ardupilot"))[0].found == 0
 
 
 def test_ardupilots_own_home_is_told() -> None:
     sent = rows_for("ardupilot", 3)
     found = changed(sent, 0, x=-353_700_000)
-    (difference,) = compare(sent, found, MISSION, "ardupilot")
+    (difference,) = compare(sent, found, MISSION, vehicle_of("ardupilot"))
     assert (difference.item, difference.field, difference.kind) == (None, "home", "dropped")
-    assert compare(sent, changed(sent, 0, x=sent[0].x + 20), MISSION, "ardupilot") == ()
+    assert compare(sent, changed(sent, 0, x=sent[0].x + 20), MISSION, vehicle_of("ardupilot")) == ()
     assert kinds(rows_for("px4", 3), changed(rows_for("px4", 3), 0, x=1), "px4")
 
 
@@ -140,6 +138,6 @@ def test_a_generic_autopilot_is_excused_nothing() -> None:
 def test_differences_in_words() -> None:
     sent = rows_with("ardupilot", WAYPOINT)
     found = changed(sent, 1, params=(2.0, 0.0, 0.0, 0.0), x=-350_100_000)
-    words = [str(each) for each in compare(sent, found, MISSION, "ardupilot")]
+    words = [str(each) for each in compare(sent, found, MISSION, vehicle_of("ardupilot"))]
     assert "mission item 0: param1 2.7 is kept as 2.0" in words
     assert "mission item 0: x: sent -35.0, found -35.01" in words

@@ -1,6 +1,6 @@
 """A mock autopilot to test ground stations against."""
 
-from faao_mav.mavlink.mock.autopilot import Fly, MockAutopilot
-from faao_mav.mavlink.mock.manners import COUNT, Manners, MockKind, ardupilot, manners_of, px4
+from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, MockKind, behaviour_of
+from faao_mav.mavlink.mock.mock_autopilot import Fly, MockAutopilot
 
-__all__ = ["COUNT", "Fly", "Manners", "MockAutopilot", "MockKind", "ardupilot", "manners_of", "px4"]
+__all__ = ["COUNT", "Behaviour", "Fly", "MockAutopilot", "MockKind", "behaviour_of"]

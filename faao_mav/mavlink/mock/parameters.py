@@ -9,11 +9,11 @@ from faao_mav.mavlink.messages import (
     ParamSet,
     ParamValue,
 )
-from faao_mav.mavlink.transfer.protocol import Firmware
+from faao_mav.mission.vehicle import Vehicle
 
 _REAL32 = 9
 
-_DEFAULTS: dict[Firmware, dict[str, float]] = {
+_DEFAULTS: dict[str, dict[str, float]] = {
     "ardupilot": {
         "SYSID_THISMAV": 1,
         "FRAME_CLASS": 1,
@@ -41,8 +41,8 @@ _DEFAULTS: dict[Firmware, dict[str, float]] = {
 class Parameters:
     """A few parameters by name, and those that were given; all are single-precision numbers."""
 
-    def __init__(self, firmware: Firmware, given: Mapping[str, float] | None = None) -> None:
-        self.values = _DEFAULTS.get(firmware, {}) | dict(given or {})
+    def __init__(self, vehicle: Vehicle, given: Mapping[str, float] | None = None) -> None:
+        self.values = _DEFAULTS[vehicle.autopilot] | dict(given or {})
 
     def on(self, message: ParamRequestList | ParamRequestRead | ParamSet) -> list[Message]:
         """Return the answer to a request; unknown names get none."""

@@ -1,8 +1,9 @@
-"""How PX4 takes and gives lists."""
+"""PX4's side of the mission protocol: how it takes and gives lists."""
 
 from dataclasses import dataclass
 from typing import Literal
 
+from faao_mav.mavlink.manners import manners_of
 from faao_mav.mavlink.messages import (
     Envelope,
     Message,
@@ -12,15 +13,15 @@ from faao_mav.mavlink.messages import (
     MissionItemInt,
     MissionRequestInt,
     MissionRequestList,
-    Row,
     Statustext,
+    WireItem,
 )
-from faao_mav.mavlink.mock.lists import Lists
-from faao_mav.mavlink.mock.manners import COUNT, Manners, check_row
-from faao_mav.mavlink.transfer.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
+from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item
+from faao_mav.mavlink.mock.lists import StoredLists
+from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
 
-_CRITICAL = 2
-_INFO = 6
+_CRITICAL, _INFO = 2, 6
+"""MAV_SEVERITY."""
 
 
 @dataclass(slots=True)
@@ -30,21 +31,22 @@ class _Transfer:
     state: Literal["idle", "receiving", "sending"] = "idle"
     partner: Address = NOBODY
     part: MissionType = MissionType.MISSION
-    next: int = 0
+    next_sequence: int = 0
     count: int = 0
     number: int = 0
-    heard: float = 0.0
-    asked: float = 0.0
-    rows: tuple[Row, ...] = ()
+    last_message_time: float = 0.0
+    last_request_time: float = 0.0
+    items: tuple[WireItem, ...] = ()
 
 
 class Px4Server:
     """The lists' keeper: one transfer at a time, and a new list replaces the old as a whole."""
 
-    def __init__(self, lists: Lists, manners: Manners) -> None:
-        self._lists, self._manners = lists, manners
+    def __init__(self, lists: StoredLists, behaviour: Behaviour) -> None:
+        self._lists, self._behaviour = lists, behaviour
+        self._manners = manners_of(lists.vehicle)
         self._transfer = _Transfer()
-        self._int_mode = manners.kind != "px4-legacy-first"
+        self._legacy = behaviour.legacy_first
 
     @property
     def deadline(self) -> float | None:
@@ -52,9 +54,9 @@ class Px4Server:
         transfer = self._transfer
         if transfer.state == "idle":
             return None
-        end = transfer.heard + self._manners.give_up
+        end = transfer.last_message_time + self._manners.upload_patience
         if transfer.state == "receiving":
-            return min(end, transfer.asked + self._manners.ask_again)
+            return min(end, transfer.last_request_time + self._manners.request_period)
         return end
 
     def reset(self) -> None:
@@ -84,80 +86,88 @@ class Px4Server:
         transfer = self._transfer
         if transfer.state == "idle":
             return []
-        if now >= transfer.heard + self._manners.give_up:
+        if now >= transfer.last_message_time + self._manners.upload_patience:
             transfer.state = "idle"
             return [_said("Operation timeout")]
-        if transfer.state == "receiving" and now >= transfer.asked + self._manners.ask_again:
+        if (
+            transfer.state == "receiving"
+            and now >= transfer.last_request_time + self._manners.request_period
+        ):
             return [self._ask(now)]
         return []
 
     def _on_count(self, sender: Address, kind: int, count: int, now: float) -> list[Message]:
         transfer = self._transfer
-        if transfer.state == "receiving" and sender == transfer.partner and transfer.next == 0:
-            transfer.heard = now
+        if (
+            transfer.state == "receiving"
+            and sender == transfer.partner
+            and transfer.next_sequence == 0
+        ):
+            transfer.last_message_time = now
             return [self._ask(now)]
         if transfer.state != "idle":
             if transfer.state == "receiving":
-                transfer.heard = now
-            return [_ack(sender, Result.ERROR, kind), _said("WPM: IGN MISSION_COUNT: Busy")]
+                transfer.last_message_time = now
+            return [MissionAck(sender, kind, Result.ERROR), _said("WPM: IGN MISSION_COUNT: Busy")]
         if kind not in tuple(MissionType):
-            return [_ack(sender, Result.INVALID, kind)]
+            return [MissionAck(sender, kind, Result.INVALID)]
         part = MissionType(kind)
-        refusal = self._manners.refusals.get((part, COUNT))
+        refusal = self._behaviour.refusals.get((part, COUNT))
         if refusal is not None:
-            return [_ack(sender, refusal, part)]
-        if count > self._manners.limits[part]:
-            return [_ack(sender, Result.NO_SPACE, part)]
+            return [MissionAck(sender, part, refusal)]
+        if count > self._behaviour.limits[part]:
+            return [MissionAck(sender, part, Result.NO_SPACE)]
         if count == 0:
             self._lists.clear(part)
-            return [_ack(sender, Result.ACCEPTED, part)]
+            return [MissionAck(sender, part, Result.ACCEPTED)]
         self._transfer = _Transfer("receiving", sender, part, 0, count, 0, now)
         return [self._ask(now)]
 
     def _ask(self, now: float) -> Message:
         transfer = self._transfer
-        transfer.asked = now
-        target = (transfer.partner.system, transfer.partner.component)
-        return MissionRequestInt(*target, transfer.next, transfer.part, not self._int_mode)
+        transfer.last_request_time = now
+        return MissionRequestInt(
+            transfer.partner, transfer.part, transfer.next_sequence, self._legacy
+        )
 
     def _on_item(self, sender: Address, item: MissionItemInt, now: float) -> list[Message]:
         transfer = self._transfer
         if sender != transfer.partner:
             return [_said("REJ. MIS ITEM: partner id mismatch")]
-        self._int_mode = not item.legacy
+        self._legacy = item.legacy
         if item.mission_type != transfer.part or transfer.state == "sending":
-            return [_ack(sender, Result.ERROR, item.mission_type)]
+            return [MissionAck(sender, item.mission_type, Result.ERROR)]
         if transfer.state == "idle":
             return self._on_late_item(sender, item)
-        transfer.heard = now
-        if item.seq != transfer.next:
+        transfer.last_message_time = now
+        if item.seq != transfer.next_sequence:
             return []
         return self._take(item, now)
 
     def _on_late_item(self, sender: Address, item: MissionItemInt) -> list[Message]:
         transfer = self._transfer
-        complete = transfer.next == transfer.count or not self._manners.complete_only
-        if item.seq + 1 == transfer.next and complete:
-            return [_ack(sender, Result.ACCEPTED, transfer.part, transfer.number)]
+        complete = transfer.next_sequence == transfer.count or not self._behaviour.complete_only
+        if item.seq + 1 == transfer.next_sequence and complete:
+            return [MissionAck(sender, transfer.part, Result.ACCEPTED, transfer.number)]
         text = _said("IGN MISSION_ITEM: No transfer")
-        return [_ack(sender, Result.ERROR, transfer.part), text]
+        return [MissionAck(sender, transfer.part, Result.ERROR), text]
 
     def _take(self, item: MissionItemInt, now: float) -> list[Message]:
         transfer, part = self._transfer, self._transfer.part
-        result = self._manners.refusals.get((part, item.seq))
-        result = result or check_row(item.row, part, self._manners.kind)
+        result = self._behaviour.refusals.get((part, item.seq))
+        result = result or check_item(item.item, part, self._behaviour, self._lists.vehicle)
         if result != Result.ACCEPTED:
             transfer.state = "idle"
             text = _said("IGN MISSION_ITEM: Invalid item")
-            return [_ack(transfer.partner, result, part), text]
-        transfer.rows = (*transfer.rows, self._lists.kept(part, item.seq, item.row))
-        transfer.next += 1
-        if transfer.next < transfer.count:
+            return [MissionAck(transfer.partner, part, result), text]
+        transfer.items = (*transfer.items, self._lists.kept(part, item.seq, item.item))
+        transfer.next_sequence += 1
+        if transfer.next_sequence < transfer.count:
             return [self._ask(now)]
         transfer.state = "idle"
-        self._lists.replace(part, transfer.rows)
+        self._lists.replace(part, transfer.items)
         transfer.number = self._lists.number(part)
-        return [_ack(transfer.partner, Result.ACCEPTED, part, transfer.number)]
+        return [MissionAck(transfer.partner, part, Result.ACCEPTED, transfer.number)]
 
     def _on_ack(self, sender: Address, ack: MissionAck, now: float) -> list[Message]:
         transfer = self._transfer
@@ -167,7 +177,7 @@ class Px4Server:
             transfer.state = "idle"
         elif transfer.state == "receiving":
             if ack.type == Result.UNSUPPORTED:
-                self._int_mode = not self._int_mode
+                self._legacy = not self._legacy
                 return [self._ask(now)]
             if ack.type == Result.OPERATION_CANCELLED:
                 transfer.state = "idle"
@@ -176,15 +186,15 @@ class Px4Server:
     def _on_list(self, sender: Address, kind: int, now: float) -> list[Message]:
         transfer = self._transfer
         again = sender == transfer.partner and kind == transfer.part
-        done = transfer.next == transfer.count
+        done = transfer.next_sequence == transfer.count
         free = transfer.state == "idle" or (transfer.state == "sending" and (again or done))
         if not free or kind not in tuple(MissionType):
             return [Statustext(_INFO, "Mission download request ignored, already active")]
         part = MissionType(kind)
-        rows = self._lists.rows(part)
-        self._transfer = _Transfer("sending", sender, part, 0, len(rows), 0, now, rows=rows)
+        items = self._lists.items(part)
+        self._transfer = _Transfer("sending", sender, part, 0, len(items), 0, now, items=items)
         number = self._lists.number(part)
-        return [MissionCount(sender.system, sender.component, len(rows), part, number)]
+        return [MissionCount(sender, part, len(items), number)]
 
     def _on_request(self, sender: Address, request: MissionRequestInt, now: float) -> list[Message]:
         transfer = self._transfer
@@ -192,16 +202,15 @@ class Px4Server:
             return [_said("WPM: REJ. CMD: partner id mismatch")]
         if transfer.state != "sending" or request.mission_type != transfer.part:
             return []
-        transfer.heard = now
-        if request.seq == transfer.next < transfer.count:
-            transfer.next += 1
-        elif request.seq != transfer.next - 1:
+        transfer.last_message_time = now
+        if request.seq == transfer.next_sequence < transfer.count:
+            transfer.next_sequence += 1
+        elif request.seq != transfer.next_sequence - 1:
             transfer.state = "idle"
             text = _said("WPM: REJ. CMD: Req. WP was unexpected")
-            return [_ack(sender, Result.ERROR, transfer.part), text]
-        target = (sender.system, sender.component)
-        row = transfer.rows[request.seq]
-        return [MissionItemInt(*target, request.seq, transfer.part, row, request.legacy)]
+            return [MissionAck(sender, transfer.part, Result.ERROR), text]
+        item = transfer.items[request.seq]
+        return [MissionItemInt(sender, transfer.part, request.seq, item, request.legacy)]
 
     def _on_clear(self, sender: Address, kind: int) -> list[Message]:
         if self._transfer.state != "idle":
@@ -211,12 +220,8 @@ class Px4Server:
         for part in MissionType:
             if kind in (part, ALL_TYPES):
                 self._lists.clear(part)
-        return [_ack(sender, Result.ACCEPTED, kind)]
+        return [MissionAck(sender, kind, Result.ACCEPTED)]
 
 
 def _said(text: str) -> Statustext:
     return Statustext(_CRITICAL, f"{text}\t")
-
-
-def _ack(target: Address, result: Result, mission_type: int, number: int = 0) -> MissionAck:
-    return MissionAck(target.system, target.component, result, mission_type, number)

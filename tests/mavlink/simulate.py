@@ -8,9 +8,9 @@ from typing import Any
 
 from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.faults import Channel, Faults
+from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import Envelope, Message
-from faao_mav.mavlink.transfer.protocol import Address
-from faao_mav.mavlink.transfer.transfer import Machine
+from faao_mav.mavlink.protocol import Address
 
 _STEP = 1e-3  # s, least time between two ticks of a machine that stays due
 

@@ -1,10 +1,12 @@
-"""How ArduPilot takes and gives lists."""
+"""ArduPilot's side of the mission protocol: how it takes and gives lists."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from faao_mav.mavlink.manners import manners_of
 from faao_mav.mavlink.messages import (
     Envelope,
+    ListMessage,
     Message,
     MissionAck,
     MissionClearAll,
@@ -13,14 +15,15 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
     MissionWritePartialList,
-    Row,
     Statustext,
+    WireItem,
 )
-from faao_mav.mavlink.mock.lists import Lists
-from faao_mav.mavlink.mock.manners import COUNT, Manners, check_row
-from faao_mav.mavlink.transfer.protocol import ALL_TYPES, Address, MissionType, Result
+from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item
+from faao_mav.mavlink.mock.lists import StoredLists
+from faao_mav.mavlink.protocol import ALL_TYPES, Address, MissionType, Result
 
 _WARNING = 4
+"""MAV_SEVERITY."""
 
 
 @dataclass(slots=True)
@@ -28,11 +31,11 @@ class _Receiving:
     """An upload under way; `fence` collects what takes effect only as a whole."""
 
     partner: Address
-    next: int
-    last: int
-    heard: float
-    asked: float
-    fence: list[Row]
+    next_sequence: int
+    last_sequence: int
+    last_item_time: float
+    last_request_time: float
+    fence: list[WireItem]
 
 
 class ArduPilotServer:
@@ -44,12 +47,13 @@ class ArduPilotServer:
 
     def __init__(
         self,
-        lists: Lists,
-        manners: Manners,
+        lists: StoredLists,
+        behaviour: Behaviour,
         ready: Callable[[], bool],
         flying: Callable[[], bool],
     ) -> None:
-        self._lists, self._manners = lists, manners
+        self._lists, self._behaviour = lists, behaviour
+        self._manners = manners_of(lists.vehicle)
         self._ready, self._flying = ready, flying
         self._uploads: dict[MissionType, _Receiving] = {}
 
@@ -65,20 +69,20 @@ class ArduPilotServer:
     def on(self, envelope: Envelope, now: float) -> list[Message]:
         """Answer a message of the mission protocol."""
         sender, message = envelope.sender, envelope.message
-        kind = getattr(message, "mission_type", None)
-        if kind is None:
+        if not isinstance(message, ListMessage):
             return []
+        kind = message.mission_type
         if kind == ALL_TYPES and isinstance(message, MissionClearAll):
             return self._clear_all(sender)
         if kind not in tuple(MissionType):
             known = isinstance(message, MissionAck)
-            return [] if known else [_ack(sender, Result.UNSUPPORTED, kind)]
+            return [] if known else [MissionAck(sender, kind, Result.UNSUPPORTED)]
         part = MissionType(kind)
         match message:
             case MissionCount(count=count):
                 return self._on_count(sender, part, count, now)
-            case MissionItemInt(seq=seq, row=row):
-                return self._on_item(sender, part, seq, row, now)
+            case MissionItemInt(seq=seq, item=item):
+                return self._on_item(sender, part, seq, item, now)
             case MissionRequestList():
                 return self._on_list(sender, part)
             case MissionRequestInt():
@@ -93,36 +97,39 @@ class ArduPilotServer:
         """Ask again, or give up."""
         out: list[Message] = []
         for part, upload in list(self._uploads.items()):
-            if now >= upload.heard + self._manners.give_up:
+            if now >= upload.last_item_time + self._manners.upload_patience:
                 del self._uploads[part]
                 out.append(Statustext(_WARNING, "Mission upload timeout"))
-                out.append(_ack(upload.partner, Result.OPERATION_CANCELLED, part))
-            elif now >= upload.asked + self._manners.ask_again:
+                out.append(MissionAck(upload.partner, part, Result.OPERATION_CANCELLED))
+            elif now >= upload.last_request_time + self._manners.request_period:
                 out.append(self._ask(part, upload, now))
         return out
 
     def _due(self, upload: _Receiving) -> float:
-        return min(upload.heard + self._manners.give_up, upload.asked + self._manners.ask_again)
+        return min(
+            upload.last_item_time + self._manners.upload_patience,
+            upload.last_request_time + self._manners.request_period,
+        )
 
     def _on_count(
         self, sender: Address, part: MissionType, count: int, now: float
     ) -> list[Message]:
         upload = self._uploads.get(part)
         if upload is not None and upload.partner != sender:
-            return [_ack(sender, Result.DENIED, part)]
-        refusal = self._manners.refusals.get((part, COUNT))
+            return [MissionAck(sender, part, Result.DENIED)]
+        refusal = self._behaviour.refusals.get((part, COUNT))
         if refusal is not None:
-            return [_ack(sender, refusal, part)]
-        limit = self._manners.limits[part]
+            return [MissionAck(sender, part, refusal)]
+        limit = self._behaviour.limits[part]
         if not self._ready():
-            return [_ack(sender, Result.NO_SPACE, part)]
+            return [MissionAck(sender, part, Result.NO_SPACE)]
         if count > limit:
             text = Statustext(_WARNING, f"Only {limit} items are supported")
-            return [_ack(sender, Result.NO_SPACE, part), text]
+            return [MissionAck(sender, part, Result.NO_SPACE), text]
         if count == 0:
             self._lists.clear(part)
             self._uploads.pop(part, None)
-            return [_ack(sender, Result.ACCEPTED, part)]
+            return [MissionAck(sender, part, Result.ACCEPTED)]
         if part is not MissionType.FENCE:
             self._lists.truncate(part, count)
         return self._begin(sender, part, 0, count - 1, now)
@@ -130,9 +137,9 @@ class ArduPilotServer:
     def _on_partial(
         self, sender: Address, part: MissionType, first: int, last: int, now: float
     ) -> list[Message]:
-        count = len(self._lists.rows(part))
+        count = len(self._lists.items(part))
         if not 0 <= first <= last <= count:
-            return [_ack(sender, Result.ERROR, part)]
+            return [MissionAck(sender, part, Result.ERROR)]
         return self._begin(sender, part, first, last, now)
 
     def _begin(
@@ -143,68 +150,66 @@ class ArduPilotServer:
         return [self._ask(part, upload, now)]
 
     def _ask(self, part: MissionType, upload: _Receiving, now: float) -> Message:
-        upload.asked = now
-        partner = upload.partner
-        return MissionRequestInt(partner.system, partner.component, upload.next, part, legacy=True)
+        upload.last_request_time = now
+        return MissionRequestInt(
+            upload.partner, part, upload.next_sequence, legacy=self._behaviour.legacy_first
+        )
 
     def _on_item(
-        self, sender: Address, part: MissionType, seq: int, row: Row, now: float
+        self, sender: Address, part: MissionType, seq: int, item: WireItem, now: float
     ) -> list[Message]:
         upload = self._uploads.get(part)
         if upload is None:
-            return [_ack(sender, Result.ERROR, part)]
-        if seq != upload.next:
-            return [_ack(sender, Result.INVALID_SEQUENCE, part)]
+            return [MissionAck(sender, part, Result.ERROR)]
+        if seq != upload.next_sequence:
+            return [MissionAck(sender, part, Result.INVALID_SEQUENCE)]
         if sender != upload.partner:
-            return [_ack(sender, Result.DENIED, part)]
-        result = self._manners.refusals.get((part, seq)) or check_row(row, part, "ardupilot")
+            return [MissionAck(sender, part, Result.DENIED)]
+        result = self._behaviour.refusals.get((part, seq)) or check_item(
+            item, part, self._behaviour, self._lists.vehicle
+        )
         if result != Result.ACCEPTED:
             del self._uploads[part]
-            return [_ack(sender, result, part)]
+            return [MissionAck(sender, part, result)]
         if part is MissionType.FENCE:
-            upload.fence.append(self._lists.kept(part, seq, row))
+            upload.fence.append(self._lists.kept(part, seq, item))
         else:
-            self._lists.put(part, seq, row)
-        upload.heard, upload.next = now, seq + 1
-        if seq < upload.last:
+            self._lists.put(part, seq, item)
+        upload.last_item_time, upload.next_sequence = now, seq + 1
+        if seq < upload.last_sequence:
             return [self._ask(part, upload, now)]
         if part is MissionType.FENCE:
             self._lists.replace(part, upload.fence)
         del self._uploads[part]
-        return [_ack(sender, Result.ACCEPTED, part)]
+        return [MissionAck(sender, part, Result.ACCEPTED)]
 
     def _on_list(self, sender: Address, part: MissionType) -> list[Message]:
         if part in self._uploads:
-            return [_ack(sender, Result.DENIED, part)]
-        count = len(self._lists.rows(part))
-        return [MissionCount(sender.system, sender.component, count, part)]
+            return [MissionAck(sender, part, Result.DENIED)]
+        count = len(self._lists.items(part))
+        return [MissionCount(sender, part, count)]
 
     def _on_request(
         self, sender: Address, part: MissionType, request: MissionRequestInt
     ) -> list[Message]:
-        rows = self._lists.rows(part)
+        items = self._lists.items(part)
         if part in self._uploads and not request.legacy:
-            return [_ack(sender, Result.DENIED, part)]
-        if request.seq >= len(rows):
+            return [MissionAck(sender, part, Result.DENIED)]
+        if request.seq >= len(items):
             wrong = Result.ERROR if part is MissionType.MISSION else Result.INVALID_SEQUENCE
-            return [_ack(sender, wrong, part)]
-        target = (sender.system, sender.component)
-        return [MissionItemInt(*target, request.seq, part, rows[request.seq], request.legacy)]
+            return [MissionAck(sender, part, wrong)]
+        return [MissionItemInt(sender, part, request.seq, items[request.seq], request.legacy)]
 
     def _on_clear(self, sender: Address, part: MissionType) -> list[Message]:
         busy = part in self._uploads or (part is MissionType.MISSION and self._flying())
         if busy:
-            return [_ack(sender, Result.ERROR, part)]
+            return [MissionAck(sender, part, Result.ERROR)]
         self._lists.clear(part)
-        return [_ack(sender, Result.ACCEPTED, part)]
+        return [MissionAck(sender, part, Result.ACCEPTED)]
 
     def _clear_all(self, sender: Address) -> list[Message]:
         if self._uploads or self._flying():
-            return [_ack(sender, Result.ERROR, ALL_TYPES)]
+            return [MissionAck(sender, ALL_TYPES, Result.ERROR)]
         for part in MissionType:
             self._lists.clear(part)
-        return [_ack(sender, Result.ACCEPTED, ALL_TYPES)]
-
-
-def _ack(target: Address, result: Result, mission_type: int) -> MissionAck:
-    return MissionAck(target.system, target.component, result, mission_type)
+        return [MissionAck(sender, ALL_TYPES, Result.ACCEPTED)]

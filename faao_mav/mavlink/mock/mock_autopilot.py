@@ -6,7 +6,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import (
+    Addressed,
     AutopilotVersion,
     CommandAck,
     CommandLong,
@@ -22,18 +24,23 @@ from faao_mav.mavlink.messages import (
     SetMode,
     Statustext,
 )
-from faao_mav.mavlink.mock.ardupilot import ArduPilotServer
-from faao_mav.mavlink.mock.feasible import infeasible
+from faao_mav.mavlink.mock.ardupilot_server import ArduPilotServer
+from faao_mav.mavlink.mock.behaviour import Behaviour, behaviour_of
 from faao_mav.mavlink.mock.flight import Flight, Posture, telemetry
-from faao_mav.mavlink.mock.lists import Lists
-from faao_mav.mavlink.mock.manners import Manners
+from faao_mav.mavlink.mock.lists import StoredLists
 from faao_mav.mavlink.mock.modes import Modes, whole
 from faao_mav.mavlink.mock.parameters import Parameters
-from faao_mav.mavlink.mock.px4 import Px4Server
-from faao_mav.mavlink.rows import mission_of
-from faao_mav.mavlink.transfer.protocol import ARMED, Address, Autopilot, MissionType, State
+from faao_mav.mavlink.mock.px4_server import Px4Server
+from faao_mav.mavlink.protocol import (
+    ARMED,
+    GROUND_STATION,
+    MAV_AUTOPILOTS,
+    Address,
+    MavState,
+    MissionType,
+)
+from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.item import Home, Mission
-from faao_mav.mission.vehicle import Autopilot as Family
 from faao_mav.mission.vehicle import Kind, Vehicle
 from faao_mav.vehicle import Track
 
@@ -57,14 +64,20 @@ class Cmd(IntEnum):
 
 
 _AUTOPILOT_VERSION, _HOME_POSITION = 148, 242
-_MAV_TYPES: dict[Kind, int] = {"copter": 2, "plane": 1}  # quadrotor, fixed wing
+"""Message numbers."""
+
+_MAV_TYPES: dict[Kind, int] = {"copter": 2, "plane": 1}
+"""MAV_TYPE: quadrotor, fixed wing."""
+
 _INFO = 6
+"""MAV_SEVERITY."""
+
 # MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
 _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
 _AT_REST = Posture(np.zeros(3), np.zeros(3), 0)
 
 
-class MockAutopilot:
+class MockAutopilot(Machine[None]):
     """It takes missions as ArduPilot or PX4 does, and flies them along `fly`'s track.
 
     `aircraft` is what its heartbeats say that it is, and whose missions it stores.
@@ -74,12 +87,11 @@ class MockAutopilot:
     `parameters` are told beside its defaults; what they do to the flight is up to `fly`.
     """
 
-    outcome: None = None
     progress = ("flying", 0, 0)
 
     def __init__(
         self,
-        manners: Manners | None = None,
+        behaviour: Behaviour | None = None,
         *,
         aircraft: Kind = "copter",
         address: Address = Address(1, 1),  # noqa: B008
@@ -91,16 +103,17 @@ class MockAutopilot:
         beat: float = 1.0,
         boot: float = 0.0,
     ) -> None:
-        self.manners = manners or Manners()
+        super().__init__()
+        self.behaviour = behaviour or behaviour_of("ardupilot")
         self.address, self.home = address, home
-        autopilot: Family = "ardupilot" if self.manners.kind == "ardupilot" else "px4"
-        self._modes, self._type = Modes(autopilot, aircraft), _MAV_TYPES[aircraft]
-        self.lists = Lists(Vehicle(autopilot, aircraft), home)
-        self.parameters = Parameters(autopilot, parameters)
+        self.vehicle = Vehicle(self.behaviour.autopilot, aircraft)
+        self._modes = Modes(self.vehicle)
+        self.lists = StoredLists(self.vehicle, home)
+        self.parameters = Parameters(self.vehicle, parameters)
         self._server: ArduPilotServer | Px4Server = (
-            ArduPilotServer(self.lists, self.manners, self._is_ready, self._is_flying)
-            if autopilot == "ardupilot"
-            else Px4Server(self.lists, self.manners)
+            ArduPilotServer(self.lists, self.behaviour, self._is_ready, self._is_flying)
+            if self.behaviour.autopilot == "ardupilot"
+            else Px4Server(self.lists, self.behaviour)
         )
         self._fly, self._speedup = fly, speedup
         self._period = 1 / rate if rate > 0 else None
@@ -141,11 +154,11 @@ class MockAutopilot:
         self._armed, self._flight, self._current = False, None, 0
         self._booted, self._ready_at = now, now + self._boot
 
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Say nothing: a vehicle does not take leave."""
-        return ()
-
     def tick(self, now: float) -> Sequence[Message]:
+        """Send what is due."""
+        return self.time_out(now)
+
+    def time_out(self, now: float) -> Sequence[Message]:
         """Send what is due."""
         self._now = now
         out: list[Message] = list(self._server.tick(now))
@@ -159,22 +172,26 @@ class MockAutopilot:
             out += telemetry(self._posture(now), self.home, now - self._booted)
         return out
 
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Answer what is addressed to this vehicle."""
         self._now = now
         sender, message = envelope.sender, envelope.message
-        system = getattr(message, "target_system", None)
-        component = getattr(message, "target_component", 0)
+        if isinstance(message, SetMode):
+            target = Address(message.target_system, 0)
+        elif isinstance(message, Addressed):
+            target = message.target
+        else:
+            return ()
         own = self.address
-        for_me = system in (0, own.system) and component in (0, own.component, 190)
-        if not for_me or sender == own:
+        as_planner = Address(own.system, GROUND_STATION.component)  # PX4 takes it for its own
+        if sender == own or not (own.takes(target) or as_planner.takes(target)):
             return ()
         match message:
             case CommandLong():
                 return self._on_command(sender, message, now)
             case SetMode(custom_mode=mode):
                 result = self._set_mode(mode, now)
-                return [CommandAck(11, result, sender.system, sender.component)]
+                return [CommandAck(sender, 11, result)]
             case ParamRequestList() | ParamRequestRead() | ParamSet():
                 return self.parameters.on(message)
             case MissionSetCurrent(seq=seq):
@@ -185,8 +202,7 @@ class MockAutopilot:
 
     def mission(self) -> Mission:
         """Return what is stored, as a mission."""
-        rows = [self.lists.rows(part) for part in MissionType]
-        return mission_of(rows[0], rows[1], rows[2], self._modes.autopilot)
+        return mission_of({part: self.lists.items(part) for part in MissionType}, self.vehicle)
 
     def _is_ready(self) -> bool:
         return self._now >= self._ready_at
@@ -219,7 +235,7 @@ class MockAutopilot:
                 self.reboot(now)
             case _:
                 result = UNSUPPORTED
-        ack = CommandAck(command.command, result, sender.system, sender.component)
+        ack = CommandAck(sender, command.command, result)
         return [ack, *answers]
 
     def _asked_for(self, kind: int) -> list[Message]:
@@ -254,7 +270,7 @@ class MockAutopilot:
         mission = self.mission()
         if not mission.items:
             return "no mission"
-        return infeasible(mission) if self._modes.autopilot == "px4" else None
+        return self.behaviour.infeasible(mission)
 
     def _begin(self, now: float) -> int:
         """Fly, once armed and told to; not a second time."""
@@ -279,28 +295,30 @@ class MockAutopilot:
         return out
 
     def _first_number(self) -> int:
-        return int(self._modes.autopilot == "ardupilot")
+        return home_items(self.vehicle, MissionType.MISSION)
 
     def _posture(self, now: float) -> Posture:
         return _AT_REST if self._flight is None else self._flight.at(now)
 
     def _set_current(self, seq: int) -> list[Message]:
-        if not 0 <= seq < len(self.lists.rows(MissionType.MISSION)):
+        if not 0 <= seq < len(self.lists.items(MissionType.MISSION)):
             return []
         self._current = seq
         return [self._mission_current()]
 
     def _mission_current(self) -> Message:
-        total = len(self.lists.rows(MissionType.MISSION)) - self._first_number()
+        total = len(self.lists.items(MissionType.MISSION)) - self._first_number()
         # MISSION_STATE: none, not started, active
         state = 1 if total == 0 else 3 if self._flight is not None else 2
         return MissionCurrent(self._current, max(total, 0), state)
 
     def _heartbeat(self) -> Message:
         if not self._is_ready():
-            state = State.CALIBRATING
+            state = MavState.CALIBRATING
         else:
-            state = State.ACTIVE if self._armed else State.STANDBY
-        autopilot = Autopilot.ARDUPILOT if self._modes.autopilot == "ardupilot" else Autopilot.PX4
+            state = MavState.ACTIVE if self._armed else MavState.STANDBY
+        autopilot = MAV_AUTOPILOTS[self.vehicle.autopilot]
         base_mode = self._modes.base_mode | (ARMED if self._armed else 0)
-        return Heartbeat(self._type, autopilot, base_mode, self._modes.custom_mode, state)
+        return Heartbeat(
+            _MAV_TYPES[self.vehicle.kind], autopilot, base_mode, self._modes.custom_mode, state
+        )
