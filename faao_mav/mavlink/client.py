@@ -24,7 +24,6 @@ from faao_mav.mavlink.transfer.session import (
 )
 from faao_mav.mavlink.wire_items import mission_of, wire_items
 from faao_mav.mission.item import Mission
-from faao_mav.vehicle.dialects import item_limit
 
 T = TypeVar("T")
 
@@ -191,7 +190,7 @@ def _change(
 def _problems(
     reports: Sequence[PartReport], peer: Peer, mission: Mission, lacks_key: bool
 ) -> tuple[str, ...]:
-    limit = 0 if peer.vehicle is None else item_limit(peer.vehicle).sure
+    limit = 0 if peer.vehicle is None else peer.vehicle.dialect.items.sure
 
     def describe(item: int) -> str:
         if item < 0:

@@ -7,15 +7,15 @@ from faao_mav.errors import LinkError
 from faao_mav.mavlink.machine import AskingMachine, Machine
 from faao_mav.mavlink.manners import autopilot_name
 from faao_mav.mavlink.messages import CommandLong, Envelope, Heartbeat, HomePosition, Message
-from faao_mav.mavlink.protocol import MAV_AUTOPILOTS, NO_AUTOPILOT, Address, MavState
+from faao_mav.mavlink.protocol import NO_AUTOPILOT, Address, MavState
 from faao_mav.mission.item import Home
-from faao_mav.mission.vehicle import Kind, Vehicle
+from faao_mav.vehicle import VehicleType, vehicle_type_by_numbers
 
 _GCS = 6
 """MAV_TYPE of ground stations."""
 
-_PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25})
-"""MAV_TYPEs that fly as planes do: fixed wing and VTOL."""
+_FIXED_WING, _VTOLS = 1, range(19, 26)
+"""MAV_TYPEs: VTOLs take missions as planes do."""
 
 _HOME_POSITION, _REQUEST_MESSAGE = 242, 512
 """Numbers of a message and a command (MAV_CMD_REQUEST_MESSAGE)."""
@@ -27,18 +27,21 @@ period."""
 
 @dataclass(frozen=True, slots=True)
 class FoundVehicle:
-    """An autopilot that was heard; `vehicle` is None if it is not one known here."""
+    """An autopilot that was heard; `vehicle` is None if its autopilot is not known here.
+
+    `kind` is its type, "copter" or "plane", whether or not the autopilot is known.
+    """
 
     address: Address
-    vehicle: Vehicle | None
-    kind: Kind
+    vehicle: VehicleType | None
+    kind: str
     armed: bool
     ready: bool
 
     @property
     def autopilot(self) -> str:
         """The autopilot by its name in plans, or "generic"."""
-        return "generic" if self.vehicle is None else self.vehicle.autopilot
+        return "generic" if self.vehicle is None else self.vehicle.family.key
 
     def __str__(self) -> str:
         state = "armed" if self.armed else "disarmed" if self.ready else "booting"
@@ -159,12 +162,9 @@ def choose(
 
 
 def _found_vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:
-    kind: Kind = "plane" if heartbeat.type in _PLANES else "copter"
-    vehicle = None
-    if heartbeat.autopilot == MAV_AUTOPILOTS["ardupilot"]:
-        vehicle = Vehicle("ardupilot", kind)
-    elif heartbeat.autopilot == MAV_AUTOPILOTS["px4"]:
-        vehicle = Vehicle("px4", kind)
+    mav_type = _FIXED_WING if heartbeat.type in _VTOLS else heartbeat.type
+    vehicle = vehicle_type_by_numbers(heartbeat.autopilot, mav_type)
+    kind = "plane" if mav_type == _FIXED_WING else "copter"
     # UNINIT is what simple vehicles say that do not tell their state.
     ready = heartbeat.system_status not in (MavState.BOOT, MavState.CALIBRATING)
     return FoundVehicle(sender, vehicle, kind, heartbeat.armed, ready)

@@ -9,7 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from faao_mav.mavlink.protocol import Result
-from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Vehicle
+from faao_mav.vehicle import AutopilotFamily, VehicleType
+from faao_mav.vehicle.ardupilot.family import ARDUPILOT
+from faao_mav.vehicle.px4 import PX4
 
 _GENERAL = {
     Result.UNSUPPORTED_FRAME: "the frame of an item is not supported",
@@ -65,8 +67,8 @@ class Manners:
 
 
 _UNKNOWN = Manners()
-_MANNERS = {
-    "ardupilot": Manners(
+_MANNERS: dict[AutopilotFamily, Manners] = {
+    ARDUPILOT: Manners(
         request_period=1.0,
         upload_patience=8.0,
         reminder=-2,
@@ -85,7 +87,7 @@ _MANNERS = {
             Result.DENIED: "another ground station is uploading",
         },
     ),
-    "px4": Manners(
+    PX4: Manners(
         request_period=0.25,
         upload_patience=5.0,
         ignores_other_items=True,
@@ -102,11 +104,11 @@ _MANNERS = {
 }
 
 
-def manners_of(vehicle: Vehicle | None) -> Manners:
+def manners_of(vehicle: VehicleType | None) -> Manners:
     """Return the manners of `vehicle`; None, or one not listed here, follows the guide."""
-    return _UNKNOWN if vehicle is None else _MANNERS.get(vehicle.autopilot, _UNKNOWN)
+    return _UNKNOWN if vehicle is None else _MANNERS.get(vehicle.family, _UNKNOWN)
 
 
-def autopilot_name(vehicle: Vehicle | None) -> str:
+def autopilot_name(vehicle: VehicleType | None) -> str:
     """Return what people call the autopilot of `vehicle`."""
-    return "an autopilot unknown here" if vehicle is None else AUTOPILOT_NAMES[vehicle.autopilot]
+    return "an autopilot unknown here" if vehicle is None else vehicle.family.name

@@ -45,9 +45,6 @@ class Result(IntEnum):
     OPERATION_CANCELLED = 15
 
 
-MAV_AUTOPILOTS = {"ardupilot": 3, "px4": 12}
-"""MAV_AUTOPILOT by the names of plans."""
-
 NO_AUTOPILOT = 8
 """MAV_AUTOPILOT_INVALID: what ground stations and other components say that they are."""
 

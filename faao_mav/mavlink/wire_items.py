@@ -18,8 +18,7 @@ from faao_mav.mission.command import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_
 from faao_mav.mission.fence import Circle, Fence, Place, Polygon, RallyPoint
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.mission.rows import as_received, as_sent
-from faao_mav.mission.vehicle import Vehicle
-from faao_mav.vehicle.dialects import dialect_of
+from faao_mav.vehicle import VehicleType
 
 GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
 """Frames whose coordinates are latitude and longitude, by their numbers in MAV_FRAME."""
@@ -36,14 +35,14 @@ def coordinate_scale(frame: int) -> float:
     return 1.0 if frame == Frame.MISSION else 1e4
 
 
-def home_items(vehicle: Vehicle | None, mission_type: MissionType) -> int:
+def home_items(vehicle: VehicleType | None, mission_type: MissionType) -> int:
     """Return how many items before the mission's own a list of `vehicle` has: its home, or none."""
-    has_home = vehicle is not None and dialect_of(vehicle).home_row
+    has_home = vehicle is not None and vehicle.dialect.home_row
     return int(has_home and mission_type is MissionType.MISSION)
 
 
 def wire_items(
-    mission: Mission, mission_type: MissionType, vehicle: Vehicle | None
+    mission: Mission, mission_type: MissionType, vehicle: VehicleType | None
 ) -> tuple[WireItem, ...]:
     """Return what `vehicle` is sent for one of the lists of `mission`.
 
@@ -78,7 +77,9 @@ def mission_item(item: WireItem) -> MissionItem:
     )
 
 
-def mission_of(lists: Mapping[MissionType, Sequence[WireItem]], vehicle: Vehicle | None) -> Mission:
+def mission_of(
+    lists: Mapping[MissionType, Sequence[WireItem]], vehicle: VehicleType | None
+) -> Mission:
     """Return the mission that the `lists` downloaded from `vehicle` make; one may be missing.
 
     Raises `InputError` for a fence that is none.
@@ -149,7 +150,7 @@ def _place_item(
     return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), x, y, z)
 
 
-def _without_nan(item: MissionItem, index: int, vehicle: Vehicle | None) -> MissionItem:
+def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:
     values = (*item.params, item.x, item.y, item.z)
     if not any(map(math.isnan, values)):
         return item

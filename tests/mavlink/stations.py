@@ -26,7 +26,7 @@ from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import VehicleType, vehicle_type
 
 VEHICLE = Address(1, 1)
 FOREIGN = Address(250, 190)
@@ -39,11 +39,11 @@ FENCE = Fence(
 RALLY = (RallyPoint(-35.36, 149.16, 30.0), RallyPoint(-35.37, 149.17, 40.0))
 
 
-def vehicle_of(kind: str) -> Vehicle | None:
+def vehicle_of(kind: str) -> VehicleType | None:
     """Return the copter of a kind of mock autopilot; None for "generic"."""
     if kind == "generic":
         return None
-    return Vehicle("ardupilot" if kind == "ardupilot" else "px4")
+    return vehicle_type("ardupilot" if kind == "ardupilot" else "px4", "copter")
 
 
 def peer_of(kind: str) -> Peer:
@@ -118,7 +118,7 @@ def upload_to(
     **more: Any,
 ) -> tuple[PartReport | None, float]:
     """Upload `rows` to `mock` over a simulated link, verified; report and time taken."""
-    peer = peer_of(mock.behaviour.autopilot)
+    peer = peer_of(mock.behaviour.family.key)
     script = Script(upload_parts([(part, tuple(rows))], peer, timeouts=timeouts))
     client = Station(script, GROUND_STATION)
     took = simulate(client, Station(mock, VEHICLE), faults, until, **more)

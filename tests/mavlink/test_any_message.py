@@ -83,7 +83,7 @@ def converse(
 @given(st.sampled_from(KINDS), st.lists(anything(to_vehicle), max_size=30))
 def test_the_mock_bears_everything(kind: MockKind, said: list[messages.Message]) -> None:
     mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly)
-    firmware = mock.lists.vehicle.autopilot
+    firmware = mock.vehicle.family.key
     mock.lists.replace(
         MissionType.MISSION, wire_items(a_mission(4), MissionType.MISSION, vehicle_of(firmware))
     )

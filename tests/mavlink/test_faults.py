@@ -63,7 +63,7 @@ def test_no_wrong_mission_is_ever_called_verified(
 ) -> None:
     manners = behaviour_of("px4", complete_only=False) if kind == "px4-late-items" else kind
     mock = mock_of(manners)
-    firmware = mock.behaviour.autopilot
+    firmware = mock.behaviour.family.key
     if occupied:
         mock.lists.replace(MISSION, rows_for(firmware, 7, shift=0.1))
     rows = rows_for(firmware, count)
@@ -159,7 +159,7 @@ def test_refusals_of_every_kind_are_reported(kind: MockKind, result: Result, seq
     if kind == "ardupilot" and seq == 0:
         seq = 1
     mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): result}))
-    rows = rows_for(mock.behaviour.autopilot, 6)[:6]
+    rows = rows_for(mock.behaviour.family.key, 6)[:6]
     report, _ = upload_to(mock, rows)
     assert not report.verified
     assert report.result == result

@@ -89,7 +89,7 @@ def test_the_item_that_is_refused_is_named_whatever_is_lost(kind: MockKind, seq:
     for loss in (0.0, 0.2, 0.4):
         for seed in range(10):
             mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): Result.INVALID_PARAM2}))
-            rows = rows_for(mock.lists.vehicle.autopilot, 12)[:12]
+            rows = rows_for(mock.vehicle.family.key, 12)[:12]
             report, _ = upload_to(mock, rows, Faults(loss=loss, seed=seed))
             assert not report.verified
             if report.result == Result.INVALID_PARAM2:

@@ -18,7 +18,7 @@ from faao_mav.mavlink.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item
+from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item, size_limit
 from faao_mav.mavlink.mock.lists import StoredLists
 from faao_mav.mavlink.protocol import ALL_TYPES, Address, MissionType, Result
 
@@ -120,7 +120,7 @@ class ArduPilotServer:
         refusal = self._behaviour.refusals.get((part, COUNT))
         if refusal is not None:
             return [MissionAck(sender, part, refusal)]
-        limit = self._behaviour.limits[part]
+        limit = size_limit(part, self._behaviour, self._lists.vehicle)
         if not self._ready():
             return [MissionAck(sender, part, Result.NO_SPACE)]
         if count > limit:

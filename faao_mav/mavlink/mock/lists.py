@@ -8,14 +8,13 @@ from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.wire_items import home_items, mission_item, wire_item
 from faao_mav.mission.item import Home
-from faao_mav.mission.vehicle import Vehicle
-from faao_mav.vehicle.storage import as_stored
+from faao_mav.vehicle import VehicleType
 
 
 class StoredLists:
     """What is stored: items as the vehicle gives them back."""
 
-    def __init__(self, vehicle: Vehicle, home: Home) -> None:
+    def __init__(self, vehicle: VehicleType, home: Home) -> None:
         self.vehicle, self.home = vehicle, home
         self._items = {
             part: [self._home_item()] * home_items(vehicle, part) for part in MissionType
@@ -33,7 +32,7 @@ class StoredLists:
         """Return what becomes of `item`; a home item is the vehicle's own, whatever is sent."""
         if seq < home_items(self.vehicle, part):
             return self._home_item()
-        return wire_item(as_stored(mission_item(item), self.vehicle), seq)
+        return wire_item(self.vehicle.dialect.stored(mission_item(item)), seq)
 
     def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
         """Store all of `items`, which are as `kept` gives them, in place of the list."""

@@ -29,20 +29,19 @@ from faao_mav.mavlink.mock.behaviour import Behaviour, behaviour_of
 from faao_mav.mavlink.mock.flight import Flight, Posture, telemetry
 from faao_mav.mavlink.mock.lists import StoredLists
 from faao_mav.mavlink.mock.modes import Modes, whole
-from faao_mav.mavlink.mock.parameters import Parameters
+from faao_mav.mavlink.mock.parameters import ParameterServer
 from faao_mav.mavlink.mock.px4_server import Px4Server
 from faao_mav.mavlink.protocol import (
     ARMED,
     GROUND_STATION,
-    MAV_AUTOPILOTS,
     Address,
     MavState,
     MissionType,
 )
 from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.item import Home, Mission
-from faao_mav.mission.vehicle import Kind, Vehicle
-from faao_mav.vehicle import Track
+from faao_mav.vehicle import Track, vehicle_type
+from faao_mav.vehicle.ardupilot.family import ARDUPILOT
 
 Fly: TypeAlias = Callable[[Mission], Track]
 
@@ -65,9 +64,6 @@ class Cmd(IntEnum):
 
 _AUTOPILOT_VERSION, _HOME_POSITION = 148, 242
 """Message numbers."""
-
-_MAV_TYPES: dict[Kind, int] = {"copter": 2, "plane": 1}
-"""MAV_TYPE: quadrotor, fixed wing."""
 
 _INFO = 6
 """MAV_SEVERITY."""
@@ -93,7 +89,7 @@ class MockAutopilot(Machine[None]):
         self,
         behaviour: Behaviour | None = None,
         *,
-        aircraft: Kind = "copter",
+        aircraft: str = "copter",
         address: Address = Address(1, 1),  # noqa: B008
         home: Home = Home(-35.363262, 149.165237, 584.0),  # noqa: B008
         fly: Fly | None = None,
@@ -106,13 +102,14 @@ class MockAutopilot(Machine[None]):
         super().__init__()
         self.behaviour = behaviour or behaviour_of("ardupilot")
         self.address, self.home = address, home
-        self.vehicle = Vehicle(self.behaviour.autopilot, aircraft)
-        self._modes = Modes(self.vehicle)
+        self.vehicle = vehicle_type(self.behaviour.family.key, aircraft)
+        self._modes = Modes(self.behaviour, aircraft)
         self.lists = StoredLists(self.vehicle, home)
-        self.parameters = Parameters(self.vehicle, parameters)
+        known = self.vehicle.defaults() | dict(self.behaviour.parameters)
+        self.parameters = ParameterServer(known | dict(parameters or {}))
         self._server: ArduPilotServer | Px4Server = (
             ArduPilotServer(self.lists, self.behaviour, self._is_ready, self._is_flying)
-            if self.behaviour.autopilot == "ardupilot"
+            if self.behaviour.family == ARDUPILOT
             else Px4Server(self.lists, self.behaviour)
         )
         self._fly, self._speedup = fly, speedup
@@ -317,8 +314,8 @@ class MockAutopilot(Machine[None]):
             state = MavState.CALIBRATING
         else:
             state = MavState.ACTIVE if self._armed else MavState.STANDBY
-        autopilot = MAV_AUTOPILOTS[self.vehicle.autopilot]
+        autopilot = self.vehicle.family.mav_autopilot
         base_mode = self._modes.base_mode | (ARMED if self._armed else 0)
         return Heartbeat(
-            _MAV_TYPES[self.vehicle.kind], autopilot, base_mode, self._modes.custom_mode, state
+            self.vehicle.mav_types[0], autopilot, base_mode, self._modes.custom_mode, state
         )

@@ -16,7 +16,7 @@ from faao_mav.mavlink.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item
+from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item, size_limit
 from faao_mav.mavlink.mock.lists import StoredLists
 from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
 
@@ -115,7 +115,7 @@ class Px4Server:
         refusal = self._behaviour.refusals.get((part, COUNT))
         if refusal is not None:
             return [MissionAck(sender, part, refusal)]
-        if count > self._behaviour.limits[part]:
+        if count > size_limit(part, self._behaviour, self._lists.vehicle):
             return [MissionAck(sender, part, Result.NO_SPACE)]
         if count == 0:
             self._lists.clear(part)

@@ -18,7 +18,7 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.protocol import Address, MissionType, Result
 from faao_mav.mavlink.transfer.pace import Timeouts
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import VehicleType
 
 Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "cancelled"]
 
@@ -32,7 +32,7 @@ class Peer:
 
     own: Address
     address: Address
-    vehicle: Vehicle | None
+    vehicle: VehicleType | None
 
     @property
     def manners(self) -> Manners:

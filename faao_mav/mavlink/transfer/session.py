@@ -18,7 +18,6 @@ from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.transfer.verify import Difference, compare
 from faao_mav.mavlink.wire_items import home_items
-from faao_mav.vehicle.dialects import dialect_of
 
 T = TypeVar("T")
 Job: TypeAlias = Generator[Machine[Any], Outcome, T]
@@ -214,7 +213,7 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
     if report.said:
         text += f". The vehicle says: {'; '.join(report.said)}"
     begun = report.item is not None and report.verdict in ("silent", "cancelled", "refused")
-    if begun and peer.vehicle is not None and not dialect_of(peer.vehicle).atomic:
+    if begun and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
         text += f". {autopilot_name(peer.vehicle)} may now hold old and new items mixed: upload "
         text += "again before flying"
     return text

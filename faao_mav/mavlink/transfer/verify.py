@@ -9,9 +9,7 @@ from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.wire_items import coordinate_scale, home_items, mission_item
 from faao_mav.mission.item import MissionItem
-from faao_mav.mission.vehicle import Vehicle
-from faao_mav.vehicle.dialects import storage_known
-from faao_mav.vehicle.storage import as_stored
+from faao_mav.vehicle import VehicleType
 
 DifferenceKind: TypeAlias = Literal["dropped", "wrong"]
 
@@ -53,7 +51,7 @@ def compare(
     sent: Sequence[WireItem],
     found: Sequence[WireItem],
     part: MissionType,
-    vehicle: Vehicle | None,
+    vehicle: VehicleType | None,
 ) -> tuple[Difference, ...]:
     """Return how the items `found` on a vehicle differ from those `sent` to it.
 
@@ -86,12 +84,16 @@ def _compare_home(sent: MissionItem, found: MissionItem) -> list[Difference]:
 
 
 def _compare_items(
-    sent: MissionItem, found: MissionItem, index: int, part: MissionType, vehicle: Vehicle | None
+    sent: MissionItem,
+    found: MissionItem,
+    index: int,
+    part: MissionType,
+    vehicle: VehicleType | None,
 ) -> list[Difference]:
     stored, unknown = sent, False
     if vehicle is not None:
-        stored = as_stored(sent, vehicle)
-        unknown = part is MissionType.MISSION and not storage_known(sent.command, vehicle)
+        stored = vehicle.dialect.stored(sent)
+        unknown = part is MissionType.MISSION and not vehicle.dialect.is_known(sent.command)
     differences = []
     for (field, was), is_, kept in zip(
         _fields(sent).items(), _fields(found).values(), _fields(stored).values(), strict=True
