@@ -24,13 +24,11 @@ from faao_mav.mavlink.messages import (
     SetMode,
     Statustext,
 )
-from faao_mav.mavlink.mock.ardupilot_server import ArduPilotServer
-from faao_mav.mavlink.mock.behaviour import Behaviour, behaviour_of
+from faao_mav.mavlink.mock.firmware import Behaviour, whole
 from faao_mav.mavlink.mock.flight import Flight, Posture, telemetry
+from faao_mav.mavlink.mock.kinds import behaviour_of
 from faao_mav.mavlink.mock.lists import StoredLists
-from faao_mav.mavlink.mock.modes import Modes, whole
 from faao_mav.mavlink.mock.parameters import ParameterServer
-from faao_mav.mavlink.mock.px4_server import Px4Server
 from faao_mav.mavlink.protocol import (
     ARMED,
     GROUND_STATION,
@@ -41,7 +39,6 @@ from faao_mav.mavlink.protocol import (
 from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.item import Home, Mission
 from faao_mav.vehicle import Track, vehicle_type
-from faao_mav.vehicle.ardupilot.family import ARDUPILOT
 
 Fly: TypeAlias = Callable[[Mission], Track]
 
@@ -67,6 +64,9 @@ _AUTOPILOT_VERSION, _HOME_POSITION = 148, 242
 
 _INFO = 6
 """MAV_SEVERITY."""
+
+_CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
+"""MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
 
 # MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
 _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
@@ -103,14 +103,12 @@ class MockAutopilot(Machine[None]):
         self.behaviour = behaviour or behaviour_of("ardupilot")
         self.address, self.home = address, home
         self.vehicle = vehicle_type(self.behaviour.family.key, aircraft)
-        self._modes = Modes(self.behaviour, aircraft)
+        self._mode, self._mission_mode = self.behaviour.firmware.modes[aircraft]
         self.lists = StoredLists(self.vehicle, home)
-        known = self.vehicle.defaults() | dict(self.behaviour.parameters)
+        known = self.vehicle.defaults() | dict(self.behaviour.firmware.parameters)
         self.parameters = ParameterServer(known | dict(parameters or {}))
-        self._server: ArduPilotServer | Px4Server = (
-            ArduPilotServer(self.lists, self.behaviour, self._is_ready, self._is_flying)
-            if self.behaviour.family == ARDUPILOT
-            else Px4Server(self.lists, self.behaviour)
+        self._firmware = self.behaviour.firmware(
+            self.lists, self.behaviour, self._is_ready, self._is_flying
         )
         self._fly, self._speedup = fly, speedup
         self._period = 1 / rate if rate > 0 else None
@@ -130,8 +128,8 @@ class MockAutopilot(Machine[None]):
             due.append(self._next_report)
         if self._flight is not None:
             due.append(self._flight.next_event)
-        if self._server.deadline is not None:
-            due.append(self._server.deadline)
+        if self._firmware.deadline is not None:
+            due.append(self._firmware.deadline)
         return min(due)
 
     @property
@@ -147,7 +145,7 @@ class MockAutopilot(Machine[None]):
 
     def reboot(self, now: float) -> None:
         """Begin anew; what is stored stays, what is under way is lost."""
-        self._server.reset()
+        self._firmware.reset()
         self._armed, self._flight, self._current = False, None, 0
         self._booted, self._ready_at = now, now + self._boot
 
@@ -158,7 +156,7 @@ class MockAutopilot(Machine[None]):
     def time_out(self, now: float) -> Sequence[Message]:
         """Send what is due."""
         self._now = now
-        out: list[Message] = list(self._server.tick(now))
+        out: list[Message] = list(self._firmware.tick(now))
         if self._flight is not None:
             out += self._follow(self._flight, now)
         if now >= self._next_beat:
@@ -193,13 +191,18 @@ class MockAutopilot(Machine[None]):
                 return self.parameters.on(message)
             case MissionSetCurrent(seq=seq):
                 return self._set_current(seq)
-        if not self._is_ready() and isinstance(self._server, Px4Server):
+        if self._firmware.silent_at_boot and not self._is_ready():
             return ()
-        return self._server.on(envelope, now)
+        return self._firmware.on(envelope, now)
 
     def mission(self) -> Mission:
         """Return what is stored, as a mission."""
         return mission_of({part: self.lists.items(part) for part in MissionType}, self.vehicle)
+
+    @property
+    def _is_mission(self) -> bool:
+        """Whether the mode is to fly the mission."""
+        return self._mode == self._mission_mode
 
     def _is_ready(self) -> bool:
         return self._now >= self._ready_at
@@ -213,10 +216,10 @@ class MockAutopilot(Machine[None]):
             case Cmd.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
             case Cmd.START:
-                self._modes.set_mission()
+                self._mode = self._mission_mode
                 result = self._begin(now)
             case Cmd.SET_MODE:
-                result = self._set_mode(self._modes.of_command(command), now)
+                result = self._set_mode(self._firmware.requested_mode(command), now)
             case Cmd.SET_CURRENT:
                 found = self._set_current(whole(command.param1))
                 result = ACCEPTED if found else DENIED
@@ -251,13 +254,13 @@ class MockAutopilot(Machine[None]):
         if not self._is_ready():
             return REJECTED
         self._armed = True
-        return self._begin(now) if self._modes.is_mission else ACCEPTED
+        return self._begin(now) if self._is_mission else ACCEPTED
 
     def _set_mode(self, mode: int, now: float) -> int:
-        if self._modes.would_be_mission(mode) and self._problem() is not None:
+        if mode == self._mission_mode and self._problem() is not None:
             return DENIED
-        self._modes.custom_mode = mode
-        if not self._modes.is_mission:
+        self._mode = mode
+        if not self._is_mission:
             self._flight = None
             return ACCEPTED
         return self._begin(now)
@@ -267,7 +270,7 @@ class MockAutopilot(Machine[None]):
         mission = self.mission()
         if not mission.items:
             return "no mission"
-        return self.behaviour.infeasible(mission)
+        return self._firmware.infeasible(mission)
 
     def _begin(self, now: float) -> int:
         """Fly, once armed and told to; not a second time."""
@@ -315,7 +318,5 @@ class MockAutopilot(Machine[None]):
         else:
             state = MavState.ACTIVE if self._armed else MavState.STANDBY
         autopilot = self.vehicle.family.mav_autopilot
-        base_mode = self._modes.base_mode | (ARMED if self._armed else 0)
-        return Heartbeat(
-            self.vehicle.mav_types[0], autopilot, base_mode, self._modes.custom_mode, state
-        )
+        base_mode = _CUSTOM_MODE | _AUTO * self._is_mission | ARMED * self._armed
+        return Heartbeat(self.vehicle.mav_types[0], autopilot, base_mode, self._mode, state)

@@ -1,10 +1,10 @@
-"""PX4's side of the mission protocol: how it takes and gives lists."""
+"""How PX4 takes and gives lists."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-from faao_mav.mavlink.manners import manners_of
 from faao_mav.mavlink.messages import (
+    CommandLong,
     Envelope,
     Message,
     MissionAck,
@@ -16,12 +16,17 @@ from faao_mav.mavlink.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item, size_limit
-from faao_mav.mavlink.mock.lists import StoredLists
+from faao_mav.mavlink.mock.firmware import MockFirmware, whole
 from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
+from faao_mav.mission.command import Command
+from faao_mav.mission.item import Mission
+from faao_mav.vehicle.px4 import PX4
 
 _CRITICAL, _INFO = 2, 6
 """MAV_SEVERITY."""
+
+_POSITIONS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
+"""Commands that PX4 counts as positions."""
 
 
 @dataclass(slots=True)
@@ -39,14 +44,40 @@ class _Transfer:
     items: tuple[WireItem, ...] = ()
 
 
-class Px4Server:
-    """The lists' keeper: one transfer at a time, and a new list replaces the old as a whole."""
+def _packed_mode(main: int, sub: int) -> int:
+    """Return the custom mode for a main and a sub mode; 0 for numbers that are none."""
+    if not (0 <= main < 256 and 0 <= sub < 256):
+        return 0
+    return main << 16 | sub << 24
 
-    def __init__(self, lists: StoredLists, behaviour: Behaviour) -> None:
-        self._lists, self._behaviour = lists, behaviour
-        self._manners = manners_of(lists.vehicle)
-        self._transfer = _Transfer()
-        self._legacy = behaviour.legacy_first
+
+class Px4Firmware(MockFirmware):
+    """PX4: one transfer at a time, and a new list replaces the old as a whole."""
+
+    family = PX4
+    mission_limit = 1000
+    modes = dict.fromkeys(("copter", "plane"), (_packed_mode(4, 3), _packed_mode(4, 4)))
+    misplaced = Result.ERROR
+    thin_polygon = Result.ERROR
+    nonsense = Result.UNSUPPORTED
+    silent_at_boot = True
+
+    def requested_mode(self, command: CommandLong) -> int:
+        """Return the custom mode that DO_SET_MODE asks for: main and sub mode in one number."""
+        return _packed_mode(whole(command.param2), whole(command.param3))
+
+    def infeasible(self, mission: Mission) -> str | None:
+        """Return why PX4, which says so in an event only, refuses to start `mission`."""
+        commands = [item.command for item in mission.items]
+        positions = [command for command in commands if command in _POSITIONS]
+        takeoffs = [item for item in mission.items if item.command == Command.NAV_TAKEOFF]
+        if Command.CONDITION_DELAY in commands:
+            return "unsupported command"
+        if any(item.z <= 0 for item in takeoffs):
+            return "take-off altitude too low"
+        if len(takeoffs) > 1 or (takeoffs and positions[0] != Command.NAV_TAKEOFF):
+            return "take-off is not the first position"
+        return "starts with landing" if positions[:1] == [Command.NAV_LAND] else None
 
     @property
     def deadline(self) -> float | None:
@@ -89,34 +120,22 @@ class Px4Server:
         if now >= transfer.last_message_time + self._manners.upload_patience:
             transfer.state = "idle"
             return [_said("Operation timeout")]
-        if (
-            transfer.state == "receiving"
-            and now >= transfer.last_request_time + self._manners.request_period
-        ):
-            return [self._ask(now)]
-        return []
+        request_due = transfer.last_request_time + self._manners.request_period
+        return [self._ask(now)] if transfer.state == "receiving" and now >= request_due else []
 
     def _on_count(self, sender: Address, kind: int, count: int, now: float) -> list[Message]:
         transfer = self._transfer
-        if (
-            transfer.state == "receiving"
-            and sender == transfer.partner
-            and transfer.next_sequence == 0
-        ):
+        if transfer.state == "receiving":
             transfer.last_message_time = now
-            return [self._ask(now)]
+            if sender == transfer.partner and transfer.next_sequence == 0:
+                return [self._ask(now)]
         if transfer.state != "idle":
-            if transfer.state == "receiving":
-                transfer.last_message_time = now
             return [MissionAck(sender, kind, Result.ERROR), _said("WPM: IGN MISSION_COUNT: Busy")]
         if kind not in tuple(MissionType):
             return [MissionAck(sender, kind, Result.INVALID)]
         part = MissionType(kind)
-        refusal = self._behaviour.refusals.get((part, COUNT))
-        if refusal is not None:
-            return [MissionAck(sender, part, refusal)]
-        if count > size_limit(part, self._behaviour, self._lists.vehicle):
-            return [MissionAck(sender, part, Result.NO_SPACE)]
+        if (result := self.check_count(part, count)) != Result.ACCEPTED:
+            return [MissionAck(sender, part, result)]
         if count == 0:
             self._lists.clear(part)
             return [MissionAck(sender, part, Result.ACCEPTED)]
@@ -154,8 +173,7 @@ class Px4Server:
 
     def _take(self, item: MissionItemInt, now: float) -> list[Message]:
         transfer, part = self._transfer, self._transfer.part
-        result = self._behaviour.refusals.get((part, item.seq))
-        result = result or check_item(item.item, part, self._behaviour, self._lists.vehicle)
+        result = self.check_item(part, item.seq, item.item)
         if result != Result.ACCEPTED:
             transfer.state = "idle"
             text = _said("IGN MISSION_ITEM: Invalid item")

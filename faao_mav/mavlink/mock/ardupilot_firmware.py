@@ -1,9 +1,8 @@
-"""ArduPilot's side of the mission protocol: how it takes and gives lists."""
+"""How ArduPilot takes and gives lists."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from types import MappingProxyType
 
-from faao_mav.mavlink.manners import manners_of
 from faao_mav.mavlink.messages import (
     Envelope,
     ListMessage,
@@ -18,9 +17,9 @@ from faao_mav.mavlink.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.mavlink.mock.behaviour import COUNT, Behaviour, check_item, size_limit
-from faao_mav.mavlink.mock.lists import StoredLists
+from faao_mav.mavlink.mock.firmware import MockFirmware
 from faao_mav.mavlink.protocol import ALL_TYPES, Address, MissionType, Result
+from faao_mav.vehicle.ardupilot.family import ARDUPILOT
 
 _WARNING = 4
 """MAV_SEVERITY."""
@@ -38,24 +37,19 @@ class _Receiving:
     fence: list[WireItem]
 
 
-class ArduPilotServer:
-    """The lists' keeper: each list has an upload of its own, and one partner at a time.
+class ArduPilotFirmware(MockFirmware):
+    """ArduPilot: each list has an upload of its own, and one partner at a time.
 
-    A mission is changed item by item: an upload that stops half-way leaves new and old items
-    mixed. `ready` tells whether booting is over, `flying` whether the mission is being flown.
+    A mission is changed item by item: an upload that stops half-way leaves new and old items mixed.
     """
 
-    def __init__(
-        self,
-        lists: StoredLists,
-        behaviour: Behaviour,
-        ready: Callable[[], bool],
-        flying: Callable[[], bool],
-    ) -> None:
-        self._lists, self._behaviour = lists, behaviour
-        self._manners = manners_of(lists.vehicle)
-        self._ready, self._flying = ready, flying
-        self._uploads: dict[MissionType, _Receiving] = {}
+    family = ARDUPILOT
+    mission_limit = 655  # as in its simulator
+    modes = MappingProxyType({"copter": (0, 3), "plane": (2, 10)})  # COPTER_MODE, PLANE_MODE
+    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
+    misplaced = Result.UNSUPPORTED
+    thin_polygon = Result.INVALID_PARAM1
+    nonsense = Result.INVALID
 
     @property
     def deadline(self) -> float | None:
@@ -64,7 +58,7 @@ class ArduPilotServer:
 
     def reset(self) -> None:
         """Forget what is under way, as a reboot does."""
-        self._uploads.clear()
+        self._uploads: dict[MissionType, _Receiving] = {}
 
     def on(self, envelope: Envelope, now: float) -> list[Message]:
         """Answer a message of the mission protocol."""
@@ -73,7 +67,7 @@ class ArduPilotServer:
             return []
         kind = message.mission_type
         if kind == ALL_TYPES and isinstance(message, MissionClearAll):
-            return self._clear_all(sender)
+            return self._on_clear(sender, kind, tuple(MissionType))
         if kind not in tuple(MissionType):
             known = isinstance(message, MissionAck)
             return [] if known else [MissionAck(sender, kind, Result.UNSUPPORTED)]
@@ -88,7 +82,7 @@ class ArduPilotServer:
             case MissionRequestInt():
                 return self._on_request(sender, part, message)
             case MissionClearAll():
-                return self._on_clear(sender, part)
+                return self._on_clear(sender, kind, (part,))
             case MissionWritePartialList(start_index=first, end_index=last):
                 return self._on_partial(sender, part, first, last, now)
         return []
@@ -117,15 +111,10 @@ class ArduPilotServer:
         upload = self._uploads.get(part)
         if upload is not None and upload.partner != sender:
             return [MissionAck(sender, part, Result.DENIED)]
-        refusal = self._behaviour.refusals.get((part, COUNT))
-        if refusal is not None:
-            return [MissionAck(sender, part, refusal)]
-        limit = size_limit(part, self._behaviour, self._lists.vehicle)
-        if not self._ready():
-            return [MissionAck(sender, part, Result.NO_SPACE)]
-        if count > limit:
+        result, limit = self.check_count(part, count), self.size_limit(part)
+        if result != Result.ACCEPTED:
             text = Statustext(_WARNING, f"Only {limit} items are supported")
-            return [MissionAck(sender, part, Result.NO_SPACE), text]
+            return [MissionAck(sender, part, result), *([text] if count > limit else [])]
         if count == 0:
             self._lists.clear(part)
             self._uploads.pop(part, None)
@@ -151,9 +140,7 @@ class ArduPilotServer:
 
     def _ask(self, part: MissionType, upload: _Receiving, now: float) -> Message:
         upload.last_request_time = now
-        return MissionRequestInt(
-            upload.partner, part, upload.next_sequence, legacy=self._behaviour.legacy_first
-        )
+        return MissionRequestInt(upload.partner, part, upload.next_sequence, self._legacy)
 
     def _on_item(
         self, sender: Address, part: MissionType, seq: int, item: WireItem, now: float
@@ -165,9 +152,7 @@ class ArduPilotServer:
             return [MissionAck(sender, part, Result.INVALID_SEQUENCE)]
         if sender != upload.partner:
             return [MissionAck(sender, part, Result.DENIED)]
-        result = self._behaviour.refusals.get((part, seq)) or check_item(
-            item, part, self._behaviour, self._lists.vehicle
-        )
+        result = self.check_item(part, seq, item)
         if result != Result.ACCEPTED:
             del self._uploads[part]
             return [MissionAck(sender, part, result)]
@@ -200,16 +185,12 @@ class ArduPilotServer:
             return [MissionAck(sender, part, wrong)]
         return [MissionItemInt(sender, part, request.seq, items[request.seq], request.legacy)]
 
-    def _on_clear(self, sender: Address, part: MissionType) -> list[Message]:
-        busy = part in self._uploads or (part is MissionType.MISSION and self._flying())
-        if busy:
-            return [MissionAck(sender, part, Result.ERROR)]
-        self._lists.clear(part)
-        return [MissionAck(sender, part, Result.ACCEPTED)]
-
-    def _clear_all(self, sender: Address) -> list[Message]:
-        if self._uploads or self._flying():
-            return [MissionAck(sender, ALL_TYPES, Result.ERROR)]
-        for part in MissionType:
+    def _on_clear(
+        self, sender: Address, kind: int, parts: tuple[MissionType, ...]
+    ) -> list[Message]:
+        flown = MissionType.MISSION in parts and self._flying()
+        if flown or any(part in self._uploads for part in parts):
+            return [MissionAck(sender, kind, Result.ERROR)]
+        for part in parts:
             self._lists.clear(part)
-        return [MissionAck(sender, ALL_TYPES, Result.ACCEPTED)]
+        return [MissionAck(sender, kind, Result.ACCEPTED)]
