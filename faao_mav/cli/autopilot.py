@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.mock import MockAutopilot
     from faao_mav.mavlink.protocol import MissionType
     from faao_mav.mission.item import Home
-    from faao_mav.plan.autopilots import Autopilot
 
 _REST = 0.5  # s without a change, after which a list is told
 
@@ -81,12 +80,12 @@ def autopilot(
         from faao_mav.vehicle.parameter_file import read_parameters
 
         values = {} if parameters is None else read_parameters(parameters)
-        flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"
+        behaviour = behaviour_of(kind)
         source = str(parameters or "parameters")
-        vehicle = Vehicle(flown_by, aircraft, values, source)
+        vehicle = Vehicle(behaviour.family.key, aircraft, values, source)
         flight_model(vehicle)  # useless parameters are refused here, not in flight
         mock = MockAutopilot(
-            behaviour_of(kind),
+            behaviour,
             aircraft=aircraft,
             address=Address(system, 1),
             home=read_home(home),

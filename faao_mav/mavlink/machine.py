@@ -45,7 +45,8 @@ class Machine(ABC, Generic[T]):
 
     def tick(self, now: float) -> Sequence[Message]:
         """Take note of the time."""
-        return () if self.outcome is not None or now < self._due else self.time_out(now)
+        due = self.deadline
+        return () if due is None or now < due else self.time_out(now)
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Give up."""
@@ -124,10 +125,6 @@ class Script(Machine[T]):
     def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Pass on what arrived."""
         return self._continue(lambda step: step.on(envelope, now), now)
-
-    def tick(self, now: float) -> Sequence[Message]:
-        """Pass on the time."""
-        return self.time_out(now)
 
     def time_out(self, now: float) -> Sequence[Message]:
         """Pass on the time."""

@@ -80,7 +80,8 @@ class MockAutopilot(Machine[None]):
     It boots for `boot` seconds, in which it refuses lists. Armed and set to the mission it flies
     what it holds, `speedup` times as fast as predicted, reports its position `rate` times a
     second, and disarms where the flight ends on the ground. Heartbeats are `beat` seconds apart.
-    `parameters` are told beside its defaults; what they do to the flight is up to `fly`.
+    `parameters` are told beside its defaults; what they do to the flight is up to `fly`. `armed`
+    tells whether the motors may turn.
     """
 
     progress = ("flying", 0, 0)
@@ -116,7 +117,7 @@ class MockAutopilot(Machine[None]):
         self._boot = boot
         self._booted = self._ready_at = self._now = 0.0
         self._next_beat = self._next_report = 0.0
-        self._armed = False
+        self.armed = False
         self._current = 0
         self._flight: Flight | None = None
 
@@ -132,11 +133,6 @@ class MockAutopilot(Machine[None]):
             due.append(self._firmware.deadline)
         return min(due)
 
-    @property
-    def armed(self) -> bool:
-        """Whether the motors may turn."""
-        return self._armed
-
     def start(self, now: float) -> Sequence[Message]:
         """Boot."""
         self._booted = self._now = self._next_beat = self._next_report = now
@@ -146,12 +142,8 @@ class MockAutopilot(Machine[None]):
     def reboot(self, now: float) -> None:
         """Begin anew; what is stored stays, what is under way is lost."""
         self._firmware.reset()
-        self._armed, self._flight, self._current = False, None, 0
+        self.armed, self._flight, self._current = False, None, 0
         self._booted, self._ready_at = now, now + self._boot
-
-    def tick(self, now: float) -> Sequence[Message]:
-        """Send what is due."""
-        return self.time_out(now)
 
     def time_out(self, now: float) -> Sequence[Message]:
         """Send what is due."""
@@ -249,11 +241,11 @@ class MockAutopilot(Machine[None]):
 
     def _arm(self, wanted: bool, now: float) -> int:
         if not wanted:
-            self._armed, self._flight = False, None
+            self.armed, self._flight = False, None
             return ACCEPTED
         if not self._is_ready():
             return REJECTED
-        self._armed = True
+        self.armed = True
         return self._begin(now) if self._is_mission else ACCEPTED
 
     def _set_mode(self, mode: int, now: float) -> int:
@@ -276,7 +268,7 @@ class MockAutopilot(Machine[None]):
         """Fly, once armed and told to; not a second time."""
         if self._problem() is not None or self._fly is None:
             return DENIED
-        if self._armed and self._flight is None:
+        if self.armed and self._flight is None:
             mission = self.mission()
             track = self._fly(Mission(mission.items, self.home, mission.fence, mission.rally))
             self._flight = Flight(track, mission.items, now, self._speedup)
@@ -289,7 +281,7 @@ class MockAutopilot(Machine[None]):
             self._current = current
             out.append(self._mission_current())
         if now >= flight.end and flight.lands:
-            self._flight, self._armed = None, False
+            self._flight, self.armed = None, False
             out.append(Statustext(_INFO, "Landed, disarming"))
             out.append(self._heartbeat())
         return out
@@ -316,7 +308,7 @@ class MockAutopilot(Machine[None]):
         if not self._is_ready():
             state = MavState.CALIBRATING
         else:
-            state = MavState.ACTIVE if self._armed else MavState.STANDBY
+            state = MavState.ACTIVE if self.armed else MavState.STANDBY
         autopilot = self.vehicle.family.mav_autopilot
-        base_mode = _CUSTOM_MODE | _AUTO * self._is_mission | ARMED * self._armed
+        base_mode = _CUSTOM_MODE | _AUTO * self._is_mission | ARMED * self.armed
         return Heartbeat(self.vehicle.mav_types[0], autopilot, base_mode, self._mode, state)
