@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from simulate import Station, simulate
 
@@ -21,7 +21,7 @@ from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType
 from faao_mav.mavlink.transfer.download import Download
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
-from faao_mav.mavlink.transfer.session import PartReport, upload_parts
+from faao_mav.mavlink.transfer.session import upload_parts
 from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Home, Mission, MissionItem
@@ -83,17 +83,17 @@ class Desk:
         self.now = 0.0
         self.sent: list[Message] = []
 
-    def start(self) -> list[Message]:
+    def start(self) -> list[Any]:
         return self._note(self.machine.start(self.now))
 
-    def tell(self, message: Message, sender: Address | None = None) -> list[Message]:
+    def tell(self, message: Message, sender: Address | None = None) -> list[Any]:
         """Return the answer to `message`."""
         envelope = Envelope(sender or self.sender, message)
         return self._note(self.machine.on(envelope, self.now))
 
-    def wait(self, seconds: float) -> list[Message]:
+    def wait(self, seconds: float) -> list[Any]:
         """Return what is sent within `seconds` of silence."""
-        end, out = self.now + seconds, list[Message]()
+        end, out = self.now + seconds, list[Any]()
         while (due := self.machine.deadline) is not None and due <= end:
             if self.machine.outcome is not None:
                 break
@@ -102,7 +102,7 @@ class Desk:
         self.now = end
         return out
 
-    def _note(self, messages: Sequence[Message]) -> list[Message]:
+    def _note(self, messages: Sequence[Message]) -> list[Any]:
         self.sent += messages
         return list(messages)
 
@@ -116,7 +116,7 @@ def upload_to(
     timeouts: Timeouts | None = None,
     until: float = 600.0,
     **more: Any,
-) -> tuple[PartReport | None, float]:
+) -> tuple[Any, float]:
     """Upload `rows` to `mock` over a simulated link, verified; report and time taken."""
     peer = peer_of(mock.behaviour.family.key)
     script = Script(upload_parts([(part, tuple(rows))], peer, timeouts=timeouts))
@@ -125,17 +125,17 @@ def upload_to(
     return (script.outcome[0] if script.outcome else None), took
 
 
-def mock_of(kind: MockKind | Behaviour, **options: Any) -> MockAutopilot:
+def mock_of(kind: str | Behaviour, **options: Any) -> MockAutopilot:
     """Return a mock autopilot that sends no position reports."""
-    manners = kind if isinstance(kind, Behaviour) else behaviour_of(kind)
-    return MockAutopilot(manners, home=HOME, rate=0.0, **options)
+    behaviour = kind if isinstance(kind, Behaviour) else behaviour_of(cast(MockKind, kind))
+    return MockAutopilot(behaviour, home=HOME, rate=0.0, **options)
 
 
 @dataclass
 class Counted:
     """A machine, and what it sends."""
 
-    machine: Machine[Any]
+    machine: Any
     sent: list[Message] = field(default_factory=list)
 
     def __getattr__(self, name: str) -> Any:

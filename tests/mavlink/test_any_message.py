@@ -68,7 +68,7 @@ def anything(target: st.SearchStrategy[Address]) -> st.SearchStrategy[messages.M
 
 def converse(
     machine: Any, address: Address, partner: Address, said: list[messages.Message]
-) -> None:
+) -> list[bytes]:
     """Tell `machine` all of `said`, a second apart, by way of real packets."""
     here, there = Codec(address), Codec(partner)
     out = [here.pack(message) for message in machine.start(0.0)]

@@ -19,7 +19,7 @@ from faao_mav.mavlink import Timeouts, clear, download, upload
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.link import Link
 from faao_mav.mavlink.messages import WireItem
-from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock import COUNT, Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import Address, MissionType, Result
 from faao_mav.mavlink.transport import open_transport, parse_connection
@@ -31,13 +31,13 @@ BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 
 
 @pytest.fixture
-def port():
+def port() -> int:
     return free_port()
 
 
-def mock_of(kind: MockKind, **options: Any):
-    manners = behaviour_of(kind) if isinstance(kind, str) else kind
-    return MockAutopilot(manners, home=HOME, fly=fly, beat=0.1, **options)
+def mock_of(kind: MockKind | Behaviour, **options: Any) -> MockAutopilot:
+    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
+    return MockAutopilot(behaviour, home=HOME, fly=fly, beat=0.1, **options)
 
 
 @BOTH
@@ -147,7 +147,7 @@ def test_several_vehicles_and_other_ground_stations(port: int) -> None:
     connection = f"udpin:127.0.0.1:{port}"
     stop = threading.Event()
 
-    def chatter():
+    def chatter() -> None:
         other = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=254)
         while not stop.wait(0.02):
             other.mav.heartbeat_send(6, 8, 0, 0, 4)
@@ -249,7 +249,7 @@ def test_interrupted_from_the_keyboard(port: int) -> None:
     mock = mock_of("px4")
     connection = f"udpout:127.0.0.1:{port}"
 
-    def observe(what: str, done: int, total: int):
+    def observe(what: str, done: int, total: int) -> None:
         if what.startswith("uploading") and done == 3:
             raise KeyboardInterrupt
 
@@ -321,7 +321,7 @@ def test_a_tcp_link_that_is_closed() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         connection = f"tcp:127.0.0.1:{server.getsockname()[1]}"
 
-        def hang_up():
+        def hang_up() -> None:
             server.accept()[0].close()
 
         thread = threading.Thread(target=hang_up)
@@ -340,14 +340,14 @@ def test_a_serial_line() -> None:
     tty.setraw(theirs)
 
     class Radio:
-        def read(self, timeout: float):
+        def read(self, timeout: float) -> list[bytes]:
             ready = select.select([ours], [], [], max(timeout, 0))[0]
             return [os.read(ours, 4096)] if ready else []
 
-        def write(self, data: bytes):
+        def write(self, data: bytes) -> None:
             os.write(ours, data)
 
-        def close(self):
+        def close(self) -> None:
             pass
 
     try:

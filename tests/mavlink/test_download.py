@@ -23,17 +23,17 @@ ROWS = rows_for("px4", 3)
 MANY = rows_for("ardupilot", 12)[:12]
 
 
-def desk_for(firmware: str = "generic", **timeouts: Any):
+def desk_for(firmware: str = "generic", **timeouts: Any) -> Desk:
     desk = Desk(Download(peer_of(firmware), timeouts=Timeouts(**timeouts)))
     desk.start()
     return desk
 
 
-def item(seq: int, *, target: Address = ME, mission_type: int = 0):
+def item(seq: int, *, target: Address = ME, mission_type: int = 0) -> MissionItemInt:
     return MissionItemInt(target, mission_type, seq, ROWS[seq])
 
 
-def wants(seq: int, *, legacy: bool = False):
+def wants(seq: int, *, legacy: bool = False) -> MissionRequestInt:
     return MissionRequestInt(VEHICLE, 0, seq, legacy)
 
 
@@ -130,7 +130,7 @@ def test_a_list_that_changes_meanwhile_is_read_anew() -> None:
     assert desk.machine.outcome.items == ROWS
 
 
-def wide_desk():
+def wide_desk() -> Desk:
     """Return a desk at which ArduPilot has given row 0, and has been asked for five more."""
     desk = desk_for("ardupilot")
     assert desk.tell(MissionCount(ME, 0, 12)) == [wants(0)]
@@ -139,7 +139,7 @@ def wide_desk():
     return desk
 
 
-def row(seq: int):
+def row(seq: int) -> MissionItemInt:
     return MissionItemInt(ME, 0, seq, MANY[seq])
 
 
@@ -217,7 +217,7 @@ def test_unsupported_changes_to_the_old_request() -> None:
 def test_a_refusal_that_is_repeated_is_final(result: Result) -> None:
     desk = desk_for()
     for _ in range(Timeouts().attempts):
-        assert desk.machine.outcome is None
+        assert not desk.machine.outcome
         desk.tell(MissionAck(ME, 0, result))
         desk.wait(0.3)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", result)
@@ -247,7 +247,7 @@ def test_who_gives_up_tells_the_vehicle() -> None:
     assert desk.machine.outcome.status == "cancelled"
 
 
-def clearing(part: MissionType = MissionType.FENCE):
+def clearing(part: MissionType = MissionType.FENCE) -> Desk:
     desk = Desk(Clear(peer_of("ardupilot"), part))
     desk.start()
     return desk
@@ -257,7 +257,7 @@ def test_clearing() -> None:
     desk = clearing()
     assert desk.sent == [MissionClearAll(VEHICLE, 1)]
     desk.tell(MissionAck(ME, 0, Result.ACCEPTED))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     desk.tell(MissionAck(ME, 1, Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
@@ -275,7 +275,7 @@ def test_clearing_may_be_refused() -> None:
     assert desk.machine.outcome.status == "refused"
     desk = clearing()
     desk.tell(MissionAck(ME, 1, Result.ERROR))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     desk.wait(1.6)
     desk.tell(MissionAck(ME, 1, Result.ERROR))
     assert desk.machine.outcome.status == "refused"

@@ -20,7 +20,7 @@ from faao_mav.mavlink import upload
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import running
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.wire_items import wire_items
 
 
@@ -96,7 +96,7 @@ def test_mavsdk_arms_and_flies_the_mission(flown: Any) -> None:
     client.upload_mission(sdk_items(rows, MissionType.MISSION))
     reached = threading.Event()
 
-    def progress(now: float, _: object):
+    def progress(now: Any, _: object) -> None:
         if now.current == len(rows) - 1:
             reached.set()
 
@@ -118,7 +118,7 @@ def test_our_client_uploads_to_mavsdks_server() -> None:
     received: list[list[SdkItem]] = []
     arrived = threading.Event()
 
-    def incoming(result: Result, plan, _: object):
+    def incoming(result: object, plan: Any, _: object) -> None:
         received.append(plan.mission_items)
         arrived.set()
 

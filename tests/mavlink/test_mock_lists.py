@@ -1,7 +1,7 @@
 """The mock autopilots' side of the mission protocol, as the real ones have it."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 from stations import FOREIGN, HOME, VEHICLE, Desk, mock_of, places, rows_for
@@ -18,38 +18,40 @@ from faao_mav.mavlink.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.mavlink.mock import MockKind, behaviour_of
+from faao_mav.mavlink.mock import Behaviour, MockKind, behaviour_of
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
 
 MISSION, FENCE, RALLY = MissionType
+T = TypeVar("T", bound=Message)
+
 TO = VEHICLE
 PLACE = (-353_000_000, 1_491_000_000)
 RALLY_ROW = WireItem(5100, 3, (0.0, 0.0, 0.0, 0.0), *PLACE, 30.0)
 
 
-def desk_for(kind: MockKind, **options: Any):
+def desk_for(kind: str | Behaviour, **options: Any) -> Desk:
     desk = Desk(mock_of(kind, **options), GROUND_STATION)
     desk.start()
     return desk
 
 
-def count(n: int, part: MissionType = MISSION):
+def count(n: int, part: int = MISSION) -> MissionCount:
     return MissionCount(TO, part, n)
 
 
-def item(seq: int, row: WireItem, part: MissionType = MISSION):
+def item(seq: int, row: WireItem, part: MissionType = MISSION) -> MissionItemInt:
     return MissionItemInt(TO, part, seq, row)
 
 
-def answers(messages: Sequence[Message], kind: MockKind):
+def answers(messages: Sequence[Message], kind: type[T]) -> list[T]:
     return [message for message in messages if isinstance(message, kind)]
 
 
-def results(messages: Sequence[Message]):
+def results(messages: Sequence[Message]) -> list[int]:
     return [message.type for message in answers(messages, MissionAck)]
 
 
-def asked(messages: Sequence[Message]):
+def asked(messages: Sequence[Message]) -> list[int]:
     return [message.seq for message in answers(messages, MissionRequestInt)]
 
 
@@ -58,7 +60,7 @@ def upload(
     rows: Sequence[WireItem],
     part: MissionType = MISSION,
     sender: Address = GROUND_STATION,
-):
+) -> list[int]:
     """Upload without a fault and return the last answer's results."""
     out = desk.tell(count(len(rows), part), sender)
     for seq, row in enumerate(rows):
@@ -67,7 +69,7 @@ def upload(
     return results(out)
 
 
-def stored(desk: Desk, part: MissionType = MISSION):
+def stored(desk: Desk, part: MissionType = MISSION) -> list[tuple[int, int, int, float]]:
     return places(desk.machine.lists.items(part))
 
 

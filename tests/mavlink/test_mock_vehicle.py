@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 from mock_flights import fly
@@ -33,13 +33,15 @@ from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 
+T = TypeVar("T", bound=Message)
+
 TO = VEHICLE
 MISSION = (MissionType.MISSION, vehicle_of("ardupilot"))
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
 
 
-def desk_for(kind: MockKind, mission: Mission = None, **options: Any):
+def desk_for(kind: MockKind, mission: Mission | None = None, **options: Any) -> Desk:
     mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, **options)
     desk = Desk(mock, GROUND_STATION)
     desk.start()
@@ -49,20 +51,20 @@ def desk_for(kind: MockKind, mission: Mission = None, **options: Any):
     return desk
 
 
-def command(number: int, *params: Any):
+def command(number: int, *params: float) -> CommandLong:
     return CommandLong(TO, number, 0, *map(float, params))
 
 
-def result(messages: Sequence[Message]):
+def result(messages: Sequence[Message]) -> int:
     (ack,) = [message for message in messages if isinstance(message, CommandAck)]
     return ack.result
 
 
-def only(messages: Sequence[Message], kind: MockKind):
+def only(messages: Sequence[Message], kind: type[T]) -> list[T]:
     return [message for message in messages if isinstance(message, kind)]
 
 
-def take_off(desk: Desk, kind: MockKind):
+def take_off(desk: Desk, kind: MockKind) -> None:
     assert result(desk.tell(command(400, 1))) == 0
     assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
 

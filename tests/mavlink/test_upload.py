@@ -9,7 +9,6 @@ from stations import FOREIGN, VEHICLE, Desk, peer_of, rows_for
 from faao_mav.errors import InputError
 from faao_mav.mavlink.messages import (
     Heartbeat,
-    Message,
     MissionAck,
     MissionCount,
     MissionItemInt,
@@ -30,23 +29,27 @@ ROWS = rows_for("px4", 3)
 BOTH = pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 
 
-def request(seq: int, *, legacy: bool = False, target: Address = ME, mission_type: int = 0):
+def request(
+    seq: int, *, legacy: bool = False, target: Address = ME, mission_type: int = 0
+) -> MissionRequestInt:
     return MissionRequestInt(target, mission_type, seq, legacy)
 
 
-def ack(result: Result, *, target: Address = ME, mission_type: int = 0, opaque_id: int = 0):
+def ack(
+    result: Result, *, target: Address = ME, mission_type: int = 0, opaque_id: int = 0
+) -> MissionAck:
     return MissionAck(target, mission_type, result, opaque_id)
 
 
 def desk_for(
     firmware: str, rows: Sequence[WireItem] = ROWS, part: MissionType = MissionType.MISSION
-):
+) -> Desk:
     desk = Desk(Upload(rows, peer_of(firmware), part))
     desk.start()
     return desk
 
 
-def asked_for_all(firmware: str):
+def asked_for_all(firmware: str) -> Desk:
     desk = desk_for(firmware)
     for seq in range(3):
         desk.tell(request(seq))
@@ -112,14 +115,14 @@ def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware: str) -> Non
     desk = desk_for(firmware)
     desk.tell(request(0))
     desk.wait(8.9)
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     sent = desk.wait(2.0)
     assert sent[-1] == MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)
     assert desk.machine.outcome.status == "silent"
     assert desk.machine.outcome.last_requested == 0
 
 
-def seqs(messages: Sequence[Message]):
+def seqs(messages: Sequence[Any]) -> list[int]:
     return [message.seq for message in messages]
 
 
@@ -140,7 +143,7 @@ def test_px4_is_never_sent_the_last_item_before_it_asks() -> None:
     desk.tell(request(2))
     assert seqs(desk.wait(1.1)) == [2]
     desk.tell(ack(Result.ACCEPTED))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
 def test_what_px4_has_taken_unasked_is_sent() -> None:
@@ -189,10 +192,12 @@ def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that() -> None
 
 
 @pytest.mark.parametrize(("count", "ahead"), [(9, [2, 3, 4]), (4, [2])])
-def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(count: int, ahead: int) -> None:
+def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(
+    count: int, ahead: list[int]
+) -> None:
     desk = desk_for("ardupilot", rows_for("ardupilot", 9)[:count])
     desk.tell(request(1))
-    sent = []
+    sent: list[int] = []
     for _ in range(5):
         desk.wait(1.6)
         sent += seqs(desk.tell(ack(Result.INVALID_SEQUENCE)))
@@ -203,7 +208,7 @@ def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(count: int, ah
 def test_invalid_sequence_from_ardupilot_ends_nothing() -> None:
     desk = asked_for_all("ardupilot")
     desk.tell(ack(Result.INVALID_SEQUENCE))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
@@ -260,7 +265,7 @@ def test_an_early_acceptance_is_about_something_else() -> None:
     desk.tell(ack(Result.ACCEPTED))
     desk.tell(request(0))
     desk.tell(ack(Result.ACCEPTED))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
 FINAL = sorted(
@@ -301,7 +306,7 @@ def test_an_error_about_a_duplicate_count_does_not_end_the_transfer() -> None:
     desk.wait(0.2)
     desk.tell(request(1))
     desk.wait(5)
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
 def test_a_busy_px4_is_asked_again_until_it_is_free() -> None:
@@ -363,7 +368,7 @@ def test_what_is_said_to_others_or_about_other_lists_is_ignored(
 ) -> None:
     desk = desk_for("px4")
     assert desk.tell(message, sender) == []
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     assert desk.tell(request(0)) != []
 
 
@@ -373,7 +378,7 @@ def test_acceptance_by_another_vehicle_is_none(firmware: str) -> None:
     desk.tell(ack(Result.ACCEPTED), Address(2, 1))
     desk.tell(ack(Result.ACCEPTED, target=FOREIGN))
     desk.tell(ack(Result.ACCEPTED, mission_type=1))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
 def test_who_gives_up_tells_the_vehicle() -> None:

@@ -10,16 +10,17 @@ import pytest
 import typer
 from conftest import free_port
 from stations import FENCE, HOME, a_mission, places, vehicle_of
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot, read_home
 from faao_mav.cli.download import download
 from faao_mav.cli.transfer_progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import running
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.protocol import MissionType
+from faao_mav.mavlink.protocol import Result as MissionResult
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import read_mission, write_wpl
@@ -30,25 +31,25 @@ app.command()(download)
 app.command()(autopilot)
 
 
-def run(*arguments: Any):
+def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(each) for each in arguments])
 
 
 @pytest.fixture
-def mission_file(tmp_path: Path):
+def mission_file(tmp_path: Path) -> Path:
     path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(a_mission(6)))
     return path
 
 
 @pytest.fixture
-def port():
+def port() -> int:
     return free_port()
 
 
-def a_mock(kind: MockKind = "ardupilot", **options: Any):
-    manners = behaviour_of(kind) if isinstance(kind, str) else kind
-    return MockAutopilot(manners, home=HOME, beat=0.1, **options)
+def a_mock(kind: MockKind | Behaviour = "ardupilot", **options: Any) -> MockAutopilot:
+    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
+    return MockAutopilot(behaviour, home=HOME, beat=0.1, **options)
 
 
 def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> None:
@@ -119,7 +120,7 @@ def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path, port: int)
 
 
 def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
-    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): Result.INVALID_PARAM7}))
+    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): MissionResult.INVALID_PARAM7}))
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
     assert result.exit_code == 1
@@ -174,14 +175,14 @@ def test_the_mock_autopilot_as_a_command(
     ended = threading.Event()
     serve = serving.serve
 
-    def until_ended(mock: MockAutopilot, connection: str, **options: Any):
+    def until_ended(mock: MockAutopilot, connection: str, **options: Any) -> None:
         serve(mock, connection, **options, stop=ended.is_set)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(serving, "serve", until_ended)
     results = []
 
-    def serve_it():
+    def serve_it() -> None:
         results.append(
             run("autopilot", "--listen", f"udpin:127.0.0.1:{port}", "--kind", "px4", "--drop", 0.05)
         )
@@ -207,6 +208,7 @@ def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]
     with transfer_progress(shown=False) as nothing:
         assert nothing is None
     with transfer_progress(shown=True) as observe:
+        assert observe is not None
         observe("uploading mission", 3, 9)
         observe("asking for home", 0, 0)
     assert capsys.readouterr().out == ""

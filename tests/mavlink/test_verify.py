@@ -19,15 +19,15 @@ MISSION = MissionType.MISSION
 
 def kinds(
     sent: Sequence[WireItem], found: Sequence[WireItem], firmware: str, part: MissionType = MISSION
-):
+) -> dict[tuple[int | None, str], str]:
     return {(d.item, d.field): d.kind for d in compare(sent, found, part, vehicle_of(firmware))}
 
 
-def rows_with(firmware: str, *items: Any):
+def rows_with(firmware: str, *items: MissionItem) -> tuple[WireItem, ...]:
     return wire_items(Mission(items, HOME), MISSION, vehicle_of(firmware))
 
 
-def changed(rows: Sequence[WireItem], index: int, **changes: Any):
+def changed(rows: Sequence[WireItem], index: int, **changes: Any) -> tuple[WireItem, ...]:
     return (*rows[:index], dataclasses.replace(rows[index], **changes), *rows[index + 1 :])
 
 

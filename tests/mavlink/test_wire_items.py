@@ -13,10 +13,11 @@ from pymavlink.dialects.v20 import common
 from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, signing_key, vehicle_of
 
 from faao_mav.errors import InputError
-from faao_mav.mavlink.codec import Codec, read_key
+from faao_mav.mavlink.codec import Codec, Packet, read_key
 from faao_mav.mavlink.messages import (
     CommandLong,
     Heartbeat,
+    Message,
     MissionAck,
     MissionCount,
     MissionItemInt,
@@ -125,13 +126,13 @@ def test_rows_hold_all_of_an_item(items: Any, firmware: str) -> None:
     assert there_and_back(mission, firmware).items == mission.items
 
 
-def packets(*messages: Any):
+def packets(*messages: Message) -> list[bytes]:
     codec = Codec(VEHICLE)
     return [codec.pack(message) for message in messages]
 
 
 ROW = WireItem(16, 3, (1.5, 0.0, 0.0, math.pi), -353_632_621, 1_491_652_371, 12.25, 1, 0)
-MESSAGES = [
+MESSAGES: list[Message] = [
     Heartbeat(2, 3, 128, 3, 4),
     Statustext(4, "Only 655 items are supported"),
     MissionCount(GROUND_STATION, 0, 700, 0xDEADBEEF),
@@ -144,17 +145,22 @@ MESSAGES = [
 ]
 
 
+def message_of(packet: Packet) -> Any:
+    assert packet.envelope is not None
+    return packet.envelope.message
+
+
 def test_messages_survive_the_wire() -> None:
     codec = Codec(GROUND_STATION)
     found = [packet for data in packets(*MESSAGES) for packet in codec.parse(data)]
-    assert [packet.envelope.message for packet in found] == MESSAGES
-    assert {packet.envelope.sender for packet in found} == {VEHICLE}
+    assert [message_of(packet) for packet in found] == MESSAGES
+    assert {packet.envelope and packet.envelope.sender for packet in found} == {VEHICLE}
 
 
 def test_items_survive_the_wire_to_the_last_digit() -> None:
     item = MissionItemInt(GROUND_STATION, 0, 3, ROW)
     (packet,) = Codec(GROUND_STATION).parse(packets(item)[0])
-    found = packet.envelope.message.item
+    found = message_of(packet).item
     assert (found.x, found.y, found.z) == (ROW.x, ROW.y, ROW.z)
     assert found.params[3] == struct.unpack("<f", struct.pack("<f", math.pi))[0]
     assert (found.current, found.autocontinue) == (1, 0)
@@ -163,7 +169,7 @@ def test_items_survive_the_wire_to_the_last_digit() -> None:
 def test_the_old_item_has_single_precision() -> None:
     item = MissionItemInt(GROUND_STATION, 0, 3, ROW, legacy=True)
     (packet,) = Codec(GROUND_STATION).parse(packets(item)[0])
-    found = packet.envelope.message
+    found = message_of(packet)
     assert found.legacy
     assert 0 < abs(found.item.y - ROW.y) < 100
 
@@ -186,7 +192,7 @@ def test_damaged_and_unknown_packets_are_passed_over() -> None:
     damaged = bytearray(good)
     damaged[12] ^= 1
     assert codec.parse(bytes(damaged)) == []
-    assert [p.envelope.message for p in codec.parse(b"noise" + other)] == [MESSAGES[1]]
+    assert [message_of(p) for p in codec.parse(b"noise" + other)] == [MESSAGES[1]]
     writer = common.MAVLink(None, 1, 1)
     unknown = common.MAVLink_vfr_hud_message(0, 0, 0, 0, 0, 0).pack(writer)
     (packet,) = codec.parse(unknown)
@@ -198,7 +204,7 @@ def test_packets_may_come_in_pieces() -> None:
     codec = Codec(GROUND_STATION)
     stream = b"".join(packets(*MESSAGES))
     found = [packet for byte in stream for packet in codec.parse(bytes([byte]))]
-    assert [packet.envelope.message for packet in found] == MESSAGES
+    assert [message_of(packet) for packet in found] == MESSAGES
 
 
 def test_signed_packets_need_the_key() -> None:
@@ -206,7 +212,7 @@ def test_signed_packets_need_the_key() -> None:
     signed = Codec(VEHICLE, key).pack(MESSAGES[0])
     assert len(signed) > len(packets(MESSAGES[0])[0])
     (packet,) = Codec(GROUND_STATION, key).parse(signed)
-    assert packet.envelope.message == MESSAGES[0]
+    assert message_of(packet) == MESSAGES[0]
     assert Codec(GROUND_STATION, signing_key("wrong")).parse(signed) == []
     assert Codec(GROUND_STATION, key).parse(packets(MESSAGES[0])[0]) == []
 
