@@ -79,8 +79,7 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         self._due, self._end = now + self._patience, now + self._boot
         return ()
 
-    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of a heartbeat."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message, sender = envelope.message, envelope.sender
         if not isinstance(message, Heartbeat) or message.type == _GCS:
             return ()
@@ -93,8 +92,7 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         self._found[sender] = _found_vehicle(sender, message)
         return self.tick(now)
 
-    def time_out(self, now: float) -> Sequence[Message]:
-        """End when there is nothing more to wait for."""
+    def _time_out(self, now: float) -> Sequence[Message]:
         if all(found.ready for found in self._found.values()) or now >= self._end:
             self.outcome = tuple(self._found[address] for address in sorted(self._found))
         else:
@@ -116,26 +114,23 @@ class AskHome(AskingMachine[list[Home]]):
         super().__init__(wait, retries)
         self._vehicle = vehicle
 
-    def question(self) -> Message:
-        """Return the request."""
+    def _question(self) -> Message:
         return CommandLong(self._vehicle, _REQUEST_MESSAGE, 0, float(_HOME_POSITION))
 
-    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Take the answer."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
         message = envelope.message
         if isinstance(message, HomePosition) and envelope.sender == self._vehicle:
             place = (message.latitude / 1e7, message.longitude / 1e7)
             self.outcome = [Home(*place, message.altitude / 1000)]
         return ()
 
-    def give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Do without."""
+    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         self.outcome = []
         return ()
 
     def cancel(self, now: float) -> Sequence[Message]:
         """Do without."""
-        return self.give_up(now)
+        return self._give_up(now)
 
 
 def choose(

@@ -17,8 +17,8 @@ class Machine(ABC, Generic[T]):
 
     It is told the time in seconds and what arrived, and answers with what is to be sent. Whoever
     runs it calls `start` once, then `on` for each message and `tick` at `deadline`, until there is
-    an `outcome`; `cancel` ends it early. What derives from it gives `start`, `receive` and
-    `time_out`, and sets `_due`, the time of the next `time_out`, and in the end `outcome`.
+    an `outcome`; `cancel` ends it early. What derives from it gives `start`, `_receive` and
+    `_time_out`, and sets `_due`, the time of the next `_time_out`, and in the end `outcome`.
     """
 
     def __init__(self) -> None:
@@ -41,30 +41,30 @@ class Machine(ABC, Generic[T]):
 
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Take note of what arrived."""
-        return () if self.outcome is not None else self.receive(envelope, now)
+        return () if self.outcome is not None else self._receive(envelope, now)
 
     def tick(self, now: float) -> Sequence[Message]:
         """Take note of the time."""
         due = self.deadline
-        return () if due is None or now < due else self.time_out(now)
+        return () if due is None or now < due else self._time_out(now)
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Give up."""
         return ()
 
     @abstractmethod
-    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Answer what arrived before the outcome."""
 
     @abstractmethod
-    def time_out(self, now: float) -> Sequence[Message]:
+    def _time_out(self, now: float) -> Sequence[Message]:
         """Do what is due now."""
 
 
 class AskingMachine(Machine[T]):
     """A machine that begins with a question, and repeats it until there is an answer.
 
-    The question is put again every `wait` seconds, `retries` times; then `give_up` is called.
+    The question is put again every `wait` seconds, `retries` times; then `_give_up` is called.
     """
 
     def __init__(self, wait: float, retries: int) -> None:
@@ -73,11 +73,11 @@ class AskingMachine(Machine[T]):
         self._retries_done = 0
 
     @abstractmethod
-    def question(self) -> Message:
+    def _question(self) -> Message:
         """Return the question."""
 
     @abstractmethod
-    def give_up(self, now: float) -> Sequence[Message]:
+    def _give_up(self, now: float) -> Sequence[Message]:
         """End, or begin anew, for want of an answer."""
 
     def start(self, now: float) -> Sequence[Message]:
@@ -85,16 +85,15 @@ class AskingMachine(Machine[T]):
         self._retries_done = 0
         return self._ask(now)
 
-    def time_out(self, now: float) -> Sequence[Message]:
-        """Ask again, or give up."""
+    def _time_out(self, now: float) -> Sequence[Message]:
         if self._retries_done == self._retries:
-            return self.give_up(now)
+            return self._give_up(now)
         self._retries_done += 1
         return self._ask(now)
 
     def _ask(self, now: float) -> Sequence[Message]:
         self._due = now + self._wait
-        return [self.question()]
+        return [self._question()]
 
 
 class Script(Machine[T]):
@@ -122,12 +121,10 @@ class Script(Machine[T]):
         """Begin the first step."""
         return self._advance(None, now)
 
-    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Pass on what arrived."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         return self._continue(lambda step: step.on(envelope, now), now)
 
-    def time_out(self, now: float) -> Sequence[Message]:
-        """Pass on the time."""
+    def _time_out(self, now: float) -> Sequence[Message]:
         return self._continue(lambda step: step.tick(now), now)
 
     def cancel(self, now: float) -> Sequence[Message]:

@@ -26,7 +26,7 @@ from faao_mav.mavlink.faults import Channel, Faults, Lost
 from faao_mav.mavlink.machine import Script
 from faao_mav.mavlink.messages import Heartbeat, Message, MissionAck, MissionCount, WireItem
 from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.mock.lists import StoredLists
+from faao_mav.mavlink.mock.firmware import StoredLists
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.session import clear_lists, download_lists, upload_parts

@@ -24,10 +24,8 @@ from faao_mav.mavlink.messages import (
     SetMode,
     Statustext,
 )
-from faao_mav.mavlink.mock.firmware import Behaviour, whole
+from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
 from faao_mav.mavlink.mock.flight import Flight, Posture, telemetry
-from faao_mav.mavlink.mock.kinds import behaviour_of
-from faao_mav.mavlink.mock.lists import StoredLists
 from faao_mav.mavlink.mock.parameters import ParameterServer
 from faao_mav.mavlink.protocol import (
     ARMED,
@@ -88,7 +86,7 @@ class MockAutopilot(Machine[None]):
 
     def __init__(
         self,
-        behaviour: Behaviour | None = None,
+        behaviour: Behaviour,
         *,
         aircraft: str = "copter",
         address: Address = Address(1, 1),  # noqa: B008
@@ -101,16 +99,13 @@ class MockAutopilot(Machine[None]):
         boot: float = 0.0,
     ) -> None:
         super().__init__()
-        self.behaviour = behaviour or behaviour_of("ardupilot")
-        self.address, self.home = address, home
-        self.vehicle = vehicle_type(self.behaviour.family.key, aircraft)
-        self._mode, self._mission_mode = self.behaviour.firmware.modes[aircraft]
+        self.behaviour, self.address, self.home = behaviour, address, home
+        self.vehicle = vehicle_type(behaviour.family.key, aircraft)
+        self._mode, self._mission_mode = behaviour.firmware.modes[aircraft]
         self.lists = StoredLists(self.vehicle, home)
-        known = self.vehicle.defaults() | dict(self.behaviour.firmware.parameters)
+        known = self.vehicle.defaults() | dict(behaviour.firmware.parameters)
         self.parameters = ParameterServer(known | dict(parameters or {}))
-        self._firmware = self.behaviour.firmware(
-            self.lists, self.behaviour, self._is_ready, self._is_flying
-        )
+        self._firmware = behaviour.firmware(self.lists, behaviour, self._is_ready, self._is_flying)
         self._fly, self._speedup = fly, speedup
         self._period = 1 / rate if rate > 0 else None
         self._beat = beat
@@ -145,8 +140,7 @@ class MockAutopilot(Machine[None]):
         self.armed, self._flight, self._current = False, None, 0
         self._booted, self._ready_at = now, now + self._boot
 
-    def time_out(self, now: float) -> Sequence[Message]:
-        """Send what is due."""
+    def _time_out(self, now: float) -> Sequence[Message]:
         self._now = now
         out: list[Message] = list(self._firmware.tick(now))
         if self._flight is not None:
@@ -159,8 +153,7 @@ class MockAutopilot(Machine[None]):
             out += telemetry(self._posture(now), self.home, now - self._booted)
         return out
 
-    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Answer what is addressed to this vehicle."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self._now = now
         sender, message = envelope.sender, envelope.message
         if isinstance(message, SetMode):

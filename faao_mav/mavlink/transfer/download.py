@@ -61,8 +61,7 @@ class Download(Exchange):
         """Items received, of all."""
         return f"reading {self._type.title}", len(self._items), self._count
 
-    def question(self) -> Message:
-        """Return the request for the list."""
+    def _question(self) -> Message:
         return MissionRequestList(self._peer.address, self._type)
 
     def start(self, now: float) -> Sequence[Message]:
@@ -71,8 +70,7 @@ class Download(Exchange):
         self._attempts_done += 1
         return super().start(now)
 
-    def take(self, message: ListMessage, now: float) -> Sequence[Message]:
-        """Take the count or an item, ask for more."""
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         if self._phase == "resting":
             return ()
         match message:
@@ -84,19 +82,17 @@ class Download(Exchange):
                 return self._on_ack(message.type, now)
         return ()
 
-    def time_out(self, now: float) -> Sequence[Message]:
-        """Ask again, begin anew, or end."""
+    def _time_out(self, now: float) -> Sequence[Message]:
         match self._phase:
             case "resting":
                 return self.start(now)
             case "list":
-                return super().time_out(now)
+                return super()._time_out(now)
         if now - self._last_progress >= self._timeouts.silence:
-            return self.give_up(now)
+            return self._give_up(now)
         return self._repeat(now)
 
-    def give_up(self, now: float) -> Sequence[Message]:
-        """Begin anew, or end and tell the vehicle."""
+    def _give_up(self, now: float) -> Sequence[Message]:
         if self._attempts_done < self._timeouts.attempts:
             return self.start(now)
         self._finish()
@@ -105,7 +101,7 @@ class Download(Exchange):
     def _on_count(self, count: int, opaque_id: int, now: float) -> Sequence[Message]:
         if self._phase == "items":
             # A repeated answer; another number means that the list has changed meanwhile.
-            return () if count == self._count else self.give_up(now)
+            return () if count == self._count else self._give_up(now)
         self._phase, self._count, self._opaque_id = "items", count, opaque_id
         self._items, self._requests, self._next_sequence = {}, {}, 0
         return self._proceed(now)

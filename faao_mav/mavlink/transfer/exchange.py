@@ -66,7 +66,7 @@ class Outcome:
 class Exchange(AskingMachine[Outcome]):
     """The transfer of one list: it opens with a question and ends with an `Outcome`.
 
-    What derives from it gives `question`, which opens the transfer, and `take`, which answers the
+    What derives from it gives `_question`, which opens the transfer, and `_take`, which answers the
     vehicle's messages about the list.
     """
 
@@ -84,22 +84,20 @@ class Exchange(AskingMachine[Outcome]):
         """What the vehicle said last, if it was no."""
 
     @abstractmethod
-    def take(self, message: ListMessage, now: float) -> Sequence[Message]:
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         """Answer what the vehicle says to us about the list."""
 
-    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of what the vehicle says in plain words, answer what is about the list."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message = envelope.message
         if envelope.sender != self._peer.address:
             return ()
         if isinstance(message, Statustext):
             self._texts = [*self._texts[1 - _TEXTS :], message.text.strip()]
         elif isinstance(message, ListMessage) and message.mission_type == self._type:
-            return self.take(message, now) if self._peer.own.takes(message.target) else ()
+            return self._take(message, now) if self._peer.own.takes(message.target) else ()
         return ()
 
-    def give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """End: the vehicle is silent, or has said no and nothing else."""
+    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         self._end("silent" if self._result is None else "refused", self._result)
         return ()
 
@@ -133,12 +131,10 @@ class Clear(Exchange):
         """Not counted."""
         return f"clearing {self._type.title}", 0, 0
 
-    def question(self) -> Message:
-        """Return the request to clear the list."""
+    def _question(self) -> Message:
         return MissionClearAll(self._peer.address, self._type)
 
-    def take(self, message: ListMessage, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Take the answer."""
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:  # noqa: ARG002
         if not isinstance(message, MissionAck):
             return ()
         if message.type == Result.ACCEPTED:

@@ -74,7 +74,7 @@ class Upload(Exchange):
         self._last_requested, self._ahead = -1, 0
         self._most_ahead, self._guessing = _AHEAD, False
         self._pace = Pace(self._timeouts, self._manners.request_period)
-        self._question = Question(0.0, 0.0)
+        self._unanswered = Question(0.0, 0.0)
         self._last_progress = 0.0
 
     @property
@@ -82,8 +82,7 @@ class Upload(Exchange):
         """Items sent, of all."""
         return f"uploading {self._type.title}", len(self._sent), len(self._items)
 
-    def question(self) -> Message:
-        """Return the announcement of the items."""
+    def _question(self) -> Message:
         return MissionCount(self._peer.address, self._type, len(self._items))
 
     def start(self, now: float) -> Sequence[Message]:
@@ -92,17 +91,15 @@ class Upload(Exchange):
         self._last_requested, self._ahead, self._guessing = -1, 0, False
         return super().start(now)
 
-    def receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of whether the vehicle is booting, and of what is about the list."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message = envelope.message
         if isinstance(message, Heartbeat) and envelope.sender == self._peer.address:
             self._booting = message.system_status < MavState.STANDBY
             ready = self._phase == "booting" and not self._booting
             return self.start(now) if ready else ()
-        return super().receive(envelope, now)
+        return super()._receive(envelope, now)
 
-    def take(self, message: ListMessage, now: float) -> Sequence[Message]:
-        """Answer a request, take an acknowledgement."""
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         match message:
             case MissionRequestInt() if self._phase != "refused":
                 return self._on_request(message.seq, now)
@@ -110,17 +107,15 @@ class Upload(Exchange):
                 return self._on_ack(message, now)
         return ()
 
-    def time_out(self, now: float) -> Sequence[Message]:
-        """Send again, wait on, or end."""
+    def _time_out(self, now: float) -> Sequence[Message]:
         match self._phase:
             case "items":
                 return self._time_out_items(now)
             case "booting" | "refused":
-                return self.give_up(now)
-        return super().time_out(now)
+                return self._give_up(now)
+        return super()._time_out(now)
 
-    def give_up(self, now: float) -> Sequence[Message]:
-        """Begin anew if what was refused may have been sent too early, else end."""
+    def _give_up(self, now: float) -> Sequence[Message]:
         if self._guessing and self._result is not None:
             self._most_ahead = 0
             return self.start(now)
@@ -132,11 +127,11 @@ class Upload(Exchange):
         if seq >= len(self._items):
             return ()
         if seq <= self._current:
-            self._question.send_again(now)
+            self._unanswered.send_again(now)
         else:
             if self._last_requested >= 0:
-                self._pace.answer(self._question, now)
-            self._question = self._pace.ask(now)
+                self._pace.answer(self._unanswered, now)
+            self._unanswered = self._pace.ask(now)
         self._last_requested, self._ahead, self._guessing = seq, 0, False
         self._phase, self._last_progress, self._result = "items", now, None
         self._retries_done = 0
@@ -175,13 +170,13 @@ class Upload(Exchange):
     def _on_invalid_sequence(self, now: float) -> Sequence[Message]:
         if self._all_sent() and self._retries_done > 0:
             return [self._item(len(self._items) - 1)]
-        if self._question.repeats == 0:
+        if self._unanswered.repeats == 0:
             self._pace.answer_again()
             return ()
         if self._ahead == self._room():
             return ()
-        self._pace.answer(self._question, now)
-        self._question = self._pace.ask(now)
+        self._pace.answer(self._unanswered, now)
+        self._unanswered = self._pace.ask(now)
         self._ahead += 1
         self._last_progress, self._due = now, now + self._pace.wait
         return [self._item(self._current)]
@@ -190,11 +185,11 @@ class Upload(Exchange):
         if not self._all_sent():
             quiet = now - self._last_progress >= self._timeouts.silence
             if self._may_repeat() and not quiet and self._result is None:
-                self._pace.repeat(self._question, now)
+                self._pace.repeat(self._unanswered, now)
                 self._due = now + self._pace.wait
                 return self._repetition()
             cancel = self._peer.ack(Result.OPERATION_CANCELLED, self._type)
-            return [cancel, *self.give_up(now)]
+            return [cancel, *self._give_up(now)]
         reminder, retries = self._reminder(), self._timeouts.retries
         if reminder is not None and self._retries_done < retries and self._result is None:
             self._retries_done += 1
@@ -207,7 +202,7 @@ class Upload(Exchange):
         """Return what is sent when the next request does not come."""
         last = self._current
         if self._manners.ignores_other_items:
-            last += min(self._question.repeats, self._room())
+            last += min(self._unanswered.repeats, self._room())
             self._guessing = self._guessing or last > self._current
         return [self._item(seq) for seq in range(last, self._current - 1, -1)]
 
