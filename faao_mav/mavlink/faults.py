@@ -119,7 +119,7 @@ class FaultyTransport:
         return self._due("in")
 
     def write(self, data: bytes) -> None:
-        """Send `data`, perhaps, and perhaps later."""
+        """Send `data` as the faults allow: late, damaged, twice or not at all."""
         self._push("out", data)
         self._flush()
 

@@ -48,7 +48,7 @@ class Tlog:
         self._file.write(struct.pack(">Q", int(self._clock() * 1e6)) + packet)
 
     def close(self) -> None:
-        """Finish."""
+        """Close the file."""
         self._file.close()
 
 
@@ -123,7 +123,7 @@ class Link:
         return outcome
 
     def begin(self, machine: Machine[T]) -> None:
-        """Start `machine`, for who calls `step` himself."""
+        """Start `machine`; `step` then carries it on."""
         self._send(machine.start(time.monotonic()))
 
     def step(self, machine: Machine[T], until: float) -> None:

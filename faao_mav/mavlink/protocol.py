@@ -8,7 +8,7 @@ from enum import IntEnum
 
 
 class MissionType(IntEnum):
-    """MAV_MISSION_TYPE: which of a vehicle's three lists is meant."""
+    """MAV_MISSION_TYPE: which of a vehicle's three lists is meant; `part` in names."""
 
     MISSION = 0
     FENCE = 1

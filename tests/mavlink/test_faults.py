@@ -1,5 +1,6 @@
 """Whatever the link does: an upload is verified and right, or reported as failed, and ends."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,9 +23,17 @@ from stations import (
     vehicle_of,
 )
 
+from faao_mav.mavlink.discover import Discovery
 from faao_mav.mavlink.faults import Channel, Faults, Lost
 from faao_mav.mavlink.machine import Script
-from faao_mav.mavlink.messages import Heartbeat, Message, MissionAck, MissionCount, WireItem
+from faao_mav.mavlink.messages import (
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionAck,
+    MissionCount,
+    WireItem,
+)
 from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.firmware import StoredLists
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
@@ -32,6 +41,7 @@ from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.session import clear_lists, download_lists, upload_parts
 from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.wire_items import wire_items
+from faao_mav.vehicle import PX4_COPTER, register, unregister
 
 MISSION = MissionType.MISSION
 REQUEST, MISSION_ACK, COUNT_ID, REQUEST_INT, ITEM_INT = 40, 47, 44, 51, 73
@@ -341,3 +351,22 @@ def test_messages_used_here_are_what_the_numbers_say() -> None:
         )
     ]
     assert numbers == [MISSION_ACK, COUNT_ID, 0]
+
+
+def test_an_autopilot_that_is_registered_is_found_and_served_as_the_guide_says() -> None:
+    family = dataclasses.replace(PX4_COPTER.family, key="toy", name="Toy", mav_autopilot=99)
+    toy = register(dataclasses.replace(PX4_COPTER, family=family))
+    try:
+        search = Discovery(system=1)
+        search.start(0.0)
+        search.on(Envelope(VEHICLE, Heartbeat(2, 99, 0, 0, 3)), 0.5)
+        (found,) = search.outcome or ()
+        assert str(found) == "Toy copter (system 1, component 1, disarmed)"
+        mock, rows = mock_of("px4"), rows_for("px4", 6)
+        peer = Peer(GROUND_STATION, VEHICLE, found.vehicle)
+        assert found.vehicle is toy
+        script: Any = Script(upload_parts([(MISSION, rows)], peer))
+        simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.05))
+        assert script.outcome[0].verified
+    finally:
+        unregister(toy)

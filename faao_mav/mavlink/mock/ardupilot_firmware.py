@@ -65,13 +65,13 @@ class ArduPilotFirmware(MockFirmware):
         sender, message = envelope.sender, envelope.message
         if not isinstance(message, ListMessage):
             return []
-        kind = message.mission_type
-        if kind == ALL_TYPES and isinstance(message, MissionClearAll):
-            return self._on_clear(sender, kind, tuple(MissionType))
-        if kind not in tuple(MissionType):
+        mission_type = message.mission_type
+        if mission_type == ALL_TYPES and isinstance(message, MissionClearAll):
+            return self._on_clear(sender, mission_type, tuple(MissionType))
+        if mission_type not in tuple(MissionType):
             known = isinstance(message, MissionAck)
-            return [] if known else [MissionAck(sender, kind, Result.UNSUPPORTED)]
-        part = MissionType(kind)
+            return [] if known else [MissionAck(sender, mission_type, Result.UNSUPPORTED)]
+        part = MissionType(mission_type)
         match message:
             case MissionCount(count=count):
                 return self._on_count(sender, part, count, now)
@@ -82,7 +82,7 @@ class ArduPilotFirmware(MockFirmware):
             case MissionRequestInt():
                 return self._on_request(sender, part, message)
             case MissionClearAll():
-                return self._on_clear(sender, kind, (part,))
+                return self._on_clear(sender, mission_type, (part,))
             case MissionWritePartialList(start_index=first, end_index=last):
                 return self._on_partial(sender, part, first, last, now)
         return []
@@ -186,11 +186,11 @@ class ArduPilotFirmware(MockFirmware):
         return [MissionItemInt(sender, part, request.seq, items[request.seq], request.legacy)]
 
     def _on_clear(
-        self, sender: Address, kind: int, parts: tuple[MissionType, ...]
+        self, sender: Address, mission_type: int, parts: tuple[MissionType, ...]
     ) -> list[Message]:
         flown = MissionType.MISSION in parts and self._flying()
         if flown or any(part in self._uploads for part in parts):
-            return [MissionAck(sender, kind, Result.ERROR)]
+            return [MissionAck(sender, mission_type, Result.ERROR)]
         for part in parts:
             self._lists.clear(part)
-        return [MissionAck(sender, kind, Result.ACCEPTED)]
+        return [MissionAck(sender, mission_type, Result.ACCEPTED)]

@@ -98,18 +98,18 @@ class Px4Firmware(MockFirmware):
         """Answer a message of the mission protocol."""
         sender = envelope.sender
         match envelope.message:
-            case MissionCount(count=count, mission_type=kind):
-                return self._on_count(sender, kind, count, now)
+            case MissionCount(count=count, mission_type=mission_type):
+                return self._on_count(sender, mission_type, count, now)
             case MissionItemInt() as item:
                 return self._on_item(sender, item, now)
             case MissionAck() as ack:
                 return self._on_ack(sender, ack, now)
-            case MissionRequestList(mission_type=kind):
-                return self._on_list(sender, kind, now)
+            case MissionRequestList(mission_type=mission_type):
+                return self._on_list(sender, mission_type, now)
             case MissionRequestInt() as request:
                 return self._on_request(sender, request, now)
-            case MissionClearAll(mission_type=kind):
-                return self._on_clear(sender, kind)
+            case MissionClearAll(mission_type=mission_type):
+                return self._on_clear(sender, mission_type)
         return []
 
     def tick(self, now: float) -> list[Message]:
@@ -123,17 +123,22 @@ class Px4Firmware(MockFirmware):
         request_due = transfer.last_request_time + self._manners.request_period
         return [self._ask(now)] if transfer.state == "receiving" and now >= request_due else []
 
-    def _on_count(self, sender: Address, kind: int, count: int, now: float) -> list[Message]:
+    def _on_count(
+        self, sender: Address, mission_type: int, count: int, now: float
+    ) -> list[Message]:
         transfer = self._transfer
         if transfer.state == "receiving":
             transfer.last_message_time = now
             if sender == transfer.partner and transfer.next_sequence == 0:
                 return [self._ask(now)]
         if transfer.state != "idle":
-            return [MissionAck(sender, kind, Result.ERROR), _said("WPM: IGN MISSION_COUNT: Busy")]
-        if kind not in tuple(MissionType):
-            return [MissionAck(sender, kind, Result.INVALID)]
-        part = MissionType(kind)
+            return [
+                MissionAck(sender, mission_type, Result.ERROR),
+                _said("WPM: IGN MISSION_COUNT: Busy"),
+            ]
+        if mission_type not in tuple(MissionType):
+            return [MissionAck(sender, mission_type, Result.INVALID)]
+        part = MissionType(mission_type)
         if (result := self.check_count(part, count)) != Result.ACCEPTED:
             return [MissionAck(sender, part, result)]
         if count == 0:
@@ -201,14 +206,14 @@ class Px4Firmware(MockFirmware):
                 transfer.state = "idle"
         return []
 
-    def _on_list(self, sender: Address, kind: int, now: float) -> list[Message]:
+    def _on_list(self, sender: Address, mission_type: int, now: float) -> list[Message]:
         transfer = self._transfer
-        again = sender == transfer.partner and kind == transfer.part
+        again = sender == transfer.partner and mission_type == transfer.part
         done = transfer.next_sequence == transfer.count
         free = transfer.state == "idle" or (transfer.state == "sending" and (again or done))
-        if not free or kind not in tuple(MissionType):
+        if not free or mission_type not in tuple(MissionType):
             return [Statustext(_INFO, "Mission download request ignored, already active")]
-        part = MissionType(kind)
+        part = MissionType(mission_type)
         items = self._lists.items(part)
         self._transfer = _Transfer("sending", sender, part, 0, len(items), 0, now, items=items)
         number = self._lists.number(part)
@@ -230,15 +235,15 @@ class Px4Firmware(MockFirmware):
         item = transfer.items[request.seq]
         return [MissionItemInt(sender, transfer.part, request.seq, item, request.legacy)]
 
-    def _on_clear(self, sender: Address, kind: int) -> list[Message]:
+    def _on_clear(self, sender: Address, mission_type: int) -> list[Message]:
         if self._transfer.state != "idle":
             return [_said("WPM: IGN CLEAR CMD: Busy")]
-        if kind != ALL_TYPES and kind not in tuple(MissionType):
+        if mission_type != ALL_TYPES and mission_type not in tuple(MissionType):
             return []
         for part in MissionType:
-            if kind in (part, ALL_TYPES):
+            if mission_type in (part, ALL_TYPES):
                 self._lists.clear(part)
-        return [MissionAck(sender, kind, Result.ACCEPTED)]
+        return [MissionAck(sender, mission_type, Result.ACCEPTED)]
 
 
 def _said(text: str) -> Statustext:

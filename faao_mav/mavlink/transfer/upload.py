@@ -71,8 +71,9 @@ class Upload(Exchange):
         self._phase: Literal["count", "items", "booting", "refused"] = "count"
         self._booting = False
         self._sent: set[int] = set()
+        # The item asked for last, the items sent beyond it, and how many those may be.
         self._last_requested, self._ahead = -1, 0
-        self._most_ahead, self._guessing = _AHEAD, False
+        self._most_ahead, self._sent_unasked = _AHEAD, False
         self._pace = Pace(self._timeouts, self._manners.request_period)
         self._unanswered = Question(0.0, 0.0)
         self._last_progress = 0.0
@@ -88,7 +89,7 @@ class Upload(Exchange):
     def start(self, now: float) -> Sequence[Message]:
         """Announce the items."""
         self._phase, self._sent, self._result = "count", set(), None
-        self._last_requested, self._ahead, self._guessing = -1, 0, False
+        self._last_requested, self._ahead, self._sent_unasked = -1, 0, False
         return super().start(now)
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
@@ -116,7 +117,7 @@ class Upload(Exchange):
         return super()._time_out(now)
 
     def _give_up(self, now: float) -> Sequence[Message]:
-        if self._guessing and self._result is not None:
+        if self._sent_unasked and self._result is not None:
             self._most_ahead = 0
             return self.start(now)
         status: Status = "silent" if self._result is None else "refused"
@@ -132,7 +133,7 @@ class Upload(Exchange):
             if self._last_requested >= 0:
                 self._pace.answer(self._unanswered, now)
             self._unanswered = self._pace.ask(now)
-        self._last_requested, self._ahead, self._guessing = seq, 0, False
+        self._last_requested, self._ahead, self._sent_unasked = seq, 0, False
         self._phase, self._last_progress, self._result = "items", now, None
         self._retries_done = 0
         item = self._item(seq)
@@ -203,7 +204,7 @@ class Upload(Exchange):
         last = self._current
         if self._manners.ignores_other_items:
             last += min(self._unanswered.repeats, self._room())
-            self._guessing = self._guessing or last > self._current
+            self._sent_unasked = self._sent_unasked or last > self._current
         return [self._item(seq) for seq in range(last, self._current - 1, -1)]
 
     @property
