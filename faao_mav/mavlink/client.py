@@ -142,6 +142,9 @@ class _Session:
     """A link on which the vehicle has been found; to be used in a `with` statement."""
 
     def __init__(self, connection: str, options: LinkOptions) -> None:
+        if unknown := set(options) - set(LinkOptions.__annotations__):
+            known = ", ".join(LinkOptions.__annotations__)
+            raise TypeError(f"there is no option {min(unknown)!r}; expected some of {known}")
         key_file, self._observe = options.get("signing_key"), options.get("observe")
         self.timeouts = options.get("timeouts") or Timeouts()
         self.started = time.monotonic()

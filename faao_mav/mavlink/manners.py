@@ -57,7 +57,11 @@ class Manners:
     meanings: Mapping[Result, str] = field(default_factory=dict)
 
     def meaning(self, result: int) -> str:
-        """Return `result` by name, and what it says when this autopilot sends it."""
+        """Return `result` by name, and what it says when this autopilot sends it.
+
+        >>> Manners().meaning(13)
+        'INVALID_SEQUENCE (an item came out of turn)'
+        """
         try:
             known = Result(result)
         except ValueError:

@@ -57,7 +57,11 @@ class Endpoint:
 
 
 def parse_connection(text: str) -> Endpoint:
-    """Return what the connection string `text` says; raises `InputError`."""
+    """Return what the connection string `text` says; raises `InputError`.
+
+    >>> parse_connection("udp:0.0.0.0:14550")
+    Endpoint(kind='udpin', host='0.0.0.0', port=14550)
+    """
     kind, colon, rest = text.partition(":")
     if colon and kind in _KINDS:
         host, colon, port = rest.rpartition(":")

@@ -124,6 +124,18 @@ class Clear(Exchange):
     """A machine that clears a list; asking twice does no harm, so it asks until answered.
 
     An ERROR is the end only if it is repeated: PX4 says nothing while busy, ArduPilot ERROR.
+
+    >>> vehicle = Address(1, 1)
+    >>> clearing = Clear(Peer(Address(255, 190), vehicle, None), MissionType.RALLY)
+    >>> clearing.start(now=0.0)
+    [MissionClearAll(target=Address(system=1, component=1), mission_type=<MissionType.RALLY: 2>)]
+    >>> clearing.deadline  # when the question is put again, s
+    1.5
+    >>> accepted = MissionAck(Address(255, 190), MissionType.RALLY, Result.ACCEPTED)
+    >>> clearing.on(Envelope(vehicle, accepted), now=0.1)
+    ()
+    >>> clearing.outcome.status
+    'accepted'
     """
 
     @property
