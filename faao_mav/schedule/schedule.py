@@ -10,32 +10,21 @@ from faao_mav.schedule.route import Route
 from faao_mav.vector import distances_to_path, lengths
 from faao_mav.vehicle import Flown
 
+# Metres of position error that one second too late or too early at the end costs. Raised from 3
+# when two plans of tests/benchmarks/missions.py ended 0.6 and 0.7 s off.
 LATE_WEIGHT = 5.0
-"""Metres of position error that one second too late or too early at the end costs.
 
-Raised from 3 when two plans of tests/benchmarks/missions.py ended 0.6 and 0.7 s off.
-"""
+# Metres of position error that one metre of path error costs beyond a share of the path tolerance.
+# Raised from 5, with which not every plan of tests/benchmarks/missions.py kept its tolerance.
+_PATH_WEIGHT, _PATH_SHARE = 8.0, 0.95
 
-_PATH_WEIGHT = 8.0
-"""Metres of position error that one metre of path error beyond `_PATH_SHARE` costs.
-
-Raised from 5, with which not every plan of tests/benchmarks/missions.py kept its path tolerance.
-"""
-
-_PATH_SHARE = 0.95
-"""The largest path error that costs nothing, as a share of the path tolerance; chosen."""
-
+# Seconds between the samples of the flown path that is compared, chosen for speed: at 5 m/s², an
+# arc that takes so long strays 0.1 m from its chord.
 _PATH_SAMPLING = 0.4
-"""Seconds between the samples of the flown path that is compared; chosen, for speed.
 
-At 5 m/s², an arc that takes so long strays 0.1 m from its chord.
-"""
-
+# Seconds before and after a waypoint counts as reached, in which it is passed. Chosen: longer than
+# crossing an acceptance radius takes, shorter than coming back.
 _PASSING_WINDOW = 3.0
-"""The time before and after a waypoint counts as reached in which an aircraft passes it, s.
-
-Chosen: longer than it takes to cross an acceptance radius, shorter than it takes to come back.
-"""
 
 
 @dataclass(frozen=True, slots=True)
