@@ -22,9 +22,8 @@ from faao_mav.optimizer.pricing import (
     saturation,
 )
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.progress import Observer, Progress
 from faao_mav.optimizer.search.bound import Bound
-from faao_mav.optimizer.solution import Solution
+from faao_mav.optimizer.solution import Observer, Progress, Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery

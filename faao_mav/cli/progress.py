@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.link import Observe
-    from faao_mav.optimizer.progress import Observer, Progress
+    from faao_mav.optimizer.solution import Observer, Progress
     from faao_mav.study import StudyRow
 
 

@@ -21,22 +21,12 @@ if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
     from faao_mav.plan import Plan
 
-_SPLINE_SPACING, _SPLINE_TIMES = 10.0, (2.0, 3.0)
-"""The least distance of spline waypoints, m, and the least times between them, s, to try; chosen.
-"""
-
-_BRAKING = 1.1
-"""The last leg of a spline flight as a multiple of v²/a: splines use half of the acceleration."""
-
-_PLANE_SHARE = 0.4
-"""The share of the path tolerance for a plane's initial route: its flight strays from it; chosen.
-"""
-
-_GOOD_COST = 1.5
-"""The `Schedule.cost`, m, from which no better parameters are tried.
-
-Raised from 1.2, to spend less time; repeats of a recorded flight differ by up to 0.4 m rms.
-"""
+# Chosen; what a change costs is not measured.
+_SPLINE_SPACING = 10.0  # the least distance of spline waypoints, m
+_SPLINE_TIMES = (2.0, 3.0)  # least times between spline waypoints to try, s
+_BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the acceleration
+_PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
+_GOOD_COST = 1.5  # the `Schedule.cost`, m, from which nothing better is looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,7 @@ legs whose speeds hardly differ share one, and values are rounded to what is sen
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,32 +18,17 @@ from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
 from faao_mav.vector import lengths
 
-_MOST_WAYPOINTS = 24
-"""The most waypoints that splitting legs leads to; the path itself may take more."""
-
-_OVERSPEED = 1.1
-"""The greatest commanded speed as a share of the plan's, where the aircraft falls behind."""
-
+# The shortest wait at the first waypoint, s. After a hold of 1 s ArduCopter is still drifting and
+# leaves 0.4 to 0.75 s late, measured in its simulator.
 _FIRST_WAIT = 6.0
-"""The shortest wait at the first waypoint, s.
 
-After a hold of 1 s ArduCopter is still drifting and leaves 0.4 to 0.75 s late, in its simulator.
-"""
-
-_LAST_WAIT = 3.0
-"""The shortest wait at w_F while speeds are fitted, s: the aircraft comes to rest there."""
-
-_ROUNDS = 5
-"""The most rounds of splitting legs, and of moving waypoints."""
-
-_WORTHWHILE = 0.98
-"""The share of its cost below which a round has to bring a schedule for another to follow."""
-
-_SPEED_SHARE = 0.85
-"""The share of the plan's speed at a split for which both parts of the leg must be long enough."""
-
-_MOVE_SHARE = 0.8
-"""The share of its offset from the plan by which a waypoint is moved the other way."""
+_LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
+_MOST_WAYPOINTS = 24  # the most that splitting legs leads to; the path itself may take more
+_OVERSPEED = 1.1  # the greatest speed over the plan's, where the aircraft falls behind
+_ROUNDS = 5  # the most rounds of splitting legs, and of moving waypoints
+_WORTHWHILE = 0.98  # the largest ratio of the costs after and before a change that is kept
+_SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
+_MOVE_SHARE = 0.8  # of its offset from the plan by which a waypoint is moved the other way
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,22 +52,18 @@ class CopterScheduler(Scheduler):
         if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
             top_speed *= _OVERSPEED
             best = self.fitted(best.route, top_speed)
-        for _ in range(_ROUNDS):
-            finer = self._with_splits(best, top_speed)
-            if finer is None:
-                break
-            best = finer
-        for _ in range(_ROUNDS):
-            if best.deviation.path <= self.tolerance and not best.route.splines.any():
-                break
-            moved = self._with_moves(best, top_speed)
-            if moved.cost > _WORTHWHILE * best.cost:
-                break
-            best = moved
+        for changes in (self._splits, self._moves):
+            for _ in range(_ROUNDS):
+                tried = (self.fitted(route, top_speed) for route in changes(best))
+                good = (each for each in tried if each.cost <= _WORTHWHILE * best.cost)
+                better = next(good, None)
+                if better is None:
+                    break
+                best = better
         return self.rounded(self.shared(best, top_speed), top_speed)
 
-    def _with_splits(self, schedule: Schedule, top_speed: float) -> Schedule | None:
-        """Return `schedule` with the legs split that are off by too much, None if that is no use.
+    def _splits(self, schedule: Schedule) -> Iterator[Route]:
+        """Yield the route with all legs split that are off by too much, with half, with one.
 
         A leg may become too short for its speed: then fewer splits can be better than all.
         """
@@ -91,11 +73,7 @@ class CopterScheduler(Scheduler):
                 chosen = np.array(sorted(times[:count]))
                 at = np.searchsorted(route.arrivals, chosen)
                 positions = np.column_stack([np.interp(chosen, self.t, x) for x in self.w.T])
-                split = route.insert(at, positions, chosen, route.speeds[at - 1])
-                finer = self.fitted(split, top_speed)
-                if finer.cost <= _WORTHWHILE * schedule.cost:
-                    return finer
-        return None
+                yield route.insert(at, positions, chosen, route.speeds[at - 1])
 
     def _split_times(self, schedule: Schedule) -> list[float]:
         """Return the plan's times, s, at which legs that are off by too much are best split.
@@ -137,16 +115,14 @@ class CopterScheduler(Scheduler):
             result &= length >= np.maximum(legs.shortest_leg(speed), legs.least)
         return result
 
-    def _with_moves(self, schedule: Schedule, top_speed: float) -> Schedule:
-        """Return `schedule` with waypoints moved against the aircraft's offset from the plan.
+    def _moves(self, schedule: Schedule) -> Iterator[Route]:
+        """Yield the route with waypoints moved, if the path is too far off or has splines.
 
-        ArduPilot's swings wide in splines, for it is not told what turning takes; PX4's cuts
-        corners with wide acceptance radii.
+        ArduPilot's aircraft swings wide in splines, for it is not told what turning takes; PX4's
+        cuts corners with wide acceptance radii.
         """
         route = schedule.route
-        movable = (route.splines | (route.radii > 0)) & (route.waits == 0)
-        points = np.arange(route.first + 1, route.last)
-        points = points[movable[points]]
-        positions = route.positions.copy()
-        positions[points] -= _MOVE_SHARE * self.offsets(schedule, points)
-        return self.fitted(replace(route, positions=positions), top_speed)
+        if schedule.deviation.path > self.tolerance or route.splines.any():
+            movable = (route.splines | (route.radii > 0)) & (route.waits == 0)
+            points = np.arange(route.first + 1, route.last)
+            yield self.moved(schedule, points[movable[points]], _MOVE_SHARE)

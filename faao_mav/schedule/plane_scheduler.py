@@ -6,7 +6,7 @@ speeds are fitted. It cannot wait, and it is slow to change its speed: time that
 always make up for.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,14 +14,11 @@ from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
 
-_MOVES = 12
-"""Times that the waypoints are moved; chosen, what more would bring is not measured."""
+_MOVES = 12  # times that the waypoints are moved; chosen, what more would bring is not measured
 
+# The share of its offset from the plan by which a waypoint is moved the other way: with more,
+# neighbouring waypoints correct the same offset and overdo it.
 _MOVE_SHARE = 0.5
-"""The share of its offset from the plan by which a waypoint is moved the other way.
-
-With more, neighbouring waypoints correct the same offset and overdo it.
-"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,11 +28,9 @@ class PlaneScheduler(Scheduler):
     def _first(self, route: Route) -> Schedule:
         """Return `route` with the waypoints that keep the path best, at the plan's speeds."""
         points = np.arange(route.first + 1, route.last + 1)
-        positions = route.positions.copy()
         schedule = best = self.flight(route)
         for _ in range(_MOVES):
-            positions[points] -= _MOVE_SHARE * self.offsets(schedule, points)
-            schedule = self.flight(replace(route, positions=positions.copy()))
+            schedule = self.flight(self.moved(schedule, points, _MOVE_SHARE))
             if schedule.cost < best.cost:
                 best = schedule
         return best

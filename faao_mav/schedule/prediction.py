@@ -9,7 +9,7 @@ from faao_mav.errors import InputError
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Rates, Solution
 from faao_mav.schedule.conversion import Conversion
-from faao_mav.schedule.schedule import deviation, lateness, positions_at
+from faao_mav.schedule.schedule import deviation, positions_at
 from faao_mav.vector import lengths
 
 
@@ -52,10 +52,7 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     begins. They increase.
     """
     at = positions_at(solution.t, t, w)
-    late = lateness(solution.t, solution.w, t, w, solution.plan.mission.path_tolerance)
-    # a path flown late is the same path: it counts up to w_F
-    within = (t >= solution.t[0]) & (t <= solution.t[-1] + max(0.0, late))
-    errors = deviation(solution.w, at, w[within] if within.any() else at, late)
+    errors = deviation(solution.t, solution.w, t, w, solution.plan.mission.path_tolerance)
     I_U, I_G = delivered(solution, at)
     near_U, near_G = delivered(solution, at, nearest_slots(solution, at))
     return Prediction(
@@ -63,7 +60,7 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
         I_U=I_U,
         I_G=I_G,
         by_position=Rates(float(np.mean(near_U)), float(np.mean(near_G))),
-        duration=solution.plan.flight.duration + late,
+        duration=solution.plan.flight.duration + errors.late,
         max_path_error=errors.path,
         max_position_error=errors.max,
         rms_position_error=errors.rms,

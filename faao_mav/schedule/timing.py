@@ -18,45 +18,27 @@ from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.schedule.schedule import LATE_WEIGHT, Clock
 from faao_mav.vehicle import CopterModel, FlightPath
 
-MOST_LEAD = 2.0
-"""The longest time by which the aircraft sets out before the plan, s."""
+MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the plan, s
+SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
 
-SHORTEST_HOLD = 1.0
-"""The shortest wait at a hover, s: an autopilot that is not told to wait flies through."""
-
+# Steps of the finite differences, m/s and s: above the predictions' numerical noise, and below what
+# changes their slope.
 _SPEED_DIFFERENCE, _WAIT_DIFFERENCE = 0.02, 0.05
-"""Steps of the finite differences, m/s and s: above the predictions' numerical noise, below what
-changes their slope."""
 
-_STEP = 0.25
-"""Seconds between the samples of a predicted flight."""
+_STEP = 0.25  # seconds between the samples of a predicted flight
+_SAMPLES = 400  # the most instants at which a predicted flight is compared with the plan
+_ITERATIONS = 12  # the most steps of a fit
+_DAMPINGS = 10.0 ** np.array([-4, -2, -1, 0, 2])  # to try, of the diagonal of the squared slopes
+_LEAST_GAIN = 0.05  # the share of the sum of squares that a step saves for another one to follow
+_MOST_LATE = 5.0  # the lateness, s, beyond which more of it costs no more
+_CRAWL = 0.5  # the least speed, m/s, to which a leg is slowed that is planned to be faster
 
-_SAMPLES = 400
-"""The most instants at which a predicted flight is compared with the plan."""
-
-_ITERATIONS = 12
-"""The most steps of a fit."""
-
-_DAMPINGS = 10.0 ** np.array([-4, -2, -1, 0, 2])
-"""The dampings that are tried, relative to the diagonal of the squared slopes."""
-
-_LEAST_GAIN = 0.05
-"""The share by which a step has to lessen the sum of squares for another one to follow."""
-
+# Errors in the last seconds of the plan weigh more by a factor: they decide when it is over.
 _FINAL_SECONDS, _FINAL_WEIGHT = 4.0, 3.5
-"""Errors in the last seconds of the plan weigh more by this factor: they decide when it is over."""
 
-_MOST_LATE = 5.0
-"""The lateness at the end beyond which more of it costs no more, s."""
-
-_CRAWL = 0.5
-"""The least speed, m/s, to which legs are slowed whose planned speed is not below it already."""
-
+# Metres of error that 1 m/s between a fitted speed and the initial one costs: it keeps speeds that
+# hardly matter where they are.
 _SPEED_PULL = 0.05
-"""Metres of error that 1 m/s between a fitted speed and the initial one costs.
-
-It keeps speeds that hardly matter where they are.
-"""
 
 
 def fit(

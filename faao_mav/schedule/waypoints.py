@@ -12,50 +12,21 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.vector import distances_to_segment, lengths
 
-SLOWEST = 0.1
-"""The least speed that is commanded for a leg, m/s; a slower trajectory hovers."""
+SLOWEST = 0.1  # the least speed that is commanded for a leg, m/s; a slower trajectory hovers
 
-_SHORTEST_HOVER = 3.0
-"""The shortest hover, s: a shorter stop is flown as slow flight."""
+# Shares of the path tolerance that together never exceed it: how far a sample may be from its leg,
+# a hover's radius (its samples are within two radii of its waypoint), and how far apart two hovers
+# may be that become one.
+LEG_SHARE, _HOVER_SHARE, _MERGE_SHARE = 0.9, 0.45, 0.05
 
-_SPEED_WINDOW = 1.0
-"""The time over which the speed that tells a hover is averaged, s.
-
-It hides the chatter of a trajectory's samples and is short against an acceleration from rest.
-"""
-
-_WIDEST_HOVER = 1.0
-"""The largest radius of a hover, m, however large the path tolerance."""
-
-_HOVER_SHARE = 0.45
-"""The largest radius of a hover as a share of the path tolerance.
-
-Samples of a hover are within two radii of its waypoint, so within 0.9 of the tolerance.
-"""
-
-LEG_SHARE = 0.9
-"""The largest distance of a sample from its leg as a share of the path tolerance."""
-
-_MERGE_SHARE = 0.05
-"""The largest distance of two hovers that become one waypoint as a share of the path tolerance.
-
-With the shares of hovers and legs the tolerance is used up and never exceeded.
-"""
-
-_SAME_POINT = 1e-3
-"""The distance, m, within which both ends of a trajectory are one waypoint."""
-
-_BISECTIONS = 8
-"""Halvings of the tolerance that evens out the legs: it is found to 1/256 of itself."""
-
-_BEND_SAMPLING = 1.0
-"""The distance of the points at which a path's bends are measured, m."""
-
-_SPLINE_TURN = 0.3
-"""The largest change of heading between two spline waypoints, rad, where spacing allows."""
-
-_SPARSEST = 2.0
-"""The largest distance of spline waypoints on straight parts as a multiple of their spacing."""
+_WIDEST_HOVER = 1.0  # the largest radius of a hover, m, however large the path tolerance
+_SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
+_SPEED_WINDOW = 1.0  # s, over which a speed is averaged: it hides a trajectory's chatter
+_SAME_POINT = 1e-3  # the distance, m, within which both ends of a trajectory are one waypoint
+_BISECTIONS = 8  # halvings of the tolerance that evens out legs: it is found to 1/256
+_BEND_SAMPLING = 1.0  # the distance of the points, m, at which a path's bends are measured
+_SPLINE_TURN = 0.3  # the largest turn between spline waypoints, rad, where their spacing allows
+_SPARSEST = 2.0  # the largest distance of spline waypoints as a multiple of their spacing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
