@@ -24,7 +24,7 @@ _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class CheckedFile:
     """A check of the mission in the file `source`.
 
     `chosen_by` says what told the autopilot and the type of vehicle.
@@ -35,14 +35,14 @@ class Verdict:
     check: Check
 
 
-def as_dict(verdict: Verdict) -> dict[str, Any]:
+def as_dict(checked: CheckedFile) -> dict[str, Any]:
     """Return the JSON object of `--json`; seconds, metres, bit/s/Hz."""
-    check, vehicle = verdict.check, verdict.check.vehicle
+    check, vehicle = checked.check, checked.check.vehicle
     predicted = None
     if check.track is not None:
         predicted = {"duration": float(check.track.t[-1]), "calibrated": not vehicle.type.caveat}
     return {
-        "mission": str(verdict.source),
+        "mission": str(checked.source),
         "items": len(check.mission.items),
         "autopilot": vehicle.autopilot,
         "type": vehicle.kind,
@@ -73,13 +73,13 @@ def rules_as_dict(rules: Sequence[Rule]) -> dict[str, Any]:
     }
 
 
-def show(verdict: Verdict, console: Console) -> None:
+def show(checked: CheckedFile, console: Console) -> None:
     """Print what was found: a table on a terminal, else one line a finding."""
-    check, vehicle = verdict.check, verdict.check.vehicle
+    check, vehicle = checked.check, checked.check.vehicle
     _line(
         console,
-        f"{verdict.source}: {len(check.mission.items)} items, for "
-        f"{vehicle.type.family.name} and a {vehicle.kind} ({verdict.chosen_by}); "
+        f"{checked.source}: {len(check.mission.items)} items, for "
+        f"{vehicle.type.family.name} and a {vehicle.kind} ({checked.chosen_by}); "
         f"parameters: {vehicle.source if vehicle.parameters else 'defaults'}",
     )
     for label, text in check_lines(check):

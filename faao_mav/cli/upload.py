@@ -95,25 +95,20 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
         "lists": [
             {
                 "list": part.part.name.lower(),
-                "items": part.items,
-                "verdict": part.verdict,
-                "result": part.result,
-                "attempts": part.attempts,
-                "opaque_id": part.opaque_id,
+                **_fields(part, "items", "verdict", "result", "attempts", "opaque_id"),
                 "differences": [
-                    {
-                        "item": each.item,
-                        "field": each.field,
-                        "sent": _plain(each.sent),
-                        "found": _plain(each.found),
-                        "kind": each.kind,
-                    }
+                    _fields(each, "item", "field", "sent", "found", "kind")
                     for each in part.differences
                 ],
             }
             for part in report.parts
         ],
     }
+
+
+def _fields(record: object, *names: str) -> dict[str, Any]:
+    """Return fields of `record` by name, as JSON takes them."""
+    return {name: _plain(getattr(record, name)) for name in names}
 
 
 def _dropped(part: "PartReport") -> list[str]:
@@ -136,7 +131,7 @@ def _part_line(part: "PartReport") -> str:
 
 
 def _plain(value: Any) -> Any:
-    """NaN, which JSON does not have, is null."""
+    """Return `value` as JSON takes it: NaN, which JSON does not have, is None."""
     if isinstance(value, tuple):
         return [_plain(each) for each in value]
     return None if value != value else value

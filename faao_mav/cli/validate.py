@@ -23,7 +23,7 @@ from faao_mav.errors import InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
 if TYPE_CHECKING:
-    from faao_mav.cli.findings import Verdict
+    from faao_mav.cli.findings import CheckedFile
     from faao_mav.optimizer.solution import Solution
     from faao_mav.plan.autopilots import Autopilot, Kind
 
@@ -92,11 +92,11 @@ def validate(
     check_apart({"--report": report}, read)
     solution = _planned(plan_file, solution_file)
     limits = (max_duration, max_distance, max_altitude)
-    verdict = _judge(mission_file, solution, (autopilot, kind, parameters), limits)
+    checked = _judge(mission_file, solution, (autopilot, kind, parameters), limits)
     if report is not None:
-        _write_report(report, verdict, solution)
-    _show(verdict, as_json)
-    if verdict.check.of(Level.ERROR) or (strict and verdict.check.of(Level.WARNING)):
+        _write_report(report, checked, solution)
+    _show(checked, as_json)
+    if checked.check.of(Level.ERROR) or (strict and checked.check.of(Level.WARNING)):
         raise typer.Exit(1)
 
 
@@ -146,8 +146,8 @@ def _judge(
     solution: "Solution | None",
     asked: "tuple[Autopilot | None, Kind | None, Path | None]",
     given: tuple[float | None, float | None, float | None],
-) -> "Verdict":
-    from faao_mav.cli.findings import Verdict
+) -> "CheckedFile":
+    from faao_mav.cli.findings import CheckedFile
     from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.validate import Limits
@@ -160,23 +160,23 @@ def _judge(
     if vehicle.type.flight_model is not None:
         vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement
     found = check(file.mission, vehicle, limits=limits, solution=solution)
-    return Verdict(mission_file, chosen_by, found)
+    return CheckedFile(mission_file, chosen_by, found)
 
 
-def _write_report(report: Path, verdict: "Verdict", solution: "Solution | None") -> None:
+def _write_report(report: Path, checked: "CheckedFile", solution: "Solution | None") -> None:
     from faao_mav.report import render_report
     from faao_mav.workflow import Result
 
-    about = Result(solution, check=verdict.check) if solution is not None else verdict.check
-    write_whole(report, render_report(about, title=verdict.source.name).encode())
+    about = Result(solution, check=checked.check) if solution is not None else checked.check
+    write_whole(report, render_report(about, title=checked.source.name).encode())
 
 
-def _show(verdict: "Verdict", as_json: bool) -> None:
+def _show(checked: "CheckedFile", as_json: bool) -> None:
     from rich.console import Console
 
     from faao_mav.cli.findings import as_dict, show
 
     if as_json:
-        typer.echo(json.dumps(as_dict(verdict), allow_nan=False))
+        typer.echo(json.dumps(as_dict(checked), allow_nan=False))
     else:
-        show(verdict, Console())
+        show(checked, Console())

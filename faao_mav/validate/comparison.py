@@ -15,7 +15,7 @@ from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.link import LinkCheck, Stretch
 from faao_mav.vector import lengths
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track
 
 _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 """Seconds by which the aircraft may set out before the plan, of which the best fit is taken.
