@@ -6,13 +6,24 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from conftest import MISSIONS, SMALL, MakePlan, edited
+from conftest import MISSIONS, SMALL, MakePlan, edited, free_port
 
 import faao_mav.study.sweep
 import faao_mav.validate.check
 import faao_mav.workflow
-from faao_mav import parse_plan, plan_mission, read_mission, read_parameters, read_plan
+from faao_mav import (
+    Vehicle,
+    check,
+    parse_plan,
+    plan_mission,
+    read_mission,
+    read_parameters,
+    read_plan,
+    upload,
+)
 from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mavlink.mock.serve import running
 from faao_mav.workflow import Result, mission_files, optimize_plan
 
 QUICK = {"radio.fading": "none", "optimizer.starts": ["straight"]}
@@ -55,6 +66,21 @@ def test_a_mission_comes_with_the_parameters_that_it_is_timed_for(
     assert read_parameters(beside) == result.conversion.parameters
     assert result.write(mission) == (mission, beside)  # its own may be replaced
     assert mission_files(mission, result.solution.plan) == (mission, beside)
+
+
+def test_what_is_written_is_in_time_and_goes_to_the_vehicle_whole(tmp_path: Path) -> None:
+    lively = {"vehicle.max_speed": 8, "flight.end": [120, 0], "flight.duration": 40}
+    result = plan_mission(parse_plan(edited(SMALL, QUICK | lively)))
+    out, beside = result.write(tmp_path / "m.plan")
+    mission, loaded = read_mission(out), Vehicle(parameters=read_parameters(beside))
+    checked = check(mission, loaded, solution=result.solution)
+    assert [finding.rule for finding in checked.findings if finding.level != "note"] == []
+    without = check(mission, Vehicle(), solution=result.solution)
+    assert "link-late" in {finding.rule for finding in without.findings}
+    port = free_port()
+    mock = MockAutopilot(behaviour_of("ardupilot"), beat=0.1)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        assert upload(mission, f"udpout:127.0.0.1:{port}").verified
 
 
 def test_the_vehicles_own_parameters_are_not_replaced(result: Result, tmp_path: Path) -> None:
