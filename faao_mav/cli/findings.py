@@ -21,6 +21,7 @@ from faao_mav.validate import Level, Rule
 from faao_mav.validate.check import Check
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
+"""How a terminal shows each level."""
 
 
 @dataclass(frozen=True, slots=True)

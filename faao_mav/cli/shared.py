@@ -21,6 +21,7 @@ def flag(name: str, text: str) -> Any:
 
 
 VEHICLE = "The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD."
+"""The help of an option for a vehicle's connection."""
 
 Number: TypeAlias = float | None
 File: TypeAlias = Path | None

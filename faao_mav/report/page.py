@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+"""The page's Content-Security-Policy: its own style, and nothing from elsewhere."""
+
 _PARTS = ("faao-mav", "numpy", "scipy", "matplotlib")
+"""The packages whose versions the page names."""
 
 
 def render_report(about: Result | Check, *, title: str = "") -> str:

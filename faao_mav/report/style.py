@@ -19,11 +19,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
+"""Colours of text, of what is secondary, of grids and of the paper; a page replaces them."""
+
 SERIES = ("#1769aa", "#c2500a", "#16825d", "#9a3d9c", "#8a6d00", "#c03352", "#54606e")
 """Colours of curves in fixed order: the colour-blind tell them apart, on light and dark paper."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+"""Markers of curves, in the order of `SERIES`."""
 
 FORMATS = (".png", ".svg", ".pdf")
+"""What the name of a figure may end in."""
 
 _ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
     colour: f"--s{k}" for k, colour in enumerate(SERIES)
