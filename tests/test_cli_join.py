@@ -166,7 +166,7 @@ def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: b
 
 def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:
     port = free_port()
-    mock = MockAutopilot(home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1)
     mock.armed = True
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock, f"udpin:127.0.0.1:{port}"):
