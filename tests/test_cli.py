@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from conftest import SMALL, edited
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,6 +16,7 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.mission.formats import read_mission, read_mission_file
+from faao_mav.plan.yaml_text import load_yaml
 from faao_mav.vehicle.parameter_file import read_parameters
 
 
@@ -249,7 +249,7 @@ VALUES = st.one_of(
 def mutations(draw: st.DrawFn) -> dict[str, Any]:
     paths = [
         f"{section}.{key}"
-        for section, keys in yaml.safe_load(TINY).items()
+        for section, keys in load_yaml(TINY, "test").items()
         for key in [*keys, "extra"]
     ]
     paths += ["radio.relay.power_dbm", "radio.relay.antennas", "radio.modulation", "radio.fading",

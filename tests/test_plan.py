@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from conftest import MISSIONS, SMALL, edited
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import Plan, parse_plan, read_plan
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 NAN, INF = float("nan"), float("inf")
 
@@ -81,6 +81,24 @@ def test_degrees_become_local_metres() -> None:
 def test_exponents_are_numbers(written: str) -> None:
     plan = parse_plan(SMALL + f"optimizer: {{tolerance: {written}}}\n")
     assert plan.optimizer.tolerance == 1e-4
+
+
+def test_values_are_those_of_yaml_1_2() -> None:
+    text = "{a: 010, b: no, c: 2:30, d: 2024-01-01, e: -.inf, f: .5, g: 0x1F, h: 1_0, i: ~, <<: =}"
+    assert load_yaml(text, "plan") == {
+        "a": 10, "b": "no", "c": "2:30", "d": "2024-01-01", "e": -INF, "f": 0.5, "g": "0x1F",
+        "h": "1_0", "i": None, "<<": "=",
+    }  # fmt: skip
+    assert load_yaml("%YAML 1.1\n---\na: 010\n", "plan") == {"a": 10}
+
+
+@given(st.dictionaries(st.text(), st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+    lambda part: st.lists(part, max_size=3) | st.dictionaries(st.text(), part, max_size=3),
+    max_leaves=8,
+)))  # fmt: skip
+def test_what_is_dumped_is_loaded(data: dict[str, Any]) -> None:
+    assert load_yaml(dump_yaml(data), "plan") == data
 
 
 @pytest.mark.parametrize(
@@ -153,14 +171,14 @@ def test_positions_with_swapped_degrees_in_range_are_recognised() -> None:
                                  "vehicle.max_acceleration", "radio.base_station.position",
                                  "radio.ground_user.position"])  # fmt: skip
 def test_required_keys(key: str) -> None:
-    data = yaml.safe_load(SMALL)
+    data = load_yaml(SMALL, "test")
     *parents, last = key.split(".")
     section = data
     for parent in parents:
         section = section[parent]
     del section[last]
     with pytest.raises(PlanError, match=rf"{key}: missing; give "):
-        parse_plan(yaml.safe_dump(data))
+        parse_plan(dump_yaml(data))
 
 
 @pytest.mark.parametrize(
@@ -233,8 +251,14 @@ def test_shortest_duration_depends_on_the_ends(
         ("- 1\n", "not list"),
         ("flight: [1\n", "line 2"),
         ("a: 1\nb: 2\na: 3\n", "line 3, column 1: not valid YAML: the key 'a' stands twice"),
-        ("a: &x 1\nb: *x\n", "line 2: aliases"),
+        ("a: &x 1\nb: *x\n", "line 2, column 4: aliases"),
         ("{" * 1000, "nested more than 20 deep"),
+        ("[" * 900_000, "nested more than 20 deep"),
+        ('a: !!float ""\n', "line 1, column 4: tags (tag:yaml.org,2002:float) are not used"),
+        ("a: !!bool maybe\n", "line 1, column 4: tags (tag:yaml.org,2002:bool) are not used"),
+        ("a: !!timestamp abc\n", "line 1, column 4: tags"),
+        ("a: !mine {b: 1}\n", "line 1, column 4: tags (!mine) are not used in plans"),
+        ("a: {b: 1}\nc: {<<: *a}\n", "line 2, column 9: aliases"),
         ("? [a]\n: 1\n", "a key has to be a word"),
         ("a: {1: 2}\n", "line 1, column 5: not valid YAML: a key has to be a word, not 1"),
         ("a: 1\n~: 2\n", "line 2, column 1: not valid YAML: a key has to be a word, not ~"),
@@ -298,7 +322,7 @@ LEAVES = st.one_of(
 @st.composite
 def mutated_plans(draw: st.DrawFn) -> str:
     """The small plan with a few keys removed, added, or given another value."""
-    data = yaml.safe_load(SMALL)
+    data = load_yaml(SMALL, "test")
     for _ in range(draw(st.integers(1, 3))):
         section = data
         while True:
@@ -313,7 +337,7 @@ def mutated_plans(draw: st.DrawFn) -> str:
                 break
         else:
             section[key] = draw(LEAVES)
-    return yaml.safe_dump(data)
+    return dump_yaml(data)
 
 
 @given(mutated_plans())

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from faao_mav.errors import PlanError
@@ -15,7 +14,7 @@ from faao_mav.plan import model, schema
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.messages import describe, quote
 from faao_mav.plan.reach import reach, shortest_duration
-from faao_mav.plan.yaml_text import MAX_CHARACTERS, load_yaml
+from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
 
 
 def read_plan(path: str | Path, *, method: str | None = None) -> model.Plan:
@@ -35,7 +34,7 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
         section = data.setdefault("optimizer", {})
         if isinstance(section, dict):
             section["method"] = method
-        text = yaml.safe_dump(data, sort_keys=False)
+        text = dump_yaml(data)
     try:
         section_tree = schema.PlanSection.model_validate(data)
     except ValidationError as error:
