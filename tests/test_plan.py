@@ -1,6 +1,7 @@
 """`plan.yaml`: what is read, and what bad input gets."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.plan import Plan, parse_plan, read_plan
+from faao_mav.plan import Plan, parse_plan, read_plan, reference
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 NAN, INF = float("nan"), float("inf")
@@ -114,7 +115,7 @@ def test_what_is_dumped_is_loaded(data: dict[str, Any]) -> None:
         ({"flight.altitude": 0}, ["flight.altitude", "above 0", "no bound"]),
         ({"flight.altitude": -40}, ["flight.altitude", "-40", "above 0"]),
         ({"radio.relay.antennas": 0}, ["radio.relay.antennas", "0", "1 to 64"]),
-        ({"radio.relay.antennas": True}, ["radio.relay.antennas", "True"]),
+        ({"radio.relay.antennas": True}, ["radio.relay.antennas", "true is not accepted"]),
         ({"radio.base_station.antennas": 2.5}, ["radio.base_station.antennas", "2.5"]),
         ({"radio.modulation": "QPSK"}, ["radio.modulation", "'QPSK'", "qpsk"]),
         ({"radio.modulaton": "qpsk"}, ["radio.modulaton", "did you mean modulation?"]),
@@ -366,3 +367,24 @@ def test_any_cut_or_insertion_gives_a_plan_or_one_error(at: int, cut: int, new: 
         parse_plan(SMALL[:at] + new + SMALL[at + cut :])
     except PlanError as error:
         assert str(error).startswith("plan: ")
+
+
+def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
+    keys = reference()
+    assert all(key.description and key.accepted for key in keys.values())
+    assert [path for path, key in keys.items() if key.required and not key.inside] == [
+        "site.origin.latitude", "site.origin.longitude", "vehicle.max_speed",
+        "vehicle.max_acceleration", "flight.start", "flight.end", "flight.altitude",
+        "flight.duration", "radio.base_station.position", "radio.ground_user.position",
+        "fence.exclusion.center", "fence.exclusion.radius", "fence.exclusion.polygon",
+    ]  # fmt: skip
+    written = {path: load_yaml(f"x: {key.default}", path)["x"] for path, key in keys.items()
+               if key.default}  # fmt: skip
+    plan = parse_plan(SMALL)
+    changed = {path for path in written if path in SMALL_KEYS}
+    full = parse_plan(edited(SMALL, {k: v for k, v in written.items() if k not in changed}))
+    assert replace(full, text="", study=None) == replace(plan, text="")
+
+
+SMALL_KEYS = {"site.origin.elevation", "flight.time_step", "radio.base_station.power_dbm",
+              "radio.relay.power_dbm"}  # fmt: skip

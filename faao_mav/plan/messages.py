@@ -1,118 +1,65 @@
-"""What pydantic found wrong, as lines that name key, value and what is accepted."""
+"""What pydantic found wrong with a plan, as lines that name key, value and what is accepted."""
 
 import difflib
-from collections.abc import Iterator, Sequence
-from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from collections.abc import Iterator
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import ValidationError
+
+from faao_mav.errors import quote
+from faao_mav.plan.keys import reference
 
 MAX_LINES = 6
-_MAX_SHOWN = 60
+"""Lines of a message: chosen to fit a small terminal."""
 
 
-def describe(error: ValidationError, schema: type[BaseModel], source: str) -> str:
+def describe(error: ValidationError, source: str) -> str:
     """Return one line per finding (at most `MAX_LINES`), each naming `source`."""
-    lines = list(dict.fromkeys(_lines(error, schema)))
+    lines = list(dict.fromkeys(_lines(error)))
     more = len(lines) - MAX_LINES
     if more > 0:
         lines = [*lines[:MAX_LINES], f"and {more} more"]
     return "\n".join(f"{source}: {line}" for line in lines)
 
 
-def quote(value: object) -> str:
-    """Return `value` as it may be shown in one line."""
-    if isinstance(value, dict | list) and not value:
-        return "nothing"
-    text = "null" if value is None else repr(value)
-    return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "..."
-
-
-def _lines(error: ValidationError, schema: type[BaseModel]) -> Iterator[str]:
+def _lines(error: ValidationError) -> Iterator[str]:
     for detail in error.errors(include_url=False):
-        path, models, description = _walk(detail["loc"], schema)
-        yield f"{path}: {_problem(detail, models, description, schema)}"
+        # a step in angle brackets is pydantic's choice among several sections
+        steps = [step for step in detail["loc"] if not str(step).startswith("<")]
+        place = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps)
+        value, kind = detail["input"], detail["type"]
+        keys = [step for step in steps if isinstance(step, str)]
+        accepted = _accepted(*keys)
+        if kind == "missing":
+            problem = f"missing; give {accepted}"
+        elif kind == "unexpected_keyword_argument":
+            problem = f"unknown key; {_nearest(*keys)}"
+        elif kind == "told":
+            problem = detail["msg"]
+        elif kind == "value_error":
+            problem = f"{quote(value)}: {detail['ctx']['error']}; give {accepted}"
+        elif kind == "finite_number":
+            problem = f"{value} is not a finite number; give {accepted}"
+        else:
+            problem = f"{quote(value)} is not accepted; give {accepted}"
+        yield f"{place.removeprefix('.')}: {problem}"
 
 
-def _problem(
-    detail: ErrorDetails,
-    model: type[BaseModel] | None,
-    description: str,
-    schema: type[BaseModel],
-) -> str:
-    kind, value = detail["type"], detail["input"]
-    if kind == "missing":
-        return f"missing; give {description}"
-    if kind == "extra_forbidden":
-        return f"unknown key; {_nearest(str(detail['loc'][-1]), model, schema)}"
-    if kind == "value_error":
-        reason = str(detail["ctx"]["error"])
-        return f"{quote(value)}: {reason}; give {description}"
-    if kind == "finite_number":
-        return f"{value} is not a finite number; give {description}"
-    return f"{quote(value)} is not accepted; give {description}"
+def _accepted(*keys: str) -> str:
+    """Return what the key at a path accepts, or the nearest known one above it."""
+    while keys and ".".join(keys) not in reference():
+        keys = keys[:-1]
+    return reference()[".".join(keys)].accepted if keys else "a mapping"
 
 
-def _nearest(key: str, model: type[BaseModel] | None, schema: type[BaseModel]) -> str:
-    known = sorted(model.model_fields) if model else []
-    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+def _nearest(*keys: str) -> str:
+    """Return where an unknown key may belong."""
+    *above, name = keys
+    section = reference().get(".".join(above))
+    known = sorted(section.inside if section else (k for k in reference() if "." not in k))
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]}?"
-    elsewhere = [path for path in paths(schema) if path.rsplit(".", 1)[-1] == key]
+    elsewhere = [path for path in reference() if path.rsplit(".", 1)[-1] == name]
     if elsewhere:
         return f"it belongs at {' or '.join(elsewhere)}"
     return f"known here: {', '.join(known)}"
-
-
-def paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Every key path below `model`."""
-    for name, field in model.model_fields.items():
-        yield prefix + name
-        for child in _models(field.annotation):
-            yield from paths(child, f"{prefix}{name}.")
-
-
-def _walk(
-    location: Sequence[int | str], schema: type[BaseModel]
-) -> tuple[str, type[BaseModel] | None, str]:
-    """Follow `location` through the schema.
-
-    Returns the key path as people write it, the model that holds the last key, and what that
-    key accepts.
-    """
-    path = ""
-    candidates: list[type[BaseModel]] = [schema]
-    holder: type[BaseModel] | None = None
-    description = "a mapping"
-    for step in location:
-        if isinstance(step, int):
-            path += f"[{step}]"
-            continue
-        named = next((m for m in candidates if m.__name__ == step), None)
-        if named is not None:  # the name of a union's member, not a key
-            candidates = [named]
-            continue
-        path += f".{step}" if path else str(step)
-        holder = candidates[0] if candidates else None
-        field = holder.model_fields.get(step) if holder else None
-        if field is None:
-            candidates = []
-            continue
-        candidates = list(_models(field.annotation))
-        description = field.description or _keys(candidates)
-    return path or "plan", holder, description
-
-
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    elif get_origin(annotation) in (Union, UnionType, list, Annotated):
-        for part in get_args(annotation):
-            yield from _models(part)
-
-
-def _keys(models: Sequence[type[BaseModel]]) -> str:
-    if not models:
-        return "another value"
-    return " or ".join(f"a mapping with {', '.join(m.model_fields)}" for m in models)
