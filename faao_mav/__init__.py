@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from faao_mav.mavlink import download, upload
     from faao_mav.mission import Mission, MissionItem
     from faao_mav.mission.formats import read_mission, render_mission
+    from faao_mav.mission.formats.parameter_file import read_parameters, render_parameters
     from faao_mav.mission.vehicle import Vehicle
     from faao_mav.optimizer.optimize import optimize
     from faao_mav.optimizer.pricing import price, saturation
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from faao_mav.plan import Plan, parse_plan, read_plan
     from faao_mav.schedule import to_mission
     from faao_mav.validate import Finding, Limits, LinkCheck
-    from faao_mav.vehicle.parameter_file import read_parameters, render_parameters
 
 _HOMES = {
     "FaaoError": "errors",
@@ -38,10 +38,10 @@ _HOMES = {
     "parse_plan": "plan",
     "price": "optimizer.pricing",
     "read_mission": "mission.formats",
-    "read_parameters": "vehicle.parameter_file",
+    "read_parameters": "mission.formats.parameter_file",
     "read_plan": "plan",
     "render_mission": "mission.formats",
-    "render_parameters": "vehicle.parameter_file",
+    "render_parameters": "mission.formats.parameter_file",
     "saturation": "optimizer.pricing",
     "save_solution": "optimizer.solution",
     "to_mission": "schedule",

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.mission.formats import read_mission, read_mission_file
+from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.plan.yaml_text import load_yaml
-from faao_mav.vehicle.parameter_file import read_parameters
 
 
 def run(*arguments: object) -> Any:
@@ -61,7 +61,7 @@ def test_the_mission_as_a_plan_of_qgroundcontrol_is_the_same(plan: Path, tmp_pat
     for name in ("m.waypoints", "m.plan", "m.kml"):
         assert run(plan, "--out", tmp_path / name, "--quiet").output == ""
     read = read_mission_file(tmp_path / "m.plan")
-    assert (read.autopilot, read.kind) == ("px4", "copter")
+    assert (read.firmware, read.vehicle_type) == (12, 2)
     assert read.mission == read_mission(tmp_path / "m.waypoints")
     assert "<LineString>" in (tmp_path / "m.kml").read_text()
 

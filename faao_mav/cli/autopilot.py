@@ -77,9 +77,9 @@ def autopilot(
         from faao_mav.mavlink.runner import predicted, serve
         from faao_mav.mavlink.transfer.protocol import Address
         from faao_mav.mavlink.transport import open_transport
+        from faao_mav.mission.formats.parameter_file import read_parameters
         from faao_mav.mission.vehicle import Vehicle
         from faao_mav.vehicle import flight_model
-        from faao_mav.vehicle.parameter_file import read_parameters
 
         values = {} if parameters is None else read_parameters(parameters)
         flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"

@@ -106,6 +106,7 @@ def _solve(
     from faao_mav.cli.progress import progress
     from faao_mav.cli.summary import Result
     from faao_mav.mission.formats import check_suffix, render_mission
+    from faao_mav.mission.formats.parameter_file import render_parameters
     from faao_mav.optimizer.optimize import optimize
     from faao_mav.optimizer.pricing import fresh_rates, price, saturation
     from faao_mav.optimizer.problem import build_problem
@@ -116,7 +117,7 @@ def _solve(
     from faao_mav.schedule.prediction import predict_delivery
     from faao_mav.validate import Limits
     from faao_mav.validate.check import check
-    from faao_mav.vehicle.parameter_file import parameter_path, render_parameters
+    from faao_mav.vehicle.files import PARAMETER_STYLE, parameter_path, plan_target
     from faao_mav.vehicle.recommend import candidates
 
     started = time.perf_counter()
@@ -163,7 +164,9 @@ def _solve(
             write_whole(precoders, precoder_table(solution).encode())
         if out is not None and tuned is not None:
             text = render_parameters(
-                conversion.parameters, read.vehicle.autopilot, header=f"{_FOR}{out.name}"
+                conversion.parameters,
+                PARAMETER_STYLE[read.vehicle.autopilot],
+                header=f"{_FOR}{out.name}",
             )
             write_whole(tuned, text.encode(errors="replace"))  # a name may be no Unicode
         if out is not None:
@@ -172,7 +175,7 @@ def _solve(
 
                 rendered = draw_mission(solution, conversion)
             else:
-                rendered = render_mission(conversion.mission, out, conversion.vehicle)
+                rendered = render_mission(conversion.mission, out, plan_target(conversion.vehicle))
             write_whole(out, rendered.encode())
         checked = check(
             conversion.mission,

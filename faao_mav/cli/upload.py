@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from faao_mav.cli.options import AllowArmed, AsJson, Component, Log, SigningKey, System, Wait
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.outcome import exit_status, note
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
@@ -41,12 +41,14 @@ def upload(
     with exit_status():
         from faao_mav.cli.transfer_progress import transfer_progress
         from faao_mav.mavlink.client import upload as run
-        from faao_mav.mission.formats import read_mission
+        from faao_mav.mission.formats import read_mission_file
 
-        mission = read_mission(mission_file)
+        file = read_mission_file(mission_file)
+        for line in file.warnings:
+            note(line)
         with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
             report = run(
-                mission,
+                file.mission,
                 to,
                 system=system,
                 component=component,

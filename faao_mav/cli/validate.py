@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.outcome import exit_status, note
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -144,6 +144,8 @@ def _judge(
         max_speed=plan.vehicle.max_speed if plan else None,
     )
     file = read_mission_file(mission_file)
+    for line in file.warnings:
+        note(line)
     vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
     if modelled(vehicle):
         flight_model(vehicle)  # a useless parameter is refused, not left out of the judgement

@@ -5,7 +5,7 @@ Read in their sources and measured on ArduCopter 4.7 and PX4 1.16 in simulation.
 
 from typing import TYPE_CHECKING
 
-from faao_mav.mission.rows import as_received, as_sent, home_item
+from faao_mav.mission.item import as_received, as_sent, home_item
 from faao_mav.vehicle.ardupilot.dialect import ARDUCOPTER, ARDUPLANE
 from faao_mav.vehicle.dialect import Dialect, Limit, SpeedAxis, SpeedChange
 from faao_mav.vehicle.px4.dialect import PX4

@@ -17,6 +17,7 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import read_mission, write_qgc_plan, write_wpl
 from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle.files import plan_target
 
 DATA = Path(__file__).parent.parent / "data" / "missions"
 
@@ -99,7 +100,7 @@ def test_mavsdk_imports_the_plan(client):
         ),
         (RallyPoint(47.25, 8.25, 40.0), RallyPoint(47.125, 8.125, 30.0)),
     )
-    text = write_qgc_plan(mission, Vehicle(autopilot))
+    text = write_qgc_plan(mission, plan_target(Vehicle(autopilot)))
     imported = raw.import_qgroundcontrol_mission_from_string(text)
 
     rows = imported.mission_items

@@ -12,7 +12,7 @@ from relay_flights import STEADY, dash_hover_dash, mission_of, plan_with
 
 from faao_mav.errors import MissionFileError
 from faao_mav.mission import Home, Mission, MissionItem
-from faao_mav.mission.formats import losses_in, read_mission, render_mission
+from faao_mav.mission.formats import losses_in, read_mission, read_mission_file, render_mission
 from faao_mav.mission.formats.wpl import read_wpl, write_wpl
 
 
@@ -44,7 +44,7 @@ missions = st.builds(Mission, st.lists(items(), max_size=6).map(tuple), st.none(
 @given(missions)
 def test_what_is_written_is_read_back_bit_for_bit(mission):
     # repr tells the sign of zero, which == does not.
-    assert repr(read_wpl(write_wpl(mission), "x")) == repr(mission)
+    assert repr(read_wpl(write_wpl(mission), "x").mission) == repr(mission)
 
 
 @STEADY
@@ -68,7 +68,7 @@ def test_what_is_not_set_is_written_as_0_and_told():
     nan = math.nan
     item = MissionItem(16, 3, (1.0, nan, 2.0, nan), nan, 8.5, nan)
     mission = Mission((READ.items[0], item), READ.home)
-    (_, read) = read_wpl(write_wpl(mission), "x").items
+    (_, read) = read_wpl(write_wpl(mission), "x").mission.items
     assert read == MissionItem(16, 3, (1.0, 0.0, 2.0, 0.0), 0.0, 8.5, 0.0)
     assert losses_in(mission, "x.txt") == [
         "not set (NaN) becomes 0: item 2 param2, item 2 param4, item 2 latitude, item 2 altitude"
@@ -120,7 +120,7 @@ READ = Mission((MissionItem(16, 3, x=47.5, y=8.6, z=50.0),), Home(47.4, 8.5, 400
     ],
 )
 def test_harmless_oddities_are_read(text):
-    read = read_wpl(text, "x")
+    read = read_wpl(text, "x").mission
     assert read.items == READ.items
     assert read.home == (None if "120" in text else READ.home)
 
@@ -159,10 +159,10 @@ def test_a_jump_goes_to_the_same_item_with_and_without_a_home_row():
     rows = write_wpl(mission).splitlines()
     target = int(float(rows[3].split("\t")[4]))
     assert rows[1 + target].split("\t")[3] == "16"
-    assert read_wpl("\n".join(rows), "x") == mission
+    assert read_wpl("\n".join(rows), "x").mission == mission
     bare = "QGC WPL 120\n" + "\n".join(rows[2:]).replace("1\t0", "0\t1", 1)
     bare = bare.replace("\n2\t", "\n1\t").replace("177\t1.", "177\t0.")
-    assert read_wpl(bare, "x").items == mission.items
+    assert read_wpl(bare, "x").mission.items == mission.items
 
 
 def with_field(index, value, row=ITEM):
@@ -186,7 +186,6 @@ def with_field(index, value, row=ITEM):
         ("\x00\x01\x02", r"line 1: '\x00\x01\x02'; expected"),
         (GOOD.replace("\t50\t1", "\t50"), "line 3: 11 fields; expected 12"),
         (GOOD.replace("\t50\t1", "\t50\t1\t0"), "line 3: 13 fields; expected 12"),
-        (with_field(0, "2"), "line 3, field index: '2'; expected 1: rows count up"),
         (with_field(0, "-1"), "field index: '-1'; expected a whole number from 0 to 65535"),
         (with_field(0, "1.0"), "field index: '1.0'; expected a whole number"),
         (with_field(1, "1"), "field current: '1'; expected 0: line 2 is already current"),
@@ -208,7 +207,7 @@ def with_field(index, value, row=ITEM):
         (with_field(10, "9" * 500), "field altitude: '9999999"),
         (with_field(11, "true"), "field autocontinue: 'true'; expected a whole number from 0"),
         (with_field(3, "22", HOME), "line 2, field command: '22'; expected 16: row 0 is the home"),
-        (with_field(2, "3", HOME), "line 2, field frame: '3'; expected 0: row 0 is the home"),
+        (with_field(2, "10", HOME), "line 2, field frame: '10'; expected 0: row 0 is the home"),
     ],
 )
 def test_damage_is_named(text, message):
@@ -218,17 +217,57 @@ def test_damage_is_named(text, message):
     assert len(str(caught.value)) < 250
 
 
+def rows(*indexes, item=ITEM):
+    return GOOD.replace(ITEM, "\n".join(f"{index}{item[1:]}" for index in indexes))
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        (rows(1, 2, 3), None),
+        (rows(1, 3, 4), "x: line 4, field index: '3': indexes do not count up; rows are taken in"),
+        (rows(1, 2, 2), "x: line 5, field index: '2': indexes do not count up"),
+        (rows(3, 2, 1), "x: line 3, field index: '3': indexes do not count up"),
+        (with_field(2, "3", HOME), "x: line 2, field frame: '3': row 0 is the home position; its "
+         "altitude is taken as above mean sea level"),
+    ],
+)  # fmt: skip
+def test_oddities_of_real_files_are_read_with_a_warning(text, warning, tmp_path):
+    read = read_wpl(text, "x")
+    assert read.mission.home == READ.home
+    assert read.mission.items == READ.items * (text.count("\n") - 2)
+    assert [w[: len(warning or "")] for w in read.warnings] == ([warning] if warning else [])
+    (tmp_path / "x.txt").write_text(text)
+    loader = MAVWPLoader()
+    assert loader.load(str(tmp_path / "x.txt")) == 1 + len(read.mission.items)
+
+
+def test_a_jump_among_rows_that_do_not_count_up_goes_by_their_order(tmp_path):
+    path = tmp_path / "x.txt"
+    path.write_text(rows(2, 4, 6) + "8\t0\t3\t177\t2\t1\t0\t0\t0\t0\t0\t1\n")
+    read = read_mission_file(path)
+    assert read.mission.items[-1].params[0] == 2
+    assert read.warnings == (
+        f"{path}: line 3, field index: '2': indexes do not count up; rows are taken in the file's "
+        "order, in which targets of DO_JUMP count too",
+    )
+    loader = MAVWPLoader()  # pymavlink numbers the rows anew, and leaves the target as it is
+    loader.load(str(path))
+    assert [loader.wp(k).seq for k in range(5)] == [0, 1, 2, 3, 4]
+    assert loader.wp(4).param1 == 2
+
+
 def test_coordinates_of_the_mission_frame_are_plain_parameters():
     text = with_field(2, "2").replace("47.5", "1000")
-    assert read_wpl(text, "x").items[0].x == 1000
+    assert read_wpl(text, "x").mission.items[0].x == 1000
 
 
 def reads_or_complains(text):
     try:
-        mission = read_wpl(text, "x")
+        mission = read_wpl(text, "x").mission
     except MissionFileError:
         return
-    assert repr(read_wpl(write_wpl(mission), "x")) == repr(mission)
+    assert repr(read_wpl(write_wpl(mission), "x").mission) == repr(mission)
 
 
 @STEADY

@@ -6,22 +6,20 @@ from typing import Literal, TypeAlias
 from faao_mav.errors import MissionFileError
 from faao_mav.files import read_text
 from faao_mav.mission.formats.losses import losses
-from faao_mav.mission.formats.mission_file import MissionFile
-from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
+from faao_mav.mission.formats.mission_file import MissionFile, PlanTarget
 from faao_mav.mission.formats.qgc_plan_writer import write_qgc_plan
 from faao_mav.mission.formats.wpl import read_wpl, write_wpl
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
 
 __all__ = [
     "MISSION_SUFFIXES",
     "MissionFile",
+    "PlanTarget",
     "check_readable",
     "check_suffix",
     "losses_in",
     "read_mission",
     "read_mission_file",
-    "read_qgc_plan",
     "read_wpl",
     "render_mission",
     "write_qgc_plan",
@@ -54,14 +52,16 @@ def read_mission_file(path: str | Path) -> MissionFile:
     check_readable(path)
     text = read_text(path, MAX_BYTES, "a mission", MissionFileError)
     if _format(path) == "plan":
+        from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan  # brings pydantic
+
         return read_qgc_plan(text, str(path))
-    return MissionFile(read_wpl(text, str(path)))
+    return read_wpl(text, str(path))
 
 
-def render_mission(mission: Mission, path: str | Path, vehicle: Vehicle | None = None) -> str:
+def render_mission(mission: Mission, path: str | Path, target: PlanTarget | None = None) -> str:
     """Return the text to write to the file `path`, in the format that its name's ending tells.
 
-    `vehicle` is whom the mission is for: `.plan` says so, and holds what it takes. Raises
+    `target` is whom a `.plan` is for, which says so and holds what that autopilot takes. Raises
     `MissionFileError` if the ending is unknown or the format cannot hold the mission at all.
     """
     path = Path(path)
@@ -71,7 +71,7 @@ def render_mission(mission: Mission, path: str | Path, vehicle: Vehicle | None =
             return write_wpl(mission)
         case "plan":
             try:
-                return write_qgc_plan(mission, vehicle)
+                return write_qgc_plan(mission, target)
             except MissionFileError as error:
                 raise MissionFileError(f"{path}: {error}") from None
         case "kml":
@@ -80,11 +80,11 @@ def render_mission(mission: Mission, path: str | Path, vehicle: Vehicle | None =
             return write_kml(mission, name=path.stem)
 
 
-def losses_in(mission: Mission, path: str | Path, vehicle: Vehicle | None = None) -> list[str]:
+def losses_in(mission: Mission, path: str | Path, target: PlanTarget | None = None) -> list[str]:
     """Return what of `mission` the text of `render_mission` does not hold, one line each."""
     path = Path(path)
     check_suffix(path)
-    return losses(mission, _format(path), vehicle)
+    return losses(mission, _format(path), target)
 
 
 def check_suffix(path: Path) -> None:

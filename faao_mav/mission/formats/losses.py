@@ -4,22 +4,22 @@ import math
 from typing import Literal
 
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_TERRAIN, Command
+from faao_mav.mission.formats.mission_file import PlanTarget
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
 
 _NAMES = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude")
 _SHOWN_ITEMS = 5
 
 
 def losses(
-    mission: Mission, file_format: Literal["wpl", "plan", "kml"], vehicle: Vehicle | None = None
+    mission: Mission, file_format: Literal["wpl", "plan", "kml"], target: PlanTarget | None = None
 ) -> list[str]:
-    """Return what of `mission` a file of that format for `vehicle` does not hold, one line each."""
+    """Return what of `mission` a file of that format for `target` does not hold, one line each."""
     match file_format:
         case "wpl":
             return [*_beside(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
         case "plan":
-            return [*_for_whom(mission, vehicle), *_home(mission)]
+            return [*_for_whom(mission, target), *_home(mission)]
         case "kml":
             return [*_beside(mission, "KML"), *_drawn(mission)]
 
@@ -52,10 +52,10 @@ def _not_set(mission: Mission) -> list[str]:
     return [f"not set (NaN) becomes 0: {shown}{more}"]
 
 
-def _for_whom(mission: Mission, vehicle: Vehicle | None) -> list[str]:
-    if vehicle is None:
+def _for_whom(mission: Mission, target: PlanTarget | None) -> list[str]:
+    if target is None:
         return ["no autopilot is known: the plan is for a generic one"]
-    return _not_set(mission) if vehicle.autopilot == "ardupilot" else []
+    return [] if target.takes_null else _not_set(mission)
 
 
 def _home(mission: Mission) -> list[str]:

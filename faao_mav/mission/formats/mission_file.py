@@ -1,22 +1,31 @@
-"""What a mission file tells."""
+"""What a mission file tells, and whom it is for."""
 
 from dataclasses import dataclass
 
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Autopilot, Kind, Vehicle
 
 
 @dataclass(frozen=True, slots=True)
 class MissionFile:
-    """A mission, and for whom it was made as far as the file says it."""
+    """A mission, for whom it was made as far as the file says it, and what was odd about it.
+
+    `firmware` is a MAV_AUTOPILOT and `vehicle_type` a MAV_TYPE, which only `.plan` files hold.
+    `warnings` are lines that name file and place.
+    """
 
     mission: Mission
-    autopilot: Autopilot | None = None
-    kind: Kind | None = None
+    firmware: int | None = None
+    vehicle_type: int | None = None
+    warnings: tuple[str, ...] = ()
 
-    @property
-    def vehicle(self) -> Vehicle | None:
-        """The vehicle that the file names, a copter unless it says otherwise; None for no name."""
-        if self.autopilot is None:
-            return None
-        return Vehicle(self.autopilot, self.kind or "copter")
+
+@dataclass(frozen=True, slots=True)
+class PlanTarget:
+    """Whom a `.plan` file is written for: a MAV_AUTOPILOT and a MAV_TYPE, 0 for a generic one.
+
+    `takes_null`: whether that autopilot is sent null, not set, or 0 instead because it refuses it.
+    """
+
+    firmware: int
+    vehicle_type: int
+    takes_null: bool = True

@@ -1,19 +1,22 @@
-"""Files of autopilot parameters: ArduPilot's `.param`, `.parm` and QGroundControl's `.params`.
+"""Files of autopilot parameters: `.param`, `.parm` and QGroundControl's `.params`.
 
-ArduPilot's ground stations write `NAME,VALUE` or `NAME VALUE`. QGroundControl writes five
+Most ground stations write `NAME,VALUE` or `NAME VALUE`. QGroundControl writes five
 tab-separated fields: system, component, name, value and MAV_PARAM_TYPE. In both, lines that start
 with `#` are comments. As read by Mission Planner, pymavlink (MAVProxy) and QGroundControl.
 """
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
+from typing import Literal, TypeAlias
 
-from faao_mav.errors import ParameterFileError
+from faao_mav.errors import ParameterFileError, quote
 from faao_mav.files import read_text
-from faao_mav.mission.vehicle import Autopilot
+
+ParameterStyle: TypeAlias = Literal["name-value", "qgroundcontrol"]
+"""`NAME,VALUE`, or QGroundControl's five fields."""
 
 MAX_BYTES = 4_000_000
 """Ten times what the largest autopilot has; keeps a wrong file name from filling the memory."""
@@ -29,25 +32,6 @@ _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"0x[0-9a-f]{1,8}", re.ASCII | re.IGNORECASE)
 _WHOLE = re.compile(r"\d{1,3}", re.ASCII)
-_MAX_SHOWN = 40
-
-_OF_PX4 = ("MPC_", "NAV_", "COM_", "EKF2_")
-_OF_ARDUPILOT = ("WPNAV_", "WP_", "ATC_", "PSC_", "ARMING_")
-
-
-def parameter_path(mission: Path, autopilot: Autopilot) -> Path:
-    """Return the file of parameters beside `mission`: `.param`, or `.params` for PX4."""
-    return mission.with_suffix(".params" if autopilot == "px4" else ".param")
-
-
-def autopilot_of(parameters: Iterable[str]) -> Autopilot | None:
-    """Return whose names `parameters` are, None where they do not tell."""
-    names = tuple(parameters)
-    px4 = any(name.startswith(_OF_PX4) for name in names)
-    ardupilot = any(name.startswith(_OF_ARDUPILOT) for name in names)
-    if px4 == ardupilot:
-        return None
-    return "px4" if px4 else "ardupilot"
 
 
 def read_parameters(path: str | Path) -> dict[str, float]:
@@ -79,29 +63,33 @@ def read_parameters(path: str | Path) -> dict[str, float]:
 
 def render_parameters(
     parameters: Mapping[str, float],
-    autopilot: Autopilot,
+    style: ParameterStyle = "name-value",
     *,
     header: str = "",
     system: int = 1,
 ) -> str:
     """Return the text of a parameter file, with the lines of `header` as comments before them.
 
-    For ArduPilot `NAME,VALUE`. For PX4 QGroundControl's five fields, where an `int` is an INT32
-    and a `float` a REAL32, so 5 and 5.0 differ: QGroundControl refuses the wrong one, and, if it
-    is connected, a `system` that is not the vehicle's. Values have as many digits as they need.
-    Raises `ParameterFileError` for names and values that no autopilot has.
+    In the style "qgroundcontrol" an `int` is an INT32 and a `float` a REAL32, so 5 and 5.0
+    differ: QGroundControl refuses the wrong one, and, if it is connected, a `system` that is not
+    the vehicle's. Values have as many digits as they need. Raises `ParameterFileError` for names
+    and values that no autopilot has.
+
+    >>> print(render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}), end="")
+    WPNAV_SPEED,800
+    WPNAV_JERK,1.5
     """
     for name, value in parameters.items():
         if not _NAME.fullmatch(name):
             raise ParameterFileError(
-                f"parameter {_shown(name)}; expected at most 16 capitals, digits and _"
+                f"parameter {quote(name)}; expected at most 16 capitals, digits and _"
             )
         if not math.isfinite(value) or (isinstance(value, int) and value not in _INT32_LIMITS):
             raise ParameterFileError(
                 f"parameter {name}: {value}; expected a finite number, an integer within 32 bits"
             )
     comments = [f"# {line}".rstrip() for line in header.splitlines()]
-    if autopilot == "px4":
+    if style == "qgroundcontrol":
         comments += [*(["#"] if header else []), "# Vehicle-Id Component-Id Name Value Type"]
         rows = [
             "\t".join((str(system), str(_AUTOPILOT_COMPONENT), name, _digits(value), _type(value)))
@@ -131,9 +119,9 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
     if len(fields) == 5:
         _, component, name, text, kind = (field.strip() for field in fields)
         if not _WHOLE.fullmatch(component):
-            raise ParameterFileError(f"{where}: component {_shown(component)}; expected a number")
+            raise ParameterFileError(f"{where}: component {quote(component)}; expected a number")
         if not _WHOLE.fullmatch(kind) or int(kind) not in _TYPES:
-            raise ParameterFileError(f"{where}: type {_shown(kind)}; expected a number 1 to 10")
+            raise ParameterFileError(f"{where}: type {quote(kind)}; expected a number 1 to 10")
         if int(component) == _AUTOPILOT_COMPONENT:
             _check_name(name, where)
             yield name, _number(text, where, whole=int(kind) in _INTEGERS)
@@ -143,7 +131,7 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
         fields.pop()
     if len(fields) != 2:
         raise ParameterFileError(
-            f"{where}: {_shown(content)}; expected NAME,VALUE or NAME VALUE, or five fields "
+            f"{where}: {quote(content)}; expected NAME,VALUE or NAME VALUE, or five fields "
             "between tabs: system, component, name, value, type"
         )
     _check_name(fields[0], where)
@@ -153,7 +141,7 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
 def _check_name(name: str, where: str) -> None:
     if not _NAME.fullmatch(name):
         raise ParameterFileError(
-            f"{where}: name {_shown(name)}; expected at most 16 capitals, digits and _"
+            f"{where}: name {quote(name)}; expected at most 16 capitals, digits and _"
         )
 
 
@@ -164,9 +152,5 @@ def _number(text: str, where: str, *, whole: bool) -> float:
         value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value) or (whole and value != int(value)):
         kind = "a whole number, as its type says" if whole else "a finite number"
-        raise ParameterFileError(f"{where}: value {_shown(text)}; expected {kind}")
+        raise ParameterFileError(f"{where}: value {quote(text)}; expected {kind}")
     return int(value) if whole else value
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "...")
