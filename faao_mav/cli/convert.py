@@ -45,7 +45,7 @@ def _run(mission_file: Path, out: Path, autopilot: Autopilot | None, as_json: bo
         read_mission_file,
         render_mission,
     )
-    from faao_mav.mission.vehicle import Vehicle
+    from faao_mav.vehicle import Vehicle
     from faao_mav.vehicle.files import kind_in, plan_target, vehicle_in
 
     check_readable(mission_file)

@@ -117,7 +117,7 @@ def _solve(
     from faao_mav.schedule.prediction import predict_delivery
     from faao_mav.validate import Limits
     from faao_mav.validate.check import check
-    from faao_mav.vehicle.files import PARAMETER_STYLE, parameter_path, plan_target
+    from faao_mav.vehicle.files import parameter_path, plan_target
     from faao_mav.vehicle.recommend import candidates
 
     started = time.perf_counter()
@@ -165,7 +165,7 @@ def _solve(
         if out is not None and tuned is not None:
             text = render_parameters(
                 conversion.parameters,
-                PARAMETER_STYLE[read.vehicle.autopilot],
+                conversion.vehicle.type.family.parameter_style,
                 header=f"{_FOR}{out.name}",
             )
             write_whole(tuned, text.encode(errors="replace"))  # a name may be no Unicode

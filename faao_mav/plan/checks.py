@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from faao_mav.errors import quote
-from faao_mav.plan.fields import Vector
+from faao_mav.plan.autopilots import VEHICLES
+from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.model import Flight, Plan, VehicleOptions
 
@@ -20,7 +21,7 @@ _SLACK = 1e-6
 def problems(plan: Plan) -> Iterator[str]:
     """Yield what is wrong with `plan`, key first; each may rest on those before it being right."""
     yield from _not_yet(plan)
-    yield from _plane(plan)
+    yield from _vehicle(plan)
     yield from _speeds(plan)
     yield from _steps(plan.flight)
     yield from _distance(plan)
@@ -35,15 +36,17 @@ def _not_yet(plan: Plan) -> Iterator[str]:
         yield "fence: does not work yet; leave it out"
 
 
-def _plane(plan: Plan) -> Iterator[str]:
+def _vehicle(plan: Plan) -> Iterator[str]:
     vehicle = plan.vehicle
-    if vehicle.type != "plane":
-        return
-    if vehicle.autopilot != "ardupilot":
+    known = VEHICLES.get((vehicle.autopilot, vehicle.type))
+    if known is None or not known.planned:
+        others = [v.autopilot for v in VEHICLES.values() if v.type == vehicle.type and v.planned]
         yield (
-            "vehicle.type: plane: missions for planes are made for ardupilot, not for "
-            f"{vehicle.autopilot} (vehicle.autopilot)"
+            f"vehicle.type: {vehicle.type}: missions for {vehicle.type}s are made for "
+            f"{listed(others, 'and')}, not for {vehicle.autopilot} (vehicle.autopilot)"
         )
+    elif known.hovers:
+        return
     if vehicle.min_speed == 0:
         yield "vehicle.min_speed: 0 m/s: a plane cannot hover; give its slowest speed, m/s"
     if plan.mission.on_finish == "land":

@@ -10,7 +10,7 @@ What is accepted follows from type and limits (`keys.reference`) unless it is sa
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
@@ -18,6 +18,7 @@ from pydantic import AfterValidator, AllowInfNan, Field, PlainValidator, Strict,
 from pydantic_core import PydanticCustomError
 
 from faao_mav.geodesy import LocalFrame
+from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
 
 Vector: TypeAlias = tuple[float, float]
 """East and north components, metres or m/s."""
@@ -35,8 +36,28 @@ Text: TypeAlias = Annotated[str, Strict()]
 class Written:
     """How a value stands in the file: what is accepted there, and the plan's value as written."""
 
-    accepted: str
+    accepted: str | Callable[[], str]
     convert: Callable[[Any], object] = lambda value: value
+
+
+def listed(words: Sequence[str], last: str = "or") -> str:
+    """Return `words` as a sentence has them.
+
+    >>> listed(["bpsk", "qpsk", "8psk"])
+    'bpsk, qpsk or 8psk'
+    """
+    return f" {last} ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+
+
+def _one_of(names: Callable[[], tuple[str, ...]]) -> PlainValidator:
+    """Check that a value is one of the `names` known when it is read."""
+
+    def check(value: object) -> object:
+        if value not in names():
+            raise PydanticCustomError("unknown_name", "is none of the names")
+        return value
+
+    return PlainValidator(check)
 
 
 def key(
@@ -195,6 +216,10 @@ Gain: TypeAlias = Annotated[
     AfterValidator(linear),
     Written("a gain from -200 to 200 dB", _db),
 ]
+AutopilotName: TypeAlias = Annotated[
+    Autopilot, _one_of(autopilots), Written(lambda: listed(autopilots()))
+]
+TypeName: TypeAlias = Annotated[Kind, _one_of(types), Written(lambda: listed(types()))]
 Antennas: TypeAlias = Annotated[
     Whole, Field(ge=1, le=64), Written("a whole number of antennas, 1 to 64")
 ]

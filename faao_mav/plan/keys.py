@@ -1,14 +1,13 @@
 """The keys of `plan.yaml`: what each means and accepts, and which of them a study varies."""
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
-from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from faao_mav.plan.fields import Written
+from faao_mav.plan.fields import Written, listed
 from faao_mav.plan.model import PlanFile
 
 POWER = "power_dbm"
@@ -39,7 +38,6 @@ class PlanKey:
     inside: tuple[str, ...] = ()
 
 
-@cache
 def reference() -> Mapping[str, PlanKey]:
     """Return every key of a plan by its path, sections before what is in them.
 
@@ -56,6 +54,7 @@ def _below(section: type, prefix: str) -> Iterator[PlanKey]:
     for field in fields(section):
         info = FieldInfo.from_annotation(field.type)  # type: ignore[arg-type]
         written = next((m for m in info.metadata if isinstance(m, Written)), Written(""))
+        in_file = written.accepted if isinstance(written.accepted, str) else written.accepted()
         inner = list(_sections(info.annotation))
         inside = tuple(key.path for one in inner for key in _below(one, "") if "." not in key.path)
         extra: Any = info.json_schema_extra or {"unit": "", "accepted": ""}
@@ -68,7 +67,7 @@ def _below(section: type, prefix: str) -> Iterator[PlanKey]:
             extra["unit"],
             "" if required or inside else _as_yaml(written.convert(default)),
             required,
-            extra["accepted"] or written.accepted or _accepted(info, extra["unit"], inside),
+            extra["accepted"] or in_file or _accepted(info, extra["unit"], inside),
             inside,
         )
         for one in inner:
@@ -102,9 +101,9 @@ def _accepted(info: FieldInfo, unit: str, inside: tuple[str, ...]) -> str:
     if inside:
         return f"a mapping with {', '.join(inside)}"
     if get_origin(kind) is Literal:
-        return _list(get_args(kind), "or")
+        return listed(get_args(kind))
     if get_origin(kind) is tuple:
-        return f"a list of {_list(get_args(get_args(kind)[0]), 'and')}"
+        return f"a list of {listed(get_args(get_args(kind)[0]), 'and')}"
     if kind is bool:
         return "true or false"
     number = "a whole number" if kind is int else "a number"
@@ -112,10 +111,6 @@ def _accepted(info: FieldInfo, unit: str, inside: tuple[str, ...]) -> str:
     limits = {n: getattr(m, n) for m in info.metadata for n in ("gt", "ge", "le") if hasattr(m, n)}
     low = f" above {limits['gt']:g}, at most" if "gt" in limits else f", {limits['ge']:g} to"
     return f"{number}{of}{low} {limits['le']:g}"
-
-
-def _list(words: Sequence[str], last: str) -> str:
-    return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
 def varied_twice(keys: Iterable[str]) -> str:

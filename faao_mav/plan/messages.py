@@ -1,12 +1,12 @@
 """What pydantic found wrong with a plan, as lines that name key, value and what is accepted."""
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from pydantic import ValidationError
 
 from faao_mav.errors import quote
-from faao_mav.plan.keys import reference
+from faao_mav.plan.keys import PlanKey, reference
 
 MAX_LINES = 6
 """Lines of a message: chosen to fit a small terminal."""
@@ -22,17 +22,18 @@ def describe(error: ValidationError, source: str) -> str:
 
 
 def _lines(error: ValidationError) -> Iterator[str]:
+    known = reference()
     for detail in error.errors(include_url=False):
         # a step in angle brackets is pydantic's choice among several sections
         steps = [step for step in detail["loc"] if not str(step).startswith("<")]
         place = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps)
         value, kind = detail["input"], detail["type"]
         keys = [step for step in steps if isinstance(step, str)]
-        accepted = _accepted(*keys)
+        accepted = _accepted(known, *keys)
         if kind == "missing":
             problem = f"missing; give {accepted}"
         elif kind == "unexpected_keyword_argument":
-            problem = f"unknown key; {_nearest(*keys)}"
+            problem = f"unknown key; {_nearest(known, *keys)}"
         elif kind == "told":
             problem = detail["msg"]
         elif kind == "value_error":
@@ -44,22 +45,22 @@ def _lines(error: ValidationError) -> Iterator[str]:
         yield f"{place.removeprefix('.')}: {problem}"
 
 
-def _accepted(*keys: str) -> str:
+def _accepted(known: Mapping[str, PlanKey], *keys: str) -> str:
     """Return what the key at a path accepts, or the nearest known one above it."""
-    while keys and ".".join(keys) not in reference():
+    while keys and ".".join(keys) not in known:
         keys = keys[:-1]
-    return reference()[".".join(keys)].accepted if keys else "a mapping"
+    return known[".".join(keys)].accepted if keys else "a mapping"
 
 
-def _nearest(*keys: str) -> str:
+def _nearest(known: Mapping[str, PlanKey], *keys: str) -> str:
     """Return where an unknown key may belong."""
     *above, name = keys
-    section = reference().get(".".join(above))
-    known = sorted(section.inside if section else (k for k in reference() if "." not in k))
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    section = known.get(".".join(above))
+    here = sorted(section.inside if section else (path for path in known if "." not in path))
+    close = difflib.get_close_matches(name, here, n=1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]}?"
-    elsewhere = [path for path in reference() if path.rsplit(".", 1)[-1] == name]
+    elsewhere = [path for path in known if path.rsplit(".", 1)[-1] == name]
     if elsewhere:
         return f"it belongs at {' or '.join(elsewhere)}"
-    return f"known here: {', '.join(known)}"
+    return f"known here: {', '.join(here)}"

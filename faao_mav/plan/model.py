@@ -14,6 +14,7 @@ from pydantic import AfterValidator, ConfigDict, Discriminator, Tag, ValidationI
 from faao_mav.plan.fields import (
     MAX_LOCAL_DISTANCE,
     Antennas,
+    AutopilotName,
     Flag,
     Gain,
     Noise,
@@ -21,6 +22,7 @@ from faao_mav.plan.fields import (
     Position,
     Power,
     Text,
+    TypeName,
     Velocity,
     Whole,
     check_degrees,
@@ -30,8 +32,6 @@ from faao_mav.plan.fields import (
     watts,
 )
 
-Autopilot: TypeAlias = Literal["ardupilot", "px4"]
-AircraftType: TypeAlias = Literal["copter", "plane"]
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
 Fading: TypeAlias = Literal["ergodic", "realization", "none"]
@@ -91,8 +91,8 @@ class Site(_Section):
 class VehicleOptions(_Section):
     """The aircraft and its limits."""
 
-    autopilot: Annotated[Autopilot, key("The autopilot that the mission is for.")] = "ardupilot"
-    type: Annotated[AircraftType, key("The kind of aircraft; a plane with ArduPilot.")] = "copter"
+    autopilot: Annotated[AutopilotName, key("The autopilot that the mission is for.")] = "ardupilot"
+    type: Annotated[TypeName, key("The kind of aircraft; a plane with ArduPilot.")] = "copter"
     max_speed: Annotated[Number, key("Largest speed v_max.", "m/s", gt=0, le=1000)]
     max_acceleration: Annotated[Number, key("Largest acceleration a_max.", "m/s^2", gt=0, le=1000)]
     min_speed: Annotated[

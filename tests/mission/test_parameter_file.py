@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
 
 @given(st.dictionaries(names, numbers, min_size=1, max_size=8))
 def test_ardupilot_files_are_read_back(folder, parameters):
-    text = render_parameters(parameters, "name-value", header="for a test\n\nof it")
+    text = render_parameters(parameters, "list", header="for a test\n\nof it")
     assert repr(read(text, folder)) == repr(parameters)
 
 
@@ -42,7 +42,7 @@ def test_px4_files_are_read_back_with_their_types(folder, parameters):
 @given(st.dictionaries(names, st.floats(-1e6, 1e6), min_size=1, max_size=8))
 def test_pymavlink_reads_the_same(tmp_path_factory, parameters):
     path = tmp_path_factory.mktemp("pymavlink") / "x.param"
-    path.write_text(render_parameters(parameters, "name-value", header="for a test"))
+    path.write_text(render_parameters(parameters, "list", header="for a test"))
     loaded = MAVParmDict()
     assert loaded.load(str(path), use_excludes=False)
     assert dict(loaded) == parameters
@@ -71,7 +71,7 @@ def test_the_form_that_qgroundcontrol_reads():
 
 
 def test_the_form_that_mission_planner_reads():
-    text = render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}, "name-value", header="x")
+    text = render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}, "list", header="x")
     assert text == "# x\nWPNAV_SPEED,800\nWPNAV_JERK,1.5\n"
 
 
@@ -166,4 +166,4 @@ def test_any_text_is_read_or_refused(folder, text):
         parameters = read(text, folder)
     except ParameterFileError:
         return
-    assert read(render_parameters(parameters, "name-value"), folder) == parameters
+    assert read(render_parameters(parameters, "list"), folder) == parameters

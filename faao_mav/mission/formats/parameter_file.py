@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 from faao_mav.errors import ParameterFileError, quote
 from faao_mav.files import read_text
 
-ParameterStyle: TypeAlias = Literal["name-value", "qgroundcontrol"]
+ParameterStyle: TypeAlias = Literal["list", "qgroundcontrol"]
 """`NAME,VALUE`, or QGroundControl's five fields."""
 
 MAX_BYTES = 4_000_000
@@ -63,7 +63,7 @@ def read_parameters(path: str | Path) -> dict[str, float]:
 
 def render_parameters(
     parameters: Mapping[str, float],
-    style: ParameterStyle = "name-value",
+    style: ParameterStyle = "list",
     *,
     header: str = "",
     system: int = 1,
