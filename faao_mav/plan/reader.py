@@ -1,17 +1,22 @@
-"""`plan.yaml` -> `Plan`."""
+"""`plan.yaml` -> `Plan`, or lines that name key, value and what is accepted."""
 
+import difflib
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from faao_mav.errors import PlanError
+from faao_mav.errors import PlanError, quote
 from faao_mav.files import read_text
 from faao_mav.plan.checks import problems
-from faao_mav.plan.messages import describe
+from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.plan.model import Plan, PlanFile
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
+
+_MAX_LINES = 6
+"""Lines of a message; chosen to fit a small terminal."""
 
 
 def read_plan(path: str | Path, *, method: str | None = None) -> Plan:
@@ -39,7 +44,7 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
     try:
         contents = _adapter().validate_python(data, context={})
     except ValidationError as error:
-        raise PlanError(describe(error, source)) from None
+        raise PlanError(_describe(error, source)) from None
     held = {field.name: getattr(contents, field.name) for field in fields(contents)}
     plan = Plan(**held, text=text, source=source)
     for problem in problems(plan):
@@ -50,3 +55,57 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
 @cache
 def _adapter() -> TypeAdapter[PlanFile]:
     return TypeAdapter(PlanFile)
+
+
+def _describe(error: ValidationError, source: str) -> str:
+    """Return one line per finding (at most `_MAX_LINES`), each naming `source`."""
+    lines = list(dict.fromkeys(_lines(error)))
+    more = len(lines) - _MAX_LINES
+    if more > 0:
+        lines = [*lines[:_MAX_LINES], f"and {more} more"]
+    return "\n".join(f"{source}: {line}" for line in lines)
+
+
+def _lines(error: ValidationError) -> Iterator[str]:
+    known = reference()
+    for detail in error.errors(include_url=False):
+        # a step in angle brackets is pydantic's choice among several sections
+        steps = [step for step in detail["loc"] if not str(step).startswith("<")]
+        place = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps)
+        value, kind = detail["input"], detail["type"]
+        keys = [step for step in steps if isinstance(step, str)]
+        accepted = _accepted(known, *keys)
+        if kind == "missing":
+            problem = f"missing; give {accepted}"
+        elif kind == "unexpected_keyword_argument":
+            problem = f"unknown key; {_nearest(known, *keys)}"
+        elif kind == "told":
+            problem = detail["msg"]
+        elif kind == "value_error":
+            problem = f"{quote(value)}: {detail['ctx']['error']}; give {accepted}"
+        elif kind == "finite_number":
+            problem = f"{value} is not a finite number; give {accepted}"
+        else:
+            problem = f"{quote(value)} is not accepted; give {accepted}"
+        yield f"{place.removeprefix('.')}: {problem}"
+
+
+def _accepted(known: Mapping[str, PlanKey], *keys: str) -> str:
+    """Return what the key at a path accepts, or the nearest known one above it."""
+    while keys and ".".join(keys) not in known:
+        keys = keys[:-1]
+    return known[".".join(keys)].accepted if keys else "a mapping"
+
+
+def _nearest(known: Mapping[str, PlanKey], *keys: str) -> str:
+    """Return where an unknown key may belong."""
+    *above, name = keys
+    section = known.get(".".join(above))
+    here = sorted(section.inside if section else (path for path in known if "." not in path))
+    close = difflib.get_close_matches(name, here, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean {close[0]}?"
+    elsewhere = [path for path in known if path.rsplit(".", 1)[-1] == name]
+    if elsewhere:
+        return f"it belongs at {' or '.join(elsewhere)}"
+    return f"known here: {', '.join(here)}"

@@ -66,7 +66,7 @@ REFUSED = {
     "text_latitude.plan": "items[2].params[4]: '47.3985'; expected a valid number or null (not",
     "scaled_latitude.plan": "mission.items[2].params[4]: 473985000; expected null or degrees",
     "jump_to_nowhere.plan": "mission.items[3].params[0]: 9; expected the doJumpId of an item",
-    "fence_of_two_corners.plan": "geoFence.polygons[0].polygon: fence polygon: 2 vertices; exp",
+    "fence_of_two_corners.plan": "geoFence.polygons[0]: fence polygon: 2 vertices; exp",
     "fence_version_1.plan": "geoFence.version: 1; expected 2: open the file in a current",
     "survey_without_items.plan": "mission.items[2].TransectStyleComplexItem.Items: is missing: "
     "the pattern was saved without its waypoints; open the file in a current QGroundControl",

@@ -6,7 +6,7 @@ File Format", and what QGroundControl and MAVSDK accept. Importing this brings p
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar
 
 from pydantic import (
@@ -180,7 +180,7 @@ def _describe(error: ValidationError) -> str:
     return f"{place}: {quote(detail['input'])}; expected {words}{hint}".removeprefix(": ")
 
 
-def _place(steps: "list[str | int]") -> str:
+def _place(steps: list[str | int]) -> str:
     return "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).removeprefix(".")
 
 
@@ -227,7 +227,7 @@ def _parse(text: str) -> Any:
     return tree
 
 
-def _odd_in(steps: "list[str | int]", value: Any) -> "Iterator[tuple[list[str | int], str]]":
+def _odd_in(steps: list[str | int], value: Any) -> Iterator[tuple[list[str | int], str]]:
     """Yield the places below `steps` where something odd stands, and what is wrong with it."""
     if isinstance(value, _Odd):
         yield steps, value.problem
@@ -237,51 +237,36 @@ def _odd_in(steps: "list[str | int]", value: Any) -> "Iterator[tuple[list[str | 
 
 
 def _mission(file: _File) -> Mission:
-    home = file.mission.plannedHomePosition
+    home, fence, rally = file.mission.plannedHomePosition, file.geoFence, file.rallyPoints
     return Mission(
         _items(file.mission),
-        _made("mission.plannedHomePosition", Home, *home) if home and any(home) else None,
-        _fence(file.geoFence) if file.geoFence else Fence(),
-        tuple(
-            _made(f"rallyPoints.points[{k}]", RallyPoint, *point)
-            for k, point in enumerate(file.rallyPoints.points if file.rallyPoints else ())
-        ),
+        _made("mission.plannedHomePosition", Home, home) if home and any(home) else None,
+        _fence(fence) if fence else Fence(),
+        _each("rallyPoints.points", RallyPoint, rally.points if rally else []),
     )
-
-
-def _made(place: str, make: Callable[..., Made], *arguments: Any) -> Made:
-    """Return `make(*arguments)`, with its `InputError` as a complaint about this place."""
-    try:
-        return make(*arguments)
-    except InputError as error:
-        raise MissionFileError(f"{place}: {error}") from None
 
 
 def _fence(fence: _Fence) -> Fence:
-    polygons, circles = fence.polygons, fence.circles
+    polygons = [[tuple(map(tuple, part.polygon)), part.inclusion] for part in fence.polygons]
+    circles = [[tuple(c.circle.center), c.circle.radius, c.inclusion] for c in fence.circles]
     back = fence.breachReturn
     return Fence(
-        tuple(
-            _made(
-                f"geoFence.polygons[{k}].polygon",
-                Polygon,
-                tuple((latitude, longitude) for latitude, longitude in part.polygon),
-                part.inclusion,
-            )
-            for k, part in enumerate(polygons)
-        ),
-        tuple(
-            _made(
-                f"geoFence.circles[{k}].circle",
-                Circle,
-                (part.circle.center[0], part.circle.center[1]),
-                part.circle.radius,
-                part.inclusion,
-            )
-            for k, part in enumerate(circles)
-        ),
-        _made("geoFence.breachReturn", RallyPoint, *back) if back else None,
+        _each("geoFence.polygons", Polygon, polygons),
+        _each("geoFence.circles", Circle, circles),
+        _made("geoFence.breachReturn", RallyPoint, back) if back else None,
     )
+
+
+def _each(place: str, make: Callable[..., Made], parts: Iterable[list[Any]]) -> tuple[Made, ...]:
+    return tuple(_made(f"{place}[{k}]", make, part) for k, part in enumerate(parts))
+
+
+def _made(place: str, make: Callable[..., Made], part: Iterable[Any]) -> Made:
+    """Return `make(*part)`, with its `InputError` as a complaint about this place."""
+    try:
+        return make(*part)
+    except InputError as error:
+        raise MissionFileError(f"{place}: {error}") from None
 
 
 def _items(mission: _Mission) -> tuple[MissionItem, ...]:
