@@ -86,7 +86,8 @@ def dash(begin: float, end: float, top: float, acceleration: float, t: Real) -> 
     fine = np.linspace(0.0, speeds[0][-1], 20_001)
     v = np.interp(fine, *speeds)
     s = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2 * np.diff(fine))])
-    return begin + np.interp(t, fine, s)
+    along: Real = begin + np.interp(t, fine, s)
+    return along
 
 
 def dash_hover_dash(hover: float = 40.0, step: float = 0.2) -> Trajectory:

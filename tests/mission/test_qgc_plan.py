@@ -31,7 +31,7 @@ points = st.builds(RallyPoint, latitudes, longitudes, numbers)
 
 
 @st.composite
-def items(draw):
+def items(draw: st.DrawFn) -> MissionItem:
     frame = draw(st.integers(0, 255))
     x, y = (numbers, numbers) if frame == 2 else (latitudes, longitudes)
     command = draw(st.integers(0, 65_535).filter(lambda number: number != 177))
@@ -47,10 +47,11 @@ def items(draw):
 
 
 @st.composite
-def missions(draw):
-    flown = draw(st.lists(items(), max_size=5))
-    if flown and draw(st.booleans()):
-        target = draw(st.integers(1, len(flown) + 1))
+def missions(draw: st.DrawFn) -> Mission:
+    flown: list[MissionItem] = draw(st.lists(items(), max_size=5))
+    with_jump: bool = draw(st.booleans())
+    if flown and with_jump:
+        target: int = draw(st.integers(1, len(flown) + 1))
         flown.append(MissionItem(177, 2, (float(target), draw(numbers), 0.0, math.nan)))
     circle = st.builds(Circle, places, st.floats(1e-3, 1e6), st.booleans())
     polygon = st.builds(Polygon, st.lists(places, min_size=3, max_size=5).map(tuple), st.booleans())
@@ -66,7 +67,9 @@ def missions(draw):
 
 @STEADY
 @given(missions(), st.sampled_from([PX4, None, PlanTarget(12, 1)]))
-def test_what_is_written_is_read_back_bit_for_bit(mission, target):
+def test_what_is_written_is_read_back_bit_for_bit(
+    mission: Mission, target: PlanTarget | None
+) -> None:
     read = read_qgc_plan(write_qgc_plan(mission, target), "x")
     # repr tells NaN and the sign of zero, which == does not.
     assert repr(read.mission) == repr(mission)
@@ -76,7 +79,7 @@ def test_what_is_written_is_read_back_bit_for_bit(mission, target):
 
 @STEADY
 @given(missions())
-def test_ardupilot_gets_0_for_what_is_not_set(mission):
+def test_ardupilot_gets_0_for_what_is_not_set(mission: Mission) -> None:
     text = write_qgc_plan(mission, ARDUPILOT)
     read = read_qgc_plan(text, "x")
     assert (read.firmware, read.vehicle_type) == (3, 2)
@@ -93,7 +96,7 @@ def test_ardupilot_gets_0_for_what_is_not_set(mission):
 
 @STEADY
 @given(missions())
-def test_the_form_that_qgroundcontrol_asks_for(mission):
+def test_the_form_that_qgroundcontrol_asks_for(mission: Mission) -> None:
     plan = json.loads(write_qgc_plan(mission, PX4))
     assert (plan["fileType"], plan["version"]) == ("Plan", 1)
     assert (plan["geoFence"]["version"], plan["rallyPoints"]["version"]) == (2, 2)
@@ -112,7 +115,7 @@ def test_the_form_that_qgroundcontrol_asks_for(mission):
             assert item["AMSLAltAboveTerrain"] is None
 
 
-def test_speeds_and_altitude_mode_are_those_of_the_mission():
+def test_speeds_and_altitude_mode_are_those_of_the_mission() -> None:
     mission = mission_of(*dash_hover_dash(), plan_with(max_speed=8.0))
     part = json.loads(write_qgc_plan(mission, PX4))["mission"]
     assert (part["cruiseSpeed"], part["hoverSpeed"], part["globalPlanAltitudeMode"]) == (8, 8, 1)
@@ -121,13 +124,13 @@ def test_speeds_and_altitude_mode_are_those_of_the_mission():
 
 
 @pytest.mark.parametrize("target", [0.0, 3.0, 1.5, math.nan, -1.0])
-def test_a_jump_to_no_item_is_not_written(target):
+def test_a_jump_to_no_item_is_not_written(target: float) -> None:
     mission = Mission((MissionItem(16, 3), MissionItem(177, 2, (target, 1.0, 0.0, 0.0))))
     with pytest.raises(MissionFileError, match=r"x\.plan: item 2: DO_JUMP to .*, 1 to 2"):
         render_mission(mission, "x.plan")
 
 
-def test_losses_of_a_plan_are_few():
+def test_losses_of_a_plan_are_few() -> None:
     mission = Mission((MissionItem(16, 3),), Home(1.0, 2.0, 3.0))
     assert losses_in(mission, "x.plan", PX4) == []
     assert losses_in(Mission(mission.items), "x.plan", PX4) == [
@@ -155,12 +158,12 @@ def test_losses_of_a_plan_are_few():
         ("[]", "x: nothing; expected an object"),
     ],
 )
-def test_texts_that_are_no_plan(text, message):
+def test_texts_that_are_no_plan(text: str, message: str) -> None:
     with pytest.raises(MissionFileError, match=f"^{message.replace('[1]', '.1.')}"):
         read_qgc_plan(text, "x")
 
 
-def test_a_long_key_over_many_numbers_takes_little_memory_and_time():
+def test_a_long_key_over_many_numbers_takes_little_memory_and_time() -> None:
     key, numbers = "k" * 200_000, ",".join(["1"] * 70_000)
     for text in (
         GOOD.replace('"fileType"', f'"{key}": [{numbers}], "fileType"'),
@@ -179,7 +182,7 @@ def test_a_long_key_over_many_numbers_takes_little_memory_and_time():
         assert peak < 50e6
 
 
-def test_whole_numbers_may_have_a_point():
+def test_whole_numbers_may_have_a_point() -> None:
     text = write_qgc_plan(Mission((MissionItem(16, 3),)), PX4)
     text = text.replace('"command": 16', '"command": 16.0')
     assert read_qgc_plan(text, "x").mission.items[0].command == 16
@@ -201,7 +204,7 @@ PATCHES = ["null", "true", "1e999", "-1", "[]", "{}", '""', "0.5", "1e9", "[[]]"
 
 @STEADY
 @given(st.data())
-def test_a_mutated_plan_is_read_or_refused(data):
+def test_a_mutated_plan_is_read_or_refused(data: st.DataObject) -> None:
     """Every value in turn becomes another, or goes missing."""
     plan = json.loads(GOOD)
     for _ in range(data.draw(st.integers(1, 2))):
@@ -231,6 +234,6 @@ trees = st.recursive(leaves, lambda part: st.lists(part) | st.dictionaries(st.te
 
 @STEADY
 @given(st.text() | trees.map(json.dumps))
-def test_any_text_is_refused(text):
+def test_any_text_is_refused(text: str) -> None:
     with pytest.raises(MissionFileError):
         read_qgc_plan(text, "x")
