@@ -13,7 +13,7 @@ from faao_mav.errors import InputError
 from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.transfer.protocol import FIRMWARE_NAMES, Firmware, MissionType
 from faao_mav.mission.command import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_POINT, Frame
-from faao_mav.mission.fence import Circle, Fence, Place, Polygon, RallyPoint
+from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon, RallyPoint
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.vehicle.dialects import as_received, as_sent
 
@@ -105,7 +105,7 @@ def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
 
 def _fence_of(items: Sequence[MissionItem]) -> Fence:
     polygons, circles, breach_return = [], [], None
-    vertices: list[Place] = []
+    vertices: list[LatLon] = []
     for number, item in enumerate(items):
         if item.command in POLYGON.values():
             vertices.append((item.x, item.y))

@@ -6,8 +6,8 @@ from typing import TypeAlias
 
 from faao_mav.errors import InputError
 
-Place: TypeAlias = tuple[float, float]
-"""WGS84 latitude and longitude, degrees."""
+LatLon: TypeAlias = tuple[float, float]
+"""Latitude and longitude, WGS84 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Circle:
     Raises `InputError` for a center that is no place on Earth or a radius that is not above 0.
     """
 
-    center: Place
+    center: LatLon
     radius: float
     inclusion: bool
 
@@ -34,7 +34,7 @@ class Polygon:
     Raises `InputError` for fewer vertices or one that is no place on Earth.
     """
 
-    vertices: tuple[Place, ...]
+    vertices: tuple[LatLon, ...]
     inclusion: bool
 
     def __post_init__(self) -> None:
@@ -65,7 +65,11 @@ class RallyPoint:
 class Fence:
     """Where the aircraft may be: inside every inclusion, outside every exclusion.
 
-    `breach_return` is where ArduPilot flies after a breach, or None.
+    `breach_return` is where ArduPilot flies after a breach, or None. A fence without areas is
+    false.
+
+    >>> bool(Fence(circles=(Circle((47.4, 8.5), 300.0, inclusion=True),))), bool(Fence())
+    (True, False)
     """
 
     polygons: tuple[Polygon, ...] = ()
@@ -76,7 +80,7 @@ class Fence:
         return bool(self.polygons or self.circles)
 
 
-def _check(place: Place, what: str) -> None:
+def _check(place: LatLon, what: str) -> None:
     latitude, longitude = place
     if not (abs(latitude) <= 90 and abs(longitude) <= 180):
         raise InputError(

@@ -10,6 +10,7 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Fence, RallyPoint
 
 Params: TypeAlias = tuple[float, float, float, float]
+"""param1 to param4 of an item."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +95,13 @@ def as_sent(mission: Mission, *, home_row: bool) -> tuple[MissionItem, ...]:
 
     With a home row (ArduPilot) row 0 is the home, zeros if there is none: the vehicle puts its
     own there. Without one (PX4) the targets of DO_JUMP, which count items from 1, count from 0.
+
+    >>> takeoff = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, z=30.0)
+    >>> again = MissionItem(Command.DO_JUMP, Frame.MISSION, (1.0, 2.0, 0.0, 0.0))
+    >>> [row.command.name for row in as_sent(Mission((takeoff, again)), home_row=True)]
+    ['NAV_WAYPOINT', 'NAV_TAKEOFF', 'DO_JUMP']
+    >>> as_sent(Mission((takeoff, again)), home_row=False)[1].params[0]
+    0.0
     """
     if not home_row:
         return tuple(jump_moved(item, -1) for item in mission.items)

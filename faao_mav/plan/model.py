@@ -230,8 +230,7 @@ class Optimizer(_Section):
     method: Annotated[Method, key("The direct method, or the paper's Algorithm 1.")] = "direct"
     precoder: Annotated[PrecoderScheme, key("The precoders that the route is for.")] = "faao"
     inputs: Annotated[
-        Inputs,
-        key("Inputs that the design is for; what is reported is the alphabet's rate."),
+        Inputs, key("Inputs that the design is for; what is reported is the alphabet's rate.")
     ] = "alphabet"
     starts: Annotated[
         tuple[Start, ...], key("Routes that the direct method starts from.", min_length=1)
@@ -303,8 +302,7 @@ class MissionOptions(_Section):
     takeoff: Annotated[Flag, key("Whether the mission begins with a take-off.")] = True
     on_finish: Annotated[OnFinish, key("What the aircraft does at the end.")] = "rtl"
     path_tolerance: Annotated[
-        Number,
-        key("Largest distance of the predicted flight from the path.", "m", ge=0.1, le=1000),
+        Number, key("Largest distance of the predicted flight from the path.", "m", ge=0.1, le=1000)
     ] = 2.0
     max_items: Annotated[
         Whole, key("Most items of the mission, the home row included.", ge=2, le=65_535)

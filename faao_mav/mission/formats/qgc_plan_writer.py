@@ -10,9 +10,14 @@ from faao_mav.mission.fence import Fence, RallyPoint
 from faao_mav.mission.formats.mission_file import PlanTarget
 from faao_mav.mission.item import Home, Mission, MissionItem
 
-_CRUISE_SPEED, _HOVER_SPEED = 15.0, 5.0  # what QGroundControl assumes
-_MIXED, _RELATIVE, _ABSOLUTE, _TERRAIN_FRAME = 0, 1, 2, 4
-"""QGroundControl's altitude modes."""
+_CRUISE_SPEED, _HOVER_SPEED = 15.0, 5.0
+"""Speeds in m/s that QGroundControl assumes of a mission without a speed: its own defaults."""
+
+_ALTITUDE_MODES = ((1, ABOVE_HOME), (2, ABOVE_SEA), (4, ABOVE_TERRAIN))
+"""QGroundControl's altitude modes by the frames of items."""
+
+_MIXED = 0
+"""QGroundControl's altitude mode of a plan whose items differ."""
 
 
 def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
@@ -75,13 +80,12 @@ def _item(number: int, item: MissionItem, mission: Mission, not_set: int | None)
 
 def _altitude_mode(item: MissionItem) -> int | None:
     """Return how QGroundControl is to show the item's altitude; None: as a plain parameter."""
-    modes = {_RELATIVE: ABOVE_HOME, _ABSOLUTE: ABOVE_SEA, _TERRAIN_FRAME: ABOVE_TERRAIN}
-    return next((mode for mode, frames in modes.items() if item.frame in frames), None)
+    return next((mode for mode, frames in _ALTITUDE_MODES if item.frame in frames), None)
 
 
 def _global_altitude_mode(mission: Mission) -> int:
     modes = {_altitude_mode(item) for item in mission.items} - {None}
-    return modes.pop() or _MIXED if len(modes) == 1 else _MIXED
+    return (modes.pop() if len(modes) == 1 else None) or _MIXED
 
 
 def _first_speed(mission: Mission) -> float | None:
