@@ -34,6 +34,7 @@ READ = {
     "nan_yaw.waypoints": FLIGHT,
     "version_100.txt": [TAKEOFF, WAYPOINT],
     "version_120.waypoints": FLIGHT,
+    "home_in_frame_3.txt": FLIGHT,
     "gap.waypoints": [TAKEOFF, WAYPOINT, JUMP, RTL],
     "px4.plan": FLIGHT,
     "bom.plan": FLIGHT,
@@ -103,6 +104,11 @@ def test_is_refused(name: str) -> None:
         read_mission(FOLDER / name)
     assert str(caught.value).startswith(f"{FOLDER / name}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_only_odd_files_have_warnings() -> None:
+    warned = {name for name in READ if read_mission_file(FOLDER / name).warnings}
+    assert warned == {"gap.waypoints", "home_in_frame_3.txt"}
 
 
 def test_what_else_the_files_tell() -> None:
