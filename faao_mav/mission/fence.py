@@ -10,6 +10,18 @@ LatLon: TypeAlias = tuple[float, float]
 """Latitude and longitude, WGS84 degrees."""
 
 
+def check_place(place: LatLon, what: str, altitude: float = 0.0) -> None:
+    """Raise `InputError`, which names `what`, for coordinates that are no place on Earth."""
+    latitude, longitude = place
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
+        raise InputError(
+            f"{what}: {latitude}, {longitude}; expected a latitude within 90 degrees and a "
+            "longitude within 180"
+        )
+    if not math.isfinite(altitude):
+        raise InputError(f"{what}: altitude {altitude}; expected finite metres")
+
+
 @dataclass(frozen=True, slots=True)
 class Circle:
     """All places within `radius` metres of `center`; to stay in (`inclusion`) or out of.
@@ -22,7 +34,7 @@ class Circle:
     inclusion: bool
 
     def __post_init__(self) -> None:
-        _check(self.center, "fence circle")
+        check_place(self.center, "fence circle")
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise InputError(f"fence circle: radius {self.radius}; expected metres above 0")
 
@@ -41,7 +53,7 @@ class Polygon:
         if len(self.vertices) < 3:
             raise InputError(f"fence polygon: {len(self.vertices)} vertices; expected at least 3")
         for vertex in self.vertices:
-            _check(vertex, "fence polygon")
+            check_place(vertex, "fence polygon")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +68,7 @@ class RallyPoint:
     altitude: float
 
     def __post_init__(self) -> None:
-        _check((self.latitude, self.longitude), "rally point")
-        if not math.isfinite(self.altitude):
-            raise InputError(f"rally point: altitude {self.altitude}; expected finite metres")
+        check_place((self.latitude, self.longitude), "rally point", self.altitude)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +88,3 @@ class Fence:
 
     def __bool__(self) -> bool:
         return bool(self.polygons or self.circles)
-
-
-def _check(place: LatLon, what: str) -> None:
-    latitude, longitude = place
-    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
-        raise InputError(
-            f"{what}: {latitude}, {longitude}; expected a latitude within 90 degrees and a "
-            "longitude within 180"
-        )

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command, Frame
-from faao_mav.mission.fence import Fence, RallyPoint
+from faao_mav.mission.fence import Fence, RallyPoint, check_place
 
 Params: TypeAlias = tuple[float, float, float, float]
 """param1 to param4 of an item."""
@@ -25,13 +25,7 @@ class Home:
     altitude: float
 
     def __post_init__(self) -> None:
-        if not (
-            abs(self.latitude) <= 90 and abs(self.longitude) <= 180 and math.isfinite(self.altitude)
-        ):
-            raise InputError(
-                f"home {self.latitude}, {self.longitude}, {self.altitude}: expected a latitude "
-                "within 90 degrees, a longitude within 180 and a finite altitude"
-            )
+        check_place((self.latitude, self.longitude), "home", self.altitude)
 
 
 @dataclass(frozen=True, slots=True)

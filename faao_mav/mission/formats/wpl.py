@@ -96,7 +96,7 @@ def read_wpl(text: str, source: str) -> MissionFile:
     """
     lines = _lines(text)
     layout = _layout(next(lines, None), source)
-    rows = [_Row(source, number, line, layout) for number, line in lines]
+    rows = [_Line(source, number, line, layout) for number, line in lines]
     if not rows:
         first = "row 0, the home position, and the items" if layout.home_row else "items"
         raise MissionFileError(f"{source}: a header but no items; expected {first}")
@@ -113,7 +113,7 @@ def read_wpl(text: str, source: str) -> MissionFile:
     return MissionFile(mission, warnings=tuple(_oddities(rows, layout, mission)))
 
 
-def _oddities(rows: "Sequence[_Row]", layout: _Layout, mission: Mission) -> Iterator[str]:
+def _oddities(rows: "Sequence[_Line]", layout: _Layout, mission: Mission) -> Iterator[str]:
     """Yield what is odd about a file that is read nevertheless."""
     if layout.home_row and rows[0].integer("frame") in ABOVE_HOME and mission.home is not None:
         yield rows[0].place("frame") + (
@@ -158,7 +158,7 @@ def _layout(line: tuple[int, str] | None, source: str) -> _Layout:
     return layout
 
 
-class _Row:
+class _Line:
     """A line's fields, read on demand so that every complaint can name its place."""
 
     def __init__(self, source: str, number: int, line: str, layout: _Layout) -> None:
