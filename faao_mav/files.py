@@ -9,7 +9,7 @@ from pathlib import Path
 
 from faao_mav.errors import InputError
 
-_NAME_KEPT = 40
+_SHOWN = 40
 """Characters of a file's name that its temporary file's name repeats: file systems allow 255."""
 
 _NO_FILE = "is a device or a pipe; give the name of a file"
@@ -87,7 +87,7 @@ def write_whole(path: str | Path, content: bytes) -> None:
     """
     target = Path(os.path.realpath(path))
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name[:_NAME_KEPT]}.", dir=target.parent)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name[:_SHOWN]}.", dir=target.parent)
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(content)

@@ -70,7 +70,7 @@ MISSION_SUFFIXES = tuple(_FORMATS)
 """What the name of a mission file may end in."""
 
 MAX_BYTES = 16_000_000
-"""More than any autopilot stores; keeps a wrong file name from filling the memory."""
+"""Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
 
 
 def read_mission(path: str | Path) -> Mission:

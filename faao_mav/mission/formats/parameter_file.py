@@ -19,14 +19,21 @@ ParameterStyle: TypeAlias = Literal["list", "qgroundcontrol"]
 """`NAME,VALUE`, or QGroundControl's five fields."""
 
 MAX_BYTES = 4_000_000
-"""Ten times what the largest autopilot has; keeps a wrong file name from filling the memory."""
+"""Bytes of the largest file that is read; chosen: ten times what the largest autopilot has."""
 
 _AUTOPILOT_COMPONENT = 1
-_INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
-_INTEGERS = range(1, 9)
-_TYPES = range(1, 11)
+"""MAV_COMP_ID_AUTOPILOT1: the component whose parameters are read."""
+
+_INT32, _REAL32 = 6, 9
+"""MAV_PARAM_TYPE of what is written; those of 8, 16, 32 and 64 bits are read."""
+
+_INTEGERS, _TYPES = range(1, 9), range(1, 11)
+"""MAV_PARAM_TYPE of integers, and all of them."""
+
 _INT32_LIMITS = range(-(2**31), 2**31)
+
 _READ_ONLY = "@READONLY"
+"""What MAVProxy writes behind a parameter that cannot be set."""
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
