@@ -1,4 +1,4 @@
-"""Names for the array types that signatures use."""
+"""Names for the array types that signatures use; shapes stand in the docstrings."""
 
 from typing import TypeAlias
 

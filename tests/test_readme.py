@@ -6,11 +6,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-import yaml
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.plan import parse_plan
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 REQUIRED = {
@@ -23,11 +23,11 @@ REQUIRED = {
 def test_the_plan_in_the_readme_shows_the_defaults() -> None:
     found = re.search(r"```yaml\n(.*?)```", README, re.DOTALL)
     assert found is not None
-    full = yaml.safe_load(found[1])
+    full = load_yaml(found[1], "test")
     least = {section: {k: full[section][k] for k in keys} for section, keys in REQUIRED.items()}
     stations = ("base_station", "ground_user")
     least["radio"] = {s: {"position": full["radio"][s]["position"]} for s in stations}
-    shown, default = parse_plan(found[1]), parse_plan(yaml.safe_dump(least))
+    shown, default = parse_plan(found[1]), parse_plan(dump_yaml(least))
     assert dataclasses.replace(shown, text="") == dataclasses.replace(default, text="")
 
 

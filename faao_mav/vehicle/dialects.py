@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from faao_mav.mission.rows import as_received, as_sent, home_item
+from faao_mav.mission.item import as_received, as_sent, home_item
 from faao_mav.vehicle.dialect import Dialect, Limit, SpeedAxis, SpeedChange
 
 if TYPE_CHECKING:

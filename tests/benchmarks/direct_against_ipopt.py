@@ -19,7 +19,6 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 import numpy as np
-import yaml
 from peer import GAIN, ROUNDS, Model, at_best, at_precoders
 
 from faao_mav.arrays import Real
@@ -33,6 +32,7 @@ from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.routes import starts
 from faao_mav.optimizer.search.start import straight_flight
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.radio.best_precoder import best_precoders
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -44,7 +44,7 @@ claims: list[tuple[str, bool, str]] = []
 
 def plan(name: str, **changes: Any) -> Plan:
     """Read a sample plan with `T`, `W`, `dt`, `modulation`, `fading` or `starts` replaced."""
-    data = yaml.safe_load((MISSIONS / f"{name}.yaml").read_text())
+    data = load_yaml((MISSIONS / f"{name}.yaml").read_text(), "test")
     data.setdefault("optimizer", {})["method"] = "direct"
     for key, value in changes.items():
         if key == "T":
@@ -58,7 +58,7 @@ def plan(name: str, **changes: Any) -> Plan:
             data["optimizer"]["starts"] = value
         else:
             data["radio"][key] = value
-    return parse_plan(yaml.safe_dump(data))
+    return parse_plan(dump_yaml(data))
 
 
 def timed(work: Callable[[], Any], times: int = 1) -> tuple[Any, float]:

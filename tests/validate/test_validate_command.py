@@ -22,6 +22,7 @@ from faao_mav.mission.formats import render_mission
 from faao_mav.mission.item import Mission
 from faao_mav.validate import RULES
 from faao_mav.vehicle import Vehicle
+from faao_mav.vehicle.files import plan_target
 
 Run = Callable[..., Any]
 
@@ -49,7 +50,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
 
 
 def written(path: Path, content: Mission, vehicle: Vehicle | None = None) -> Path:
-    path.write_text(render_mission(content, path, vehicle))
+    path.write_text(render_mission(content, path, plan_target(vehicle)))
     return path
 
 

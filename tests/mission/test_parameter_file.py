@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.mavparm import MAVParmDict
 
 from faao_mav.errors import InputError, ParameterFileError
-from faao_mav.vehicle.parameter_file import autopilot_of, read_parameters, render_parameters
+from faao_mav.mission.formats.parameter_file import read_parameters, render_parameters
 
 names = st.from_regex(r"[A-Z][A-Z0-9_]{0,15}", fullmatch=True)
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -24,31 +24,35 @@ def read(text: str, folder: Path) -> dict[str, float]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("parameters")
 
 
 @given(st.dictionaries(names, numbers, min_size=1, max_size=8))
-def test_ardupilot_files_are_read_back(folder, parameters):
-    text = render_parameters(parameters, "ardupilot", header="for a test\n\nof it")
+def test_ardupilot_files_are_read_back(folder: Path, parameters: dict[str, float]) -> None:
+    text = render_parameters(parameters, "list", header="for a test\n\nof it")
     assert repr(read(text, folder)) == repr(parameters)
 
 
 @given(st.dictionaries(names, numbers | integers, min_size=1, max_size=8))
-def test_px4_files_are_read_back_with_their_types(folder, parameters):
-    assert repr(read(render_parameters(parameters, "px4"), folder)) == repr(parameters)
+def test_px4_files_are_read_back_with_their_types(
+    folder: Path, parameters: dict[str, float]
+) -> None:
+    assert repr(read(render_parameters(parameters, "qgroundcontrol"), folder)) == repr(parameters)
 
 
 @given(st.dictionaries(names, st.floats(-1e6, 1e6), min_size=1, max_size=8))
-def test_pymavlink_reads_the_same(tmp_path_factory, parameters):
+def test_pymavlink_reads_the_same(
+    tmp_path_factory: pytest.TempPathFactory, parameters: dict[str, float]
+) -> None:
     path = tmp_path_factory.mktemp("pymavlink") / "x.param"
-    path.write_text(render_parameters(parameters, "ardupilot", header="for a test"))
+    path.write_text(render_parameters(parameters, "list", header="for a test"))
     loaded = MAVParmDict()
     assert loaded.load(str(path), use_excludes=False)
     assert dict(loaded) == parameters
 
 
-def test_what_pymavlink_writes_is_read(tmp_path):
+def test_what_pymavlink_writes_is_read(tmp_path: Path) -> None:
     written = MAVParmDict()
     written.update({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5, "A_VERY_LONG_NAME": -0.25})
     path = tmp_path / "x.parm"
@@ -56,9 +60,9 @@ def test_what_pymavlink_writes_is_read(tmp_path):
     assert read_parameters(path) == written
 
 
-def test_the_form_that_qgroundcontrol_reads():
+def test_the_form_that_qgroundcontrol_reads() -> None:
     text = render_parameters({"MPC_ACC_HOR": 5.0, "MIS_TKO_LAND_REQ": 2, "NAV_ACC_RAD": 2e-5},
-                             "px4", header="Timed for these.")  # fmt: skip
+                             "qgroundcontrol", header="Timed for these.")  # fmt: skip
     assert text == (
         "# Timed for these.\n"
         "#\n"
@@ -67,15 +71,15 @@ def test_the_form_that_qgroundcontrol_reads():
         "1\t1\tMIS_TKO_LAND_REQ\t2\t6\n"
         "1\t1\tNAV_ACC_RAD\t0.00002\t9\n"
     )
-    assert render_parameters({"A": 1}, "px4", system=7).endswith("7\t1\tA\t1\t6\n")
+    assert render_parameters({"A": 1}, "qgroundcontrol", system=7).endswith("7\t1\tA\t1\t6\n")
 
 
-def test_the_form_that_mission_planner_reads():
-    text = render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}, "ardupilot", header="x")
+def test_the_form_that_mission_planner_reads() -> None:
+    text = render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}, "list", header="x")
     assert text == "# x\nWPNAV_SPEED,800\nWPNAV_JERK,1.5\n"
 
 
-def test_qgroundcontrols_own_file(tmp_path):
+def test_qgroundcontrols_own_file(tmp_path: Path) -> None:
     text = (
         "# Onboard parameters for Vehicle 1\n#\n# Stack: PX4 Pro\n# Vehicle: Multi-Rotor\n"
         "# Version: 1.16.1 dev\n# Git Revision: 0123456789abcdef\n#\n"
@@ -102,7 +106,7 @@ def test_qgroundcontrols_own_file(tmp_path):
         "A 1 @READONLY\nB 2.5\n",
     ],
 )
-def test_harmless_oddities_are_read(text, tmp_path):
+def test_harmless_oddities_are_read(text: str, tmp_path: Path) -> None:
     assert read(text, tmp_path) == {"A": 1, "B": 2.5}
 
 
@@ -128,14 +132,14 @@ def test_harmless_oddities_are_read(text, tmp_path):
         ("1\t2\tA\t1\t9\n", "no parameters in it"),
     ],
 )
-def test_damage_is_named(text, message, tmp_path):
+def test_damage_is_named(text: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterFileError, match=re.escape(message)) as caught:
         read(text, tmp_path)
     assert str(caught.value).startswith(str(tmp_path / "x.param: "))
     assert isinstance(caught.value, InputError)
 
 
-def test_files_that_are_no_text(tmp_path):
+def test_files_that_are_no_text(tmp_path: Path) -> None:
     with pytest.raises(ParameterFileError, match="cannot be read: No such file"):
         read_parameters(tmp_path / "absent.param")
     (tmp_path / "x.param").write_bytes(b"A,1\nB,\xff\n")
@@ -155,31 +159,15 @@ def test_files_that_are_no_text(tmp_path):
         ("A", 2**31, "parameter A: 2147483648; expected a finite number, an integer within 32"),
     ],
 )
-def test_what_no_autopilot_has_is_not_written(name, value, message):
+def test_what_no_autopilot_has_is_not_written(name: str, value: float, message: str) -> None:
     with pytest.raises(ParameterFileError, match=re.escape(message)):
-        render_parameters({name: value}, "px4")
+        render_parameters({name: value}, "qgroundcontrol")
 
 
 @given(st.text())
-def test_any_text_is_read_or_refused(folder, text):
+def test_any_text_is_read_or_refused(folder: Path, text: str) -> None:
     try:
         parameters = read(text, folder)
     except ParameterFileError:
         return
-    assert read(render_parameters(parameters, "ardupilot"), folder) == parameters
-
-
-@pytest.mark.parametrize(
-    ("names", "whose"),
-    [
-        (["WPNAV_SPEED"], "ardupilot"),
-        (["WP_SPD", "RTL_ALT"], "ardupilot"),
-        (["RTL_RETURN_ALT", "MPC_XY_CRUISE"], "px4"),
-        (["NAV_ACC_RAD"], "px4"),
-        (["RTL_ALT"], None),
-        (["MPC_XY_CRUISE", "WPNAV_SPEED"], None),
-        ([], None),
-    ],
-)
-def test_names_tell_whose_parameters_they_are(names: list[str], whose: str | None) -> None:
-    assert autopilot_of(names) == whose
+    assert read(render_parameters(parameters, "list"), folder) == parameters

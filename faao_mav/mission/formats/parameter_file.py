@@ -1,52 +1,44 @@
-"""Files of autopilot parameters: ArduPilot's `.param`, `.parm` and QGroundControl's `.params`.
+"""Files of autopilot parameters: `.param`, `.parm` and QGroundControl's `.params`.
 
-ArduPilot's ground stations write `NAME,VALUE` or `NAME VALUE`. QGroundControl writes five
+Most ground stations write `NAME,VALUE` or `NAME VALUE`. QGroundControl writes five
 tab-separated fields: system, component, name, value and MAV_PARAM_TYPE. In both, lines that start
 with `#` are comments. As read by Mission Planner, pymavlink (MAVProxy) and QGroundControl.
 """
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
+from typing import Literal, TypeAlias
 
-from faao_mav.errors import ParameterFileError
+from faao_mav.errors import ParameterFileError, quote
 from faao_mav.files import read_text
-from faao_mav.plan.autopilots import Autopilot
-from faao_mav.vehicle.registry import families, family
+
+ParameterStyle: TypeAlias = Literal["list", "qgroundcontrol"]
+"""`NAME,VALUE`, or QGroundControl's five fields."""
 
 MAX_BYTES = 4_000_000
-"""Ten times what the largest autopilot has; keeps a wrong file name from filling the memory."""
+"""Bytes of the largest file that is read; chosen: ten times what the largest autopilot has."""
 
 _AUTOPILOT_COMPONENT = 1
-_INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
-_INTEGERS = range(1, 9)
-_TYPES = range(1, 11)
+"""MAV_COMP_ID_AUTOPILOT1: the component whose parameters are read."""
+
+_INT32, _REAL32 = 6, 9
+"""MAV_PARAM_TYPE of what is written; those of 8, 16, 32 and 64 bits are read."""
+
+_INTEGERS, _TYPES = range(1, 9), range(1, 11)
+"""MAV_PARAM_TYPE of integers, and all of them."""
+
 _INT32_LIMITS = range(-(2**31), 2**31)
+
 _READ_ONLY = "@READONLY"
+"""What MAVProxy writes behind a parameter that cannot be set."""
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"0x[0-9a-f]{1,8}", re.ASCII | re.IGNORECASE)
 _WHOLE = re.compile(r"\d{1,3}", re.ASCII)
-_MAX_SHOWN = 40
-
-
-def parameter_path(mission: Path, autopilot: Autopilot) -> Path:
-    """Return the file of parameters beside `mission`: `.param`, or `.params` for PX4."""
-    return mission.with_suffix(family(autopilot).parameter_suffix)
-
-
-def autopilot_of(parameters: Iterable[str]) -> Autopilot | None:
-    """Return whose names `parameters` are, None where they do not tell."""
-    names = tuple(parameters)
-    found = [
-        each.key
-        for each in families()
-        if any(name.startswith(each.parameter_prefixes) for name in names)
-    ]
-    return found[0] if len(found) == 1 else None
 
 
 def read_parameters(path: str | Path) -> dict[str, float]:
@@ -78,29 +70,33 @@ def read_parameters(path: str | Path) -> dict[str, float]:
 
 def render_parameters(
     parameters: Mapping[str, float],
-    autopilot: Autopilot,
+    style: ParameterStyle = "list",
     *,
     header: str = "",
     system: int = 1,
 ) -> str:
     """Return the text of a parameter file, with the lines of `header` as comments before them.
 
-    For ArduPilot `NAME,VALUE`. For PX4 QGroundControl's five fields, where an `int` is an INT32
-    and a `float` a REAL32, so 5 and 5.0 differ: QGroundControl refuses the wrong one, and, if it
-    is connected, a `system` that is not the vehicle's. Values have as many digits as they need.
-    Raises `ParameterFileError` for names and values that no autopilot has.
+    In the style "qgroundcontrol" an `int` is an INT32 and a `float` a REAL32, so 5 and 5.0
+    differ: QGroundControl refuses the wrong one, and, if it is connected, a `system` that is not
+    the vehicle's. Values have as many digits as they need. Raises `ParameterFileError` for names
+    and values that no autopilot has.
+
+    >>> print(render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}), end="")
+    WPNAV_SPEED,800
+    WPNAV_JERK,1.5
     """
     for name, value in parameters.items():
         if not _NAME.fullmatch(name):
             raise ParameterFileError(
-                f"parameter {_shown(name)}; expected at most 16 capitals, digits and _"
+                f"parameter {quote(name)}; expected at most 16 capitals, digits and _"
             )
         if not math.isfinite(value) or (isinstance(value, int) and value not in _INT32_LIMITS):
             raise ParameterFileError(
                 f"parameter {name}: {value}; expected a finite number, an integer within 32 bits"
             )
     comments = [f"# {line}".rstrip() for line in header.splitlines()]
-    if family(autopilot).parameter_style == "qgroundcontrol":
+    if style == "qgroundcontrol":
         comments += [*(["#"] if header else []), "# Vehicle-Id Component-Id Name Value Type"]
         rows = [
             "\t".join((str(system), str(_AUTOPILOT_COMPONENT), name, _digits(value), _type(value)))
@@ -130,9 +126,9 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
     if len(fields) == 5:
         _, component, name, text, kind = (field.strip() for field in fields)
         if not _WHOLE.fullmatch(component):
-            raise ParameterFileError(f"{where}: component {_shown(component)}; expected a number")
+            raise ParameterFileError(f"{where}: component {quote(component)}; expected a number")
         if not _WHOLE.fullmatch(kind) or int(kind) not in _TYPES:
-            raise ParameterFileError(f"{where}: type {_shown(kind)}; expected a number 1 to 10")
+            raise ParameterFileError(f"{where}: type {quote(kind)}; expected a number 1 to 10")
         if int(component) == _AUTOPILOT_COMPONENT:
             _check_name(name, where)
             yield name, _number(text, where, whole=int(kind) in _INTEGERS)
@@ -142,7 +138,7 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
         fields.pop()
     if len(fields) != 2:
         raise ParameterFileError(
-            f"{where}: {_shown(content)}; expected NAME,VALUE or NAME VALUE, or five fields "
+            f"{where}: {quote(content)}; expected NAME,VALUE or NAME VALUE, or five fields "
             "between tabs: system, component, name, value, type"
         )
     _check_name(fields[0], where)
@@ -152,7 +148,7 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
 def _check_name(name: str, where: str) -> None:
     if not _NAME.fullmatch(name):
         raise ParameterFileError(
-            f"{where}: name {_shown(name)}; expected at most 16 capitals, digits and _"
+            f"{where}: name {quote(name)}; expected at most 16 capitals, digits and _"
         )
 
 
@@ -163,9 +159,5 @@ def _number(text: str, where: str, *, whole: bool) -> float:
         value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value) or (whole and value != int(value)):
         kind = "a whole number, as its type says" if whole else "a finite number"
-        raise ParameterFileError(f"{where}: value {_shown(text)}; expected {kind}")
+        raise ParameterFileError(f"{where}: value {quote(text)}; expected {kind}")
     return int(value) if whole else value
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "...")
