@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_forms import bpsk_two_antennas_rate
 from conftest import MakePlan
 
 from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
@@ -13,7 +14,6 @@ from faao_mav.optimizer.algorithm1.trajectory_step import (
 )
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.search.start import straight_flight
-from faao_mav.radio.precoder import bpsk_two_antennas_rate
 
 
 def sums_of(problem: Problem) -> tuple[SumOfExponentials, ...]:
