@@ -23,8 +23,8 @@ from faao_mav.optimizer.interior.maximize import (
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.progress import Observer, Progress
+from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.mode_rate import ModeRate
-from faao_mav.optimizer.rates.place import PlaceRate, place
 from faao_mav.optimizer.rates.rate_model import CurveRate, rate_model
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.coarse import improved
@@ -43,13 +43,13 @@ class RateField:
     """Both links' rates over the map: what `interior` maximises the smaller mean of."""
 
     links: tuple[Link, ...]
-    rates: tuple[PlaceRate, ...]
+    rates: tuple[RateModel, ...]
 
     def value(self, w: Real) -> Real:
         """Return the rates (2, ..., n) at positions w (2, ..., n), bits."""
         found = []
         for link, rate in zip(self.links, self.rates, strict=True):
-            at = place(link, w)
+            at = link_coordinates(link, w)
             found.append(rate.value(at.gain_log, at.cosine))
         return np.stack(found)
 
@@ -58,7 +58,7 @@ class RateField:
         shape = (len(self.links), *w.shape[1:])
         value, gradient, hessian = np.empty(shape), np.empty((2, *shape)), np.empty((3, *shape))
         for j, (link, rate) in enumerate(zip(self.links, self.rates, strict=True)):
-            at = place(link, w)
+            at = link_coordinates(link, w)
             partials = rate.partials(at.gain_log, at.cosine)
             value[j] = partials.value
             gradient[:, j], hessian[:, j] = at.by_position(partials)
@@ -188,16 +188,16 @@ def _solution(
     return replace(solution, history=np.array([*honest, reached]))
 
 
-def _precoders(link: Link, rate: PlaceRate, wanted: Design, w: Real, H: Complex) -> Complex:
+def _precoders(link: Link, rate: RateModel, wanted: Design, w: Real, H: Complex) -> Complex:
     """The precoders at the final positions, from the best start that is known for them."""
-    where = place(link, w.T)
+    where = link_coordinates(link, w.T)
     at = where.gain_log, where.cosine
     if isinstance(rate, CurveRate) and wanted.optimal:
-        return wanted.precoders(link, H, start=rate.start(*at))
+        return wanted.precoders(link, H, start=rate.initial_precoders(*at))
     found = wanted.precoders(link, H)
     if not isinstance(rate, BestRate | ModeRate) or rate.exact:
         return found
-    carried = wanted.precoders(link, H, start=rate.start(*at))
+    carried = wanted.precoders(link, H, start=rate.initial_precoders(*at))
     better = wanted.rate(link, H, carried) > wanted.rate(link, H, found)
     return np.asarray(np.where(better[:, None, None], carried, found))
 
