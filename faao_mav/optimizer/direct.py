@@ -27,8 +27,8 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate, rate_model
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
-from faao_mav.optimizer.search.coarse import improved
-from faao_mav.optimizer.search.routes import starts
+from faao_mav.optimizer.search.multistart import improve_starts
+from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.solution import Solution, make_solution
 
 _POLISH = 12
@@ -83,7 +83,9 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
     tell(1, "the starts", 0.0)
-    rough = improved(kin, field, routes, tolerance=_ROUGH, max_iterations=options.max_iterations)
+    rough = improve_starts(
+        kin, field, routes, tolerance=_ROUGH, max_iterations=options.max_iterations
+    )
     flights = [*routes.values(), *rough.flights.values()]
     worth = field.value(np.stack([flight.w.T for flight in flights], axis=1)).mean(axis=-1)
     worth = worth.min(axis=0)
@@ -103,10 +105,10 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             opening=FAR if begun_afresh else NEAR,
         )
 
-    ends = finished([rough.flights[name] for name in rough.hopeful])
+    ends = finished([rough.flights[name] for name in rough.promising])
     spread = dict(zip(routes, counted[len(routes) :], strict=True))
     if not wanted.gaussian:
-        spread |= {name: end.value for name, end in zip(rough.hopeful, ends, strict=True)}
+        spread |= {name: end.value for name, end in zip(rough.promising, ends, strict=True)}
     if worth.max() > max(end.value for end in ends):
         ends += finished([flights[int(worth.argmax())]])
     final = _polished(problem, wanted, field, max(ends, key=lambda end: end.value))

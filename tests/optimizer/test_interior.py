@@ -20,7 +20,7 @@ from faao_mav.optimizer.interior.min_speed import Slow
 from faao_mav.optimizer.interior.newton import Newton
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.scaled import LENGTH, flight_variables
-from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.stationarity import kkt_residual
 
 STATIONS = np.array([[0.0, 0.0], [300.0, 300.0]])

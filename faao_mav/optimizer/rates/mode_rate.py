@@ -2,8 +2,8 @@
 
 The best rate depends on H through its singular values λ_1 >= λ_2 alone. It is therefore one
 function f(a, κ) of a = ln(W λ_1² / σ²) and κ = λ_2 / λ_1 for all slots: the best precoders are
-searched once on a grid of a and κ, and a bicubic spline interpolates their rates. With H = sqrt(gain) H_r,
-a = l + ln(W λ_1² / σ²) of H_r, and κ does not depend on l.
+searched once on a grid of a and κ, and a bicubic spline interpolates their rates. With
+H = sqrt(gain) H_r, a = l + ln(W λ_1² / σ²) of H_r, and κ does not depend on l.
 """
 
 import math
