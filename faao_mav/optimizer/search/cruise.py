@@ -55,7 +55,7 @@ def cruise(kin: Kinematics) -> Trajectory:
 
 
 def cruise_by(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
-    """Return a feasible flight that circles at each of `stations` (2,), or None if none was found."""
+    """Return a feasible flight that circles at each of `stations`, or None if none was found."""
     return next(_attempts(kin, stations), None)
 
 
