@@ -270,8 +270,8 @@ def _largest_singular_values(link: Link, slots: int) -> Real:
     for u in directions:
         H_r = link.fade(link.line_of_sight_at(np.full(slots, u)))
         largest = np.maximum(largest, np.linalg.svd(H_r, compute_uv=False))
-    # Between two directions of the grid a singular value changes by less than the norm of the change
-    # of H_r, in which no phase changes by more than pi (antennas - 1) du.
+    # Between two directions of the grid a singular value changes by less than the norm of the
+    # change of H_r, in which no phase changes by more than pi (antennas - 1) du.
     du = 1 / (len(directions) - 1) if len(directions) > 1 else 0.0
     phase = np.pi * (max(link.receive, link.transmit) - 1) * du
     return np.asarray(largest + phase * link.los_share * np.sqrt(link.receive * link.transmit))
@@ -289,8 +289,8 @@ def majorant_lines(r: Real, rates: Real) -> tuple[Real, Real]:
     """
     step = r[:, 1:2] - r[:, :1]
     moving = np.where(step > 0, step, 1.0)
-    # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being known on
-    # the grid only.
+    # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being known
+    # on the grid only.
     between = np.abs(np.diff(rates, 2, axis=1)).max(axis=1, keepdims=True) / 4
     tangent = np.minimum(0.0, np.diff(rates, axis=1) / moving)
     whole = np.minimum(0.0, (rates[:, -1:] - rates[:, :1]) / (moving * (r.shape[1] - 1)))
