@@ -59,6 +59,15 @@ class BestPrecoders:
         return np.asarray(np.mean(each, axis=-1))
 
 
+def has_closed_form(modulation: str, antennas: int) -> bool:
+    """Return whether the best precoder for one channel has a closed form.
+
+    >>> has_closed_form("bpsk", 2), has_closed_form("qpsk", 2), has_closed_form("64qam", 1)
+    (True, False, True)
+    """
+    return antennas == 1 or (antennas == 2 and modulation == "bpsk")
+
+
 def _checked(
     H: RealOrComplex, axes: int, power: float, noise: float, start: RealOrComplex | None
 ) -> Complex:
@@ -86,7 +95,7 @@ def _best(
     shape, (S, receive, N) = H.shape[:-3], H.shape[-3:]
     flat = H.reshape(-1, S, receive, N)
     classes = difference_classes(modulation, N)
-    exact = N == 1 or (S == 1 and N == 2 and modulation == "bpsk")
+    exact = N == 1 or (S == 1 and has_closed_form(modulation, N))
     P = np.ones((len(flat), N, N), dtype=np.complex128)
     if exact and N == 2:
         P = bpsk_two_antennas(flat[:, 0], power)

@@ -16,7 +16,7 @@ from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import DirectionPartials, RatePartials
 from faao_mav.optimizer.rates.spline import BicubicSpline, GridPosition
-from faao_mav.radio.best_precoder import best_precoders
+from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 
 _SPACING = 0.125
 """Spacing of the grid of a, 0.54 dB. Chosen; what a change costs is not measured."""
@@ -157,8 +157,7 @@ def _search(modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
     Without a closed form, every `_SEARCH_EVERY`-th point is searched from all starts. All points
     are then searched from the four of these around them, and keep the best.
     """
-    exact = best_precoders(H[:1, :1], 1.0, modulation, 1.0).exact
-    if exact:
+    if has_closed_form(modulation, H.shape[-1]):
         best = best_precoders(H, 1.0, modulation, 1.0)
         return best.rate, best.P, True
     every_a, every_k = _SEARCH_EVERY

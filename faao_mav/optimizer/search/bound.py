@@ -26,7 +26,7 @@ from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
 from faao_mav.optimizer.rates.rate_model import best_curve
-from faao_mav.radio.best_precoder import best_precoders
+from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 
 _LINES = 64
 """Tangents of the majorant of each slot."""
@@ -230,15 +230,16 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     upper bound: each singular value of H_r is the largest over all directions.
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
+    exact = has_closed_form(link.modulation, link.transmit)
     gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
     if link.nlos is None or optimal.averaged:
         curve = best_curve(link, optimal, gain_log.min(), gain_log.max())
-        return curve.value(gain_log, gain_log), False if optimal.averaged else _closed_form(link)
+        return curve.value(gain_log, gain_log), not optimal.averaged and exact
     singular = _largest_singular_values(link, len(r))
     H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
     k = np.arange(singular.shape[1])
     H_r[:, k, k] = singular
-    if _closed_form(link):
+    if exact:
         H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
         return best_precoders(H, link.power, link.modulation, link.noise).rate, True
     diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
@@ -257,10 +258,6 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
         start = best.P
     spline = CubicSpline(columns, np.stack(rates, axis=1), axis=1)
     return np.asarray(spline(np.arange(r.shape[1]))), False
-
-
-def _closed_form(link: Link) -> bool:
-    return link.transmit == 1 or (link.modulation == "bpsk" and link.transmit == 2)
 
 
 def _largest_singular_values(link: Link, slots: int) -> Real:
