@@ -15,7 +15,7 @@ VALUES = st.lists(st.floats(-100, 100), min_size=4, max_size=30)
 def test_values_and_derivatives_are_those_of_scipy(
     values: list[float], first: float, step: float, order: int
 ) -> None:
-    x = first + step * np.arange(len(values))
+    x = np.asarray(first + step * np.arange(len(values)), dtype=float)
     beyond = np.linspace(x[0] - step, x[-1] + step, 101)
     expected = interpolate.CubicSpline(x, values)(beyond, order)
     scale = max(np.abs(values).max(), 1e-9) / step**order
