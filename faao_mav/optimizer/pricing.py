@@ -19,25 +19,15 @@ from faao_mav.radio.rate import cutoff_rate
 SATURATED = 0.999
 """Share of N log2(rho) from which a link counts as saturated. Chosen."""
 
-_MOST_PAIRS, _PART_PAIRS, _PARTS = 1000, 150, 6
-"""Pairs of slot and draw up to which all are averaged; beyond, pairs per sample and samples.
-Chosen: the error, which is stated, is then some 5e-3 bit/s/Hz."""
+# Chosen: with these, where slots and draws are sampled, the stated error is some 5e-3 bit/s/Hz.
+_MOST_PAIRS = 1000  # pairs of slot and draw up to which all are averaged
+_PART_PAIRS, _PARTS = 150, 6  # pairs per sample and samples beyond
+_COARSER = 6.0  # tolerance of the noise average of a sample, in that of the result
+_FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
+_FRESH_SEARCHES = 128  # slots with a new draw, and a search, where precoders know the draw
 
-_COARSER = 6.0
-"""Tolerance of the noise average of a sample, in that of the result: the choice of slots and draws
-errs more than the noise. Chosen."""
-
-_FRESH_DRAWS = 64
-"""New draws of the fading per slot where one precoder serves all draws. Chosen."""
-
-_FRESH_SEARCHES = 128
-"""Slots with a new draw, and a search for its precoder, where precoders know the draw. Chosen."""
-
-_MAX_SPARE_DB = 300.0
-"""Largest spare power that is looked for, dB: beyond any link."""
-
-_BISECTIONS = 60
-"""Bisections of the spare power: 300 dB / 2^60 is rounding."""
+_MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
+_BISECTIONS = 60  # bisections of the spare power: 300 dB / 2^60 is rounding
 
 
 @dataclass(frozen=True, slots=True)

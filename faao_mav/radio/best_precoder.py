@@ -26,11 +26,8 @@ from faao_mav.radio.precoder import (
 from faao_mav.radio.precoder_search import search
 from faao_mav.radio.rate import cutoff_rate
 
-_CHUNK = 4_000_000
-"""Numbers held at once while the derivatives are assembled: 32 MB. Chosen."""
-
-_STARTS = 20
-"""Points from which each search starts, about, to reckon its memory with."""
+_CHUNK = 4_000_000  # numbers held at once while the derivatives are assembled: 32 MB. Chosen
+_STARTS = 20  # points from which each search starts, about, to reckon its memory with
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,36 +80,6 @@ def _checked(
     return H
 
 
-def _best(
-    H: Complex,
-    power: float,
-    modulation: str,
-    noise: float,
-    start: RealOrComplex | None,
-    tolerance: float,
-) -> BestPrecoders:
-    """Return ``best_mean_precoders`` of H (..., S, N_r, N_t), with the arguments checked."""
-    shape, (S, receive, N) = H.shape[:-3], H.shape[-3:]
-    flat = H.reshape(-1, S, receive, N)
-    classes = difference_classes(modulation, N)
-    exact = N == 1 or (S == 1 and has_closed_form(modulation, N))
-    P = np.ones((len(flat), N, N), dtype=np.complex128)
-    if exact and N == 2:
-        P = bpsk_two_antennas(flat[:, 0], power)
-    elif not exact:
-        A = flat * (np.sqrt(power) / (2.0 * np.sqrt(noise)))
-        given = None if start is None else np.reshape(start, (-1, N, N)).astype(np.complex128)
-        mean = np.mean(flat, axis=1)
-        step = max(1, _CHUNK // (S * 2 * N**4 * (_STARTS if start is None else 1)))
-        for first in range(0, len(flat), step):
-            part = slice(first, first + step)
-            known = None if given is not None else _known(mean[part], power, noise)
-            begin = None if given is None else given[part]
-            P[part] = search(A[part], classes, tolerance, begin, known)
-    P = _with_power(P, power)
-    return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)
-
-
 def _known(H: Complex, power: float, noise: float) -> Complex:
     """Return the identity and the classical schemes, (5, b, N_t, N_t), for H (b, N_r, N_t)."""
     identity = np.broadcast_to(np.eye(H.shape[-1]), (*H.shape[:-2], H.shape[-1], H.shape[-1]))
@@ -155,8 +122,8 @@ def best_precoders(
     >>> float(best_precoders(H, 2.0, "qpsk", 1.0).rate.round(4))
     2.2761
     """
-    H = _checked(H, 2, power, noise, start)
-    return _best(H[..., None, :, :], power, modulation, noise, start, tolerance)
+    H = _checked(H, 2, power, noise, start)[..., None, :, :]
+    return best_mean_precoders(H, power, modulation, noise, start=start, tolerance=tolerance)
 
 
 def best_mean_precoders(
@@ -192,4 +159,22 @@ def best_mean_precoders(
     (2, 2)
     """
     H = _checked(H_draws, 3, power, noise, start)
-    return _best(H, power, modulation, noise, start, tolerance)
+    shape, (S, receive, N) = H.shape[:-3], H.shape[-3:]
+    flat = H.reshape(-1, S, receive, N)
+    classes = difference_classes(modulation, N)
+    exact = N == 1 or (S == 1 and has_closed_form(modulation, N))
+    P = np.ones((len(flat), N, N), dtype=np.complex128)
+    if exact and N == 2:
+        P = bpsk_two_antennas(flat[:, 0], power)
+    elif not exact:
+        A = flat * (np.sqrt(power) / (2.0 * np.sqrt(noise)))
+        given = None if start is None else np.reshape(start, (-1, N, N)).astype(np.complex128)
+        mean = np.mean(flat, axis=1)
+        step = max(1, _CHUNK // (S * 2 * N**4 * (_STARTS if start is None else 1)))
+        for first in range(0, len(flat), step):
+            part = slice(first, first + step)
+            known = None if given is not None else _known(mean[part], power, noise)
+            begin = None if given is None else given[part]
+            P[part] = search(A[part], classes, tolerance, begin, known)
+    P = _with_power(P, power)
+    return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)

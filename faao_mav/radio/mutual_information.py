@@ -23,25 +23,13 @@ from faao_mav.radio.real_channel import real_channel, real_inputs
 
 _LN2 = float(np.log(2.0))
 
-_MOST_DIFFERENCES = 1 << 20
-"""Difference vectors up to which the cutoff rate, which proves the ceiling, is computed. Chosen."""
-
-_NEGLIGIBLE = 1e-6
-"""Amplitude of a received dimension, in standard deviations of the noise, that is left out: it adds
-less than 1e-12 bit."""
-
-_WEAK = 1e-3
-"""Total SNR below which two terms of the series in the SNR are right to six digits."""
-
-_ROUGH = 0.1
-"""Largest standard error of one slot among many, bits: the spread of rougher ones says little."""
-
-_RARE = 0.5
-"""Gap of the cutoff rate to its ceiling, bits, below which transmission errors count as rare.
-Chosen; what a change costs is not measured."""
-
-_GRID_INPUTS = 64
-"""Input vectors up to which averaging each of them over a grid is quicker than lattices. Chosen."""
+# Chosen, unless another reason is given.
+_MOST_DIFFERENCES = 1 << 20  # difference vectors up to which the cutoff rate proves the ceiling
+_NEGLIGIBLE = 1e-6  # amplitude of a dimension, noise deviations, that adds less than 1e-12 bit
+_WEAK = 1e-3  # total SNR below which two terms of the series in the SNR are right to six digits
+_ROUGH = 0.1  # largest standard error of one slot among many, bits
+_RARE = 0.5  # gap of the cutoff rate to its ceiling, bits, below which errors count as rare
+_GRID_INPUTS = 64  # input vectors up to which a grid for each is quicker than lattices
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,36 +11,19 @@ from faao_mav.radio.real_channel import RealInputs
 
 _LN2 = float(np.log(2.0))
 
-_CHUNK = 1 << 18
-"""Likelihoods held at once: 2 MB, so that they stay in a processor's cache. Chosen."""
-
-_NOISES = 128
-"""Noise samples handled together at least, which keeps the inner loops long. Chosen."""
-
-_REACH = 6.5
-"""Radius of the grid in standard deviations: less than 1e-9 of the mass lies beyond."""
-
-_FIRST_SPACING, _LAST_SPACING = 0.8, 0.03
-"""Spacings of the first grid and of the last one tried, in standard deviations; each is finer than
-the one before by √2. Chosen; what a change costs is not measured."""
+# Chosen, unless another reason is given; what a change costs is not measured.
+_CHUNK = 1 << 18  # likelihoods held at once: 2 MB, which stay in a processor's cache
+_NOISES = 128  # noise samples handled together at least, which keeps the inner loops long
+_REACH = 6.5  # radius of the grid, standard deviations: less than 1e-9 of the mass lies beyond
+_FIRST_SPACING, _LAST_SPACING = 0.8, 0.03  # of the grids, standard deviations; √2 finer each time
+_SHIFTS = 16  # random shifts per lattice; their spread is the standard error
+_FIRST_POINTS, _MOST_POINTS = 16, 1 << 15  # lattice points per shift: a million samples at most
+_FIRST_POINTS_POOLED = 4  # the first number where all slots meet the tolerance together
+_WIDE = 2.0  # standard deviation of the noises that are sampled where errors are rare
 
 _KOROBOV = 826727
 """Generator of the lattice: its powers are the rule. Of 300 numbers drawn at random it has the
 smallest P_2 figures over 2^5 to 2^10 points in 3 to 9 dimensions."""
-
-_SHIFTS = 16
-"""Random shifts per lattice: their spread is the standard error, with 15 degrees of freedom."""
-
-_FIRST_POINTS, _MOST_POINTS = 16, 1 << 15
-"""Lattice points per shift, first and last number tried: with 16 shifts and both signs of the noise
-at most a million samples a slot. Chosen."""
-
-_FIRST_POINTS_POOLED = 4
-"""The first number of lattice points where the slots meet the tolerance together. Chosen."""
-
-_WIDE = 2.0
-"""Standard deviation of the noises sampled where errors are rare. Chosen; what a change costs is
-not measured."""
 
 
 def normal_grid(dimensions: int, spacing: float) -> tuple[Real, Real]:

@@ -46,17 +46,10 @@ _MARGIN = 0.03
 """The channels, counted in the order of gains, whose optima a channel tries as well, and the share
 of ln δ by which such an optimum may be worse before it is improved."""
 
-_COARSE = 1e-4
-"""Tolerance, as a relative power, that tells starts apart, and where rates are saturated."""
-
-_STEPS = 60
-"""Newton steps at most."""
-
-_MOST_DAMPED = 1e7
-"""Damping, relative to the largest curvature, beyond which a refused step is due to rounding."""
-
-_LONGEST = 0.7
-"""Longest step, radians on the sphere ||Q||_F = 1."""
+_COARSE = 1e-4  # tolerance, as a relative power, that tells starts apart, and in saturation
+_STEPS = 60  # Newton steps at most
+_MOST_DAMPED = 1e7  # damping, in the largest curvature, beyond which a refusal is due to rounding
+_LONGEST = 0.7  # longest step, radians on the sphere ||Q||_F = 1
 
 
 def _starts(gains: Real, antennas: int, random: int) -> Complex:

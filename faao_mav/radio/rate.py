@@ -6,8 +6,7 @@ from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses
 
-_CHUNK = 2_000_000
-"""Complex numbers held at once: 32 MB. Chosen."""
+_CHUNK = 2_000_000  # complex numbers held at once: 32 MB. Chosen
 
 
 def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:

@@ -18,26 +18,14 @@ from faao_mav.optimizer.rates import DirectionPartials, RatePartials
 from faao_mav.optimizer.rates.spline import BicubicSpline, GridPosition
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 
-_SPACING = 0.125
-"""Spacing of the grid of a, 0.54 dB. Chosen; what a change costs is not measured."""
-
-_WHOLE = 2
-"""The grid of a ends at multiples of this, so that the links of one plan share a table. Chosen."""
-
-_MARGIN = 0.1
-"""Margin of the grid of a beyond the values at the sampled directions. Chosen."""
-
-_RATIOS = 17
-"""Grid points of κ, evenly from 0 to 1. Chosen; what a change costs is not measured."""
-
-_SEARCH_EVERY = (8, 4)
-"""Every so many grid points of a and of κ precoders are searched from all starts. Chosen."""
-
-_STEP = 1e-3
-"""Step of u in the central differences of a and κ: their errors are of the order of 1e-6."""
-
-_DIRECTIONS = 33
-"""Directions u at which the range of a is sampled. Chosen."""
+# Chosen; what a change costs is not measured.
+_SPACING = 0.125  # spacing of the grid of a: 0.54 dB
+_WHOLE = 2  # the grid of a ends at multiples of this, so that the links of a plan share a table
+_MARGIN = 0.1  # margin of the grid of a beyond the values at the sampled directions
+_RATIOS = 17  # grid points of κ, evenly from 0 to 1
+_SEARCH_EVERY = (8, 4)  # steps of a and of κ between points that are searched from all starts
+_STEP = 1e-3  # step of u in the central differences of a and κ, whose errors are about 1e-6
+_DIRECTIONS = 33  # directions u at which the range of a is sampled
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -28,36 +28,16 @@ from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
 from faao_mav.optimizer.rates.rate_model import best_curve
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 
-_LINES = 64
-"""Tangents of the majorant of each slot."""
-
-_DISTANCES = 600
-"""Distances at which the best rate of each slot is tabulated."""
-
-_SEARCHED = 25
-"""Distances at which precoders are searched where no table of modes exists; a cubic spline
-interpolates the rates. Chosen."""
-
-_DIRECTIONS = 257
-"""Directions u over which the largest singular values are taken. Chosen."""
-
-_WEIGHTS = (0.3, 0.4, 0.45, 0.5, 0.55, 0.6, 0.7)
-"""Weights lambda of R_B against R_U that are tried to limit the distances."""
-
-_BISECTIONS = 11
-"""Bisections of the greatest distance: it is found to 1 / 2048 of the range."""
-
-_BLOCKS = 150
-"""Blocks of slots in which the rate along a way out and back is summed."""
-
-_PASSES = 2
-"""Rounds of limiting the distances: the second tabulates the shorter ranges in more detail."""
-
-_SPEED_CELLS = 12
-"""Cells of the radial speed between -v_max and v_max."""
-
-_MOST_SLOTS = 2_000
-"""Slots up to which known plans limit the distances: memory grows with slots times distances."""
+_LINES = 64  # tangents of the majorant of each slot
+_DISTANCES = 600  # distances at which the best rate of each slot is tabulated
+_SEARCHED = 25  # distances at which precoders are searched where there is no table of modes
+_DIRECTIONS = 257  # directions u over which the largest singular values are taken
+_WEIGHTS = (0.3, 0.4, 0.45, 0.5, 0.55, 0.6, 0.7)  # weights lambda of R_B against R_U
+_BISECTIONS = 11  # bisections of the greatest distance: it is found to 1 / 2048 of the range
+_BLOCKS = 150  # blocks of slots in which the rate along a way out and back is summed
+_PASSES = 2  # rounds of limiting the distances; the second tabulates the shorter ranges
+_SPEED_CELLS = 12  # cells of the radial speed between -v_max and v_max
+_MOST_SLOTS = 2_000  # slots up to which known plans limit the distances: memory grows with them
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,23 +15,13 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, followed
 
-_TURN_SHARE = 0.95
-"""Share of a_max that turns use; the rest is for the correction that meets the ends. Chosen."""
-
-_WIDEST = 2.404825557695773
-"""Amplitude in radians of a weave whose mean displacement is zero: the first zero of J_0."""
-
-_WEAVES = (16, 8, 4, 2, 1)
-"""Numbers of waves that are tried, most first: many waves stay close to the line. Chosen."""
-
-_SPEEDS = (1.1, 1.02, 1.3, 1.0)
-"""Speeds c that are tried, in v_min: those above 1 leave the optimiser room. Chosen."""
-
-_TOLERANCE = 1e-9
-"""Violation of a limit, in its SI unit, and length in metres that count as zero."""
-
-_ROUNDS = 40
-"""Bisections of a weave's amplitude, and fixed-point rounds of a line between two turns. Chosen."""
+# Chosen, but for _WIDEST.
+_TURN_SHARE = 0.95  # share of a_max that turns use; the rest is for meeting the ends
+_WIDEST = 2.404825557695773  # amplitude of a weave of no displacement: the first zero of J_0
+_WEAVES = (16, 8, 4, 2, 1)  # numbers of waves that are tried; many stay close to the line
+_SPEEDS = (1.1, 1.02, 1.3, 1.0)  # speeds c that are tried, in v_min; above 1 there is room
+_TOLERANCE = 1e-9  # violation of a limit, in its SI unit, and length in metres that are zero
+_ROUNDS = 40  # bisections of an amplitude, and fixed-point rounds of a line between two turns
 
 Headings = Callable[[int, float], Real]
 """A function of k and a share: k headings (k,), radians, relative to the mean direction, whose

@@ -18,15 +18,9 @@ COARSE_SLOTS = 60
 FEWEST_SLOTS = 2 * COARSE_SLOTS
 """Slots from which a coarse copy is used. Chosen; what a change costs is not measured."""
 
-_COARSE_TOLERANCE = 3e-3
-"""Least tolerance of the search on the copy, which differs from the flight by more. Chosen."""
-
-_COARSE_ERROR = 5e-3
-"""Share of the best value within which starts count as equally good on the copy. Chosen."""
-
-_SAME = 0.02
-"""Distance below which two flights count as the same, as a share of the longer of their extents in
-x and y. Chosen."""
+_COARSE_TOLERANCE = 3e-3  # least tolerance on the copy, which differs from the flight by more
+_COARSE_ERROR = 5e-3  # share of the best value within which starts are equally good on the copy
+_SAME = 0.02  # distance of flights that count as one, in the longer of their extents in x and y
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,11 +16,8 @@ _BISECTIONS = 12
 _LEAST_SHARE = 0.02
 """Share of the way to a station below which a start would be all but the straight one. Chosen."""
 
-_EAST = np.array([1.0, 0.0])
-"""The direction of a line of no length."""
-
-_ALONG = 1e-12
-"""Velocity across a line, in shares of v_max, that counts as none: rounding errors."""
+_EAST = np.array([1.0, 0.0])  # the direction of a line of no length
+_ALONG = 1e-12  # velocity across a line, in shares of v_max, that counts as none: rounding errors
 
 
 def starts(
