@@ -18,8 +18,8 @@ from faao_mav.optimizer.algorithm1.trajectory_step import (
     convex_bound,
     merge_equal,
 )
+from faao_mav.optimizer.kinematics import LENGTH
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.scaled import LENGTH
 from faao_mav.radio.constellation import difference_classes
 
 

@@ -20,9 +20,9 @@ from faao_mav.optimizer.algorithm1.successive import (
     shrink,
     successive_approximation,
 )
-from faao_mav.optimizer.kinematics import Trajectory
+from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.scaled import LENGTH, flight_variables, solve
+from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.radio.rate import exponents
 
 

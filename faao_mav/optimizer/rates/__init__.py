@@ -8,7 +8,8 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
   (``radio.line_of_sight: ula``).
 
 A rate model (``RateModel``) therefore works with l and u, and ``LinkCoordinates`` carries its
-derivatives over to w by the chain rule. There are six, from the quickest that is exact for a plan:
+derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
+six models:
 
 ====================  ==================================  =========================================
 model                 fading, precoders                   method

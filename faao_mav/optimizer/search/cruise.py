@@ -13,7 +13,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory, followed
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 
 # Chosen, but for _WIDEST.
 _TURN_SHARE = 0.95  # share of a_max that turns use; the rest is for meeting the ends
@@ -73,7 +73,7 @@ def _feasible(kin: Kinematics, v: Real | None) -> Iterator[Trajectory]:
     """Yield the flight with velocities v (n, 2), corrected to meet the ends, if it is feasible."""
     if v is None:
         return
-    flight = followed(kin, v)
+    flight = kin.follow(v)
     if max(kin.residuals(flight).values()) < _TOLERANCE:
         yield flight
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.maximize import Stage, StageValues, maximize_all
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory, followed, settled
+from faao_mav.optimizer.interior.maximize import feasible, maximize_all
+from faao_mav.optimizer.interior.rewards import Stage, StageValues
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 
 COARSE_SLOTS = 60
 """Slots of the coarse copy: enough for the shape of a route. Chosen."""
@@ -85,7 +86,7 @@ def improve_starts(
     if len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
         copy, reward = _coarse(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
         tolerance = max(tolerance, _COARSE_TOLERANCE)
-        on_copy = [followed(copy, _resampled(kin, flight, copy)) for flight in on_copy]
+        on_copy = [copy.follow(_resampled(kin, flight, copy)) for flight in on_copy]
     solved = maximize_all(copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations)
     optima = dict(zip(flights, solved, strict=True))
     ranked = sorted(optima, key=lambda name: -optima[name].value)
@@ -100,7 +101,7 @@ def improve_starts(
     ends = {name: optimum.trajectory for name, optimum in optima.items()}
     if copy is not kin:
         ends = {
-            name: settled(kin, flights[name], _resampled(copy, end, kin))
+            name: feasible(kin, flights[name], _resampled(copy, end, kin))
             for name, end in ends.items()
         }
     return ImprovedStarts(ends, promising)

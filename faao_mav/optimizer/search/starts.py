@@ -7,7 +7,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory, followed
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.cruise import cruise, cruise_by
 
 _BISECTIONS = 12
@@ -74,7 +74,7 @@ def straight_flight(kin: Kinematics) -> Trajectory:
     if not _leads_aside(kin, direction):
         speed = even_speed(kin, direction, distance)
         if speed is not None:
-            return followed(kin, speed[:, None] * direction)
+            return kin.follow(speed[:, None] * direction)
     return cruise(kin) if kin.min_speed > 0 else _gentlest_flight(kin)
 
 
@@ -258,4 +258,4 @@ def _joined(kin: Kinematics, parts: list[_StraightPart]) -> Trajectory | None:
     for k in range(stops):
         hover = spare // stops + (k < spare % stops)
         velocities[k + 1] = np.vstack([np.zeros((hover, 2)), velocities[k + 1][1:]])
-    return followed(kin, np.vstack(velocities))
+    return kin.follow(np.vstack(velocities))
