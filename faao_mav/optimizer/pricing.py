@@ -2,6 +2,11 @@
 
 `price` has its mutual information, `fresh_rates` its rates on new draws of the fading, `saturation`
 the power that it could do without.
+
+>>> from faao_mav import optimize, price, read_plan, saturation
+>>> solution = optimize(read_plan("missions/paper.yaml"))
+>>> round(saturation(solution).spare_db, 1), round(price(solution).average, 4)  # dB, bit/s/Hz
+(19.7, 2.0)
 """
 
 from dataclasses import dataclass, replace
