@@ -29,8 +29,7 @@ from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.rates.slot_rate import FixedRate
 from faao_mav.optimizer.search.bound import upper_bound
-from faao_mav.optimizer.search.routes import starts
-from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.optimizer.search.starts import starts, straight_flight
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.radio.best_precoder import best_precoders

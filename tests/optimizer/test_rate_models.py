@@ -10,7 +10,7 @@ from conftest import MakePlan
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.problem import Link, build_problem
-from faao_mav.optimizer.rates.place import PlaceRate, place
+from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.rate_model import rate_model
 from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate, FixedRate
 from faao_mav.radio.precoder import SCHEMES
@@ -36,22 +36,22 @@ def places(link: Link, seed: int = 3) -> Real:
 
 
 def coordinates(link: Link, w: Real) -> tuple[Real, Real]:
-    at = place(link, w.T)
+    at = link_coordinates(link, w.T)
     return at.gain_log, at.cosine
 
 
-def derivatives(link: Link, rate: PlaceRate, w: Real) -> tuple[Real, Real]:
-    at = place(link, w.T)
+def derivatives(link: Link, rate: RateModel, w: Real) -> tuple[Real, Real]:
+    at = link_coordinates(link, w.T)
     gradient, hessian = at.by_position(rate.partials(at.gain_log, at.cosine))
     return gradient.T, hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
 
 
 @pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
 @pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
-@pytest.mark.parametrize("turning", [True, False])
+@pytest.mark.parametrize("rotating", [True, False])
 @pytest.mark.parametrize("hop", [0, 1])
 def test_fixed_precoders(
-    small_plan: MakePlan, line_of_sight: str, modulation: str, turning: bool, hop: int
+    small_plan: MakePlan, line_of_sight: str, modulation: str, rotating: bool, hop: int
 ) -> None:
     link = build_problem(
         small_plan(
@@ -70,13 +70,13 @@ def test_fixed_precoders(
     def rate(at: Real) -> Real:
         """The rate of precoders that are fixed, or turn with the line of sight from w on."""
         moved = P
-        if turning and link.follows_position:
+        if rotating and link.follows_position:
             first = link.line_of_sight_at(coordinates(link, w)[1])[:, 0]
             then = link.line_of_sight_at(coordinates(link, at)[1])[:, 0]
             moved = (first * np.conj(then))[:, :, None] * P
         return link.rates(at, link.small_scale(at), moved)
 
-    gradient, hessian = derivatives(link, FixedRate(link, P, turning=turning), w)
+    gradient, hessian = derivatives(link, FixedRate(link, P, rotating=rotating), w)
     assert gradient == pytest.approx(gradient_by_differences(rate, w), rel=1e-4, abs=1e-7)
     assert hessian == pytest.approx(hessian_by_differences(rate, w), rel=1e-3, abs=1e-6)
 
@@ -148,7 +148,7 @@ def test_tables_hold_the_rate_at_every_place(
         tabled = rate.value(*coordinates(link, w))
         assert tabled == pytest.approx(exactly(link, wanted, w), abs=2e-4)
 
-        def value(at: Real, rate: PlaceRate = rate, link: Link = link) -> Real:
+        def value(at: Real, rate: RateModel = rate, link: Link = link) -> Real:
             return rate.value(*coordinates(link, at))
 
         gradient, hessian = derivatives(link, rate, w)

@@ -11,8 +11,13 @@ from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.search.coarse import SLOTS, WORTH_IT, Blocks, improved
-from faao_mav.optimizer.search.routes import starts
+from faao_mav.optimizer.search.multistart import (
+    COARSE_SLOTS,
+    FEWEST_SLOTS,
+    BlockStage,
+    improve_starts,
+)
+from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan, parse_plan
 
 
@@ -37,12 +42,12 @@ def test_a_block_has_the_mean_of_its_slots() -> None:
         value = np.einsum("cjn,cn->jn", slope, w)
         return StageValues(value, slope, np.zeros((3, 2, 501)))
 
-    w = rng.normal(size=(2, SLOTS))
-    found = Blocks(stage, 501, SLOTS)(w)
-    held = w[:, np.rint(np.arange(501) * (SLOTS - 1) / 500).astype(int)]
+    w = rng.normal(size=(2, COARSE_SLOTS))
+    found = BlockStage(stage, 501, COARSE_SLOTS)(w)
+    held = w[:, np.rint(np.arange(501) * (COARSE_SLOTS - 1) / 500).astype(int)]
     assert found.value.mean(axis=1) == pytest.approx(stage(held).value.mean(axis=1))
     shift = rng.normal(size=w.shape)
-    moved = Blocks(stage, 501, SLOTS)(w + shift).value - found.value
+    moved = BlockStage(stage, 501, COARSE_SLOTS)(w + shift).value - found.value
     assert moved == pytest.approx(np.einsum("cjn,cn->jn", found.gradient, shift))
 
 
@@ -59,15 +64,15 @@ def test_what_is_rejected_would_not_have_won(power: int) -> None:
     assert solution.rates.R_avg == pytest.approx(max(alone.values()), abs=plan.optimizer.tolerance)
     problem = build_problem(plan)
     routes = starts_of(problem)
-    rough = improved(
+    rough = improve_starts(
         problem.kinematics,
         rate_field(problem, design(plan)),
         routes,
         tolerance=1e-3,
         max_iterations=50,
     )
-    assert 0 < len(rough.hopeful) < len(names)
-    dropped = set(names) - set(rough.hopeful)
+    assert 0 < len(rough.promising) < len(names)
+    dropped = set(names) - set(rough.promising)
     assert all(solution.starts[name] <= solution.rates.R_avg for name in dropped)
     for flight in rough.flights.values():
         assert max(problem.kinematics.residuals(flight).values()) < 1e-7
@@ -77,9 +82,9 @@ def test_short_flights_are_improved_as_they_are(small_plan: MakePlan) -> None:
     plan = small_plan()
     problem = build_problem(plan)
     kin, field = problem.kinematics, rate_field(problem, design(plan))
-    assert kin.slots < WORTH_IT
+    assert kin.slots < FEWEST_SLOTS
     routes = starts_of(problem)
-    rough = improved(kin, field, routes, tolerance=1e-3, max_iterations=50)
+    rough = improve_starts(kin, field, routes, tolerance=1e-3, max_iterations=50)
     for name, flight in routes.items():
         alone = maximize(kin, field, flight, tolerance=1e-3, max_iterations=50)
         assert rough.flights[name].w == pytest.approx(alone.trajectory.w, abs=1e-6)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faao_mav.optimizer.kinematics import Kinematics
-from faao_mav.optimizer.search.routes import starts
+from faao_mav.optimizer.search.starts import starts
 
 STATIONS = {"bs": np.array([0.0, 0.0]), "user": np.array([300.0, 300.0])}
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]
