@@ -16,7 +16,7 @@ from faao_mav.schedule.run_in import begins_at_speed
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.link import LinkCheck, Stretch
 from faao_mav.vector import lengths
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track
 
 _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 

@@ -413,3 +413,53 @@ def test_px4_planes_are_not_predicted_as_copters() -> None:
     with pytest.raises(InputError, match="no model of how PX4 flies planes"):
         predict(Mission((at(Command.NAV_WAYPOINT, 100),)), vehicle)
     assert all(map(modelled, VEHICLES))
+
+
+PLANE = Vehicle("ardupilot", "plane")
+
+
+def far_and_back(vehicle: Vehicle) -> Track:
+    """Take off to 50 m, fly 3 km out and return to launch."""
+    return flown(
+        at(Command.NAV_TAKEOFF, up=50.0, north=300.0),
+        at(Command.NAV_WAYPOINT, 0, 3000, 50),
+        RTL,
+        vehicle=vehicle,
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "height"),
+    [
+        ({}, 100),
+        ({"RTL_ALTITUDE": 200}, 200),
+        ({"ALT_HOLD_RTL": 15_000}, 150),
+        ({"RTL_ALTITUDE": 30}, 30),
+        ({"RTL_ALTITUDE": -1}, 50),
+        ({"RTL_ALT": 20_000}, 100),
+    ],
+)
+def test_a_plane_returns_at_its_own_height_and_stays_up(
+    parameters: dict[str, float], height: float
+) -> None:
+    track = far_and_back(replace(PLANE, parameters=parameters))
+    assert track.position[-1, 2] == pytest.approx(height, abs=3)
+    assert np.hypot(*track.position[-1, :2]) < 150
+
+
+def test_a_copter_climbs_to_its_return_height_and_lands() -> None:
+    track = far_and_back(replace(COPTER, parameters={"RTL_ALT": 8_000}))
+    assert track.position[:, 2].max() == pytest.approx(80, abs=0.5)
+    assert track.position[-1, 2] == pytest.approx(0, abs=1e-6)
+
+
+def test_px4_climbs_at_its_mission_speed_whatever_its_greatest_is() -> None:
+    steep = (at(Command.NAV_TAKEOFF), at(Command.NAV_WAYPOINT, 0, 20, 30), waypoint(0, 40, up=90))
+    climbs = {
+        most: flown(*steep, vehicle=replace(PX4, parameters={"MPC_Z_VEL_MAX_UP": most}))
+        .velocity[:, 2]
+        .max()
+        for most in (2.0, 6.0)
+    }
+    assert climbs[2.0] == pytest.approx(2, abs=0.3)
+    assert climbs[6.0] == pytest.approx(3, abs=0.5)
