@@ -96,7 +96,7 @@ def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
 
 
 @dataclass
-class _Stretch:
+class _PathBuilder:
     """Waypoints to be flown in one go; the first is where the aircraft rests.
 
     `waits` are items that only make it wait at one of the points, with that point's number.
@@ -128,7 +128,7 @@ class _Walk:
     clock: float = 0.0
     speed: float = math.nan
     over: bool = False
-    stretch: _Stretch | None = None
+    stretch: _PathBuilder | None = None
     parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -236,7 +236,7 @@ class _Walk:
     def _towards(
         self, index: int, goal: Real, hold: float, *, spline: bool = False, radius: float = 0.0
     ) -> None:
-        stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
+        stretch = self.stretch = self.stretch or _PathBuilder([self.place], [index])
         if np.abs(goal - stretch.points[-1]).max() <= _SAME_PLACE:
             whole = self.vehicle.type.whole_second_holds
             stretch.delays[-1] += math.floor(hold) if whole else hold
@@ -251,7 +251,7 @@ class _Walk:
         stretch.radii.append(radius)
 
     def _delay(self, index: int, seconds: float) -> None:
-        stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
+        stretch = self.stretch = self.stretch or _PathBuilder([self.place], [index])
         stretch.delays[-1] += seconds
         stretch.waits.append((index, len(stretch.points) - 1))
 

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, half_overlap
 from faao_mav.vehicle.ardupilot.copter.leg import at_speed, planned
-from faao_mav.vehicle.ardupilot.copter.ramp import Limits
+from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
 
-LIMITS = Limits(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
+LIMITS = LegBounds(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
 
 limits = st.builds(
-    Limits,
+    LegBounds,
     speed=st.floats(0.5, 15),
     acceleration=st.floats(0.5, 8),
     jerk=st.floats(0.5, 20),
@@ -69,7 +69,7 @@ def test_a_ramp_that_never_reaches_the_acceleration():
 
 def test_measured_lengths_that_reach_8_metres_per_second():
     assert 48 < 2 * planned(500, LIMITS).up.length < 50
-    quick = Limits(8.0, 4.0, 10.0, 0.3)
+    quick = LegBounds(8.0, 4.0, 10.0, 0.3)
     assert 21 < 2 * planned(500, quick).up.length < 23
 
 

@@ -7,6 +7,7 @@ from math import sqrt
 from typing import TypeVar
 
 from faao_mav.arrays import Real
+from faao_mav.vehicle.px4.parameters import Px4Limits
 
 _ALIGNED = 0.98
 """Cosine of the angle to the target from which an aircraft no longer counts as turning."""
@@ -27,25 +28,7 @@ _Speed = TypeVar("_Speed", float, Real)
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """What bounds a trajectory: m/s² and m/s³, horizontally, upwards and downwards.
-
-    `error` m is how far behind the aircraft may be for the trajectory's clock to stop.
-    """
-
-    acceleration: float
-    jerk: float
-    corner_gain: float
-    climb_acceleration: float
-    climb_speed: float
-    descent_acceleration: float
-    descent_speed: float
-    height_radius: float
-    error: float
-
-
-@dataclass(frozen=True, slots=True)
-class Leg:
+class GuidedLeg:
     """A leg: horizontal places and directions are complex, east + i north.
 
     `target` m and `height` m are the end, `along` and `onward` the unit directions of this leg and
@@ -82,12 +65,12 @@ def stopping_distance(jerk: float, acceleration: float, speed: _Speed) -> _Speed
 
 
 def legs(
-    limits: Limits,
+    limits: Px4Limits,
     points: Real,
     radii: Sequence[float],
     speeds: Sequence[float],
     holds: Sequence[float],
-) -> list[Leg]:
+) -> list[GuidedLeg]:
     """Return the legs between `points` (m, 3), m - 1 of them.
 
     `radii` are (m,), `speeds` (m - 1,), `holds` (m,). Only the waypoint after the target is
@@ -106,7 +89,7 @@ def legs(
         passable = following > 1e-3 and following >= radii[k + 1] and hold <= 0
         slopes = complex(abs(moves[k]), rises[k]), complex(following, rises[k + 1])
         result.append(
-            Leg(
+            GuidedLeg(
                 target=places[k + 1],
                 height=heights[k + 1],
                 along=along[k],
@@ -122,7 +105,7 @@ def legs(
     return result
 
 
-def _exit_climb(limits: Limits, slope: complex, onward: complex) -> float:
+def _exit_climb(limits: Px4Limits, slope: complex, onward: complex) -> float:
     """Return the vertical speed at which the end of a leg may be passed, m/s.
 
     `slope` and `onward` are this leg and the next, m: along the ground + i upwards.
@@ -141,7 +124,7 @@ def _half_turn(cosine: float) -> float:
 
 
 def level_setpoint(
-    limits: Limits, leg: Leg, place: complex, velocity: complex, remembered: float
+    limits: Px4Limits, leg: GuidedLeg, place: complex, velocity: complex, remembered: float
 ) -> tuple[complex, float, float]:
     """Return the unit direction and the speed, m/s, asked for, and the speed to remember for turns.
 
@@ -178,7 +161,7 @@ def corner_speed(gain: float, acceleration: float, radius: float, cosine: float)
     return sqrt(gain * acceleration * radius * _half_turn(cosine))
 
 
-def _slowing(limits: Limits, leg: Leg, direction: complex, distance: float) -> float:
+def _slowing(limits: Px4Limits, leg: GuidedLeg, direction: complex, distance: float) -> float:
     """Return the speed from which the target `distance` away is passed slowly enough.
 
     The passing speed is the corner's, at most the leg's `exit_speed`.
@@ -193,7 +176,7 @@ def _ramp(share: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def _along_leg(leg: Leg, offset: complex, straight: complex) -> complex:
+def _along_leg(leg: GuidedLeg, offset: complex, straight: complex) -> complex:
     """Return the unit direction to the leg's point that is max(R, 5 m) away."""
     rest = offset * leg.along.conjugate()
     if rest.real <= 0:
@@ -204,7 +187,7 @@ def _along_leg(leg: Leg, offset: complex, straight: complex) -> complex:
 
 
 def climb_setpoint(
-    limits: Limits, leg: Leg, distance: float, height: float, speed: float
+    limits: Px4Limits, leg: GuidedLeg, distance: float, height: float, speed: float
 ) -> tuple[float, float]:
     """Return the horizontal speed and the vertical velocity asked for, m/s.
 

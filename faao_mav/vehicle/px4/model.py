@@ -8,15 +8,13 @@ from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.flight_path import FlightPath, Flown
-from faao_mav.vehicle.parameter import ParameterValues
-from faao_mav.vehicle.px4.guidance import Limits
-from faao_mav.vehicle.px4.parameters import COPTER_TABLE as TABLE
+from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.sampling import grid, sampled
 from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, Simulation
 
 
 @dataclass(frozen=True, slots=True)
-class Px4:
+class Px4(Px4Limits):
     """How a PX4 multicopter flies plain waypoints in mission mode, without wind.
 
     A simulation of PX4's own chain: guidance with a look at the next waypoint only, smoothing
@@ -27,31 +25,10 @@ class Px4:
     m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
     """
 
-    cruise_speed: float = TABLE["cruise_speed"].default
-    max_speed: float = TABLE["max_speed"].default
-    acceleration: float = TABLE["acceleration"].default
-    jerk: float = TABLE["jerk"].default
-    corner_gain: float = TABLE["corner_gain"].default
-    error_limit: float = TABLE["error_limit"].default
-    acceptance_radius: float = TABLE["acceptance_radius"].default
-    height_radius: float = TABLE["height_radius"].default
-    climb_speed: float = TABLE["climb_speed"].default
-    descent_speed: float = TABLE["descent_speed"].default
-    climb_acceleration: float = TABLE["climb_acceleration"].default
-    descent_acceleration: float = TABLE["descent_acceleration"].default
-
     _simulations: list[Simulation] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
     """The last one: flights along the same points come one after the other."""
-
-    @classmethod
-    def from_vehicle(cls, vehicle: ParameterValues) -> "Px4":
-        """Return the model with the parameters of `vehicle`.
-
-        Raises `InputError` for a value that is too small to fly with or not finite.
-        """
-        return cls(**{key: vehicle.value(key) for key in cls.__slots__ if key in TABLE})
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -90,21 +67,8 @@ class Px4:
     def _simulation(self, points: Real, radii: Real) -> Simulation:
         """Return what has flown legs of this path already, if it is that of the last call."""
         if not (self._simulations and self._simulations[0].leads_along(points, radii)):
-            self._simulations[:] = [Simulation(self._limits(), points, radii)]
+            self._simulations[:] = [Simulation(self, points, radii)]
         return self._simulations[0]
-
-    def _limits(self) -> Limits:
-        return Limits(
-            self.acceleration,
-            self.jerk,
-            self.corner_gain,
-            self.climb_acceleration,
-            self.climb_speed,
-            self.descent_acceleration,
-            self.descent_speed,
-            self.height_radius,
-            self.error_limit,
-        )
 
 
 def _standing(point: Real, holds: Real, step: float) -> list[Flown]:

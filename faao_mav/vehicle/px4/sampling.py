@@ -7,7 +7,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.flight_path import Flown
-from faao_mav.vehicle.px4.simulation import Log
+from faao_mav.vehicle.px4.simulation import FlightLog
 
 
 def grid(end: float, step: float) -> Real:
@@ -15,7 +15,7 @@ def grid(end: float, step: float) -> Real:
     return np.arange(math.ceil(end / step - 1e-9) + 1, dtype=float) * step
 
 
-def sampled(logs: Sequence[Log], height: float, step: float) -> list[Flown]:
+def sampled(logs: Sequence[FlightLog], height: float, step: float) -> list[Flown]:
     """Return the flights of `logs` every `step` seconds up to the latest end.
 
     `height` m is that of a path that does not climb.

@@ -5,7 +5,7 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from faao_mav.vehicle.ardupilot.copter.leg import Leg
+from faao_mav.vehicle.ardupilot.copter.leg import StraightLeg
 
 Direction: TypeAlias = tuple[float, float, float]
 """A unit vector: east, north, up."""
@@ -24,7 +24,7 @@ class CornerLimits:
 
 
 def half_overlap(
-    leg: Leg, u: Direction, following: Leg, w: Direction, limits: CornerLimits
+    leg: StraightLeg, u: Direction, following: StraightLeg, w: Direction, limits: CornerLimits
 ) -> float:
     """Return h, s: the `following` leg begins 2 h before `leg` ends, along `u` and `w`.
 

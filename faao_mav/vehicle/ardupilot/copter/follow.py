@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Row, Stop
+from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Stop, TargetRow
 
 _MARGIN = 0.05
 """The target waits for an aircraft that is slower than it by more than this part."""
@@ -49,7 +49,9 @@ class Pursuit:
     arrivals: Real
 
 
-def pursue(course: Course, table: Sequence[Row], follower: Follower, patience: float) -> Pursuit:
+def pursue(
+    course: Course, table: Sequence[TargetRow], follower: Follower, patience: float
+) -> Pursuit:
     """Return the flight along `course`, given as `table`, up to the end of its last hold.
 
     The target's clock runs at a rate s <= 1 with the time constant `patience`, s: towards the

@@ -9,7 +9,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
-from faao_mav.vehicle.ardupilot.copter.ramp import Limits, ramp_from_rest, rise_time
+from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds, ramp_from_rest, rise_time
 from faao_mav.vehicle.parameter import ParameterValues
 
 
@@ -52,8 +52,8 @@ class ArduCopterLegs:
     def _ramp_length(self, speed: float) -> float:
         return ramp_from_rest(self._limits(speed), math.inf).length if speed > 0 else 0.0
 
-    def _limits(self, speed: float) -> Limits:
-        return Limits(speed, self.acceleration, self.jerk, rise_time(self.input_time))
+    def _limits(self, speed: float) -> LegBounds:
+        return LegBounds(speed, self.acceleration, self.jerk, rise_time(self.input_time))
 
 
 def _each(law: Callable[[float], float], values: Real) -> Real:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, Direction, half_overlap
-from faao_mav.vehicle.ardupilot.copter.course import Course, Placed, Stop
-from faao_mav.vehicle.ardupilot.copter.leg import Leg, at_speed, planned
-from faao_mav.vehicle.ardupilot.copter.ramp import Limits
+from faao_mav.vehicle.ardupilot.copter.course import Course, PlacedLeg, Stop
+from faao_mav.vehicle.ardupilot.copter.leg import StraightLeg, at_speed, planned
+from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
 from faao_mav.vehicle.ardupilot.copter.spline import (
     Curve,
     CurvedLeg,
@@ -37,11 +37,11 @@ class Bounds:
     rise: float
     radius: float
 
-    def along(self, direction: Direction, speed: float) -> Limits:
+    def along(self, direction: Direction, speed: float) -> LegBounds:
         """Return the limits along `direction` where `speed` across the ground is commanded."""
         east, north, up = direction
         ground = math.hypot(east, north)
-        return Limits(
+        return LegBounds(
             min(_over(speed, ground), _over(self.up if up > 0 else self.down, abs(up))),
             min(_over(self.acceleration, ground), _over(self.vertical, abs(up))),
             self.jerk,
@@ -54,14 +54,14 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _PlannedLeg:
     """A leg, if there is one, and how the flight goes on after it.
 
     The next leg begins 2 `early` seconds before this one ends, planned at this one's speed if it
     `overlaps`; a leg that does not begins at the speed `entry`, m/s.
     """
 
-    leg: Leg | CurvedLeg | None
+    leg: StraightLeg | CurvedLeg | None
     early: float = 0.0
     overlaps: bool = False
     entry: float = 0.0
@@ -88,8 +88,8 @@ class Router:
         self._curves = [self._curve(k, splines) for k in range(len(self._steps))]
         self._corner = CornerLimits(bounds.radius, bounds.corner, bounds.vertical)
         # flights that differ in a few speeds have most of their legs in common
-        self._known: dict[tuple[int, float, float | None, float, float], _Step] = {}
-        self._from_rest: dict[tuple[int, float], Leg] = {}
+        self._known: dict[tuple[int, float, float | None, float, float], _PlannedLeg] = {}
+        self._from_rest: dict[tuple[int, float], StraightLeg] = {}
 
     def leads_along(
         self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_]
@@ -101,7 +101,7 @@ class Router:
 
     def course(self, speeds: Sequence[float], waits: Sequence[float]) -> Course:
         """Return the course at `speeds` (m - 1,), m/s, with `waits` (m,), s, at the stops."""
-        legs: list[Placed] = []
+        legs: list[PlacedLeg] = []
         stops: list[Stop] = []
         passed = [0.0]
         start, planned_at, early, entry = 0.0, None, 0.0, 0.0
@@ -111,7 +111,7 @@ class Router:
                 step = self._known[key] = self._step(*key)
             end = start
             if step.leg is not None:
-                legs.append(Placed(step.leg, start, self._points[k], self._steps[k]))
+                legs.append(PlacedLeg(step.leg, start, self._points[k], self._steps[k]))
                 end = legs[-1].end
             if self._stopping[k + 1]:
                 stops.append(Stop(k + 1, end, waits[k + 1]))
@@ -122,40 +122,40 @@ class Router:
 
     def _step(
         self, k: int, speed: float, planned_at: float | None, elapsed: float, entry: float
-    ) -> _Step:
-        """Leg k at `speed`: if it was planned at another speed it has begun `elapsed` s ago."""
-        leg: Leg | CurvedLeg | None = None
+    ) -> _PlannedLeg:
+        """StraightLeg k at `speed`: if it was planned at another speed it has begun `elapsed` s ago."""
+        leg: StraightLeg | CurvedLeg | None = None
         if planned_at is not None:
             begun = self._begun(k, planned_at)
             leg = at_speed(begun, self._bounds.along(self._directions[k], speed).speed, elapsed)
         elif self._lengths[k] > _POINT:
             leg = self._planned(k, speed, entry)
         if leg is None or self._stopping[k + 1]:
-            return _Step(leg)
-        if isinstance(leg, Leg) and self._is_straight(k + 1):
+            return _PlannedLeg(leg)
+        if isinstance(leg, StraightLeg) and self._is_straight(k + 1):
             following = self._begun(k + 1, speed)
             u, w = self._directions[k], self._directions[k + 1]
-            return _Step(leg, half_overlap(leg, u, following, w, self._corner), overlaps=True)
-        return _Step(leg, entry=leg.final)
+            return _PlannedLeg(leg, half_overlap(leg, u, following, w, self._corner), overlaps=True)
+        return _PlannedLeg(leg, entry=leg.final)
 
     def _is_straight(self, k: int) -> bool:
         return self._curves[k] is None and self._lengths[k] > _POINT
 
-    def _planned(self, k: int, speed: float, entry: float) -> Leg | CurvedLeg:
-        """Leg k, begun at the speed `entry`."""
+    def _planned(self, k: int, speed: float, entry: float) -> StraightLeg | CurvedLeg:
+        """StraightLeg k, begun at the speed `entry`."""
         curve = self._curves[k]
         if curve is None:
             return self._straight(k, speed, entry)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
         return flown(curve, self._bounds.spline(speed), entry, end)
 
-    def _begun(self, k: int, speed: float) -> Leg:
+    def _begun(self, k: int, speed: float) -> StraightLeg:
         """Return the straight leg k that begins at rest, as the one before it ends."""
         if (leg := self._from_rest.get((k, speed))) is None:
             leg = self._from_rest[k, speed] = self._straight(k, speed)
         return leg
 
-    def _straight(self, k: int, speed: float, entry: float = 0.0) -> Leg:
+    def _straight(self, k: int, speed: float, entry: float = 0.0) -> StraightLeg:
         limits = self._bounds.along(self._directions[k], speed)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
         return planned(self._lengths[k], limits, start=entry, end=end)
