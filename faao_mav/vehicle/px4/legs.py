@@ -6,9 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.px4.guidance import stopping_distance, stopping_speed
-from faao_mav.vehicle.px4.parameters import COPTER_TABLE as TABLE
+from faao_mav.vehicle.px4.parameters import Px4Limits
 
 _RADIUS = 4.0
 """The least acceptance radius that is asked for on long legs, m: on flown plans 4 m kept the time
@@ -28,19 +27,11 @@ recommended value."""
 
 
 @dataclass(frozen=True, slots=True)
-class Px4Legs:
+class Px4Legs(Px4Limits):
     """How PX4 flies a leg between plain waypoints: a in m/s², j in m/s³."""
 
     least: ClassVar[float] = 3.0  # NAV_ACC_RAD is 2 m
     run_in: ClassVar[float] = 1.2
-
-    acceleration: float = TABLE["acceleration"].default
-    jerk: float = TABLE["jerk"].default
-
-    @classmethod
-    def of(cls, vehicle: ParameterValues) -> "Px4Legs":
-        """Return how `vehicle` flies legs."""
-        return cls(vehicle.value("acceleration"), vehicle.value("jerk"))
 
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg flown at `speed`, m; same shape.

@@ -11,6 +11,7 @@ from faao_mav.arrays import Real
 from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, Direction, half_overlap
 from faao_mav.vehicle.ardupilot.copter.course import Course, PlacedLeg, Stop
 from faao_mav.vehicle.ardupilot.copter.leg import StraightLeg, at_speed, planned
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
 from faao_mav.vehicle.ardupilot.copter.spline import (
     Curve,
@@ -22,35 +23,6 @@ from faao_mav.vehicle.ardupilot.copter.spline import (
 
 _POINT = 1e-6
 """A leg shorter than this, m, is none: its end counts as reached where it begins."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bounds:
-    """The autopilot's limits: m/s, m/s², m/s³, s and m, as in `ArduCopter`."""
-
-    up: float
-    down: float
-    acceleration: float
-    vertical: float
-    corner: float
-    jerk: float
-    rise: float
-    radius: float
-
-    def along(self, direction: Direction, speed: float) -> LegBounds:
-        """Return the limits along `direction` where `speed` across the ground is commanded."""
-        east, north, up = direction
-        ground = math.hypot(east, north)
-        return LegBounds(
-            min(_over(speed, ground), _over(self.up if up > 0 else self.down, abs(up))),
-            min(_over(self.acceleration, ground), _over(self.vertical, abs(up))),
-            self.jerk,
-            self.rise,
-        )
-
-    def spline(self, speed: float) -> SplineLimits:
-        """Return the limits along a spline where `speed` is commanded."""
-        return SplineLimits(speed, self.up, self.down, self.acceleration, self.vertical)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +49,20 @@ class Router:
     """
 
     def __init__(
-        self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_], bounds: Bounds
+        self,
+        points: Real,
+        splines: NDArray[np.bool_],
+        stopping: NDArray[np.bool_],
+        limits: ArduCopterLimits,
     ) -> None:
-        self._points, self._bounds = points, bounds
+        self._points, self._limits = points, limits
         self._marks = np.stack([splines, stopping])
         self._stopping: list[bool] = stopping.tolist()
         self._steps = np.diff(points, axis=0)
         self._lengths: list[float] = np.linalg.norm(self._steps, axis=1).tolist()
         self._directions = [_direction(step) for step in self._steps.tolist()]
         self._curves = [self._curve(k, splines) for k in range(len(self._steps))]
-        self._corner = CornerLimits(bounds.radius, bounds.corner, bounds.vertical)
+        self._corner = CornerLimits(limits.radius, limits.corner, limits.climb_acceleration)
         # flights that differ in a few speeds have most of their legs in common
         self._known: dict[tuple[int, float, float | None, float, float], _PlannedLeg] = {}
         self._from_rest: dict[tuple[int, float], StraightLeg] = {}
@@ -123,11 +99,11 @@ class Router:
     def _step(
         self, k: int, speed: float, planned_at: float | None, elapsed: float, entry: float
     ) -> _PlannedLeg:
-        """StraightLeg k at `speed`: if it was planned at another speed it has begun `elapsed` s ago."""
+        """Leg k at `speed`: if it was planned at another speed it has begun `elapsed` s ago."""
         leg: StraightLeg | CurvedLeg | None = None
         if planned_at is not None:
             begun = self._begun(k, planned_at)
-            leg = at_speed(begun, self._bounds.along(self._directions[k], speed).speed, elapsed)
+            leg = at_speed(begun, _along(self._limits, self._directions[k], speed).speed, elapsed)
         elif self._lengths[k] > _POINT:
             leg = self._planned(k, speed, entry)
         if leg is None or self._stopping[k + 1]:
@@ -142,12 +118,12 @@ class Router:
         return self._curves[k] is None and self._lengths[k] > _POINT
 
     def _planned(self, k: int, speed: float, entry: float) -> StraightLeg | CurvedLeg:
-        """StraightLeg k, begun at the speed `entry`."""
+        """Leg k, begun at the speed `entry`."""
         curve = self._curves[k]
         if curve is None:
             return self._straight(k, speed, entry)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
-        return flown(curve, self._bounds.spline(speed), entry, end)
+        return flown(curve, _spline_limits(self._limits, speed), entry, end)
 
     def _begun(self, k: int, speed: float) -> StraightLeg:
         """Return the straight leg k that begins at rest, as the one before it ends."""
@@ -156,19 +132,19 @@ class Router:
         return leg
 
     def _straight(self, k: int, speed: float, entry: float = 0.0) -> StraightLeg:
-        limits = self._bounds.along(self._directions[k], speed)
+        limits = _along(self._limits, self._directions[k], speed)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
         return planned(self._lengths[k], limits, start=entry, end=end)
 
     def _final(self, k: int, speed: float) -> float:
         """The speed at the end of leg k, where a spline goes on: 0 between straight legs."""
-        spline = self._bounds.spline(speed)
+        spline = _spline_limits(self._limits, speed)
         here, following = self._curves[k], self._curves[k + 1]
         if following is not None:
             final = float(following.allowed(spline)[0])
             return final if here is None else min(final, float(here.allowed(spline)[-1]))
         if here is not None and self._is_straight(k + 1):
-            limits = self._bounds.along(self._directions[k + 1], speed)
+            limits = _along(self._limits, self._directions[k + 1], speed)
             straight = planned(self._lengths[k + 1], limits)
             return min(straight.up.high, float(here.allowed(spline)[-1]))
         return 0.0
@@ -198,3 +174,29 @@ def _direction(step: Sequence[float]) -> Direction:
 
 def _over(limit: float, share: float) -> float:
     return limit / share if share > 0 else math.inf
+
+
+def _along(limits: ArduCopterLimits, direction: Direction, speed: float) -> LegBounds:
+    """Return the limits along `direction` where `speed` across the ground is commanded."""
+    east, north, up = direction
+    ground = math.hypot(east, north)
+    return LegBounds(
+        min(
+            _over(speed, ground),
+            _over(limits.climb_speed if up > 0 else limits.descent_speed, abs(up)),
+        ),
+        min(_over(limits.acceleration, ground), _over(limits.climb_acceleration, abs(up))),
+        limits.jerk,
+        limits.rise,
+    )
+
+
+def _spline_limits(limits: ArduCopterLimits, speed: float) -> SplineLimits:
+    """Return the limits along a spline where `speed` is commanded."""
+    return SplineLimits(
+        speed,
+        limits.climb_speed,
+        limits.descent_speed,
+        limits.acceleration,
+        limits.climb_acceleration,
+    )

@@ -44,7 +44,7 @@ ARDUPLANE = VehicleType(
     dialect=PLANE_DIALECT,
     vertical=_vertical,
     fence_needs_one_inclusion=needs_one_inclusion,
-    legs=ArduPlaneLegs.of,
+    legs=ArduPlaneLegs.from_vehicle,
     flight_model=_model,
 )
 """ArduPlane 4.7, by its documents. How it turns and how fast it may fly is tuned on each aircraft:
