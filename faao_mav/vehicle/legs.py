@@ -1,7 +1,7 @@
 """How vehicles fly legs, by another name, until its callers ask `Vehicle.legs`."""
 
-from faao_mav.vehicle.ardupilot.copter.legs import ArduCopterLegs
-from faao_mav.vehicle.px4.legs import Px4Legs
+from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
+from faao_mav.vehicle.px4.guidance import Px4Legs
 from faao_mav.vehicle.vehicle import Vehicle
 from faao_mav.vehicle.vehicle_type import LegLimits as Legs
 

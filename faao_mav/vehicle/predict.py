@@ -15,9 +15,8 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Track
+from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Track, VerticalProfile
 from faao_mav.vehicle.vehicle import Vehicle
-from faao_mav.vehicle.vertical import VerticalProfile
 
 LONGEST = 86_400.0
 """A flight is followed for this long, s: no copter flies for a day."""

@@ -6,9 +6,8 @@ from typing import Literal, Protocol
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.dialect import Dialect
-from faao_mav.vehicle.flight_path import FlightModel
+from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
-from faao_mav.vehicle.vertical import VerticalProfile
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,10 +26,10 @@ from faao_mav.vehicle import (
     vehicle_type_by_numbers,
 )
 from faao_mav.vehicle.dialect import Dialect, Limit, SpeedChange
+from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import Parameter, ParameterValues, table
 from faao_mav.vehicle.parameter_file import autopilot_of, parameter_path, render_parameters
 from faao_mav.vehicle.px4.model import Px4
-from faao_mav.vehicle.vertical import VerticalProfile
 
 TOY = AutopilotFamily(
     key="toy",

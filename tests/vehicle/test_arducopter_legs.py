@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, half_overlap
 from faao_mav.vehicle.ardupilot.copter.leg import at_speed, planned
 from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
+from faao_mav.vehicle.ardupilot.copter.route import CornerLimits, half_overlap
 
 LIMITS = LegBounds(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
 

@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 
-from faao_mav.vehicle.ardupilot.copter.legs import ArduCopterLegs
+from faao_mav.vehicle.ardupilot import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
-from faao_mav.vehicle.ardupilot.family import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.recommend import accelerations_to_try
 from faao_mav.vehicle.vehicle_type import VehicleType
-from faao_mav.vehicle.vertical import VerticalProfile
 
 __all__ = ["ARDUCOPTER", "ArduCopter", "ArduCopterLegs"]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import Self
 
-from faao_mav.vehicle.ardupilot.parameters import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
 from faao_mav.vehicle.parameter import Limits, Parameter, ParameterValues, table
 
 

@@ -1,14 +1,15 @@
 """The legs of a flight: planned one after the other, as the autopilot does."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, Direction, half_overlap
 from faao_mav.vehicle.ardupilot.copter.course import Course, PlacedLeg, Stop
 from faao_mav.vehicle.ardupilot.copter.leg import StraightLeg, at_speed, planned
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
@@ -20,6 +21,60 @@ from faao_mav.vehicle.ardupilot.copter.spline import (
     flown,
     hermite,
 )
+
+Direction: TypeAlias = tuple[float, float, float]
+"""A unit vector: east, north, up."""
+
+_TICKS = 1 << 40
+"""In the longest overlap: how finely it is sought."""
+
+
+@dataclass(frozen=True, slots=True)
+class CornerLimits:
+    """What must hold half-way round: metres from the waypoint, m/s² across the ground and up."""
+
+    radius: float
+    acceleration: float
+    vertical: float
+
+
+def half_overlap(
+    leg: StraightLeg, u: Direction, following: StraightLeg, w: Direction, limits: CornerLimits
+) -> float:
+    """Return h, s: the `following` leg begins 2 h before `leg` ends, along `u` and `w`.
+
+    The target moves by the sum of both. h is the largest, up to half of either leg's ramp, at
+    which after h s of the overlap it is within the limits and slower than both legs' limits.
+    """
+    longest = min(leg.down.duration, following.up.duration) / 2
+    end, length = leg.duration, leg.length
+    slowest = min(leg.limits.speed, following.limits.speed)
+    across = u[0] * w[0] + u[1] * w[1]
+    along = across + u[2] * w[2]
+    u_ground, w_ground = u[0] ** 2 + u[1] ** 2, w[0] ** 2 + w[1] ** 2
+
+    def excess(h: float) -> float:
+        s, v, a = leg.at(end - h)
+        t, x, b = following.at(h)
+        left = length - s
+        position = math.sqrt(max(0.0, left * left + t * t - 2 * left * t * along))
+        velocity = math.sqrt(max(0.0, v * v + x * x + 2 * v * x * along))
+        ground = math.sqrt(max(0.0, a * a * u_ground + b * b * w_ground + 2 * a * b * across))
+        return (
+            max(
+                position / limits.radius,
+                velocity / slowest,
+                ground / limits.acceleration,
+                abs(a * u[2] + b * w[2]) / limits.vertical,
+            )
+            - 1
+        )
+
+    if excess(longest) <= 1e-9:
+        return longest
+    tick = longest / _TICKS
+    return tick * bisect_left(range(_TICKS), 0.0, key=lambda ticks: excess(ticks * tick))
+
 
 _POINT = 1e-6
 """A leg shorter than this, m, is none: its end counts as reached where it begins."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,6 +11,27 @@ from faao_mav.arrays import Real
 from faao_mav.vehicle.ardupilot.plane.motion import Motion
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.flight_path import FlightPath, Flown
+
+
+@dataclass(frozen=True, slots=True)
+class ArduPlaneLegs(ArduPlaneLimits):
+    """How ArduPlane flies a leg."""
+
+    least: ClassVar[float] = 0.0
+    run_in: ClassVar[float] = 4.0  # chosen: room to come onto a track, whatever its course
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg flown at `speed`, m: one look-ahead; same shape."""
+        return self.look_ahead * speed
+
+    def reachable_speed(self, length: Real) -> Real:
+        """Return the speed at which legs of `length`, m, are not cut short, m/s; same shape."""
+        return length / self.look_ahead
+
+    def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
+        """Return acceptance radii, m: 0, ArduPlane's own; the shape of `turn`."""
+        return np.zeros_like(turn)
+
 
 _HEADED = math.radians(10)
 """A loiter is left when the course is this close to the next waypoint."""

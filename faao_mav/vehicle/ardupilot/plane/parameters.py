@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import pi, radians
 
-from faao_mav.vehicle.ardupilot.parameters import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
 from faao_mav.vehicle.parameter import Limits, Parameter, table
 
 
