@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
-from faao_mav.vehicle import Vehicle, modelled
+from faao_mav.vehicle import Track, Vehicle
 from faao_mav.vehicle.predict import predict
-from faao_mav.vehicle.track import Track
 
 HOME = Home(47.4, 8.5, 400.0)
 FRAME = LocalFrame(47.4, 8.5)
@@ -25,6 +24,11 @@ PX4 = Vehicle("px4")
 VEHICLES = [COPTER, PX4, Vehicle("ardupilot", "plane")]
 
 
+def four(*params: float) -> tuple[float, float, float, float]:
+    one, two, three, last = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return one, two, three, last
+
+
 def at(
     command: int,
     east: float = 0.0,
@@ -34,13 +38,11 @@ def at(
     frame: int = Frame.GLOBAL_RELATIVE_ALT,
 ) -> MissionItem:
     latitude, longitude = FRAME.to_geodetic([east, north])
-    padded = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return MissionItem(command, frame, padded, float(latitude), float(longitude), up)  # type: ignore[arg-type]
+    return MissionItem(command, frame, four(*params), float(latitude), float(longitude), up)
 
 
 def do(command: int, *params: float) -> MissionItem:
-    padded = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return MissionItem(command, Frame.MISSION, padded)  # type: ignore[arg-type]
+    return MissionItem(command, Frame.MISSION, four(*params))
 
 
 def waypoint(east: float, north: float, hold: float = 0.0, up: float = 30.0) -> MissionItem:
@@ -409,10 +411,10 @@ def test_items_are_flown_in_order(items: list[MissionItem], end: MissionItem) ->
 
 def test_px4_planes_are_not_predicted_as_copters() -> None:
     vehicle = Vehicle("px4", "plane")
-    assert not modelled(vehicle)
+    assert vehicle.type.flight_model is None
     with pytest.raises(InputError, match="no model of how PX4 flies planes"):
         predict(Mission((at(Command.NAV_WAYPOINT, 100),)), vehicle)
-    assert all(map(modelled, VEHICLES))
+    assert all(vehicle.type.flight_model for vehicle in VEHICLES)
 
 
 PLANE = Vehicle("ardupilot", "plane")
