@@ -180,8 +180,9 @@ def _fence_on(context: ValidationContext, bit: int) -> bool:
 _WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 _HORIZONTAL = (0, 1)
 
-# Lean in degrees and the top speed that it gave, m/s: a quadrotor of ArduPilot's simulator.
 _LEAN = ((30.0, 10.3), (45.0, 15.2))
+"""The lean angle, degrees, and the top speed that it gave, m/s. Measured: a quadrotor of
+ArduPilot's simulator."""
 
 
 @RULES.error(

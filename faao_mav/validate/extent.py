@@ -11,10 +11,10 @@ from faao_mav.validate.rule import Issue, Rules
 RULES = Rules()
 
 FAR = 10_000.0
-"""Farther than this, m, from home or from item to item is hardly meant."""
+"""The distance from home or from item to item, m, that is hardly meant. Chosen."""
 
 COMMON_CEILING = 120.0
-"""What many countries allow without a permission, m above ground."""
+"""The height, m above ground, that many countries allow without a permission."""
 
 _GIVEN = "the limit that was given"
 _LANDINGS = (Command.NAV_LAND, Command.NAV_VTOL_LAND)

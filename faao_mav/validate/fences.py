@@ -12,7 +12,8 @@ from faao_mav.validate.rule import Issue, Rules
 RULES = Rules()
 
 LEAST_MARGIN = 2.0
-"""Nearer to the fence than this, m, the aircraft's own position error counts."""
+"""The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
+what a change costs is not measured."""
 
 _GEOMETRY = "plane geometry about home; ArduPilot AC_Fence, PX4 Geofence"
 

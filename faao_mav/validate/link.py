@@ -12,19 +12,22 @@ if TYPE_CHECKING:
 RULES = Rules()
 
 LEAST_SHARE = 0.95
-"""Of the planned rate; below it the mission does not do its job."""
+"""The share of the planned rate below which the mission does not do its job. Chosen."""
 
 GOOD_SHARE = 0.995
-"""Of the planned rate; below it something can be won back."""
+"""The share of the planned rate below which something can be won back. Chosen."""
 
 LATE, LATE_SHARE = 3.0, 0.05
-"""Seconds, and share of the planned duration: both exceeded, the plan is not kept."""
+"""By how many seconds, and by which share of the planned duration, a flight ends late that does not
+keep its plan: both are exceeded. Chosen."""
 
 PATH_ALLOWANCE = 0.2
-"""Metres beyond the plan's path_tolerance: predictions are no better."""
+"""How far beyond the plan's path_tolerance the predicted path may lie, m: predictions are no
+better."""
 
 ALTITUDE_ERROR = 2.0
-"""Metres; from 100 m up that is a tenth of a decibel."""
+"""The error of the altitude that is reported, m: from 100 m up it changes the rate by a tenth of a
+decibel."""
 
 _SOURCE = "the plan, and the rate along the predicted flight"
 

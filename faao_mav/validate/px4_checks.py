@@ -20,6 +20,7 @@ _FLIES = FLOWN_TO | {_CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH, 187, 211, 42
 """What checkTakeoff counts as flying: actuators, grippers and winches as well."""
 
 _CLOSEST_GATE = 0.05
+"""The least distance of a gate from its neighbours, m. PX4's own."""
 
 _TAKEOFF, _LANDING, _BOTH, _BOTH_OR_NONE, _BOTH_OR_NONE_ON_GROUND = 1, 2, 3, 4, 5
 
@@ -233,6 +234,8 @@ def _max_vertical(context: ValidationContext) -> Iterator[Issue]:
 _APPROACH = "PX4 1.16 FeasibilityChecker::checkFixedWindLandApproach"
 _PATTERN = "PX4 1.16 FeasibilityChecker::checkLandPatternValidity"
 _SPARE_ANGLE = 0.1
+"""How much steeper than FW_LND_ANG PX4 lets an approach be, degrees. PX4's own."""
+
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)
 
 

@@ -11,14 +11,21 @@ from faao_mav.validate.rule import Issue, Rules
 RULES = Rules()
 
 SHARP = 45.0
-"""A turn of more than this, degrees, slows a copter down."""
+"""The turn, degrees, above which a copter slows down for a corner. Measured on ArduCopter and
+PX4."""
 
 _SLOW = 3.0
-"""At this commanded speed, m/s, and below corners hardly matter."""
+"""The commanded speed, m/s, up to which corners hardly matter. Chosen."""
 
 _CLIMB_SHARE = 0.8
+"""The share of the climbing time that the way over ground may fall short to: less, and the leg is
+steep. Chosen."""
+
 _GRAVITY = 9.81
+"""Standard gravity, m/s²."""
+
 _SHORTEST = 1.0
+"""The length, m, below which a leg has no direction to turn from. Chosen."""
 
 
 def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, float]]:

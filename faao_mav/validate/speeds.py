@@ -9,30 +9,30 @@ import numpy as np
 from faao_mav.mission.command import Command
 from faao_mav.validate.context import HOME, Straight, ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
+from faao_mav.vehicle.vehicle_type import OVERSPEED
 
 RULES = Rules()
 
 REACHED_SHARE = 0.8
-"""Of the commanded speed; a leg that stays below it is reported."""
+"""The share of the commanded speed below which a leg is reported. Chosen."""
 
 TIME_LOST = 2.0
-"""Seconds that a run of such legs loses at least: in less, corners are taken and speeds changed."""
-
-HEADROOM = 1.1
-"""Of the vehicle's max_speed: more is an error; up to it speed makes up for corners."""
+"""The least time, s, that a reported run of slow legs loses: in less, corners are taken and speeds
+are changed. Chosen."""
 
 CRAWL_SHARE = 0.5
-"""Of the commanded speed; a row of legs below it is a crawl."""
+"""The share of the commanded speed below which a row of legs is a crawl. Chosen."""
 
 CRAWL_LEGS = 5
-"""Legs in a row that make a crawl."""
+"""The least number of legs in a row that make a crawl. Chosen."""
 
 _LIMIT = "the plan's vehicle.max_speed"
 _MEASURED = "flight models measured on ArduCopter 4.7 and PX4 1.16.1; the predicted flight"
 _SHORTEST = 1.0
-"""Legs shorter than this, m, are corrections, not legs to speed up on."""
+"""The length, m, below which a leg is a correction and not one to speed up on. Chosen."""
 
-_SLOWEST = 0.1  # m/s
+_SLOWEST = 0.1
+"""The least speed that is reckoned with, m/s, so that times stay finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,13 +151,13 @@ def _reached_speeds(context: ValidationContext) -> tuple[list[Straight], list[fl
 
 @RULES.error(
     "speed-above-limit",
-    f"faster than the vehicle's max_speed by more than {100 * (HEADROOM - 1):.0f} %",
+    f"faster than the vehicle's max_speed by more than {100 * (OVERSPEED - 1):.0f} %",
     _LIMIT,
 )
 def _above_limit(context: ValidationContext) -> Iterator[Issue]:
     limit = context.limits.max_speed
     if limit is not None:
-        for index, speed in _faster_than(HEADROOM * limit, context):
+        for index, speed in _faster_than(OVERSPEED * limit, context):
             yield Issue(
                 index,
                 f"{speed:g} m/s from here on; the vehicle's max_speed is {limit:g} m/s",
@@ -167,14 +167,14 @@ def _above_limit(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.note(
     "speed-headroom",
-    f"faster than the vehicle's max_speed by up to {100 * (HEADROOM - 1):.0f} %",
+    f"faster than the vehicle's max_speed by up to {100 * (OVERSPEED - 1):.0f} %",
     _LIMIT,
 )
 def _headroom(context: ValidationContext) -> Iterator[Issue]:
     limit = context.limits.max_speed
     if limit is None:
         return
-    above = [found for found in _faster_than(limit, context) if found[1] <= HEADROOM * limit]
+    above = [found for found in _faster_than(limit, context) if found[1] <= OVERSPEED * limit]
     if above:
         index, speed = max(above, key=lambda found: found[1])
         yield Issue(

@@ -77,10 +77,6 @@ class FlightModel(Protocol):
         """Return the predicted flight along `path`, sampled every `step` seconds."""
         ...
 
-
-class CopterModel(FlightModel, Protocol):
-    """A model that can be fitted to a plan."""
-
     def fly_many(
         self,
         path: FlightPath,

@@ -1,9 +1,10 @@
 """Questions about a vehicle's flight model by other names, until their callers ask `Vehicle`."""
 
-from typing import cast
-
-from faao_mav.vehicle.flight_path import CopterModel, FlightModel
+from faao_mav.vehicle.flight_path import FlightModel
 from faao_mav.vehicle.vehicle import Vehicle
+
+CopterModel = FlightModel
+"""A flight model by its former name."""
 
 
 def modelled(vehicle: Vehicle) -> bool:
@@ -18,7 +19,7 @@ def caveat(vehicle: Vehicle) -> str:
 
 def copter_model(vehicle: Vehicle, latitude: float | None = None) -> CopterModel:
     """Return the model of a multicopter that flies at `latitude`, degrees."""
-    return cast(CopterModel, vehicle.flight_model(latitude))
+    return vehicle.flight_model(latitude)
 
 
 def flight_model(vehicle: Vehicle, latitude: float | None = None) -> FlightModel:

@@ -19,12 +19,19 @@ from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Track, Vertica
 from faao_mav.vehicle.vehicle import Vehicle
 
 LONGEST = 86_400.0
-"""A flight is followed for this long, s: no copter flies for a day."""
+"""The longest flight that is followed, s: no copter flies for a day."""
 
-_MOST_STEPS = 5000  # items flown, jumps included
-_REPEATS = 20  # of a jump that never ends
-_SAME_PLACE = 0.01  # m
-_SHORTEST = 1e-3  # s
+_MOST_STEPS = 5000
+"""The largest number of items that are flown, repeats by DO_JUMP included. Chosen."""
+
+_REPEATS = 20
+"""How often a DO_JUMP that never ends is followed. Chosen."""
+
+_SAME_PLACE = 0.01
+"""The distance, m, below which two places are one."""
+
+_SHORTEST = 1e-3
+"""The shortest motion, s, that is worth a sample."""
 
 
 def predict(

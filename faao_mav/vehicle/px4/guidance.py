@@ -12,18 +12,22 @@ from faao_mav.arrays import Real
 from faao_mav.vehicle.px4.parameters import Px4Limits
 
 _ALIGNED = 0.98
-"""Cosine of the angle to the target from which an aircraft no longer counts as turning."""
+"""The cosine of the angle between velocity and target from which an aircraft no longer counts as
+turning (about 11 degrees). PX4's own."""
 
 _BLEND = 0.01
-"""Half the range of that cosine over which turning fades, so that flights depend smoothly on it."""
+"""Half the range of that cosine over which turning fades: flights then depend smoothly on their
+speeds. Chosen; what a change costs is not measured."""
 
 _LOOKAHEAD = 5.0
-"""Least distance, m, at which a turning aircraft aims along the leg."""
+"""The least distance, m, at which a turning aircraft aims along its leg. PX4's own."""
 
 _SLOW = 0.5
-"""A direction slower than this never holds up the other, horizontal and vertical, m/s."""
+"""The least speed, m/s, to which the slower of the horizontal and the vertical motion holds up the
+other. PX4's own."""
 
 _TINY = 1e-9
+"""Added to lengths, so that nothing is divided by 0."""
 
 
 _Speed = TypeVar("_Speed", float, Real)
@@ -210,8 +214,7 @@ def climb_setpoint(
 
 
 _RADIUS = 4.0
-"""The least acceptance radius that is asked for on long legs, m: on flown plans 4 m kept the time
-better than NAV_ACC_RAD's 2 m (about 130 flights)."""
+"""The least acceptance radius that is asked for on long legs, m. Measured: about 130 flights."""
 
 _RADIUS_SHARE = 0.45
 """The greatest acceptance radius as a share of the shorter leg at the waypoint. Chosen below 0.5,
@@ -219,11 +222,12 @@ so that the circles of two waypoints do not meet; a radius as long as its leg co
 
 _CUT, _CUT_WITH_HIGH_JERK = 1.3, 1.0
 """How much of a corner a wide acceptance radius may cut, m: the second from `_HIGH_JERK` on, where
-an aircraft that is soon at speed again loses less in a corner. Chosen by the missions' errors."""
+an aircraft is soon at speed again and loses less in a corner. Chosen; what a change costs is not
+measured."""
 
 _HIGH_JERK = 10.0
-"""The jerk from which corners cost little time, m/s³. Chosen between 4, PX4's default, and 20, the
-recommended value."""
+"""The jerk from which corners cost little time, m/s³: between the default of 4 and the recommended
+20. Chosen; what a change costs is not measured."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,11 @@ VELOCITY_GAINS = (1.8, 0.4, 0.2)
 """MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC."""
 
 ATTITUDE_LAG = 0.25
-"""Time constant from the acceleration asked for to the thrust's, s. Fitted."""
+"""The time constant from the acceleration asked for to the thrust's, s. Fitted to recorded
+flights."""
 
 DRAG = 0.1
-"""Air drag over mass, 1/s. Fitted."""
+"""The air drag over mass, 1/s. Fitted to recorded flights."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
 _TRAJECTORY, _CHANGES, _STATES = 4, 7, 10
@@ -27,6 +28,7 @@ _CAUSES = [_POSITION, _VELOCITY, _THRUST, _INTEGRAL, 5, 7, 6, 8, 9]
 """The states that a `StepFactors` looks at: the position's lag says all of the two positions."""
 
 _TERMS = 12
+"""The number of terms of the series of exp(A dt)."""
 
 Number = TypeVar("Number", float, complex)
 

@@ -13,16 +13,19 @@ from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.step import FlightState, at_rest, moved
 
 STEP = 0.1
-"""Longest step of the simulation, s: what was calibrated."""
+"""The longest step of the simulation, s: the one that was calibrated."""
 
 SWITCH_DELAY = 0.1
-"""From reaching a waypoint, or from the end of a hold there, to leaving for the next, s."""
+"""How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
+next, s. Measured: 0.1 s late after holds."""
 
 START_LAG = 0.12
-"""From the first leg becoming current to the trajectory moving, s. Fitted."""
+"""How long after the first leg becomes current the trajectory moves, s. Fitted to recorded
+flights."""
 
 _SETTLED = 2e-3
-"""Slower than this, m/s, a holding aircraft is taken to stand."""
+"""The speed, m/s, below which a holding aircraft is taken to stand. Chosen; what a change costs is
+not measured."""
 
 _ALIKE = 3e-4
 """States that differ by less, m, m/s, m/s², are taken to be the same.
@@ -31,9 +34,11 @@ Variants of a flight take some 20 s to move alike again; ten times less would ta
 """
 
 _STEADY = 1e-5
-"""A velocity off by less, m/s, stays as it is along a leg: a few mm in minutes."""
+"""The deviation of a velocity, m/s, below which it is taken to stay as it is along a leg: a few
+millimetres in minutes."""
 
 _TINY = 1e-9
+"""The shortest time, s, and length, m, that count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

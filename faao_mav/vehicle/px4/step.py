@@ -9,9 +9,11 @@ from faao_mav.vehicle.px4.response import Motion, Number, advance, step_of
 from faao_mav.vehicle.px4.smoothing import Axis, follow, soon_there
 
 WANDER = 0.08
-"""How far the position estimate strays from the trajectory all the time, m. Fitted."""
+"""How far the position estimate strays from the trajectory all the time, m. Fitted to recorded
+flights."""
 
 _TINY = 1e-9
+"""The speed, m/s, below which nothing moves."""
 
 
 class FlightState(NamedTuple):

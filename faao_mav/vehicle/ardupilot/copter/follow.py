@@ -11,7 +11,8 @@ from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Stop, TargetR
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 
 _MARGIN = 0.05
-"""The target waits for an aircraft that is slower than it by more than this part."""
+"""The share by which an aircraft may be slower than its target before the target's clock waits for
+it. The autopilot's own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

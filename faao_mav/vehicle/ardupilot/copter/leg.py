@@ -24,7 +24,8 @@ LegState: TypeAlias = tuple[float, float, float]
 """Distance along the leg, m; speed, m/s; acceleration, m/s²."""
 
 _JERK_TIMES = 12
-"""A second ramp needs a cruise of so many jerk times: the autopilot's own rule of thumb."""
+"""The least length of the cruise that has room for a second ramp, in jerk times at the speed: the
+autopilot's own rule."""
 
 
 @dataclass(frozen=True)

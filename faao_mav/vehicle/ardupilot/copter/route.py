@@ -26,7 +26,7 @@ Direction: TypeAlias = tuple[float, float, float]
 """A unit vector: east, north, up."""
 
 _TICKS = 1 << 40
-"""In the longest overlap: how finely it is sought."""
+"""The number of steps into which the longest overlap of two legs is divided to find it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def half_overlap(
 
 
 _POINT = 1e-6
-"""A leg shorter than this, m, is none: its end counts as reached where it begins."""
+"""The length, m, below which a leg is none: its end counts as reached where it begins."""
 
 
 @dataclass(frozen=True, slots=True)

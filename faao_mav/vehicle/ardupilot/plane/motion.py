@@ -6,9 +6,11 @@ import math
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 
 STEP = 0.1
-"""Step of the simulation, s."""
+"""The step of the simulation, s. Chosen; what a change costs is not measured."""
 
 _GRAVITY = 9.80665
+"""Standard gravity, m/s²."""
+
 _ROLL_LAG = 0.5
 """Time constant of the bank, s: ArduPlane's default RLL2SRV_TCONST."""
 
