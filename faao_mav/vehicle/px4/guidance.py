@@ -242,7 +242,7 @@ class Px4Legs(Px4Limits):
 
         It must be able to stop at the next waypoint: that is its stopping distance.
 
-        >>> float(Px4Legs(5.0, 10.0).shortest_leg(np.array(8.0)))
+        >>> float(Px4Legs(acceleration=5.0, jerk=10.0).shortest_leg(np.array(8.0)))
         14.4
         """
         return stopping_distance(self.jerk, self.acceleration, speed)
