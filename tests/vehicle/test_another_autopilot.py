@@ -13,7 +13,7 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import MissionItem
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
-from faao_mav.schedule.convert import convert
+from faao_mav.schedule import convert
 from faao_mav.validate import Limits
 from faao_mav.validate.check import check
 from faao_mav.vehicle import (
@@ -144,7 +144,7 @@ def test_a_mission_is_made_predicted_and_validated() -> None:
     solution = optimize(plan)
     conversion = convert(solution)
     assert dict(conversion.parameters) == {"TOY_SPEED": 8.0, "TOY_ACCEL": 5.0}
-    assert conversion.schedule.error < 3
+    assert conversion.schedule.deviation.rms < 3
     found = check(
         conversion.mission, conversion.vehicle, limits=Limits(max_speed=8.0), solution=solution
     )
