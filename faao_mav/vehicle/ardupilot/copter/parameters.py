@@ -1,4 +1,4 @@
-"""ArduCopter's parameters: names of 4.8 and later (SI units) first, those before it (cm) second."""
+"""ArduCopter's parameters: the newer names (SI units) first, those of 4.7 and before (cm) second."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,11 +17,9 @@ def _parameter(
     old: str,
     factor: float = 0.01,
     least: float = 0.1,
-    documented: tuple[float, float] | None = None,
+    documented: tuple[float, float] = (-math.inf, math.inf),
 ) -> Parameter:
     names = {new: 1.0, old: factor}
-    if documented is None:
-        return Parameter(key, unit, default, names, least, source=SOURCE)
     return Parameter(key, unit, default, names, least, documented=documented, source=SOURCE)
 
 

@@ -1,4 +1,4 @@
-"""ArduPlane's parameters: names of 4.5 and later first, those before it second."""
+"""ArduPlane's parameters: the newer names first, the older ones second."""
 
 from dataclasses import dataclass
 from math import pi, radians
