@@ -1,4 +1,4 @@
-"""ArduCopter's parameters: the newer names (SI units) first, those of 4.7 and before (cm) second."""
+"""ArduCopter's parameters: the newer names (SI units) first, those up to 4.7 (cm) second."""
 
 import math
 from dataclasses import dataclass, replace
