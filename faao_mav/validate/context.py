@@ -8,16 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.validate.fence_map import FenceMap, fence_map
-from faao_mav.validate.limits import Limits
 from faao_mav.validate.link import LinkCheck
-from faao_mav.validate.parameters import cruise_speed
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.dialects import speed_change
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track, Vehicle
 
 NAV_LAST = 95
 """Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""
@@ -30,8 +27,30 @@ HOME = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Where an item flies to: metres east and north of `Case.frame`, and above home.
+class Limits:
+    """What a flight must stay within; None: no limit.
+
+    `max_duration`, s, of the whole flight; `max_distance`, m, from home over ground;
+    `max_altitude`, m above home; `max_speed`, m/s, over ground; `max_acceleration`, m/s², over
+    ground. Raises `InputError` for one that is not a finite number above 0.
+    """
+
+    max_duration: float | None = None
+    max_distance: float | None = None
+    max_altitude: float | None = None
+    max_speed: float | None = None
+    max_acceleration: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name}: {value}; expected a number above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedItem:
+    """Where an item flies to: metres east and north of `ValidationContext.frame`, and above home.
 
     `index` is the item's, `HOME` for home. `up` is NaN where nothing tells it: heights above
     terrain, or above the sea without a home.
@@ -49,7 +68,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Leg:
+class Straight:
     """A straight from one place to the next, ordered by the item at `index`.
 
     `speed` is what is commanded, m/s; `spline`: the aircraft curves to its end; `jump`: the item
@@ -57,8 +76,8 @@ class Leg:
     """
 
     index: int
-    start: Place
-    end: Place
+    start: PlacedItem
+    end: PlacedItem
     speed: float
     spline: bool = False
     jump: bool = False
@@ -75,8 +94,8 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Case:
-    """A mission to judge.
+class ValidationContext:
+    """A mission to judge; parameters of its vehicle that are no use count as not given.
 
     `track` is how it is predicted to fly, if that is known; `link` what it is predicted to
     deliver, if there is a plan to compare with.
@@ -87,6 +106,9 @@ class Case:
     track: Track | None = None
     limits: Limits = field(default_factory=Limits)
     link: LinkCheck | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vehicle", self.vehicle.usable())
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
@@ -108,12 +130,12 @@ class Case:
         return None
 
     @cached_property
-    def home(self) -> Place | None:
+    def home(self) -> PlacedItem | None:
         """Home, at the origin of the local frame, or None."""
-        return Place(HOME, 0.0, 0.0, 0.0) if self.mission.home is not None else None
+        return PlacedItem(HOME, 0.0, 0.0, 0.0) if self.mission.home is not None else None
 
     @cached_property
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[PlacedItem, ...]:
         """Where the items fly to, in order; without those whose coordinates are unusable.
 
         ArduPilot takes 0, 0 for the place where it is.
@@ -121,7 +143,7 @@ class Case:
         if self.frame is None:
             return ()
         here = (0.0, 0.0)
-        ardupilot = self.vehicle.autopilot == "ardupilot"
+        dialect = self.vehicle.type.dialect
         indices = [k for k, item in enumerate(self.items) if self._is_place(item)]
         local = self.frame.to_local(
             [self.items[k].x for k in indices], [self.items[k].y for k in indices]
@@ -130,19 +152,19 @@ class Case:
         for k, (east, north) in zip(indices, local.tolist(), strict=True):
             item = self.items[k]
             if at_zero(item):
-                if not ardupilot:
+                if not dialect.zero_means_here:
                     continue
             elif math.isfinite(east) and math.isfinite(north):  # not so at the antipode
                 here = (east, north)
             else:
                 continue
-            places.append(Place(k, *here, self._height(item)))
+            places.append(PlacedItem(k, *here, self._height(item)))
         return tuple(places)
 
     def _is_place(self, item: MissionItem) -> bool:
         if item.command not in FLOWN_TO or not on_earth(item):
             return False
-        return item.frame != Frame.MISSION or self.vehicle.autopilot == "ardupilot"
+        return item.frame != Frame.MISSION or self.vehicle.type.dialect.placed_in_mission_frame
 
     def _height(self, item: MissionItem) -> float:
         if item.frame in ABOVE_HOME:
@@ -153,14 +175,14 @@ class Case:
         return math.nan
 
     @cached_property
-    def legs(self) -> tuple[Leg, ...]:
+    def legs(self) -> tuple[Straight, ...]:
         """The straights that the items order: from home, between the places, back, by DO_JUMP.
 
         A return to launch ends at home, unless there are rally points to go to instead.
         """
         return tuple(self._legs())
 
-    def _legs(self) -> Iterator[Leg]:
+    def _legs(self) -> Iterator[Straight]:
         by_index = {place.index: place for place in self.places}
         here = self.home
         for k, item in enumerate(self.items):
@@ -168,19 +190,28 @@ class Case:
             place = by_index.get(k)
             if place is not None:
                 if here is not None:
-                    yield Leg(k, here, place, speed, item.command == Command.NAV_SPLINE_WAYPOINT)
+                    yield Straight(
+                        k, here, place, speed, item.command == Command.NAV_SPLINE_WAYPOINT
+                    )
                 here = place
             elif here is None:
                 continue
             elif item.command == Command.NAV_RETURN_TO_LAUNCH:
                 if self.home is not None and not self.mission.rally:
-                    yield Leg(k, here, replace(self.home, up=math.nan), speed)
+                    yield Straight(k, here, replace(self.home, up=math.nan), speed)
             elif item.command == Command.DO_JUMP:
                 target = self.jump_target(k)
                 reached = range(len(self.items))[target:] if target is not None else ()
                 after = next((by_index[j] for j in reached if j in by_index), None)
                 if after is not None:
-                    yield Leg(k, here, after, speed, jump=True)
+                    yield Straight(k, here, after, speed, jump=True)
+
+    def stored(self, item: MissionItem) -> MissionItem | None:
+        """Return what the vehicle gives back for `item`, None if it refuses it."""
+        dialect = self.vehicle.type.dialect
+        if not fits_message(item) or dialect.refusal(item):
+            return None
+        return dialect.stored(item)
 
     def jump_target(self, index: int) -> int | None:
         """Return the index that the DO_JUMP at `index` goes to, None if there is no such item."""
@@ -192,15 +223,12 @@ class Case:
     @cached_property
     def speeds(self) -> tuple[float, ...]:
         """The speed over ground commanded for the leg to each item, m/s."""
-        default = cruise_speed(self.vehicle)
-        cruise = default.of(self.vehicle)
-        if not cruise > 0:
-            cruise = default.default
+        cruise = self.vehicle.value("cruise_speed")
         speed, speeds = cruise, []
         for item in self.items:
             change = None
             if item.command == Command.DO_CHANGE_SPEED:
-                change = speed_change(item, self.vehicle)
+                change = self.vehicle.type.dialect.speed_change(item)
             if change is not None and change.axis in ("horizontal", "airspeed"):
                 speed = cruise if change.speed is None else change.speed
             speeds.append(speed)
