@@ -15,6 +15,7 @@ import pytest
 import yaml
 from conftest import free_port
 from pages import PAGES, ROOT, Block, blocks, difference
+from test_architecture import FLOORS
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -139,7 +140,9 @@ def test_files_and_modules_that_pages_name_exist() -> None:
 
 
 def test_links_between_pages_lead_somewhere() -> None:
-    links = [(page, re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text)) for page, text in PAGES.items()]
+    links = [
+        (page, re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text)) for page, text in PAGES.items()
+    ]
     targets = [(page, (ROOT / page).parent / target) for page, found in links for target in found]
     assert [each for each in targets if not each[1].exists()] == []
 
@@ -165,6 +168,12 @@ def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
     solution = optimize(plan)
     assert solution.rates.R_avg == pytest.approx(float(best.split()[0]), abs=1e-4)
     assert solution.history[0] == pytest.approx(float(start), abs=1e-4)
+
+
+def test_the_house_that_is_shown_has_the_floors_of_the_house() -> None:
+    rows = re.findall(r"^\| (\d+) \| (`.*?`) \|", PAGES["docs/house.md"], re.MULTILINE)
+    shown = {int(floor): set(re.findall(r"`(\w+)`", rooms)) for floor, rooms in rows}
+    assert shown == {floor: set(rooms) for floor, rooms in enumerate(FLOORS, start=1)}
 
 
 def test_the_readme_is_short() -> None:
