@@ -5,9 +5,11 @@ A fenced block is of one kind, by the word after its fence:
 - `console`: lines `$ COMMAND`, each with the output that follows it, both streams together. A
   line `...` stands for any lines. A command that ends in ` &` runs until the page ends. Port 14550
   stands for a free one.
-- `python`: run in order, one namespace a page. A `text` block right after it is what it prints.
+- `python`: one namespace a page. A `text` block right after it is what it prints.
 - `sh`: commands without output, not run; options and files in them have to exist.
 - `yaml`, `text`: shown only.
+
+Blocks of a page are run in their order, in one folder.
 
 `<!-- not run: REASON -->` in the line before a block keeps it from being run.
 
@@ -44,7 +46,9 @@ class Block:
 
     @property
     def commands(self) -> list[tuple[str, str]]:
-        """The commands of a `console` block with their outputs."""
+        """The commands of a `console` block with their outputs; none in others."""
+        if self.kind != "console":
+            return []
         parts = re.split(r"^\$ (.*)\n", self.text, flags=re.MULTILINE)
         return list(zip(parts[1::2], parts[2::2], strict=True))
 

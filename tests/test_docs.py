@@ -1,7 +1,6 @@
 """What README and the pages of docs/ show is true, and the site builds without a warning."""
 
 import contextlib
-import dataclasses
 import io
 import os
 import re
@@ -9,12 +8,13 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
 from conftest import free_port
-from pages import PAGES, ROOT, Block, blocks, difference
+from pages import PAGES, ROOT, blocks, difference
 from test_architecture import FLOORS
 from typer.testing import CliRunner
 
@@ -63,33 +63,28 @@ def output_of(command: str) -> str:
     return done.stdout
 
 
-def run_python(found: list[Block]) -> None:
-    names: dict[str, object] = {}
-    for block, following in zip(found, [*found[1:], None], strict=True):
-        if block.kind != "python" or not block.run:
-            continue
-        with contextlib.redirect_stdout(io.StringIO()) as printed:
-            exec(block.text, names)
-        if following is not None and following.kind == "text":
-            assert difference(following.text, printed.getvalue()) is None
-
-
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if {b.kind for b in blocks(page)} & {"console", "python"}]
 )
 def test_what_a_page_shows_is_printed(page: str, folder: Path) -> None:
     port = f"127.0.0.1:{free_port()}"
-    found = blocks(page)
+    names: dict[str, object] = {}
+    found = [replace(b, text=b.text.replace("127.0.0.1:14550", port)) for b in blocks(page)]
     with contextlib.ExitStack() as lasting:
-        for block in found:
-            for command, shown in block.commands if block.kind == "console" and block.run else ():
-                here = command.replace("127.0.0.1:14550", port)
-                if here.endswith(" &"):
+        for block, following in zip(found, [*found[1:], None], strict=True):
+            if not block.run:
+                continue
+            for command, shown in block.commands:
+                if command.endswith(" &"):
                     listen = f" --listen udpin:{port}"
-                    lasting.enter_context(running(here.removesuffix(" &") + listen))
+                    lasting.enter_context(running(command.removesuffix(" &") + listen))
                 else:
-                    assert difference(shown, output_of(here)) is None, command
-        run_python(found)
+                    assert difference(shown, output_of(command)) is None, command
+            if block.kind == "python":
+                with contextlib.redirect_stdout(io.StringIO()) as printed:
+                    exec(block.text, names)
+                if following is not None and following.kind == "text":
+                    assert difference(following.text, printed.getvalue()) is None
 
 
 @pytest.mark.parametrize(
@@ -154,7 +149,7 @@ def test_the_plan_that_is_shown_has_every_default() -> None:
     stations = ("base_station", "ground_user")
     least["radio"] = {s: {"position": full["radio"][s]["position"]} for s in stations}
     given, default = parse_plan(shown), parse_plan(yaml.safe_dump(least))
-    assert dataclasses.replace(given, text="") == dataclasses.replace(default, text="")
+    assert replace(given, text="") == replace(default, text="")
 
 
 @pytest.mark.parametrize("row", re.findall(r"^\| `(missions/.*) \|$", PAGES["README.md"], re.M))
@@ -162,9 +157,7 @@ def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
     name, _, start, best, _ = re.split(r" *\| ", row)
     plan = read_plan(ROOT / name.split("`")[0])
     if "--method direct" in name:
-        plan = dataclasses.replace(
-            plan, optimizer=dataclasses.replace(plan.optimizer, method="direct")
-        )
+        plan = replace(plan, optimizer=replace(plan.optimizer, method="direct"))
     solution = optimize(plan)
     assert solution.rates.R_avg == pytest.approx(float(best.split()[0]), abs=1e-4)
     assert solution.history[0] == pytest.approx(float(start), abs=1e-4)
