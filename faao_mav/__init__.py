@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from faao_mav.mavlink import download, upload
     from faao_mav.mission import Mission, MissionItem
     from faao_mav.mission.formats import read_mission, render_mission
-    from faao_mav.mission.vehicle import Vehicle
     from faao_mav.optimizer.optimize import optimize
     from faao_mav.optimizer.pricing import price, saturation
     from faao_mav.optimizer.solution import Solution, load_solution, save_solution
     from faao_mav.plan import Plan, parse_plan, read_plan
     from faao_mav.schedule import to_mission
     from faao_mav.validate import Finding, Limits, LinkCheck
+    from faao_mav.vehicle import Vehicle
     from faao_mav.vehicle.parameter_file import read_parameters, render_parameters
 
 _HOMES = {
@@ -31,7 +31,7 @@ _HOMES = {
     "MissionItem": "mission",
     "Plan": "plan",
     "Solution": "optimizer.solution",
-    "Vehicle": "mission.vehicle",
+    "Vehicle": "vehicle",
     "download": "mavlink",
     "load_solution": "optimizer.solution",
     "optimize": "optimizer.optimize",

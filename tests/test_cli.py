@@ -158,7 +158,7 @@ def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
     plan.write_text(edited(SMALL, {"vehicle.parameters": {"WPNAV_JERK": 0}}))
     result = run(plan, "--out", out, "--save", save)
     assert result.exit_code == 2
-    assert "vehicle.parameters.WPNAV_JERK: 0" in result.stderr
+    assert "vehicle.parameters: WPNAV_JERK: 0" in result.stderr
     assert not save.exists()
     plan.write_text(edited(SMALL, {"mission.max_items": 4}))
     result = run(plan, "--out", out, "--save", save)

@@ -19,10 +19,9 @@ from faao_mav.mavlink.mock import MockAutopilot, manners_of
 from faao_mav.mavlink.runner import predicted, running
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home, Mission
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.optimizer.solution import load_solution
 from faao_mav.validate.comparison import compare_with_plan
-from faao_mav.vehicle import Track
+from faao_mav.vehicle import Track, Vehicle
 from faao_mav.vehicle.dialects import as_stored
 from faao_mav.vehicle.parameter_file import parameter_path, read_parameters
 

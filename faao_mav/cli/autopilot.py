@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.mock import MockAutopilot
     from faao_mav.mavlink.transfer.protocol import MissionType
     from faao_mav.mission.item import Home
-    from faao_mav.mission.vehicle import Autopilot
+    from faao_mav.plan.autopilots import Autopilot
 
 _REST = 0.5  # s without a change, after which a list is told
 
@@ -77,8 +77,7 @@ def autopilot(
         from faao_mav.mavlink.runner import predicted, serve
         from faao_mav.mavlink.transfer.protocol import Address
         from faao_mav.mavlink.transport import open_transport
-        from faao_mav.mission.vehicle import Vehicle
-        from faao_mav.vehicle import flight_model
+        from faao_mav.vehicle import Vehicle, flight_model
         from faao_mav.vehicle.parameter_file import read_parameters
 
         values = {} if parameters is None else read_parameters(parameters)

@@ -45,14 +45,15 @@ def _run(mission_file: Path, out: Path, autopilot: Autopilot | None, as_json: bo
         read_mission_file,
         render_mission,
     )
-    from faao_mav.mission.vehicle import Vehicle
+    from faao_mav.vehicle import Vehicle
 
     check_readable(mission_file)
     check_suffix(out)
     check_writable(out)
     check_apart({"--out": out}, {"MISSION": mission_file})
     read = read_mission_file(mission_file)
-    vehicle = Vehicle(autopilot, read.kind or "copter") if autopilot else read.vehicle
+    whose = autopilot or read.autopilot
+    vehicle = Vehicle(whose, read.kind or "copter") if whose else None
     lost = losses_in(read.mission, out, vehicle)
     write_whole(out, render_mission(read.mission, out, vehicle).encode())
     for line in lost:

@@ -10,10 +10,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from faao_mav.cli.finding_lines import count_of, grouped, items_of, line_of, message_of
-from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Vehicle
 from faao_mav.validate import Level, Rule
 from faao_mav.validate.check import Check
-from faao_mav.vehicle import caveat
+from faao_mav.vehicle import Vehicle, caveat
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
 
@@ -117,7 +116,7 @@ def show_rules(rules: Sequence[Rule], console: Console) -> None:
 def _head(verdict: Verdict) -> str:
     vehicle = verdict.vehicle
     lines = [
-        f"{verdict.source}: {verdict.items} items, for {AUTOPILOT_NAMES[vehicle.autopilot]} and a "
+        f"{verdict.source}: {verdict.items} items, for {vehicle.type.family.name} and a "
         f"{vehicle.kind} ({verdict.chosen_by}); parameters: "
         f"{vehicle.source if vehicle.parameters else 'defaults'}"
     ]

@@ -14,9 +14,9 @@ from faao_mav.errors import InputError
 if TYPE_CHECKING:
     from faao_mav.cli.findings import Verdict
     from faao_mav.mission.item import Mission
-    from faao_mav.mission.vehicle import Autopilot, Kind
     from faao_mav.optimizer.solution import Solution
     from faao_mav.plan import Plan
+    from faao_mav.plan.autopilots import Autopilot, Kind
 
 
 def validate(

@@ -1,10 +1,11 @@
 """Who flies a mission file: what tells, and in which order it is believed."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
-from faao_mav.mission.vehicle import AUTOPILOT_NAMES, Autopilot, Kind, Vehicle, vehicle_of
+from faao_mav.plan.autopilots import Autopilot, Kind, autopilots
+from faao_mav.vehicle import Vehicle, family, vehicle_of
 from faao_mav.vehicle.parameter_file import autopilot_of, parameter_path, read_parameters
 
 if TYPE_CHECKING:
@@ -39,8 +40,8 @@ def choose_vehicle(
         theirs = autopilot_of(given)
         if theirs is not None and theirs != whose:
             raise InputError(
-                f"{parameters}: parameters of {AUTOPILOT_NAMES[theirs]}, but the mission is for "
-                f"{AUTOPILOT_NAMES[whose]} ({chosen_by}): "
+                f"{parameters}: parameters of {family(theirs).name}, but the mission is for "
+                f"{family(whose).name} ({chosen_by}): "
                 f"give the vehicle's own, or --autopilot {theirs}"
             )
         values, source = given, str(parameters)
@@ -60,7 +61,7 @@ def _told(
     if given is not None:
         theirs = autopilot_of(given)
     else:
-        found = [a for a in get_args(Autopilot) if parameter_path(mission_file, a).is_file()]
+        found = [a for a in autopilots() if parameter_path(mission_file, a).is_file()]
         theirs = found[0] if len(found) == 1 else None
     if theirs is not None:
         return Vehicle(theirs), "as its parameters say"

@@ -21,7 +21,7 @@ from faao_mav.mavlink.transfer.session import (
 )
 from faao_mav.mavlink.transfer.transfer import Peer, Script
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.dialects import item_limit
 
 _ABSENT = (Result.UNSUPPORTED, Result.INVALID)

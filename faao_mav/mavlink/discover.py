@@ -7,7 +7,7 @@ from faao_mav.errors import LinkError
 from faao_mav.mavlink.messages import CommandLong, Envelope, Heartbeat, HomePosition, Message
 from faao_mav.mavlink.transfer.protocol import FIRMWARE_NAMES, Address, Autopilot, Firmware, State
 from faao_mav.mission.item import Home
-from faao_mav.mission.vehicle import Kind
+from faao_mav.plan.autopilots import Kind
 
 _GCS = 6
 _PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25})  # fixed wing, VTOL

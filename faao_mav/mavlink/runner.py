@@ -12,8 +12,7 @@ from faao_mav.mavlink.link import Link
 from faao_mav.mavlink.mock import Fly, MockAutopilot
 from faao_mav.mavlink.transport import Transport, open_transport
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
-from faao_mav.vehicle import Track
+from faao_mav.vehicle import Track, Vehicle
 
 _PATIENCE = 0.1  # s between two looks at whether to stop
 

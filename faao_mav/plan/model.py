@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+from faao_mav.plan.autopilots import Autopilot, Kind
+
 Vector: TypeAlias = tuple[float, float]
 """East and north components, metres or m/s."""
 
-Autopilot: TypeAlias = Literal["ardupilot", "px4"]
-VehicleType: TypeAlias = Literal["copter", "plane"]
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
 Fading: TypeAlias = Literal["ergodic", "realization", "none"]
@@ -46,7 +46,7 @@ class Vehicle:
     max_acceleration: float
     min_speed: float = 0.0
     autopilot: Autopilot = "ardupilot"
-    type: VehicleType = "copter"
+    type: Kind = "copter"
     parameters: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -12,6 +12,7 @@ from faao_mav.errors import PlanError
 from faao_mav.files import read_text
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import model, schema
+from faao_mav.plan.autopilots import VEHICLES
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.messages import describe, quote
 from faao_mav.plan.reach import reach, shortest_duration
@@ -206,13 +207,15 @@ class _Reader:
         )
 
     def check_plane(self, vehicle: model.Vehicle) -> None:
-        if vehicle.type != "plane":
+        known = VEHICLES[vehicle.autopilot, vehicle.type]
+        if known.hovers:
             return
-        if vehicle.autopilot != "ardupilot":
+        if not known.planned:
+            others = [v.autopilot for v in VEHICLES.values() if v.type == known.type and v.planned]
             raise self.fail(
                 "vehicle.type",
-                f"plane: missions for planes are made for ardupilot, not for {vehicle.autopilot} "
-                "(vehicle.autopilot)",
+                f"{known.type}: missions for {known.type}s are made for {' and '.join(others)}, "
+                f"not for {known.autopilot} (vehicle.autopilot)",
             )
         if vehicle.min_speed == 0:
             raise self.fail(

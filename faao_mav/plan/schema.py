@@ -4,13 +4,15 @@ Decibels and degrees as people write them; `reader` turns them into the SI units
 Each field's description says what is accepted and is what an error message quotes.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
+from pydantic_core import PydanticCustomError
 
+from faao_mav.plan.autopilots import autopilots, types
 from faao_mav.plan.model import (
-    Autopilot,
     ChannelKnowledge,
     Fading,
     Inputs,
@@ -24,7 +26,6 @@ from faao_mav.plan.model import (
     StudyFigure,
     StudyScheme,
     Vector,
-    VehicleType,
 )
 
 MAX_LOCAL_DISTANCE = 100_000.0
@@ -38,6 +39,17 @@ class Degrees:
 
     latitude: float
     longitude: float
+
+
+def _one_of(names: Callable[[], tuple[str, ...]]) -> Callable[[object], object]:
+    """Return a check that a value is one of the `names` known when it is read."""
+
+    def check(value: object) -> object:
+        if value not in names():
+            raise PydanticCustomError("unknown_name", "is none of the names")
+        return value
+
+    return check
 
 
 def _is_number(value: object) -> bool:
@@ -138,8 +150,12 @@ class SiteSection(Section):
 class VehicleSection(Section):
     """`vehicle`."""
 
-    autopilot: Autopilot = Field("ardupilot", description="ardupilot or px4")
-    type: VehicleType = Field("copter", description="copter or plane")
+    autopilot: Annotated[str, BeforeValidator(_one_of(autopilots))] = Field(
+        "ardupilot", description="ardupilot or px4"
+    )
+    type: Annotated[str, BeforeValidator(_one_of(types))] = Field(
+        "copter", description="copter or plane"
+    )
     max_speed: float = Field(gt=0, le=1000, description="a speed above 0, at most 1000 m/s")
     max_acceleration: float = Field(
         gt=0, le=1000, description="an acceleration above 0, at most 1000 m/s^2"

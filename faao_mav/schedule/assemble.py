@@ -7,7 +7,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.schedule.route import Route
-from faao_mav.vehicle.recommend import FASTEST
+from faao_mav.vehicle import vehicle_of
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
@@ -41,14 +41,17 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         for x, y in zip(latitudes, longitudes, strict=True)
     ]
 
-    plane = plan.vehicle.type == "plane"
+    vehicle_type = vehicle_of(plan).type
+    plane, whole_seconds = not vehicle_type.hovers, vehicle_type.whole_second_holds
     axis = _AIRSPEED if plane else _GROUND_SPEED
     items = []
     if plan.mission.takeoff:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
         here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
         items.append(_at(Command.NAV_TAKEOFF, here, altitude, _PITCH if plane else 0.0))
-    commanded = float(route.speeds[0]) if plane else min(plan.vehicle.max_speed, FASTEST)
+    commanded = (
+        float(route.speeds[0]) if plane else min(plan.vehicle.max_speed, vehicle_type.fastest)
+    )
     items.append(_change_speed(commanded, axis))
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
@@ -56,7 +59,7 @@ def assemble(route: Route, plan: "Plan") -> Mission:
             items.append(_change_speed(speed, axis))
             commanded = speed
         hold, delay = float(route.holds[k]), float(route.delays[k])
-        if plan.vehicle.autopilot == "px4":  # keeps fractions
+        if not whole_seconds:
             hold, delay = hold + delay, 0.0
         items.append(
             _waypoint(place, altitude, hold, float(route.radii[k]), spline=bool(route.splines[k]))

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle, vehicle_of
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.outline import Splines, plan_route
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
@@ -14,10 +13,10 @@ from faao_mav.schedule.route import Route
 from faao_mav.schedule.run_in import with_run_in
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
-from faao_mav.vehicle import copter_model, flight_model
+from faao_mav.vehicle import Vehicle, copter_model, flight_model, vehicle_of
 from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
 from faao_mav.vehicle.legs import ArduCopterLegs, Legs, legs_of
-from faao_mav.vehicle.recommend import FASTEST, candidates
+from faao_mav.vehicle.recommend import candidates
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
@@ -80,7 +79,7 @@ def convert(solution: "Solution") -> Conversion:
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     plan, t, w = solution.plan, solution.t, solution.w
-    top = min(plan.vehicle.max_speed, FASTEST)
+    top = min(plan.vehicle.max_speed, vehicle_of(plan).type.fastest)
     trials = [_Trial.of(solution, parameters, top) for parameters in candidates(plan)]
     share = _PLANE_SHARE if plan.vehicle.type == "plane" else 1.0
     straight = plan_route(t, w, plan, share=share)
@@ -126,8 +125,10 @@ def _scheduler(solution: "Solution", vehicle: Vehicle, legs: Legs, top: float) -
     if vehicle.kind == "plane":
         plane = ArduPlane.from_vehicle(vehicle)
         least, most = plane.min_speed, min(plan.vehicle.max_speed, plane.max_speed)
-        return PlaneScheduler(t, w, plane, legs, most, near, max(plan.vehicle.min_speed, least))
-    return Scheduler(t, w, copter_model(vehicle, plan.origin.latitude), legs, top, near)
+        slowest = max(plan.vehicle.min_speed, least)
+        return PlaneScheduler(t, w, plane, legs, most, near, slowest, whole_seconds=False)
+    model, whole = copter_model(vehicle, plan.origin.latitude), vehicle.type.whole_second_holds
+    return Scheduler(t, w, model, legs, top, near, whole_seconds=whole)
 
 
 def _refined(firsts: list[tuple[Schedule, _Trial]]) -> list[tuple[Schedule, _Trial]]:

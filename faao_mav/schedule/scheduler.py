@@ -67,7 +67,7 @@ class Scheduler:
     `t` (n,) s and `w` (n, 2) m are the plan; `legs` says how short a leg may be for its speed,
     and how wide its acceptance radius; no speed is below `min_speed` or above `max_speed`, m/s,
     unless the aircraft would not keep up: then by at most a tenth. The flight is over when the
-    aircraft is within `tolerance` m of w_F.
+    aircraft is within `tolerance` m of w_F. `whole_seconds`: holds lose their fractions.
     """
 
     t: Real
@@ -77,6 +77,7 @@ class Scheduler:
     max_speed: float
     tolerance: float
     min_speed: float = SLOWEST
+    whole_seconds: bool = True
 
     def first(self, route: Route) -> Schedule:
         """Return `route` with the speeds and holds that fit best."""
@@ -161,7 +162,7 @@ class Scheduler:
 
     def _waiting(self, route: Route, waits: Real) -> Route:
         """Return `route` with `waits` (m,), s, as holds, and as delays what holds cannot say."""
-        holds = np.floor(waits) if self.legs.whole_seconds else waits
+        holds = np.floor(waits) if self.whole_seconds else waits
         return replace(route, holds=holds, delays=np.round(waits - holds, 9))
 
     def _finer(self, found: Schedule, top: float) -> Schedule | None:

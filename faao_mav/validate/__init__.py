@@ -1,13 +1,13 @@
 """Whether an autopilot takes a mission, an aircraft can fly it, and it delivers the link."""
 
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.validate.case import Case
 from faao_mav.validate.finding import Finding, Level
 from faao_mav.validate.limits import Limits
 from faao_mav.validate.link import LinkCheck, Stretch
 from faao_mav.validate.registry import RULES
 from faao_mav.validate.rule import Rule
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.track import Track
 
 __all__ = [

@@ -11,11 +11,11 @@ from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.validate.fence_map import FenceMap, fence_map
 from faao_mav.validate.limits import Limits
 from faao_mav.validate.link import LinkCheck
 from faao_mav.validate.parameters import cruise_speed
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.dialects import speed_change
 from faao_mav.vehicle.track import Track
 

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.track import Track
 
 if TYPE_CHECKING:

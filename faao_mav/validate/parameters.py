@@ -7,7 +7,7 @@ both generations.
 import math
 from dataclasses import dataclass
 
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True)

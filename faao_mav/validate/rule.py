@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from faao_mav.mission.vehicle import Autopilot, Kind, Vehicle
+from faao_mav.plan.autopilots import Autopilot, Kind
 from faao_mav.validate.finding import Finding, Level
+from faao_mav.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from faao_mav.validate.case import Case

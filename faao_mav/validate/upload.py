@@ -77,7 +77,7 @@ def _full(case: Case) -> Iterator[Issue]:
     if rows > most and not _on_card(case):
         yield Issue(
             None,
-            f"{rows} items{_with_home(case)}; {dialect_of(case.vehicle).name} stores {most} at "
+            f"{rows} items{_with_home(case)}; {case.vehicle.type.name} stores {most} at "
             "most (NO_SPACE)",
             _thin(case),
         )

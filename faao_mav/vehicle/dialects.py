@@ -1,18 +1,13 @@
-"""What ArduCopter, ArduPlane and PX4 each do with the items they are given.
-
-Read in their sources and measured on ArduCopter 4.7 and PX4 1.16 in simulation.
-"""
+"""Questions about a vehicle's items by other names, until their callers ask `Vehicle.type`."""
 
 from typing import TYPE_CHECKING
 
 from faao_mav.mission.rows import as_received, as_sent, home_item
-from faao_mav.vehicle.ardupilot.dialect import ARDUCOPTER, ARDUPLANE
 from faao_mav.vehicle.dialect import Dialect, Limit, SpeedAxis, SpeedChange
-from faao_mav.vehicle.px4.dialect import PX4
 
 if TYPE_CHECKING:
     from faao_mav.mission.item import MissionItem
-    from faao_mav.mission.vehicle import Vehicle
+    from faao_mav.vehicle.vehicle import Vehicle
 
 __all__ = [
     "Dialect",
@@ -33,39 +28,29 @@ __all__ = [
 
 def dialect_of(vehicle: "Vehicle") -> Dialect:
     """Return what the autopilot of `vehicle` does with items."""
-    if vehicle.autopilot == "px4":
-        return PX4
-    return ARDUPLANE if vehicle.kind == "plane" else ARDUCOPTER
+    return vehicle.type.dialect
 
 
 def accepts(item: "MissionItem", vehicle: "Vehicle") -> str | None:
     """Return why the autopilot refuses `item` on upload, None if it takes it."""
-    return dialect_of(vehicle).refusal(item)
+    return vehicle.type.dialect.refusal(item)
 
 
 def as_stored(item: "MissionItem", vehicle: "Vehicle") -> "MissionItem":
-    """Return what reading back gives for an `item` that was accepted, as `refusal` tells.
-
-    Numbers went over the wire: parameters and altitude are of single precision, degrees multiples
-    of 1e-7. What the autopilot has no room for is gone.
-    """
-    return dialect_of(vehicle).stored(item)
+    """Return what reading back gives for an `item` that was accepted."""
+    return vehicle.type.dialect.stored(item)
 
 
 def storage_known(command: int, vehicle: "Vehicle") -> bool:
-    """Say whether it is known what the autopilot keeps of `command`.
-
-    Of the others `as_stored` takes everything to be kept.
-    """
-    known = dialect_of(vehicle).known
-    return known is None or command in known
+    """Say whether it is known what the autopilot keeps of `command`."""
+    return vehicle.type.dialect.is_known(command)
 
 
 def item_limit(vehicle: "Vehicle") -> Limit:
     """Return how many items the autopilot stores, the home row included where it has one."""
-    return dialect_of(vehicle).items
+    return vehicle.type.dialect.items
 
 
 def speed_change(item: "MissionItem", vehicle: "Vehicle") -> SpeedChange | None:
     """Return what a DO_CHANGE_SPEED changes, None for one that changes nothing."""
-    return dialect_of(vehicle).speed_change(item)
+    return vehicle.type.dialect.speed_change(item)

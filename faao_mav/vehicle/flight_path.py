@@ -1,13 +1,14 @@
-"""What a flight model is asked, and what it answers."""
+"""What a flight model is asked, what it answers, and the predicted flight of a whole mission."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
+from faao_mav.geodesy import LocalFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,10 +47,26 @@ class Flown:
     velocity: Real
 
 
-class FlightModel(Protocol):
-    """How one kind of vehicle flies legs; `calibrated`: compared with recorded flights."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """The predicted flight of a whole mission.
 
-    calibrated: ClassVar[bool]
+    `t` (n,), s, counts from the start of the mission; `position` (n, 3) and `velocity` (n, 3) are
+    east, north, up in metres about `frame`'s origin (up: above home) and m/s; `item` (n,) is the
+    index into `Mission.items` of the item under way. `reached` (items,), s, is when each item was
+    done, NaN for items that take no time of their own or never end.
+    """
+
+    t: Real
+    position: Real
+    velocity: Real
+    item: NDArray[np.int_]
+    reached: Real
+    frame: LocalFrame
+
+
+class FlightModel(Protocol):
+    """How a vehicle with given parameters flies a path."""
 
     @property
     def cruise_speed(self) -> float:

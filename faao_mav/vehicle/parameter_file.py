@@ -13,7 +13,8 @@ from pathlib import Path
 
 from faao_mav.errors import ParameterFileError
 from faao_mav.files import read_text
-from faao_mav.mission.vehicle import Autopilot
+from faao_mav.plan.autopilots import Autopilot
+from faao_mav.vehicle.registry import families, family
 
 MAX_BYTES = 4_000_000
 """Ten times what the largest autopilot has; keeps a wrong file name from filling the memory."""
@@ -31,23 +32,21 @@ _HEXADECIMAL = re.compile(r"0x[0-9a-f]{1,8}", re.ASCII | re.IGNORECASE)
 _WHOLE = re.compile(r"\d{1,3}", re.ASCII)
 _MAX_SHOWN = 40
 
-_OF_PX4 = ("MPC_", "NAV_", "COM_", "EKF2_")
-_OF_ARDUPILOT = ("WPNAV_", "WP_", "ATC_", "PSC_", "ARMING_")
-
 
 def parameter_path(mission: Path, autopilot: Autopilot) -> Path:
     """Return the file of parameters beside `mission`: `.param`, or `.params` for PX4."""
-    return mission.with_suffix(".params" if autopilot == "px4" else ".param")
+    return mission.with_suffix(family(autopilot).parameter_suffix)
 
 
 def autopilot_of(parameters: Iterable[str]) -> Autopilot | None:
     """Return whose names `parameters` are, None where they do not tell."""
     names = tuple(parameters)
-    px4 = any(name.startswith(_OF_PX4) for name in names)
-    ardupilot = any(name.startswith(_OF_ARDUPILOT) for name in names)
-    if px4 == ardupilot:
-        return None
-    return "px4" if px4 else "ardupilot"
+    found = [
+        each.key
+        for each in families()
+        if any(name.startswith(each.parameter_prefixes) for name in names)
+    ]
+    return found[0] if len(found) == 1 else None
 
 
 def read_parameters(path: str | Path) -> dict[str, float]:
@@ -101,7 +100,7 @@ def render_parameters(
                 f"parameter {name}: {value}; expected a finite number, an integer within 32 bits"
             )
     comments = [f"# {line}".rstrip() for line in header.splitlines()]
-    if autopilot == "px4":
+    if family(autopilot).parameter_style == "qgroundcontrol":
         comments += [*(["#"] if header else []), "# Vehicle-Id Component-Id Name Value Type"]
         rows = [
             "\t".join((str(system), str(_AUTOPILOT_COMPONENT), name, _digits(value), _type(value)))

@@ -6,7 +6,7 @@ and the return are climbs and descents at constant speed with what the autopilot
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,13 +15,9 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
-from faao_mav.vehicle.ardupilot.copter import ArduCopter
-from faao_mav.vehicle.dialects import speed_change
-from faao_mav.vehicle.flight_path import FlightModel, FlightPath
-from faao_mav.vehicle.models import flight_model
-from faao_mav.vehicle.track import Track
-from faao_mav.vehicle.vertical import Vertical
+from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Track
+from faao_mav.vehicle.vehicle import Vehicle
+from faao_mav.vehicle.vertical import VerticalProfile
 
 LONGEST = 86_400.0
 """A flight is followed for this long, s: no copter flies for a day."""
@@ -52,8 +48,8 @@ def predict(
         none = np.empty(0, dtype=int)
         return Track(np.empty(0), empty, empty, none, reached, frame or LocalFrame(0.0, 0.0))
     frame = frame or LocalFrame(*start)
-    model = flight_model(vehicle, frame.latitude)
-    walk = _Walk(mission, vehicle, frame, step, model, Vertical.of(vehicle))
+    model = vehicle.flight_model(frame.latitude)
+    walk = _Walk(mission, vehicle, frame, step, model, vehicle.vertical)
     walk.place = np.append(frame.to_local(*start), 0.0)
     walk.home = walk.goal = walk.place
     for index, item in _in_order(mission):
@@ -125,7 +121,7 @@ class _Walk:
     frame: LocalFrame
     step: float
     model: FlightModel
-    vertical: Vertical
+    vertical: VerticalProfile
     place: Real = field(default_factory=lambda: np.zeros(3))
     goal: Real = field(default_factory=lambda: np.zeros(3))
     home: Real = field(default_factory=lambda: np.zeros(3))
@@ -138,6 +134,7 @@ class _Walk:
     def __post_init__(self) -> None:
         self.reached = np.full(len(self.mission.items), np.nan)
         self.speed = self._own_speed()
+        self.flying = self.vehicle
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
@@ -217,15 +214,15 @@ class _Walk:
 
     def _take_off(self, index: int, item: MissionItem) -> None:
         self.fly()
-        here = self.vehicle.autopilot == "ardupilot" and not (item.x or item.y)
+        here = self.vehicle.type.dialect.zero_means_here and not (item.x or item.y)
         unset = math.isnan(item.x) or math.isnan(item.y)
         goal = self._height_over(self.place, item, index)
         if not (here or unset):
             goal = self._spot(index, item)
-        if self.vehicle.kind == "copter":
+        if self.vehicle.type.hovers:
             climb = np.array([self.place[0], self.place[1], goal[2]])
             self._go(index, climb, self.vertical.take_off(float(goal[2] - self.place[2])))
-        if np.hypot(*(goal - self.place)[:2]) > _SAME_PLACE or self.vehicle.kind == "plane":
+        if np.hypot(*(goal - self.place)[:2]) > _SAME_PLACE or not self.vehicle.type.hovers:
             self._towards(index, goal, 0.0)
             self.fly()
         self.reached[index] = self.clock
@@ -241,7 +238,8 @@ class _Walk:
     ) -> None:
         stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
         if np.abs(goal - stretch.points[-1]).max() <= _SAME_PLACE:
-            stretch.delays[-1] += math.floor(hold) if self._whole() else hold
+            whole = self.vehicle.type.whole_second_holds
+            stretch.delays[-1] += math.floor(hold) if whole else hold
             stretch.waits.append((index, len(stretch.points) - 1))
             return
         stretch.points.append(goal)
@@ -267,14 +265,15 @@ class _Walk:
 
     def _return(self, index: int) -> None:
         self.fly()
-        level = max(float(self.place[2]), self.vertical.return_height)
-        if level > self.place[2] + _SAME_PLACE:
+        level = self.vertical.returns_at(float(self.place[2]))
+        if self.vehicle.type.hovers and level > self.place[2] + _SAME_PLACE:
             up = np.array([self.place[0], self.place[1], level])
             self._go(index, up, self.vertical.climb(level - float(self.place[2])))
-        own, self.speed = self.speed, self._own_speed()
+        self.speed = self._own_speed()
         self._towards(index, np.array([self.home[0], self.home[1], level]), 0.0)
-        self._descend(index)
-        self.speed = own
+        if self.vertical.lands_on_return:
+            self._descend(index)
+        self.over = True
 
     def _descend(self, index: int) -> None:
         self.fly()
@@ -304,25 +303,20 @@ class _Walk:
         )
 
     def _change_speed(self, item: MissionItem) -> None:
-        change = speed_change(item, self.vehicle)
+        change = self.vehicle.type.dialect.speed_change(item)
         if change is None:
             return
-        if change.axis in ("climb", "descent") and isinstance(self.model, ArduCopter):
+        if change.axis in ("climb", "descent"):
             if change.speed is not None:
                 self.fly()
-                if change.axis == "climb":
-                    self.model = replace(self.model, climb_speed=change.speed)
-                else:
-                    self.model = replace(self.model, descent_speed=change.speed)
+                self.flying = self.flying.having(f"{change.axis}_speed", change.speed)
+                self.model = self.flying.flight_model(self.frame.latitude)
         else:
             self.speed = self._own_speed() if change.speed is None else change.speed
 
     def _own_speed(self) -> float:
         """The speed of waypoints before any command, m/s."""
         return self.model.cruise_speed
-
-    def _whole(self) -> bool:
-        return self.vehicle.autopilot == "ardupilot" and self.vehicle.kind == "copter"
 
     def _spot(self, index: int, item: MissionItem) -> Real:
         """Return the place of `item`, (3,) m."""

@@ -9,69 +9,37 @@ a waypoint's altitude.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from faao_mav.vehicle.parameter import Parameter
+from faao_mav.vehicle.registry import vehicle_type
+
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
 
 _GENTLE = (1.35, 2.0)
-"""Of a_max: the first makes up for the time that a jerk-limited ramp loses."""
-
-_CURVED = {"ardupilot": 4.0, "px4": 5.0}
-"""m/s²: corners and short legs at speed."""
-
-_RANGE = {"ardupilot": (0.5, 5.0), "px4": (2.0, 15.0)}
-"""m/s²: what the autopilots accept."""
-
-FASTEST = 20.0
-"""The greatest speed that both autopilots can be told, m/s."""
-
-_HEADROOM = 1.1
-"""Of the plan's greatest speed: what a schedule may command."""
-
-_PX4_TOP = 12.0
-"""PX4's own MPC_XY_VEL_MAX, m/s, which caps every speed."""
-
-_JERK = {"ardupilot": 10.0, "px4": 20.0}
+"""The gentle accelerations to try, as multiples of a_max: 1.35 makes up for the time that
+a jerk-limited ramp loses (measured: 1.3 to 1.4 on near-straight plans); 2 is chosen."""
 
 
 def candidates(plan: "Plan") -> tuple[Mapping[str, float], ...]:
-    """Return sets of parameters to try, the gentlest first; one empty set for `keep`.
+    """Return the sets of parameters to try for `plan`, the gentlest first.
 
-    Likewise for aeroplanes: how they turn and how fast they may fly is tuned on each.
-
-    ArduPilot's have the names of both generations: a vehicle takes those that it knows.
+    One empty set if the plan keeps its vehicle's own, or if they are tuned on each vehicle, as an
+    aeroplane's are.
     """
-    if plan.mission.parameters == "keep" or plan.vehicle.type == "plane":
+    given = plan.vehicle
+    if plan.mission.parameters == "keep":
         return ({},)
-    autopilot, limit = plan.vehicle.autopilot, plan.vehicle.max_acceleration
-    low, high = _RANGE[autopilot]
-    tried = dict.fromkeys(
-        round(min(max(acceleration, low), high), 2)
-        for acceleration in (*(share * limit for share in _GENTLE), _CURVED[autopilot])
-    )
-    named = _ardupilot if autopilot == "ardupilot" else _px4
-    return tuple(named(plan, acceleration) for acceleration in sorted(tried))
+    recommended = vehicle_type(given.autopilot, given.type).recommended
+    return tuple(recommended(given.max_speed, given.max_acceleration))
 
 
-def _ardupilot(plan: "Plan", acceleration: float) -> dict[str, float]:
-    speed, jerk = min(plan.vehicle.max_speed, FASTEST), _JERK["ardupilot"]
-    return {
-        "WPNAV_SPEED": round(100 * speed),
-        "WPNAV_ACCEL": round(100 * acceleration),
-        "WPNAV_JERK": jerk,
-        "WP_SPD": speed,
-        "WP_ACC": acceleration,
-        "WP_JERK": jerk,
-    }
+def accelerations_to_try(
+    parameter: Parameter, max_acceleration: float, curved: float
+) -> list[float]:
+    """Return values of `parameter` to try for a plan's a_max, m/s², the lowest first.
 
-
-def _px4(plan: "Plan", acceleration: float) -> dict[str, float]:
-    speed = min(plan.vehicle.max_speed, FASTEST)
-    top = min(_HEADROOM * speed, FASTEST)
-    return {
-        "MPC_XY_CRUISE": speed,
-        **({"MPC_XY_VEL_MAX": round(top, 2)} if top > _PX4_TOP else {}),
-        "MPC_ACC_HOR": acceleration,
-        "MPC_JERK_AUTO": _JERK["px4"],
-        "MPC_XY_ERR_MAX": 10.0,
-        "NAV_MC_ALT_RAD": 3.0,
-    }
+    They are the gentle ones and one for `curved` paths, all within the documented range.
+    """
+    low, high = parameter.documented
+    wanted = (*(share * max_acceleration for share in _GENTLE), curved)
+    return sorted({round(min(max(each, low), high), 2) for each in wanted})

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from recorded import FLIGHTS, Recorded, Row, compared, read, show
 
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.ardupilot.copter import ArduCopter
 from faao_mav.vehicle.flight_path import FlightPath
 

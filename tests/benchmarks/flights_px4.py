@@ -10,7 +10,7 @@ errors were seen while the model was built, so they are no blind test.
 
 from recorded import FLIGHTS, Row, compared, read, show
 
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.px4 import Px4
 
 FITTED = (

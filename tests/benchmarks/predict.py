@@ -9,7 +9,7 @@ import numpy as np
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
-from faao_mav.mission.vehicle import Autopilot, Vehicle
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.predict import predict
 
 HOME = Home(47.4, 8.5, 400.0)
@@ -48,7 +48,7 @@ def survey(items: int) -> Mission:
 
 
 def main() -> None:
-    autopilots: tuple[Autopilot, ...] = ("ardupilot", "px4")
+    autopilots: tuple[str, ...] = ("ardupilot", "px4")
     print("autopilot   items   flight, s   prediction, s")
     for autopilot in autopilots:
         for items in (20, 100, 600):

@@ -13,8 +13,8 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.validate import Limits, validate
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.track import Track
 
 HOME = Home(-35.363262, 149.165237, 584.0)

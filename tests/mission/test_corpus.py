@@ -120,4 +120,4 @@ def test_what_else_the_files_tell() -> None:
     assert mission.fence.breach_return is not None
     assert mission.fence.breach_return.altitude == 50
     assert [(p.latitude, p.longitude, p.altitude) for p in mission.rally] == [(47.3976, 8.5457, 40)]
-    assert read_mission_file(FOLDER / "plain.waypoints").vehicle is None
+    assert read_mission_file(FOLDER / "plain.waypoints").autopilot is None

@@ -9,12 +9,12 @@ from relay_flights import Trajectory, converted, plan_with
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
-from faao_mav.mission.vehicle import vehicle_of
 from faao_mav.plan import Plan
 from faao_mav.schedule import Conversion, plan_route
 from faao_mav.schedule.convert import check_vehicle
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.run_in import with_run_in
+from faao_mav.vehicle import vehicle_of
 from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
 from faao_mav.vehicle.flight_path import FlightPath
 from faao_mav.vehicle.legs import legs_of

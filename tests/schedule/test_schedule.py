@@ -18,11 +18,10 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
-from faao_mav.mission.vehicle import vehicle_of
 from faao_mav.schedule import Conversion, assemble, plan_route
 from faao_mav.schedule.outline import Splines
 from faao_mav.schedule.scheduler import Scheduler
-from faao_mav.vehicle import copter_model
+from faao_mav.vehicle import copter_model, vehicle_of
 from faao_mav.vehicle.legs import legs_of
 from faao_mav.vehicle.predict import predict
 

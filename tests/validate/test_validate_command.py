@@ -18,8 +18,8 @@ from faao_mav.cli.validate import validate
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.formats import render_mission
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.validate import RULES
+from faao_mav.vehicle import Vehicle
 
 Run = Callable[..., Any]
 

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from faao_mav.cli.validate import validate as command
 from faao_mav.errors import InfeasibleError, MissionFileError
 from faao_mav.mission.formats import read_mission, read_mission_file
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.validate import Level, validate
+from faao_mav.vehicle import Vehicle
 
 DATA = Path(__file__).parent.parent / "data"
 CORPUS = DATA / "validate"

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faao_mav.errors import InputError
-from faao_mav.mission.vehicle import Vehicle
-from faao_mav.vehicle.ardupilot.copter import ArduCopter
+from faao_mav.vehicle import Vehicle
+from faao_mav.vehicle.ardupilot.copter import ARDUCOPTER, ArduCopter
 from faao_mav.vehicle.flight_path import FlightPath
 
 QUICK = ArduCopter(acceleration=4, jerk=10)
@@ -269,7 +269,7 @@ def test_a_useless_parameter_is_named(value: float) -> None:
 
 
 def test_calibrated() -> None:
-    assert ArduCopter.calibrated
+    assert ARDUCOPTER.calibrated
 
 
 def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:

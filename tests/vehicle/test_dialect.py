@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.mission import Home, Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.dialects import (
     SpeedChange,
     accepts,

@@ -5,8 +5,9 @@ import pytest
 from relay_flights import plan_with
 
 from faao_mav.errors import InputError
-from faao_mav.mission.vehicle import vehicle_of
-from faao_mav.vehicle.legs import ArduCopterLegs, Px4Legs, legs_of
+from faao_mav.vehicle import FlightPath, LegLimits, vehicle_of
+from faao_mav.vehicle.ardupilot.copter import ArduCopter, ArduCopterLegs
+from faao_mav.vehicle.px4 import Px4Legs
 
 
 def test_measured_lengths_of_arducopter_legs():
@@ -18,9 +19,25 @@ def test_measured_lengths_of_arducopter_legs():
 def test_a_ramp_too_short_to_reach_the_acceleration_joins_the_long_one():
     legs = ArduCopterLegs()
     change = legs.acceleration**2 / legs.jerk + 0.3 * legs.acceleration
-    below, above = legs.ramp_duration(np.array([change - 1e-9, change + 1e-9]))
+    below, above = legs.shortest_leg(np.array([change - 1e-9, change + 1e-9]))
     assert below == pytest.approx(above, abs=1e-6)
-    assert legs.ramp_duration(np.array(0.0)) == pytest.approx(0.6)
+    assert legs.shortest_leg(np.array(0.0)) == 0
+
+
+@pytest.mark.parametrize("legs", [ArduCopterLegs(), ArduCopterLegs(4.0, 10.0), Px4Legs(5.0, 20.0)])
+def test_a_leg_and_the_speed_reached_on_it_are_one_law(legs: LegLimits) -> None:
+    speeds = np.array([0.3, 1.0, 5.0, 12.0])
+    assert legs.reachable_speed(legs.shortest_leg(speeds)) == pytest.approx(speeds)
+
+
+@pytest.mark.parametrize("jerk", [1.0, 10.0])
+def test_the_model_reaches_the_speed_on_its_shortest_leg(jerk: float) -> None:
+    length = float(ArduCopterLegs(4.0, jerk).shortest_leg(np.array(5.0)))
+    points = np.array([[0.0, 0.0, 30.0], [0.0, length, 30.0]])
+    path = FlightPath(points, np.array([9.0]), np.zeros(2), np.zeros(2, dtype=bool), np.zeros(2))
+    model = ArduCopter(acceleration=4.0, jerk=jerk)
+    (target,) = model.fly_many(path, path.speeds[None], path.holds[None], 0.01, rough=True)
+    assert target.velocity.max() == pytest.approx(5.0, abs=0.01)
 
 
 def test_a_px4_leg_is_one_in_which_it_can_stop():
@@ -41,9 +58,9 @@ def test_a_px4_leg_is_one_in_which_it_can_stop():
     ],
 )
 def test_parameters_of_either_generation(autopilot, parameters, legs):
-    assert legs_of(vehicle_of(plan_with(autopilot=autopilot, parameters=parameters))) == legs
+    assert vehicle_of(plan_with(autopilot=autopilot, parameters=parameters)).legs == legs
 
 
 def test_an_unusable_parameter_is_named():
-    with pytest.raises(InputError, match=r"plan: vehicle\.parameters\.WPNAV_JERK: 0; give"):
-        legs_of(vehicle_of(plan_with(parameters={"WPNAV_JERK": 0.0})))
+    with pytest.raises(InputError, match=r"plan: vehicle\.parameters: WPNAV_JERK: 0; give"):
+        _ = vehicle_of(plan_with(parameters={"WPNAV_JERK": 0.0})).legs

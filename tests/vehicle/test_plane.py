@@ -8,7 +8,7 @@ from flight_paths import line, path_of, wandering
 from hypothesis import given, settings
 
 from faao_mav.errors import InputError
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import ARDUPLANE, Vehicle
 from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
 from faao_mav.vehicle.flight_path import FlightPath
 
@@ -23,8 +23,8 @@ def test_motion_is_an_aeroplanes(path: FlightPath) -> None:
     assert speed.min() >= PLANE.min_speed - 1e-6
     assert speed.max() <= PLANE.max_speed + 1e-6
     climb = flown.velocity[:, 2]
-    assert -PLANE.sink_rate - 1e-9 <= climb.min()
-    assert climb.max() <= PLANE.climb_rate + 1e-9
+    assert -PLANE.descent_speed - 1e-9 <= climb.min()
+    assert climb.max() <= PLANE.climb_speed + 1e-9
     moved = np.linalg.norm(np.diff(flown.position, axis=0), axis=1) / 0.1
     assert moved.max(initial=0) <= PLANE.max_speed + 0.1
     heading = np.unwrap(np.arctan2(flown.velocity[:, 1], flown.velocity[:, 0]))
@@ -124,4 +124,4 @@ def test_a_useless_parameter_is_named(name: str, value: float, least: str) -> No
 
 
 def test_not_calibrated() -> None:
-    assert not ArduPlane.calibrated
+    assert not ARDUPLANE.calibrated

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
-from faao_mav.vehicle import modelled
+from faao_mav.vehicle import Vehicle, modelled
 from faao_mav.vehicle.predict import predict
 from faao_mav.vehicle.track import Track
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.flight_path import FlightPath
-from faao_mav.vehicle.px4 import Px4
+from faao_mav.vehicle.px4 import PX4_COPTER, Px4
 
 SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)
 
@@ -223,7 +223,9 @@ def test_limits_come_from_parameters() -> None:
     )
     assert Px4.from_vehicle(vehicle) == Px4(acceleration=5, climb_speed=2, descent_speed=1)
     both = Vehicle("px4", "copter", {"MPC_Z_VEL_MAX_UP": 2, "MPC_Z_V_AUTO_UP": 4})
-    assert Px4.from_vehicle(both).climb_speed == 4
+    assert Px4.from_vehicle(both).climb_speed == 2
+    high = Vehicle("px4", "copter", {"MPC_Z_VEL_MAX_UP": 6})
+    assert Px4.from_vehicle(high).climb_speed == 3  # PX4 climbs at MPC_Z_V_AUTO_UP in missions
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
@@ -234,4 +236,4 @@ def test_a_useless_parameter_is_named(value: float) -> None:
 
 
 def test_calibrated() -> None:
-    assert Px4.calibrated
+    assert PX4_COPTER.calibrated

@@ -33,9 +33,9 @@ from faao_mav.mavlink.mock.px4 import Px4Server
 from faao_mav.mavlink.rows import mission_of
 from faao_mav.mavlink.transfer.protocol import ARMED, Address, Autopilot, MissionType, State
 from faao_mav.mission.item import Home, Mission
-from faao_mav.mission.vehicle import Autopilot as Family
-from faao_mav.mission.vehicle import Kind, Vehicle
-from faao_mav.vehicle import Track
+from faao_mav.plan.autopilots import Autopilot as Family
+from faao_mav.plan.autopilots import Kind
+from faao_mav.vehicle import Track, Vehicle
 
 Fly: TypeAlias = Callable[[Mission], Track]
 

@@ -8,7 +8,7 @@ from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.rows import item_of, row_of
 from faao_mav.mavlink.transfer.protocol import MissionType
 from faao_mav.mission.item import Home
-from faao_mav.mission.vehicle import Vehicle
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.storage import as_stored
 
 

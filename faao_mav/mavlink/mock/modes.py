@@ -1,7 +1,7 @@
 """Flight modes, as far as they start a mission."""
 
 from faao_mav.mavlink.messages import CommandLong
-from faao_mav.mission.vehicle import Autopilot, Kind
+from faao_mav.plan.autopilots import Autopilot, Kind
 
 _STABILIZE: dict[Kind, int] = {"copter": 0, "plane": 2}
 _AUTO: dict[Kind, int] = {"copter": 3, "plane": 10}

@@ -5,9 +5,9 @@ Source: MAVLink developer guide, "Mission Protocol", and the MAVLink common set.
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
-Firmware: TypeAlias = Literal["ardupilot", "px4", "generic"]
+Firmware: TypeAlias = str
 """Whose manners a vehicle has; "generic" is any that follows the guide to the letter."""
 
 FIRMWARE_NAMES = {"ardupilot": "ArduPilot", "px4": "PX4", "generic": "an autopilot unknown here"}

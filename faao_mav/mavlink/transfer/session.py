@@ -16,7 +16,7 @@ from faao_mav.mavlink.transfer.protocol import MissionType, Result, meaning
 from faao_mav.mavlink.transfer.transfer import Machine, Outcome, Peer
 from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.transfer.verify import Difference, compare
-from faao_mav.mission.vehicle import Kind
+from faao_mav.plan.autopilots import Kind
 
 Verdict: TypeAlias = Literal["verified", "different", "unread", "refused", "silent", "cancelled"]
 

@@ -9,7 +9,8 @@ from faao_mav.mavlink.messages import Row
 from faao_mav.mavlink.rows import coordinate_scale, item_of
 from faao_mav.mavlink.transfer.protocol import Firmware, MissionType
 from faao_mav.mission.item import MissionItem
-from faao_mav.mission.vehicle import Kind, Vehicle
+from faao_mav.plan.autopilots import Kind
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.dialects import storage_known
 from faao_mav.vehicle.storage import as_stored
 

@@ -6,12 +6,11 @@ from typing import Literal, TypeAlias
 from faao_mav.errors import MissionFileError
 from faao_mav.files import read_text
 from faao_mav.mission.formats.losses import losses
-from faao_mav.mission.formats.mission_file import MissionFile
+from faao_mav.mission.formats.mission_file import MissionFile, NamedVehicle
 from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
 from faao_mav.mission.formats.qgc_plan_writer import write_qgc_plan
 from faao_mav.mission.formats.wpl import read_wpl, write_wpl
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Vehicle
 
 __all__ = [
     "MISSION_SUFFIXES",
@@ -58,7 +57,7 @@ def read_mission_file(path: str | Path) -> MissionFile:
     return MissionFile(read_wpl(text, str(path)))
 
 
-def render_mission(mission: Mission, path: str | Path, vehicle: Vehicle | None = None) -> str:
+def render_mission(mission: Mission, path: str | Path, vehicle: NamedVehicle | None = None) -> str:
     """Return the text to write to the file `path`, in the format that its name's ending tells.
 
     `vehicle` is whom the mission is for: `.plan` says so, and holds what it takes. Raises
@@ -80,7 +79,7 @@ def render_mission(mission: Mission, path: str | Path, vehicle: Vehicle | None =
             return write_kml(mission, name=path.stem)
 
 
-def losses_in(mission: Mission, path: str | Path, vehicle: Vehicle | None = None) -> list[str]:
+def losses_in(mission: Mission, path: str | Path, vehicle: NamedVehicle | None = None) -> list[str]:
     """Return what of `mission` the text of `render_mission` does not hold, one line each."""
     path = Path(path)
     check_suffix(path)

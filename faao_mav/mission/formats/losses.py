@@ -4,15 +4,17 @@ import math
 from typing import Literal
 
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_TERRAIN, Command
+from faao_mav.mission.formats.mission_file import NamedVehicle
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
 
 _NAMES = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude")
 _SHOWN_ITEMS = 5
 
 
 def losses(
-    mission: Mission, file_format: Literal["wpl", "plan", "kml"], vehicle: Vehicle | None = None
+    mission: Mission,
+    file_format: Literal["wpl", "plan", "kml"],
+    vehicle: NamedVehicle | None = None,
 ) -> list[str]:
     """Return what of `mission` a file of that format for `vehicle` does not hold, one line each."""
     match file_format:
@@ -52,7 +54,7 @@ def _not_set(mission: Mission) -> list[str]:
     return [f"not set (NaN) becomes 0: {shown}{more}"]
 
 
-def _for_whom(mission: Mission, vehicle: Vehicle | None) -> list[str]:
+def _for_whom(mission: Mission, vehicle: NamedVehicle | None) -> list[str]:
     if vehicle is None:
         return ["no autopilot is known: the plan is for a generic one"]
     return _not_set(mission) if vehicle.autopilot == "ardupilot" else []

@@ -1,9 +1,23 @@
 """What a mission file tells."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from faao_mav.mission.item import Mission
-from faao_mav.mission.vehicle import Autopilot, Kind, Vehicle
+
+
+class NamedVehicle(Protocol):
+    """A vehicle as far as mission files name it."""
+
+    @property
+    def autopilot(self) -> str:
+        """The name of its autopilot."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """The name of its type."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,12 +25,5 @@ class MissionFile:
     """A mission, and for whom it was made as far as the file says it."""
 
     mission: Mission
-    autopilot: Autopilot | None = None
-    kind: Kind | None = None
-
-    @property
-    def vehicle(self) -> Vehicle | None:
-        """The vehicle that the file names, a copter unless it says otherwise; None for no name."""
-        if self.autopilot is None:
-            return None
-        return Vehicle(self.autopilot, self.kind or "copter")
+    autopilot: str | None = None
+    kind: str | None = None

@@ -13,12 +13,11 @@ from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats.json_tree import Node, parse_json
 from faao_mav.mission.formats.mission_file import MissionFile
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.mission.vehicle import Autopilot, Kind
 
-FIRMWARE: dict[Autopilot, int] = {"ardupilot": 3, "px4": 12}
+FIRMWARE: dict[str, int] = {"ardupilot": 3, "px4": 12}
 """MAV_AUTOPILOT of each autopilot."""
 
-VEHICLE_TYPES: dict[Kind, tuple[int, ...]] = {"copter": (2, 3, 4, 13, 14, 15), "plane": (1,)}
+VEHICLE_TYPES: dict[str, tuple[int, ...]] = {"copter": (2, 3, 4, 13, 14, 15), "plane": (1,)}
 """MAV_TYPE of each kind of vehicle; the first is the one to write."""
 
 EXPANDED = ("survey", "CorridorScan")
@@ -66,11 +65,11 @@ def _type_of(mission: Node, key: str) -> int | None:
     return mission[key].integer(255) if key in mission else None
 
 
-def _first(numbers: dict[Autopilot, int], number: int | None) -> Autopilot | None:
+def _first(numbers: dict[str, int], number: int | None) -> str | None:
     return next((name for name, own in numbers.items() if own == number), None)
 
 
-def _first_of(numbers: dict[Kind, tuple[int, ...]], number: int | None) -> Kind | None:
+def _first_of(numbers: dict[str, tuple[int, ...]], number: int | None) -> str | None:
     return next((name for name, own in numbers.items() if number in own), None)
 
 

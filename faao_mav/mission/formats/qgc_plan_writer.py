@@ -7,16 +7,16 @@ from typing import Any
 from faao_mav.errors import MissionFileError
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, Command
 from faao_mav.mission.fence import Fence, RallyPoint
+from faao_mav.mission.formats.mission_file import NamedVehicle
 from faao_mav.mission.formats.qgc_plan_reader import FIRMWARE, VEHICLE_TYPES
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.mission.vehicle import Vehicle
 
 _CRUISE_SPEED, _HOVER_SPEED = 15.0, 5.0  # what QGroundControl assumes
 _MIXED, _RELATIVE, _ABSOLUTE, _TERRAIN_FRAME = 0, 1, 2, 4
 """QGroundControl's altitude modes."""
 
 
-def write_qgc_plan(mission: Mission, vehicle: Vehicle | None = None) -> str:
+def write_qgc_plan(mission: Mission, vehicle: NamedVehicle | None = None) -> str:
     """Return `mission` as the text of a `.plan` file for `vehicle`, a generic one if None.
 
     NaN is written as null, except for ArduPilot, which refuses it: there it is 0 (`losses`
@@ -50,7 +50,7 @@ def write_qgc_plan(mission: Mission, vehicle: Vehicle | None = None) -> str:
 
 
 def _item(
-    number: int, item: MissionItem, mission: Mission, vehicle: Vehicle | None
+    number: int, item: MissionItem, mission: Mission, vehicle: NamedVehicle | None
 ) -> dict[str, Any]:
     if item.command == Command.DO_JUMP and item.params[0] not in range(1, len(mission.items) + 1):
         raise MissionFileError(

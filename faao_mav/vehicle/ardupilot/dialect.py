@@ -1,6 +1,7 @@
 """ArduCopter and ArduPlane: items are squeezed into 15 bytes each."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +10,16 @@ from faao_mav.mission.command import (
     ABOVE_HOME,
     ABOVE_SEA,
     ABOVE_TERRAIN,
+    FENCE_RETURN_POINT,
     FLOWN_TO,
+    RALLY_POINT,
     Command,
     Frame,
 )
 from faao_mav.mission.item import MissionItem
 from faao_mav.vehicle.dialect import (
+    NOTHING,
+    ROWS_BESIDE,
     Codec,
     Codecs,
     Dialect,
@@ -24,8 +29,10 @@ from faao_mav.vehicle.dialect import (
     degrees,
     dropped,
     flag,
+    misplaced,
     name_of,
     single,
+    through,
     whole,
 )
 
@@ -56,9 +63,6 @@ def _turning_radius(value: float) -> float:
     return math.copysign(stored, value) if stored else 0.0
 
 
-_NOTHING: Codecs = (dropped, dropped, dropped, dropped)
-
-
 def _first(codec: Codec) -> Codecs:
     return (codec, dropped, dropped, dropped)
 
@@ -67,11 +71,11 @@ _COMMON: dict[int, Codecs] = {
     Command.NAV_LOITER_UNLIM: (dropped, dropped, _signed_radius, dropped),
     Command.NAV_LOITER_TURNS: (_uint8, dropped, _turning_radius, flag),
     Command.NAV_LOITER_TIME: (_uint16, dropped, _direction, flag),
-    Command.NAV_RETURN_TO_LAUNCH: _NOTHING,
+    Command.NAV_RETURN_TO_LAUNCH: NOTHING,
     Command.NAV_LAND: (_uint16, dropped, dropped, _direction),
     Command.NAV_TAKEOFF: _first(_uint16),
     Command.NAV_LOITER_TO_ALT: (dropped, _signed_radius, dropped, flag),
-    Command.NAV_VTOL_TAKEOFF: _NOTHING,
+    Command.NAV_VTOL_TAKEOFF: NOTHING,
     Command.NAV_VTOL_LAND: _first(_uint16),
     Command.NAV_DELAY: (single, _int8, _int8, _int8),
     Command.CONDITION_DELAY: _first(single),
@@ -80,9 +84,9 @@ _COMMON: dict[int, Codecs] = {
     Command.DO_JUMP: (_uint16, _int16, dropped, dropped),
     Command.DO_CHANGE_SPEED: (_uint8, single, single, dropped),
     Command.DO_SET_HOME: _first(_uint16),
-    Command.DO_LAND_START: _NOTHING,
-    Command.DO_SET_ROI_LOCATION: _NOTHING,
-    Command.DO_SET_ROI_NONE: _NOTHING,
+    Command.DO_LAND_START: NOTHING,
+    Command.DO_SET_ROI_LOCATION: NOTHING,
+    Command.DO_SET_ROI_NONE: NOTHING,
     Command.DO_SET_ROI: _first(_uint16),
 }
 _COPTER: dict[int, Codecs] = {
@@ -106,6 +110,9 @@ _PLACED = FLOWN_TO | {
     *(30, 92, 94, 188, 191),
 }
 """Commands that are stored with a place; the others come back at 0, 0, 0 in frame 0."""
+
+_NARROW = {5: 0, 6: 3, 11: 10}
+"""The frame in which a row of the fence is read back that was sent in this one."""
 
 _FRAMES = ABOVE_SEA | ABOVE_HOME | ABOVE_TERRAIN | {Frame.MISSION}
 
@@ -142,22 +149,21 @@ def _refusal(item: MissionItem, known: dict[int, Codecs], kind: str) -> str | No
             f"{kind} does not support frame {item.frame} for {name_of(item.command)}; "
             f"give one of {', '.join(map(str, sorted(map(int, _FRAMES))))}"
         )
-    for name, value, limit in (("latitude", item.x, 90), ("longitude", item.y, 180)):
-        if not abs(value) <= limit:
-            return f"{kind} takes no {name} {value:g}; give degrees within {limit}"
+    if (wrong := misplaced(item)) is not None:
+        name, value, limit = wrong
+        return f"{kind} takes no {name} {value:g}; give degrees within {limit}"
     if not abs(item.z) < _HIGHEST:
         return f"{kind} takes no altitude {item.z:g}; give metres below {_HIGHEST:g}"
     return None
 
 
 def _stored(item: MissionItem, known: dict[int, Codecs]) -> MissionItem:
+    if item.command in ROWS_BESIDE:
+        return _stored_beside(item)
     codecs = known.get(item.command)
     result = replace(item, autocontinue=True)
     if codecs is not None:
-        param1, param2, param3, param4 = (
-            codec(value) for codec, value in zip(codecs, item.params, strict=True)
-        )
-        result = replace(result, params=(param1, param2, param3, param4))
+        result = through(codecs, result)
     if item.command in _PLACED:
         frame = Frame.GLOBAL
         if item.frame in ABOVE_HOME:
@@ -186,30 +192,41 @@ def _plane_speed(item: MissionItem) -> SpeedChange | None:
     return SpeedChange(axis, speed) if speed > 0 else None
 
 
-_SURE = 650  # 655 in simulation
-_JUMPS = Limit(15, 100)
+def _stored_beside(item: MissionItem) -> MissionItem:
+    """A rally point has whole metres of altitude, a vertex or circle of the fence has none."""
+    if item.command == RALLY_POINT:
+        return replace(item, z=float(math.trunc(item.z)))
+    altitude = item.z if item.command == FENCE_RETURN_POINT else 0.0
+    return replace(item, frame=_NARROW.get(item.frame, item.frame), z=altitude)
 
-ARDUCOPTER = Dialect(
-    name="ArduCopter",
-    home_row=True,
-    items=Limit(_SURE, 718),
-    jumps=_JUMPS,
-    atomic=False,
-    splines=True,
-    refusal=lambda item: _refusal(item, _COMMON | _COPTER, "ArduCopter"),
-    stored=lambda item: _stored(item, _COMMON | _COPTER),
-    speed_change=_copter_speed,
-    known=frozenset(_COMMON | _COPTER),
-)
-ARDUPLANE = Dialect(
-    name="ArduPlane",
-    home_row=True,
-    items=Limit(_SURE, 724),
-    jumps=_JUMPS,
-    atomic=False,
-    splines=False,
-    refusal=lambda item: _refusal(item, _COMMON | _PLANE, "ArduPlane"),
-    stored=lambda item: _stored(item, _COMMON | _PLANE),
-    speed_change=_plane_speed,
-    known=frozenset(_COMMON | _PLANE),
-)
+
+def _dialect(
+    name: str,
+    own: dict[int, Codecs],
+    most: int,
+    speed_change: Callable[[MissionItem], SpeedChange | None],
+    *,
+    splines: bool,
+) -> Dialect:
+    known = _COMMON | own
+    return Dialect(
+        home_row=True,
+        items=Limit(650, most),  # 655 in simulation
+        jumps=Limit(15, 100),
+        fence_rows=84,
+        rally_rows=10,
+        atomic=False,
+        splines=splines,
+        zero_means_here=True,
+        placed_in_mission_frame=True,
+        refusal=lambda item: _refusal(item, known, name),
+        stored=lambda item: _stored(item, known),
+        speed_change=speed_change,
+        unlimited=lambda values: values.value("sd_storage") > 0,
+        make_room="set BRD_SD_MISSION to store missions on the card",
+        known=frozenset(known),
+    )
+
+
+COPTER_DIALECT = _dialect("ArduCopter", _COPTER, 718, _copter_speed, splines=True)
+PLANE_DIALECT = _dialect("ArduPlane", _PLANE, 724, _plane_speed, splines=False)

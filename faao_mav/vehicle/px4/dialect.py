@@ -8,6 +8,8 @@ import numpy as np
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, Command, Frame
 from faao_mav.mission.item import MissionItem
 from faao_mav.vehicle.dialect import (
+    NOTHING,
+    ROWS_BESIDE,
     Codec,
     Codecs,
     Dialect,
@@ -16,8 +18,10 @@ from faao_mav.vehicle.dialect import (
     degrees,
     dropped,
     flag,
+    misplaced,
     name_of,
     single,
+    through,
     whole,
 )
 
@@ -32,7 +36,6 @@ def _fourth(codec: Codec) -> Codecs:
     return (dropped, dropped, dropped, codec)
 
 
-_NOTHING: Codecs = (dropped, dropped, dropped, dropped)
 _GATE = 4501
 
 _PLACED: dict[int, Codecs] = {
@@ -44,10 +47,10 @@ _PLACED: dict[int, Codecs] = {
     Command.NAV_LOITER_TO_ALT: (flag, single, dropped, flag),
     Command.NAV_VTOL_TAKEOFF: _fourth(_heading),
     Command.NAV_VTOL_LAND: _fourth(_heading),
-    Command.DO_SET_ROI_LOCATION: _NOTHING,
-    Command.DO_SET_ROI: _NOTHING,
-    80: _NOTHING,
-    _GATE: _NOTHING,
+    Command.DO_SET_ROI_LOCATION: NOTHING,
+    Command.DO_SET_ROI: NOTHING,
+    80: NOTHING,
+    _GATE: NOTHING,
 }
 """Commands in the frames of places, and what is read back of their parameters."""
 
@@ -69,6 +72,9 @@ _UNPLACED = frozenset(
 )
 """Commands in frame 2."""
 
+_WIDE = {0: 5, 3: 6}
+"""The frame in which a fence or rally row is read back that was sent in this one."""
+
 _JUMP: Codecs = (whole(-32_768, 32_767), whole(0, 65_535), single, single)
 
 
@@ -86,33 +92,27 @@ def _refusal(item: MissionItem) -> str | None:
         if item.command in _UNPLACED:
             return f"PX4 takes {name} in frame 2 (MISSION) only, not {item.frame}"
         return f"PX4 does not support {name} in missions"
-    for place, value, limit in (("latitude", item.x, 90), ("longitude", item.y, 180)):
-        if not abs(value) <= limit:
-            return f"PX4 has no use for {place} {value:g}; give degrees within {limit}"
+    if (wrong := misplaced(item)) is not None:
+        place, value, limit = wrong
+        return f"PX4 has no use for {place} {value:g}; give degrees within {limit}"
     return None
 
 
 def _stored(item: MissionItem) -> MissionItem:
+    if item.command in ROWS_BESIDE:
+        return replace(item, frame=_WIDE.get(item.frame, item.frame))
     if item.frame == Frame.MISSION:
         codecs = _JUMP if item.command == Command.DO_JUMP else (single, single, single, single)
         x, y = (0.0 if math.isnan(v) else float(round(v)) for v in (item.x, item.y))
-        return replace(item, params=_through(codecs, item), x=x, y=y, z=single(item.z))
+        return replace(through(codecs, item), x=x, y=y, z=single(item.z))
     above_home = item.frame in ABOVE_HOME
     return replace(
-        item,
+        through(_PLACED.get(item.command, NOTHING), item),
         frame=Frame.GLOBAL_RELATIVE_ALT_INT if above_home else Frame.GLOBAL_INT,
-        params=_through(_PLACED.get(item.command, _NOTHING), item),
         x=degrees(item.x),
         y=degrees(item.y),
         z=single(item.z),
     )
-
-
-def _through(codecs: Codecs, item: MissionItem) -> tuple[float, float, float, float]:
-    param1, param2, param3, param4 = (
-        codec(value) for codec, value in zip(codecs, item.params, strict=True)
-    )
-    return param1, param2, param3, param4
 
 
 def _speed_change(item: MissionItem) -> SpeedChange | None:
@@ -121,14 +121,18 @@ def _speed_change(item: MissionItem) -> SpeedChange | None:
     return SpeedChange("horizontal", speed if speed > 0 else None)
 
 
-PX4 = Dialect(
-    name="PX4",
+DIALECT = Dialect(
     home_row=False,
     items=Limit(1_000, 65_534),
     jumps=None,
+    fence_rows=64,
+    rally_rows=8,
     atomic=True,
     splines=False,
+    zero_means_here=False,
+    placed_in_mission_frame=False,
     refusal=_refusal,
     stored=_stored,
     speed_change=_speed_change,
 )
+"""PX4's dialect, whatever it flies."""

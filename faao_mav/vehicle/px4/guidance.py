@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import sqrt
+from typing import TypeVar
 
 from faao_mav.arrays import Real
 
@@ -20,6 +21,9 @@ _SLOW = 0.5
 """A direction slower than this never holds up the other, horizontal and vertical, m/s."""
 
 _TINY = 1e-9
+
+
+_Speed = TypeVar("_Speed", float, Real)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +76,7 @@ def stopping_speed(jerk: float, acceleration: float, distance: float, final: flo
     return max(speed, final)
 
 
-def _stopping_distance(jerk: float, acceleration: float, speed: float) -> float:
+def stopping_distance(jerk: float, acceleration: float, speed: _Speed) -> _Speed:
     """Return from how far, m, `stopping_speed` to rest is `speed`: d = v (v + b) / 2 a."""
     return speed * (speed + 4 * acceleration * acceleration / jerk) / (2 * acceleration)
 
@@ -112,7 +116,7 @@ def legs(
                 hold=hold,
                 exit_speed=min(ahead, speed) if passable else 0.0,
                 exit_climb=_exit_climb(limits, *slopes) if hold <= 0 else 0.0,
-                braking=_stopping_distance(limits.jerk, limits.acceleration, speed),
+                braking=stopping_distance(limits.jerk, limits.acceleration, speed),
             )
         )
     return result
@@ -166,14 +170,22 @@ def level_setpoint(
     )
 
 
+def corner_speed(gain: float, acceleration: float, radius: float, cosine: float) -> float:
+    """Return how fast PX4 passes a waypoint of acceptance `radius`, m, where it turns, m/s.
+
+    sqrt(g a R cot(θ/2)) with g = MPC_XY_TRAJ_P and `cosine` that of the turn θ.
+    """
+    return sqrt(gain * acceleration * radius * _half_turn(cosine))
+
+
 def _slowing(limits: Limits, leg: Leg, direction: complex, distance: float) -> float:
     """Return the speed from which the target `distance` away is passed slowly enough.
 
-    The passing speed is sqrt(g a R cot(θ/2)), g = MPC_XY_TRAJ_P, at most the leg's `exit_speed`.
+    The passing speed is the corner's, at most the leg's `exit_speed`.
     """
     cosine = (direction * leg.onward.conjugate()).real
-    corner = limits.corner_gain * limits.acceleration * leg.radius * _half_turn(cosine)
-    passing = min(sqrt(corner), leg.exit_speed)
+    corner = corner_speed(limits.corner_gain, limits.acceleration, leg.radius, cosine)
+    passing = min(corner, leg.exit_speed)
     return stopping_speed(limits.jerk, limits.acceleration, distance, passing)
 
 

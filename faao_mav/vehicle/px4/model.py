@@ -2,33 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.vehicle.flight_path import FlightPath, Flown
-from faao_mav.vehicle.limits import Parameter, limits_of
+from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.px4.guidance import Limits
+from faao_mav.vehicle.px4.parameters import COPTER_TABLE as TABLE
 from faao_mav.vehicle.px4.sampling import grid, sampled
 from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, Simulation
-
-_PARAMETERS = {
-    "cruise_speed": Parameter({"MPC_XY_CRUISE": 1.0}, 0.1),
-    "max_speed": Parameter({"MPC_XY_VEL_MAX": 1.0}, 0.1),
-    "acceleration": Parameter({"MPC_ACC_HOR": 1.0}, 0.1),
-    "jerk": Parameter({"MPC_JERK_AUTO": 1.0}, 0.1),
-    "corner_gain": Parameter({"MPC_XY_TRAJ_P": 1.0}, 0.01),
-    "error_limit": Parameter({"MPC_XY_ERR_MAX": 1.0}, 0.1),
-    "acceptance_radius": Parameter({"NAV_ACC_RAD": 1.0}, 0.05),
-    "height_radius": Parameter({"NAV_MC_ALT_RAD": 1.0}, 0.05),
-    "climb_speed": Parameter({"MPC_Z_V_AUTO_UP": 1.0, "MPC_Z_VEL_MAX_UP": 1.0}, 0.1),
-    "descent_speed": Parameter({"MPC_Z_V_AUTO_DN": 1.0, "MPC_Z_VEL_MAX_DN": 1.0}, 0.1),
-    "climb_acceleration": Parameter({"MPC_ACC_UP_MAX": 1.0}, 0.1),
-    "descent_acceleration": Parameter({"MPC_ACC_DOWN_MAX": 1.0}, 0.1),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +27,18 @@ class Px4:
     m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
     """
 
-    calibrated: ClassVar[bool] = True
-
-    cruise_speed: float = 5.0
-    max_speed: float = 12.0
-    acceleration: float = 3.0
-    jerk: float = 4.0
-    corner_gain: float = 0.5
-    error_limit: float = 2.0
-    acceptance_radius: float = 2.0
-    height_radius: float = 0.8
-    climb_speed: float = 3.0
-    descent_speed: float = 1.5
-    climb_acceleration: float = 4.0
-    descent_acceleration: float = 3.0
+    cruise_speed: float = TABLE["cruise_speed"].default
+    max_speed: float = TABLE["max_speed"].default
+    acceleration: float = TABLE["acceleration"].default
+    jerk: float = TABLE["jerk"].default
+    corner_gain: float = TABLE["corner_gain"].default
+    error_limit: float = TABLE["error_limit"].default
+    acceptance_radius: float = TABLE["acceptance_radius"].default
+    height_radius: float = TABLE["height_radius"].default
+    climb_speed: float = TABLE["climb_speed"].default
+    descent_speed: float = TABLE["descent_speed"].default
+    climb_acceleration: float = TABLE["climb_acceleration"].default
+    descent_acceleration: float = TABLE["descent_acceleration"].default
 
     _simulations: list[Simulation] = field(
         default_factory=list, init=False, repr=False, compare=False
@@ -64,12 +46,12 @@ class Px4:
     """The last one: flights along the same points come one after the other."""
 
     @classmethod
-    def from_vehicle(cls, vehicle: Vehicle) -> "Px4":
-        """Return the model with the limits that `vehicle.parameters` set.
+    def from_vehicle(cls, vehicle: ParameterValues) -> "Px4":
+        """Return the model with the parameters of `vehicle`.
 
         Raises `InputError` for a value that is too small to fly with or not finite.
         """
-        return cls(**limits_of(vehicle, _PARAMETERS))
+        return cls(**{key: vehicle.value(key) for key in cls.__slots__ if key in TABLE})
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.

@@ -3,41 +3,22 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.vehicle.ardupilot.copter.course import Course, grid_of, motions, table_of
 from faao_mav.vehicle.ardupilot.copter.follow import Follower, pursue
+from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
+from faao_mav.vehicle.ardupilot.copter.ramp import rise_time
 from faao_mav.vehicle.ardupilot.copter.route import Bounds, Router
 from faao_mav.vehicle.flight_path import FlightPath, Flown
-from faao_mav.vehicle.limits import Parameter, limits_of
+from faao_mav.vehicle.parameter import ParameterValues
 
 _G = 9.80665
-_LEAST_INPUT_TIME = 0.1
 _DEGREE = 111_318.845
 """Metres to a degree, north, and times the cosine of the latitude east, to the autopilot."""
-
-_PARAMETERS = {
-    "cruise_speed": Parameter({"WP_SPD": 1.0, "WPNAV_SPEED": 0.01}, 0.1),
-    "climb_speed": Parameter({"WP_SPD_UP": 1.0, "WPNAV_SPEED_UP": 0.01}, 0.1),
-    "descent_speed": Parameter({"WP_SPD_DN": 1.0, "WPNAV_SPEED_DN": 0.01}, 0.1),
-    "acceleration": Parameter({"WP_ACC": 1.0, "WPNAV_ACCEL": 0.01}, 0.1),
-    "climb_acceleration": Parameter({"WP_ACC_Z": 1.0, "WPNAV_ACCEL_Z": 0.01}, 0.1),
-    "corner_acceleration": Parameter({"WP_ACC_CNR": 1.0, "WPNAV_ACCEL_C": 0.01}, 0.0),
-    "jerk": Parameter({"WP_JERK": 1.0, "WPNAV_JERK": 1.0}, 0.1),
-    "radius": Parameter({"WP_RADIUS_M": 1.0, "WPNAV_RADIUS": 0.01}, 0.05),
-    "lean_angle": Parameter(
-        {"ATC_ANGLE_MAX": math.radians(1.0), "ANGLE_MAX": math.radians(0.01)}, math.radians(5.0)
-    ),
-    "input_time": Parameter({"ATC_INPUT_TC": 1.0}, 0.0),
-    "position_gain": Parameter({"PSC_NE_POS_P": 1.0, "PSC_POSXY_P": 1.0}, 0.1),
-    "velocity_gain": Parameter({"PSC_NE_VEL_P": 1.0, "PSC_VELXY_P": 1.0}, 0.1),
-    "velocity_integral": Parameter({"PSC_NE_VEL_I": 1.0, "PSC_VELXY_I": 1.0}, 0.0),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,21 +40,19 @@ class ArduCopter:
     simulated quadrotor.
     """
 
-    calibrated: ClassVar[bool] = True
-
-    cruise_speed: float = 10.0
-    climb_speed: float = 2.5
-    descent_speed: float = 1.5
-    acceleration: float = 2.5
-    climb_acceleration: float = 1.0
-    corner_acceleration: float = 0.0
-    jerk: float = 1.0
-    radius: float = 2.0
-    lean_angle: float = math.radians(30)
-    input_time: float = 0.15
-    position_gain: float = 1.0
-    velocity_gain: float = 2.0
-    velocity_integral: float = 1.0
+    cruise_speed: float = TABLE["cruise_speed"].default
+    climb_speed: float = TABLE["climb_speed"].default
+    descent_speed: float = TABLE["descent_speed"].default
+    acceleration: float = TABLE["acceleration"].default
+    climb_acceleration: float = TABLE["climb_acceleration"].default
+    corner_acceleration: float = TABLE["corner_acceleration"].default
+    jerk: float = TABLE["jerk"].default
+    radius: float = TABLE["radius"].default
+    lean_angle: float = TABLE["lean_angle"].default
+    input_time: float = TABLE["input_time"].default
+    position_gain: float = TABLE["position_gain"].default
+    velocity_gain: float = TABLE["velocity_gain"].default
+    velocity_integral: float = TABLE["velocity_integral"].default
     east_metre: float = 1.0
     north_metre: float = 1.0
     lag: float = 0.17
@@ -84,13 +63,13 @@ class ArduCopter:
     """The last one: flights along the same points come one after the other."""
 
     @classmethod
-    def from_vehicle(cls, vehicle: Vehicle, latitude: float | None = None) -> "ArduCopter":
-        """Return the model with the limits that `vehicle.parameters` set, of either generation.
+    def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> "ArduCopter":
+        """Return the model with the parameters of `vehicle`.
 
         With the `latitude` of the flight, degrees, it counts metres as the autopilot does.
         Raises `InputError` for a value that is too small to fly with or not finite.
         """
-        model = cls(**limits_of(vehicle, _PARAMETERS))
+        model = cls(**{key: vehicle.value(key) for key in cls.__slots__ if key in TABLE})
         if latitude is None:
             return model
         east, north = _metres(latitude)
@@ -168,7 +147,7 @@ class ArduCopter:
             vertical=self.climb_acceleration,
             corner=self.corner_acceleration or 2 * self.acceleration,
             jerk=self.jerk,
-            rise=2 * max(self.input_time, _LEAST_INPUT_TIME),
+            rise=rise_time(self.input_time),
             radius=self.radius,
         )
 

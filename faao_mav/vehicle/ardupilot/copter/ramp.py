@@ -12,8 +12,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeAlias
 
+_LEAST_INPUT_TIME = 0.1
+"""The autopilot's own lower bound of ATC_INPUT_TC, s."""
+
 Phase: TypeAlias = tuple[float, float, float]
 """(T, c, d): T seconds with the jerk c + d cos(pi t / T)."""
+
+
+def rise_time(input_time: float) -> float:
+    """Return t_j, s, for ATC_INPUT_TC: twice it."""
+    return 2 * max(input_time, _LEAST_INPUT_TIME)
 
 
 @dataclass(frozen=True, slots=True)

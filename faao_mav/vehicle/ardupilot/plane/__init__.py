@@ -1,1 +1,51 @@
-"""How ArduPlane flies a mission."""
+"""ArduPlane: what it is, and how it flies a mission."""
+
+from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
+from faao_mav.vehicle.ardupilot.family import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.ardupilot.plane.legs import ArduPlaneLegs
+from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
+from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
+from faao_mav.vehicle.flight_path import FlightModel
+from faao_mav.vehicle.parameter import ParameterValues
+from faao_mav.vehicle.vehicle_type import VehicleType
+from faao_mav.vehicle.vertical import VerticalProfile
+
+__all__ = ["ARDUPLANE", "ArduPlane", "ArduPlaneLegs"]
+
+
+def _vertical(vehicle: ParameterValues) -> VerticalProfile:
+    """A return flies home at RTL_ALTITUDE and circles there (ArduPlane's RTL; RTL_AUTOLAND 0)."""
+    climb, height = vehicle.value("climb_speed"), vehicle.value("return_height")
+    return VerticalProfile(
+        take_off_speed=climb,
+        climb_speed=climb,
+        descent_speed=vehicle.value("descent_speed"),
+        acceleration=1.0,
+        landing_speed=0.5,
+        landing_height=10.0,
+        return_height=height,
+        spool=3.5,
+        keeps_height=height < 0,
+        lands_on_return=False,
+    )
+
+
+def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # noqa: ARG001
+    return ArduPlane.from_vehicle(vehicle)
+
+
+ARDUPLANE = VehicleType(
+    family=ARDUPILOT,
+    kind="plane",
+    name="ArduPlane",
+    mav_types=(1,),
+    hovers=False,
+    parameters=TABLE,
+    dialect=PLANE_DIALECT,
+    vertical=_vertical,
+    fence_needs_one_inclusion=needs_one_inclusion,
+    legs=ArduPlaneLegs.of,
+    flight_model=_model,
+)
+"""ArduPlane 4.7, by its documents. How it turns and how fast it may fly is tuned on each aircraft:
+no parameters are recommended."""

@@ -3,30 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.mission.vehicle import Vehicle
 from faao_mav.vehicle.ardupilot.plane.motion import Motion, Tuning
+from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
 from faao_mav.vehicle.flight_path import FlightPath, Flown
-from faao_mav.vehicle.limits import Parameter, limits_of
-
-_PARAMETERS = {
-    "cruise_speed": Parameter({"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}, 1.0),
-    "min_speed": Parameter({"AIRSPEED_MIN": 1.0, "ARSPD_FBW_MIN": 1.0}, 1.0),
-    "max_speed": Parameter({"AIRSPEED_MAX": 1.0, "ARSPD_FBW_MAX": 1.0}, 1.0),
-    "roll_limit": Parameter(
-        {"ROLL_LIMIT_DEG": math.pi / 180, "LIM_ROLL_CD": math.pi / 18_000}, math.radians(5)
-    ),
-    "waypoint_radius": Parameter({"WP_RADIUS": 1.0}, 1.0),
-    "loiter_radius": Parameter({"WP_LOITER_RAD": 1.0}, 1.0, signed=True),
-    "climb_rate": Parameter({"TECS_CLMB_MAX": 1.0}, 0.1),
-    "sink_rate": Parameter({"TECS_SINK_MIN": 1.0}, 0.1),
-    "period": Parameter({"NAVL1_PERIOD": 1.0}, 1.0),
-    "damping": Parameter({"NAVL1_DAMPING": 1.0}, 0.1),
-}
+from faao_mav.vehicle.parameter import ParameterValues
 
 _HEADED = math.radians(10)
 """A loiter is left when the course is this close to the next waypoint."""
@@ -46,26 +30,24 @@ class ArduPlane:
     `loiter_radius` turns left.
     """
 
-    calibrated: ClassVar[bool] = False
-
-    cruise_speed: float = 12.0
-    min_speed: float = 9.0
-    max_speed: float = 22.0
-    roll_limit: float = math.radians(45)
-    waypoint_radius: float = 90.0
-    loiter_radius: float = 60.0
-    climb_rate: float = 5.0
-    sink_rate: float = 2.0
-    period: float = 17.0
-    damping: float = 0.75
+    cruise_speed: float = TABLE["cruise_speed"].default
+    min_speed: float = TABLE["min_speed"].default
+    max_speed: float = TABLE["max_speed"].default
+    roll_limit: float = TABLE["roll_limit"].default
+    waypoint_radius: float = TABLE["waypoint_radius"].default
+    loiter_radius: float = TABLE["loiter_radius"].default
+    climb_speed: float = TABLE["climb_speed"].default
+    descent_speed: float = TABLE["descent_speed"].default
+    period: float = TABLE["period"].default
+    damping: float = TABLE["damping"].default
 
     @classmethod
-    def from_vehicle(cls, vehicle: Vehicle) -> "ArduPlane":
-        """Return the model with the limits that `vehicle.parameters` set.
+    def from_vehicle(cls, vehicle: ParameterValues) -> "ArduPlane":
+        """Return the model with the parameters of `vehicle`.
 
         Raises `InputError` for a value that is too small to fly with or not finite.
         """
-        return cls(**limits_of(vehicle, _PARAMETERS))
+        return cls(**{key: vehicle.value(key) for key in cls.__slots__ if key in TABLE})
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -109,8 +91,8 @@ class _Flight:
             plane.period,
             plane.damping,
             plane.roll_limit,
-            plane.climb_rate,
-            plane.sink_rate,
+            plane.climb_speed,
+            plane.descent_speed,
         )
         moves = [b - a for a, b in zip(self._places, self._places[1:], strict=False) if b != a]
         course = math.atan2(moves[0].imag, moves[0].real) if moves else math.pi / 2

@@ -25,8 +25,8 @@ class Tuning:
     period: float
     damping: float
     roll_limit: float
-    climb_rate: float
-    sink_rate: float
+    climb_speed: float
+    descent_speed: float
 
 
 class Motion:
@@ -127,7 +127,7 @@ class Motion:
         self._bank += (bank - self._bank) * (1 - math.exp(-STEP / _ROLL_LAG))
         self._speed += (speed - self._speed) * (1 - math.exp(-STEP / _ENERGY_LAG))
         rate = climb + (height - self._height) / _ENERGY_LAG
-        self._climb = min(max(rate, -tuning.sink_rate), tuning.climb_rate)
+        self._climb = min(max(rate, -tuning.descent_speed), tuning.climb_speed)
         turn = _GRAVITY * math.tan(self._bank) / self._speed * STEP
         self.place += cmath.rect(self._ground_speed() * STEP, self.course + turn / 2)
         self.course += turn

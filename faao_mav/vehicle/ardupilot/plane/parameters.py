@@ -1,0 +1,42 @@
+"""ArduPlane's parameters: names of 4.5 and later first, those before it second."""
+
+from math import radians
+
+from faao_mav.vehicle.ardupilot.parameters import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.parameter import Parameter, table
+
+
+def _parameter(
+    key: str, unit: str, default: float, names: dict[str, float], least: float
+) -> Parameter:
+    return Parameter(key, unit, default, names, least, source=SOURCE)
+
+
+TABLE = table(
+    _parameter("cruise_speed", "m/s", 12.0, {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}, 1.0),
+    _parameter("min_speed", "m/s", 9.0, {"AIRSPEED_MIN": 1.0, "ARSPD_FBW_MIN": 1.0}, 1.0),
+    _parameter("max_speed", "m/s", 22.0, {"AIRSPEED_MAX": 1.0, "ARSPD_FBW_MAX": 1.0}, 1.0),
+    Parameter(
+        "roll_limit",
+        "rad",
+        radians(45),
+        {"ROLL_LIMIT_DEG": radians(1), "LIM_ROLL_CD": radians(0.01)},
+        radians(5),
+        radians(85),
+        source=SOURCE,
+    ),
+    _parameter("waypoint_radius", "m", 90.0, {"WP_RADIUS": 1.0}, 1.0),
+    Parameter(
+        "loiter_radius", "m", 60.0, {"WP_LOITER_RAD": 1.0}, 1.0, either_sign=True, source=SOURCE
+    ),
+    _parameter("climb_speed", "m/s", 5.0, {"TECS_CLMB_MAX": 1.0}, 0.1),
+    _parameter("descent_speed", "m/s", 2.0, {"TECS_SINK_MIN": 1.0}, 0.1),
+    _parameter("period", "s", 17.0, {"NAVL1_PERIOD": 1.0}, 1.0),
+    _parameter("damping", "", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1),
+    _parameter("return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0),
+    *SHARED,
+    switch("fence_type", 4, "FENCE_TYPE"),
+    rally_limit(5000.0),
+)
+"""ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate
+with an idling engine; a `return_height` below 0 keeps the height at which the return begins."""

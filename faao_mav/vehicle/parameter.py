@@ -1,0 +1,95 @@
+"""One record for each parameter of an autopilot: its names, unit, default and bounds."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Protocol, TypeAlias
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of an autopilot.
+
+    `key` is what this package calls it, `unit` the unit of `default`, `least` and `greatest`: SI,
+    angles in radians; "" for switches, bits and gains. `names` are the autopilot's own names, the
+    newest generation first, each with the factor that turns its number into `unit`: a vehicle
+    knows one generation, a parameter file may carry both. Values outside `least` to `greatest` are
+    no use (of a parameter of `either_sign`: their size); `documented` is the narrower range of the
+    autopilot's documentation, if recommended values have to stay in it. The autopilot lowers the
+    value to that of the parameter `capped_by`. `source` says where names and default come from.
+
+    >>> speed = Parameter("cruise_speed", "m/s", 10.0, {"WP_SPD": 1.0, "WPNAV_SPEED": 0.01})
+    >>> speed.name_in({"WPNAV_SPEED": 750})
+    'WPNAV_SPEED'
+    >>> speed.written(7.5, "WPNAV_SPEED"), speed.written(7.5, "WP_SPD")
+    (750, 7.5)
+    """
+
+    key: str
+    unit: str
+    default: float
+    names: Mapping[str, float]
+    least: float = -math.inf
+    greatest: float = math.inf
+    either_sign: bool = False
+    documented: tuple[float, float] = (-math.inf, math.inf)
+    capped_by: str = ""
+    source: str = ""
+
+    @property
+    def newest_name(self) -> str:
+        """The name in the newest generation."""
+        return next(iter(self.names))
+
+    @property
+    def oldest_name(self) -> str:
+        """The name in the oldest generation."""
+        return list(self.names)[-1]
+
+    def name_in(self, given: Mapping[str, float]) -> str | None:
+        """Return the newest of the names that `given` has, None if it has none."""
+        return next((name for name in self.names if name in given), None)
+
+    def is_usable(self, number: float, name: str) -> bool:
+        """Tell whether the autopilot's `number` under `name` is within the bounds."""
+        value = self.names[name] * (abs(number) if self.either_sign else number)
+        # The bounds themselves are usable, whatever the factor rounds to.
+        slack = 1e-12 * abs(value) if math.isfinite(value) else 0.0
+        return math.isfinite(value) and self.least - slack <= value <= self.greatest + slack
+
+    def expected(self, name: str) -> str:
+        """Return in words which numbers under `name` are of use."""
+        factor = self.names[name]
+        bounds = []
+        if math.isfinite(self.least):
+            bounds.append(f"at least {self.least / factor:g}")
+        if math.isfinite(self.greatest):
+            bounds.append(f"at most {self.greatest / factor:g}")
+        sign = " of either sign" if self.either_sign else ""
+        return f"a number{' of ' if bounds else ''}{' and '.join(bounds)}{sign}"
+
+    def written(self, value: float, name: str) -> float:
+        """Return `value`, in `unit`, as the autopilot's number under `name`.
+
+        Centimetres and the like are whole numbers.
+        """
+        factor = self.names[name]
+        return value if factor == 1.0 else round(value / factor)
+
+
+ParameterTable: TypeAlias = Mapping[str, Parameter]
+"""The parameters of one vehicle by `Parameter.key`."""
+
+
+class ParameterValues(Protocol):
+    """Where values of parameters come from: a `Vehicle`."""
+
+    def value(self, key: str) -> float:
+        """Return the value of the parameter `key` in the unit of its table."""
+        ...
+
+
+def table(*parameters: Parameter) -> ParameterTable:
+    """Return `parameters` by key; of two with one key the later one counts."""
+    return MappingProxyType({parameter.key: parameter for parameter in parameters})

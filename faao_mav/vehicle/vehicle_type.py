@@ -1,0 +1,118 @@
+"""What the rest of the package asks about an autopilot and a type of vehicle."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from faao_mav.arrays import Real
+from faao_mav.vehicle.dialect import Dialect
+from faao_mav.vehicle.flight_path import FlightModel
+from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
+from faao_mav.vehicle.vertical import VerticalProfile
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotFamily:
+    """An autopilot, whatever it flies.
+
+    `key` is its name in plans and options, `name` the one that is shown, `mav_autopilot` its
+    MAV_AUTOPILOT number on the wire and in `.plan` files. Its parameter files end in
+    `parameter_suffix`: "list" has lines of NAME,VALUE, "qgroundcontrol" five fields between tabs.
+    Parameters whose names begin with one of `parameter_prefixes` are its own.
+    """
+
+    key: str
+    name: str
+    mav_autopilot: int
+    parameter_suffix: str
+    parameter_style: Literal["list", "qgroundcontrol"]
+    parameter_prefixes: tuple[str, ...]
+
+
+class LegLimits(Protocol):
+    """How a vehicle with given parameters flies a leg between two waypoints."""
+
+    @property
+    def least(self) -> float:
+        """Shorter legs, m, are not flown: both their ends count as reached at once."""
+        ...
+
+    @property
+    def run_in(self) -> float:
+        """The leg before a start at speed, as a multiple of the shortest leg for that speed."""
+        ...
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg on which `speed`, m/s, is reached, m; same shape."""
+        ...
+
+    def reachable_speed(self, length: Real) -> Real:
+        """Return the greatest speed reached on legs of `length`, m, in m/s; same shape."""
+        ...
+
+    def radii(self, room: Real, turn: Real) -> Real:
+        """Return acceptance radii, m, that suit waypoints; 0 leaves them to the autopilot.
+
+        `room` (n,), m, is the shorter of the two legs at each waypoint, `turn` (n,) the angle
+        between them, rad.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VehicleType:
+    """One autopilot flying one type of vehicle: what is true of all of them.
+
+    Attributes:
+        family: the autopilot.
+        kind: the type of vehicle as plans and options name it.
+        name: the name that is shown, as "ArduCopter".
+        mav_types: its MAV_TYPE numbers; the first is written into `.plan` files and heartbeats.
+        hovers: it can stand still in the air; else it circles to wait.
+        whole_second_holds: the hold of a waypoint loses its fraction of a second.
+        parameters: its parameters by key.
+        dialect: what it does with the items of a mission.
+        fastest: the greatest speed that it can be told, m/s.
+        vertical: its take-off, climb, return and landing.
+        fence_needs_one_inclusion: being inside one of several inclusion areas is enough; else the
+            vehicle has to be inside all.
+        legs: how it flies a leg; None if missions are not made for it.
+        flight_model: how it flies a mission, with the latitude in degrees if that is known; None if
+            `unmodelled` says why there is no model.
+        recommended: the sets of parameters to try for a plan's greatest speed, m/s, and
+            acceleration, m/s², the gentlest first; one empty set: it flies with its own.
+        calibrated: the flight model is compared with recorded flights.
+        corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
+            radians; None if no such law is known.
+    """
+
+    family: AutopilotFamily
+    kind: str
+    name: str
+    mav_types: tuple[int, ...]
+    hovers: bool
+    parameters: ParameterTable
+    dialect: Dialect
+    vertical: Callable[[ParameterValues], VerticalProfile]
+    whole_second_holds: bool = False
+    fastest: float = 20.0
+    fence_needs_one_inclusion: Callable[[ParameterValues], bool] = lambda _: True
+    legs: Callable[[ParameterValues], LegLimits] | None = None
+    flight_model: Callable[[ParameterValues, float | None], FlightModel] | None = None
+    unmodelled: str = ""
+    calibrated: bool = False
+    recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
+    corner_speed: Callable[[ParameterValues, float], float] | None = None
+
+    @property
+    def caveat(self) -> str:
+        """What to say of predicted flights; nothing where the model is compared with flights."""
+        if self.calibrated or self.flight_model is None:
+            return ""
+        return "by a model after the autopilot's documents, not compared with recorded flights"
+
+    def defaults(self) -> dict[str, float]:
+        """Return the defaults by the autopilot's oldest names, in the autopilot's own units."""
+        return {
+            p.oldest_name: p.written(p.default, p.oldest_name) for p in self.parameters.values()
+        }
