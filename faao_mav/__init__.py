@@ -1,8 +1,7 @@
 """Radio-relay flights for finite alphabets: from a plan to a MAVLink mission.
 
->>> from faao_mav import optimize, read_plan, to_mission  # doctest: +SKIP
+>>> from faao_mav import optimize, read_plan  # doctest: +SKIP
 >>> solution = optimize(read_plan("missions/copter_relay.yaml"))  # doctest: +SKIP
->>> mission = to_mission(solution)  # doctest: +SKIP
 """
 
 from importlib import import_module
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from faao_mav.optimizer.pricing import price, saturation
     from faao_mav.optimizer.solution import Solution, load_solution, save_solution
     from faao_mav.plan import Plan, parse_plan, read_plan
-    from faao_mav.schedule import to_mission
     from faao_mav.validate import Finding, Limits, LinkCheck
     from faao_mav.vehicle import Vehicle
     from faao_mav.vehicle.parameter_file import read_parameters, render_parameters
@@ -44,7 +42,6 @@ _HOMES = {
     "render_parameters": "vehicle.parameter_file",
     "saturation": "optimizer.pricing",
     "save_solution": "optimizer.solution",
-    "to_mission": "schedule",
     "upload": "mavlink",
 }
 
@@ -70,7 +67,6 @@ __all__ = [
     "render_parameters",
     "saturation",
     "save_solution",
-    "to_mission",
     "upload",
 ]
 

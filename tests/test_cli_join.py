@@ -7,14 +7,15 @@ from typing import Any
 
 import pytest
 from conftest import SMALL, edited, free_port
+from stations import VEHICLE
 from typer.testing import CliRunner
 
 from faao_mav import download, upload
 from faao_mav.cli.main import app
 from faao_mav.mavlink.messages import ParamRequestRead
-from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import Result
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import Result
 from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
@@ -96,7 +97,7 @@ def test_a_mission_with_errors_is_kept_but_not_called_good(
 
 def test_upload_after_writing(plan: Path, out: Path) -> None:
     port = free_port()
-    mock = MockAutopilot(manners_of("px4"), home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1)
     plan.write_text(edited(GENTLE, {"vehicle.autopilot": "px4", "mission.parameters": "keep"}))
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", "--system", 1)
@@ -113,7 +114,7 @@ def test_a_download_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
         HOME,
         Fence(circles=(Circle((-35.36, 149.16), 90.0, inclusion=True),)),
     )
-    mock = MockAutopilot(manners_of("px4"), home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1)
     with running(mock, f"udpin:127.0.0.1:{port}"):
         assert upload(sent, f"udpout:127.0.0.1:{port}").verified
         result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out)
@@ -128,7 +129,7 @@ def test_a_planes_mission_on_a_plane(out: Path, tmp_path: Path) -> None:
     far = {"flight.start": [0, 200], "flight.end": [200, 0], "flight.time_step": 1}
     plan.write_text(edited(GENTLE, level | free | far | {"vehicle.max_speed": 16}))
     port = free_port()
-    mock = MockAutopilot(ardupilot(), aircraft="plane", home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("ardupilot"), aircraft="plane", home=HOME, beat=0.1)
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", "--json")
     assert result.exit_code == 0, result.output
@@ -148,7 +149,9 @@ def test_options_of_an_upload_without_one(plan: Path, out: Path, option: tuple[s
 @pytest.mark.parametrize("as_json", [False, True])
 def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: bool) -> None:
     port = free_port()
-    mock = MockAutopilot(ardupilot(refusals={(0, 2): Result.UNSUPPORTED}), home=HOME, beat=0.1)
+    mock = MockAutopilot(
+        behaviour_of("ardupilot", refusals={(0, 2): Result.UNSUPPORTED}), home=HOME, beat=0.1
+    )
     with running(mock, f"udpin:127.0.0.1:{port}"):
         options = ["--json"] if as_json else []
         result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", *options)
@@ -164,7 +167,7 @@ def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: b
 def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:
     port = free_port()
     mock = MockAutopilot(home=HOME, beat=0.1)
-    mock._armed = True
+    mock.armed = True
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock, f"udpin:127.0.0.1:{port}"):
         refused = run(plan, "--out", out, "--upload", connection)
@@ -237,7 +240,7 @@ def test_the_mock_flies_by_its_parameters(
         transport.close()
         made.append(mock)
 
-    monkeypatch.setattr("faao_mav.mavlink.runner.serve", serve)
+    monkeypatch.setattr("faao_mav.mavlink.mock.serve.serve", serve)
     listen = ["--listen", f"udpin:127.0.0.1:{free_port()}"]
     slow = tmp_path / "slow.param"
     slow.write_text("WPNAV_ACCEL,50\nWPNAV_SPEED,300\n")
@@ -245,7 +248,7 @@ def test_the_mock_flies_by_its_parameters(
     assert run("autopilot", *listen, "--parameters", slow).exit_code == 0
     quick, late = (mock._fly(mission).t[-1] for mock in made)
     assert late > quick + 20
-    (answer,) = made[1].parameters.on(ParamRequestRead(1, 1, "WPNAV_ACCEL", -1))
+    (answer,) = made[1].parameters.on(ParamRequestRead(VEHICLE, "WPNAV_ACCEL", -1))
     assert answer.param_value == read_parameters(slow)["WPNAV_ACCEL"]
     slow.write_text("WPNAV_ACCEL,0\n")
     refused = run("autopilot", *listen, "--parameters", slow)

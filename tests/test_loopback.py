@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 from faao_mav import download
 from faao_mav.cli.main import app
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mavlink.mock import MockAutopilot, manners_of
-from faao_mav.mavlink.runner import predicted, running
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mavlink.mock.serve import predicted, running
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home, Mission
 from faao_mav.optimizer.solution import load_solution
@@ -106,7 +106,9 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
     def fly(mission: Mission) -> Track:
         return predicted(Vehicle(kind, parameters=read_parameters(tuned)))(mission)
 
-    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, speedup=SPEEDUP, rate=RATE, beat=0.1)
+    mock = MockAutopilot(
+        behaviour_of(kind), home=HOME, fly=fly, speedup=SPEEDUP, rate=RATE, beat=0.1
+    )
     with running(mock, f"udpin:127.0.0.1:{port}"):
         connection = f"udpout:127.0.0.1:{port}"
         arguments = (plan, "--out", out, "--save", save, "--upload", connection, "--json")

@@ -8,7 +8,7 @@ from conftest import MISSIONS, SMALL, MakePlan, edited
 
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
-from faao_mav.schedule.convert import Conversion, convert
+from faao_mav.schedule.conversion import Conversion, convert
 from faao_mav.schedule.prediction import predict_delivery
 from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check

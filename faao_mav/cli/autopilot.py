@@ -12,11 +12,10 @@ from faao_mav.cli.outcome import exit_status
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.messages import Row
+    from faao_mav.mavlink.messages import WireItem
     from faao_mav.mavlink.mock import MockAutopilot
-    from faao_mav.mavlink.transfer.protocol import MissionType
+    from faao_mav.mavlink.protocol import MissionType
     from faao_mav.mission.item import Home
-    from faao_mav.plan.autopilots import Autopilot
 
 _REST = 0.5  # s without a change, after which a list is told
 
@@ -73,20 +72,20 @@ def autopilot(
     with exit_status():
         from faao_mav.mavlink.codec import read_key
         from faao_mav.mavlink.faults import Faults
-        from faao_mav.mavlink.mock import MockAutopilot, manners_of
-        from faao_mav.mavlink.runner import predicted, serve
-        from faao_mav.mavlink.transfer.protocol import Address
+        from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+        from faao_mav.mavlink.mock.serve import predicted, serve
+        from faao_mav.mavlink.protocol import Address
         from faao_mav.mavlink.transport import open_transport
         from faao_mav.vehicle import Vehicle, flight_model
         from faao_mav.vehicle.parameter_file import read_parameters
 
         values = {} if parameters is None else read_parameters(parameters)
-        flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"
+        behaviour = behaviour_of(kind)
         source = str(parameters or "parameters")
-        vehicle = Vehicle(flown_by, aircraft, values, source)
+        vehicle = Vehicle(behaviour.family.key, aircraft, values, source)
         flight_model(vehicle)  # useless parameters are refused here, not in flight
         mock = MockAutopilot(
-            manners_of(kind),
+            behaviour,
             aircraft=aircraft,
             address=Address(system, 1),
             home=read_home(home),
@@ -119,16 +118,16 @@ class Diary:
     """Tells what changes on a mock autopilot, lists when they have come to rest."""
 
     def __init__(self) -> None:
-        self._told: dict[MissionType, tuple[Row, ...]] = {}
-        self._seen: dict[MissionType, tuple[Row, ...]] = {}
+        self._told: dict[MissionType, tuple[WireItem, ...]] = {}
+        self._seen: dict[MissionType, tuple[WireItem, ...]] = {}
         self._changed = 0.0
         self._armed = False
 
     def __call__(self, mock: "MockAutopilot") -> None:
         """Print what is new since the last call."""
-        from faao_mav.mavlink.transfer.protocol import MissionType
+        from faao_mav.mavlink.protocol import MissionType
 
-        lists = {part: mock.lists.rows(part) for part in MissionType}
+        lists = {part: mock.lists.items(part) for part in MissionType}
         if not self._told:
             self._told = self._seen = lists
         if lists != self._seen:
@@ -141,9 +140,9 @@ class Diary:
 
     def finish(self) -> None:
         """Print what has been seen and not told."""
-        for part, rows in self._seen.items():
-            if rows != self._told[part]:
-                typer.echo(f"{part.title}: {len(rows)} rows")
+        for part, items in self._seen.items():
+            if items != self._told[part]:
+                typer.echo(f"{part.title}: {len(items)} rows")
         self._told = self._seen
 
 

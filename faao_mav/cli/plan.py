@@ -109,10 +109,9 @@ def _solve(
     from faao_mav.optimizer.optimize import optimize
     from faao_mav.optimizer.pricing import fresh_rates, price, saturation
     from faao_mav.optimizer.problem import build_problem
-    from faao_mav.optimizer.progress import Progress
-    from faao_mav.optimizer.solution import save_solution
+    from faao_mav.optimizer.solution import Progress, save_solution
     from faao_mav.plan import read_plan
-    from faao_mav.schedule.convert import check_vehicle, convert
+    from faao_mav.schedule.conversion import check_vehicle, convert
     from faao_mav.schedule.prediction import predict_delivery
     from faao_mav.validate import Limits
     from faao_mav.validate.check import check

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from faao_mav.optimizer.progress import Observer, Progress
+from faao_mav.optimizer.solution import Observer, Progress
 
 
 @contextmanager

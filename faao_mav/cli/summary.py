@@ -9,7 +9,7 @@ from faao_mav.cli.finding_lines import count_of, grouped, line_of
 from faao_mav.optimizer.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.optimizer.solution import Solution
-from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate.finding import Finding, Level
 from faao_mav.vehicle import caveat

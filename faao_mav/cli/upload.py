@@ -83,7 +83,7 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
         "vehicle": {
             "system": vehicle.address.system,
             "component": vehicle.address.component,
-            "autopilot": vehicle.firmware,
+            "autopilot": vehicle.autopilot,
             "type": vehicle.kind,
         },
         "seconds": round(report.seconds, 3),

@@ -1,8 +1,7 @@
 """Plan -> Solution, by the method that the plan asks for."""
 
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.progress import Observer
-from faao_mav.optimizer.solution import Solution
+from faao_mav.optimizer.solution import Observer, Solution
 from faao_mav.plan import Plan
 
 

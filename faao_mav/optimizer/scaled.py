@@ -1,4 +1,4 @@
-"""The feasible set as CVXPY constraints, in units that suit an interior-point solver.
+"""Convex problems over the feasible flights through CVXPY, in units that suit its solver.
 
 With metres as the unit Clarabel fails on (27); with lengths in about 100 m, speeds in v_max and
 accelerations in a_max every variable is of the order of one.
@@ -13,10 +13,8 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-
-LENGTH = 100.0
-"""Unit of length inside the solver, m."""
+from faao_mav.optimizer.interior.rewards import Stage
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 _INSIDE = 1e-7  # by which the least speed is raised, for what the solver leaves open
 
@@ -115,3 +113,39 @@ def solve(problem: cp.Problem) -> str:
         if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
             return str(cp.INFEASIBLE)
     raise SolverError("Clarabel made no progress on a convex problem")
+
+
+def kkt_residual(
+    kin: Kinematics, stage: Stage, trajectory: Trajectory, *, reach: float = 1.0
+) -> float:
+    """Return the best first-order gain of min_j F_j per metre, in rewards per metre.
+
+        max  (min_j (F_j + G_j . d) - min_j F_j) / reach  over the feasible flights w + d
+             with |d_n| <= `reach` metres in x and in y, G_j the gradient of F_j
+
+    The feasible set is convex, so that this is zero exactly where the conditions of Karush, Kuhn
+    and Tucker hold. It is a convex problem: its optimum is that of Clarabel, to about 1e-8 of
+    the largest gradient. Raises `SolverError` where Clarabel finds none.
+    """
+    values = stage(trajectory.w.T)
+    total = values.value.mean(axis=1)
+    slots = values.value.shape[1]
+    unit = float(np.abs(values.gradient).max())
+    if unit == 0:
+        return 0.0
+    flight = flight_variables(kin, about=trajectory.v)
+    shift = (flight.w - trajectory.w / LENGTH) * (LENGTH / reach)
+    gains = [
+        (above / (unit * reach)) + cp.sum(cp.multiply(gradient.T / (unit * slots), shift))
+        for above, gradient in zip(
+            total - total.min(), np.moveaxis(values.gradient, 1, 0), strict=True
+        )
+    ]
+    gain = cp.Variable()
+    problem = cp.Problem(
+        cp.Maximize(gain),
+        [*flight.constraints, cp.abs(shift) <= 1, *(gain <= each for each in gains)],
+    )
+    if solve(problem) == cp.INFEASIBLE:
+        raise SolverError("the flight given breaks its limits")
+    return max(0.0, float(problem.value)) * unit

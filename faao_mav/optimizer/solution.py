@@ -1,10 +1,10 @@
-"""What an optimiser returns: trajectory, precoders, rates, and the means to check them."""
+"""What an optimiser tells and returns, and how a solution is checked, saved and loaded."""
 
 import io
 import json
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,20 @@ from faao_mav.files import write_whole
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where an optimiser stands: R_avg of the best iterate so far, and what runs now."""
+
+    iteration: int
+    max_iterations: int
+    stage: str
+    best_rate: float
+
+
+Observer = Callable[[Progress], None]
+"""What an optimiser tells its progress to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +48,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solved plan: SI units, local east-north metres, one row per time slot.
+    '''A solved plan: SI units, local east-north metres, one row per time slot.
 
     `t` (n,) s; `w`, `v`, `a` (n, 2); `P_B` (n, N_t, N_t) and `P_U` (n, N_u, N_u) in sqrt(W);
     the fading `H_rB` (n, N_u, N_t) and `H_rU` (n, N_r, N_u) without path gain; `I_U`, `I_G`
@@ -43,7 +57,23 @@ class Solution:
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end.
-    """
+
+    >>> from faao_mav import optimize, parse_plan
+    >>> solution = optimize(parse_plan("""
+    ... site: {origin: {latitude: -35.36, longitude: 149.17, elevation: 584}}
+    ... vehicle: {max_speed: 20, max_acceleration: 5}
+    ... flight: {start: [0, 50], end: [50, 0], altitude: 40, duration: 10, time_step: 0.5}
+    ... radio:
+    ...   fading: none
+    ...   base_station: {position: [0, 0], power_dbm: 0}
+    ...   relay: {power_dbm: 0, noise_dbm: -80}
+    ...   ground_user: {position: [60, 60], noise_dbm: -80}
+    ... """))
+    >>> round(solution.rates.R_avg, 3), solution.is_feasible(1e-6)
+    (0.642, True)
+    >>> solution.kkt_residual() < 1e-3
+    True
+    '''
 
     plan: Plan
     t: Real
@@ -101,6 +131,26 @@ class Solution:
             found[name] = float(np.abs(H_r - link.small_scale(self.w)).max())
         found["(9) rate"] = abs(again.R_avg - self.rates.R_avg)
         return found
+
+    def is_feasible(self, tolerance: float = 1e-6) -> bool:
+        """Tell whether every one of the `residuals` is below `tolerance`, each in its own unit."""
+        return max(self.residuals().values()) < tolerance
+
+    def kkt_residual(self, reach: float = 1.0) -> float:
+        """Return how much R_avg can still gain per metre, to first order, bit/s/Hz/m.
+
+        The gain is that of the best feasible move by at most `reach` metres in x and in y of every
+        slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
+        found from the arrays by CVXPY, without the multipliers of the method that solved the plan.
+        Raises `SolverError` where the trajectory breaks its limits.
+        """
+        from faao_mav.optimizer.design import design
+        from faao_mav.optimizer.rates.field import rate_field
+        from faao_mav.optimizer.scaled import kkt_residual
+
+        problem = build_problem(self.plan)
+        rates = rate_field(problem, design(self.plan))
+        return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach)
 
 
 def _excess(P: Complex, power: float) -> float:

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.formats.kml import Station, TimedTrack, write_kml
 from faao_mav.optimizer.solution import Solution
-from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.conversion import Conversion
 from faao_mav.vehicle.predict import predict
 
 START = datetime(2000, 1, 1, tzinfo=UTC)

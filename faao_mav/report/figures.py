@@ -9,7 +9,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.report.route_map import route_map
 from faao_mav.report.style import MUTED, SERIES, label, legend_above, new_figure, styled
 from faao_mav.report.waypoint_numbers import number_waypoints
-from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
 
 if TYPE_CHECKING:

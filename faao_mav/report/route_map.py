@@ -12,7 +12,7 @@ from faao_mav.mission.fence import Fence
 from faao_mav.optimizer.solution import Solution
 from faao_mav.report.style import INK, MUTED, SERIES, label, legend_above, mark_stations
 from faao_mav.report.waypoint_numbers import waypoints
-from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.conversion import Conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

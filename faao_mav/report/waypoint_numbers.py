@@ -11,7 +11,7 @@ from faao_mav.mission.command import Command
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
-from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.conversion import Conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

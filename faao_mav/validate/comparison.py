@@ -9,10 +9,9 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
-from faao_mav.schedule.deviation import passing
-from faao_mav.schedule.outline import set_out
+from faao_mav.schedule.initial_route import begins_at_speed, set_out
 from faao_mav.schedule.prediction import Prediction, price_flight
-from faao_mav.schedule.run_in import begins_at_speed
+from faao_mav.schedule.schedule import passing
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.link import LinkCheck, Stretch
 from faao_mav.vector import lengths

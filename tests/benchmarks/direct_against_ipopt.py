@@ -24,10 +24,10 @@ from peer import GAIN, ROUNDS, Model, at_best, at_precoders
 
 from faao_mav.arrays import Real
 from faao_mav.errors import PlanError
-from faao_mav.optimizer.direct import RateField
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.rates.slot_rate import FixedRate
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.routes import starts

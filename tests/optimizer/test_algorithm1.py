@@ -10,7 +10,7 @@ from conftest import MISSIONS, MakePlan
 from faao_mav.errors import InfeasibleError, PlanError, SolverError
 from faao_mav.optimizer.algorithm1 import algorithm1 as module
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.progress import Progress
+from faao_mav.optimizer.solution import Progress
 from faao_mav.plan import read_plan
 from faao_mav.radio.precoder import SCHEMES
 

@@ -5,11 +5,12 @@ import pytest
 from conftest import MISSIONS, MakePlan, edited
 
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.direct import rate_field
-from faao_mav.optimizer.interior.maximize import StageValues, maximize
+from faao_mav.optimizer.interior.maximize import maximize
+from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.coarse import SLOTS, WORTH_IT, Blocks, improved
 from faao_mav.optimizer.search.routes import starts
 from faao_mav.plan import Plan, parse_plan

@@ -14,14 +14,17 @@ from scipy.optimize import minimize
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior import cones
 from faao_mav.optimizer.interior.banded import SIZE, FlightMatrix, Q, V, W, Y
-from faao_mav.optimizer.interior.iterate import FlightScale, Point, best_floor
-from faao_mav.optimizer.interior.maximize import Stage, StageValues, maximize, maximize_all
-from faao_mav.optimizer.interior.min_speed import Slow
+from faao_mav.optimizer.interior.constraint import ScaledFlight
+from faao_mav.optimizer.interior.half_planes import HalfPlanesState
+from faao_mav.optimizer.interior.iterate import Iterate, best_floor
+from faao_mav.optimizer.interior.limits import FlightLimits, LimitsState
+from faao_mav.optimizer.interior.maximize import maximize, maximize_all
+from faao_mav.optimizer.interior.min_speed import MinSpeedConstraint
 from faao_mav.optimizer.interior.newton import Newton
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.scaled import LENGTH, flight_variables
+from faao_mav.optimizer.interior.rewards import Stage, StageValues
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+from faao_mav.optimizer.scaled import flight_variables, kkt_residual
 from faao_mav.optimizer.search.start import straight_flight
-from faao_mav.optimizer.stationarity import kkt_residual
 
 STATIONS = np.array([[0.0, 0.0], [300.0, 300.0]])
 HEIGHT = 100.0
@@ -297,14 +300,9 @@ def test_a_small_problem_agrees_with_slsqp(law: Law) -> None:
 
     x: Any = np.concatenate([start.v[0], start.a[:-1].ravel(), [reward(stage, start)]])
     limits: Any = [{"type": "ineq", "fun": room}, {"type": "eq", "fun": ends}]
-    peer = minimize(
-        lambda x: float(-x[-1]),
-        x,
-        method="SLSQP",
-        constraints=limits,
-        options={"maxiter": 500},
-        tol=1e-12,
-    )
+    least: Any = minimize  # its stubs know no constraints of arrays
+    how = {"method": "SLSQP", "constraints": limits, "options": {"maxiter": 500}, "tol": 1e-12}
+    peer = least(lambda x: float(-x[-1]), x, **how)
     assert peer.success
     assert best.value == pytest.approx(float(peer.x[-1]), rel=1e-5)
 
@@ -390,10 +388,10 @@ def test_the_band_matrix_is_the_dense_one(seed: int, n: int, first: bool, last: 
         first = last = False  # otherwise nothing can move, and K is singular
     h, flights = 0.3, 2
     matrix = FlightMatrix(n, h, (first, last))
-    (at_w, full_w), (at_v, full_v), (give, full_give) = (
+    (at_w, full_w), (at_v, full_v), (compliance, full_compliance) = (
         symmetric(rng, flights, n) for _ in range(3)
     )
-    factors = matrix.factor(at_w, at_v, give)
+    factors = matrix.factor(at_w, at_v, compliance)
     assert factors.sound.all()
     right = rng.standard_normal((3, flights, n, SIZE))
     solved = factors.solve(right.copy())
@@ -405,7 +403,7 @@ def test_the_band_matrix_is_the_dense_one(seed: int, n: int, first: bool, last: 
             if i == n - 1:
                 dense[i, Q, i, Q] = dense[i, Y, i, Y] = eye
                 continue
-            dense[i, Q, i, Q] = -full_give[k, i]
+            dense[i, Q, i, Q] = -full_compliance[k, i]
             for later, sign in ((i, -1.0), (i + 1, 1.0)):
                 for row, column, value in ((Q, V, sign), (Y, V, -h), (Y, W, sign)):
                     dense[i, row, later, column] = value * eye
@@ -423,33 +421,32 @@ def test_the_band_matrix_is_the_dense_one(seed: int, n: int, first: bool, last: 
     assert (y[..., :-1] * moved).sum() == pytest.approx((matrix.pull(y[..., :-1]) * w).sum())
 
 
-def discs(scale: FlightScale, first: Real | float, v: Real) -> Real:
+def discs(flight: ScaledFlight, first: Real | float, v: Real) -> Real:
     """Return s_0 = `first` and D v as one array."""
-    found = np.empty((3, v.shape[1], 2 * v.shape[2] - 1))
-    scale.enter(found, first, v)
-    return found
+    x = np.concatenate([v * flight.matrix.moves_v, flight.accelerations(v)], axis=-1)
+    return np.concatenate([np.broadcast_to(first, (1, *x.shape[1:])), x])
 
 
 @pytest.mark.parametrize("make", [plane, copter])
 def test_forces_are_the_transpose_of_what_they_act_on(make: Callable[..., Kinematics]) -> None:
-    rng, scale = np.random.default_rng(0), FlightScale(make(2))
-    n = scale.matrix.slots
+    rng, flight = np.random.default_rng(0), ScaledFlight(make(2), [FlightLimits()])
+    matrix, n = flight.matrix, flight.matrix.slots
     v, w = rng.standard_normal((2, 2, 3, n))
-    v *= scale.matrix.moves_v
+    v *= matrix.moves_v
     y, on_a = rng.standard_normal((2, 2, 3, n - 1))
-    drawn = (y * (scale.matrix.dynamics(w, v) - scale.matrix.dynamics(w, 0 * v))).sum()
-    taken = (on_a * discs(scale, 0.0, v)[1:, :, n:]).sum()
-    assert (scale.left_over(y, on_a) * v).sum() == pytest.approx(drawn - taken)
+    of_motion = (y * (matrix.dynamics(w, v) - matrix.dynamics(w, 0 * v))).sum()
+    of_limits = (on_a * discs(flight, 0.0, v)[1:, :, n:]).sum()
+    assert (flight.forces_asked(y, on_a) * v).sum() == pytest.approx(of_motion - of_limits)
 
 
 def test_a_singular_flight_leaves_the_others_alone() -> None:
     rng = np.random.default_rng(0)
     matrix = FlightMatrix(5, 0.5, (True, True))
-    at_w, at_v, give = (symmetric(rng, 3, 5)[0] for _ in range(3))
-    alone = matrix.factor(at_w[:, 2:], at_v[:, 2:], give[:, 2:])
+    at_w, at_v, compliance = (symmetric(rng, 3, 5)[0] for _ in range(3))
+    alone = matrix.factor(at_w[:, 2:], at_v[:, 2:], compliance[:, 2:])
     at_w[:, 0] = np.nan
-    at_w[:, 1] = at_v[:, 1] = give[:, 1] = 0
-    factors = matrix.factor(at_w, at_v, give)
+    at_w[:, 1] = at_v[:, 1] = compliance[:, 1] = 0
+    factors = matrix.factor(at_w, at_v, compliance)
     assert factors.sound[:, 0].tolist() == [False, False, True]
     right = rng.standard_normal((1, 3, 5, SIZE))
     assert factors.solve(right.copy())[:, 2] == pytest.approx(alone.solve(right[:, 2:])[:, 0])
@@ -475,10 +472,11 @@ def test_the_scaling_of_the_cones(seed: int) -> None:
     one = np.zeros((3, 1, m))
     one[0] = 1
     assert product(s, cones.inverse(s)) == pytest.approx(one, abs=1e-8)
-    curvature, give, lean = scaling.curvature, scaling.give(), scaling.lean()
+    stiffness, compliance = scaling.stiffness, scaling.compliance()
+    coupling = scaling.coupling()
     second = scaling.second_order(ds, dz)
     for i in range(m):
-        w, eta = scaling.point[:, 0, i], scaling.stiffness[0, i] ** -0.5
+        w, eta = scaling.w[:, 0, i], scaling.per_square[0, i] ** -0.5
         full = eta * np.block(
             [[w[:1], w[1:]], [w[1:, None], np.eye(2) + np.outer(w[1:], w[1:]) / (1 + w[0])]]
         )
@@ -490,12 +488,12 @@ def test_the_scaling_of_the_cones(seed: int) -> None:
 
         assert full @ z[:, 0, i] == pytest.approx(back @ s[:, 0, i], rel=1e-5, abs=1e-7)
         assert square @ s[:, 0, i] == close(z[:, 0, i])
-        xx, xy, yy = curvature[:, 0, i]
+        xx, xy, yy = stiffness[:, 0, i]
         block = np.array([[xx, xy], [xy, yy]])
         assert block == close(square[1:, 1:])
-        xx, xy, yy = give[:, 0, i]
+        xx, xy, yy = compliance[:, 0, i]
         assert block @ [[xx, xy], [xy, yy]] == pytest.approx(np.eye(2), abs=1e-6)
-        assert lean[:, 0, i] == close(square[1:, 0])
+        assert coupling[:, 0, i] == close(square[1:, 0])
         goal = z - np.einsum("ij,j->i", square, ds[:, 0, i])[:, None, None]
         assert scaling.radial(z, ds[0], goal[1:])[0, i] == close(goal[0, 0, i])
         unaimed = goal - z
@@ -520,82 +518,76 @@ def test_a_newton_step_solves_the_linearised_conditions(
 ) -> None:
     rng = np.random.default_rng(seed)
     kin = copter(1.4) if hover else plane(1.4)
-    scale, n, mu, share = FlightScale(kin), kin.slots, np.array([[0.3]]), 0.7
+    kept = [FlightLimits(), *([MinSpeedConstraint(least)] if least else [])]
+    flight, n, mu, share = ScaledFlight(kin, kept), kin.slots, np.array([[0.3]]), 0.7
     m = 2 * n - 1
-    v = 0.01 * rng.standard_normal((2, 1, n))
-    x = discs(scale, 0.0, v)[1:]
+    w, v = rng.standard_normal((2, 1, n)), 0.01 * rng.standard_normal((2, 1, n))
+    x = discs(flight, 0.0, v)[1:]
     total = rng.standard_normal((2, 1, 1))
     concave = -symmetric(rng, 2, 1, n)[0]
     margin = rng.uniform(0, 0.1, (1, m))
     # a limit on what cannot move is there in name only, and pulls at nothing
     real = np.concatenate([np.ones((1, 1, m)), x != 0])
-    point = Point(
-        w=rng.standard_normal((2, 1, n)),
+    slacks = np.concatenate([(np.hypot(*x) + 0.1 + margin)[None], x])
+    limits = LimitsState(flight, np.stack([slacks, inside(rng, m) * real], axis=1), margin)
+    begun = flight.begin(w, v, np.array([[0.2]]), 1.0)
+    slow = begun[1] if least else None
+    assert slow is None or isinstance(slow, HalfPlanesState)
+    at = Iterate(
+        w=w,
         v=v,
         y=rng.standard_normal((2, 1, n - 1)),
-        pair=np.stack(
-            [np.concatenate([(np.hypot(*x) + 0.1 + margin)[None], x]), inside(rng, m) * real],
-            axis=1,
-        ),
-        margin=margin,
-        slow=Slow.begin(v, least, scale.matrix.moves_v, 0.2) if least > 0 else None,
+        states=(limits, *begun[1:]),
         weights=np.array([0.3, 0.7])[:, None, None],
         total=total,
         floor=best_floor(total, share * mu),
-        gradient=rng.standard_normal((2, 2, 1, n)) * scale.matrix.moves_w,
+        gradient=rng.standard_normal((2, 2, 1, n)) * flight.matrix.moves_w,
         hessian=concave,
     )
-    slow = point.slow
-    assert (share * mu / (total - point.floor)).sum() == pytest.approx(1)
-    scaling = cones.Scaling.between(point.pair)
-    newton = Newton.at(
-        scale,
-        point,
-        scaling,
-        share=share,
-        proximal=np.array([[0.01]]),
-        cut=np.array([[cut]]),
+    assert (share * mu / (total - at.floor)).sum() == pytest.approx(1)
+    newton = Newton.factored(
+        flight, at, barrier_share=share, proximal=np.array([[0.01]]), cut=np.array([[cut]])
     )
     assert newton.factors.sound.all()
     correction = 0.01 * rng.standard_normal((3, 1, m)) * real
-    of_slow = 0.01 * rng.standard_normal((1, n)) * (slow.on if slow else 0)
-    none = np.zeros((1, 1))
-    corrected = newton.step(mu, correction, of_slow), mu, correction, of_slow
-    for step, at, taken, slowly in ((newton.step(none), none, none, none), corrected):
-        xx, xy, yy = -(point.weights * concave).sum(axis=1)
-        dx, dy = step.dw
+    target = mu * cones.inverse(limits.pair[:, 0]) - correction
+    of_slow = rng.standard_normal((1, n)) * (slow.on if slow else 0)
+    for direction, goal, slow_goal, barrier in (
+        (newton.predictor(), 0 * target, np.zeros((1, n)), 0 * mu),
+        (newton.aimed(mu, (target, of_slow) if least else (target,)), target, of_slow, mu),
+    ):
+        dw, dv = direction.move.w, direction.move.v
+        xx, xy, yy = -(at.weights * concave).sum(axis=1)
+        dx, dy = dw
         bent = np.stack([(xx + 0.01) * dx + xy * dy, xy * dx + (yy + 0.01) * dy])
-        weights, z = point.weights + step.dweights, point.z + step.dz
-        on_w = scale.matrix.pull(point.y + step.dy)
-        force = bent * scale.matrix.moves_w + on_w - (weights * point.gradient).sum(axis=1)
+        weights = at.weights + direction.weights
+        ds, z = direction.steps[0][:, 0], limits.pair[:, 1] + direction.steps[0][:, 1]
+        on_w = flight.matrix.pull(at.y + direction.y)
+        force = bent * flight.matrix.moves_w + on_w - (weights * at.gradient).sum(axis=1)
         assert force == pytest.approx(np.zeros((2, 1, n)), abs=1e-7)
-        pulled = z[1:, :, :n] * scale.matrix.moves_v
+        pulled = z[1:, :, :n] * flight.matrix.moves_v
         if slow is not None:
-            raised = slow.z + step.slow[1]
-            assert slow.s * raised + slow.z * step.slow[0] == pytest.approx(
-                at * slow.on - slowly, abs=1e-7
-            )
-            assert step.slow[0] == pytest.approx((slow.u * step.dv).sum(axis=0) - slow.margin)
-            pulled = pulled + slow.u * raised
-        on_v = scale.left_over(point.y + step.dy, z[1:, :, n:])
+            slow_ds, slow_z = direction.steps[1][0], slow.z + direction.steps[1][1]
+            assert slow.s * slow_z + slow.z * slow_ds == pytest.approx(slow.s * slow_goal, abs=1e-7)
+            assert slow_ds == pytest.approx((slow.u * dv).sum(axis=0) - slow.margin)
+            pulled = pulled + slow.u * slow_z
+        on_v = flight.forces_asked(at.y + direction.y, z[1:, :, n:])
         assert on_v == pytest.approx(pulled, abs=1e-7 * (1 + np.abs(pulled).max()))
-        assert scale.matrix.dynamics(point.w + step.dw, point.v + step.dv) == pytest.approx(
+        assert flight.matrix.dynamics(w + dw, v + dv) == pytest.approx(
             np.zeros((2, 1, n - 1)), abs=1e-9
         )
-        assert step.ds == pytest.approx(discs(scale, -margin, step.dv))
+        assert ds == pytest.approx(discs(flight, -margin, dv))
         assert weights.sum() == pytest.approx(1)
-        gains = (point.gradient * step.dw[:, None]).sum(axis=(0, -1))[..., None]
-        assert step.dtotal == pytest.approx(gains)
-        assert gains - step.rise + (total - point.floor) * weights / point.weights == pytest.approx(
-            at * share / point.weights
-        )
-        target = at * cones.inverse(point.s) - taken
+        gains = (at.gradient * dw[:, None]).sum(axis=(0, -1))[..., None]
+        assert direction.total == pytest.approx(gains)
+        room = (total - at.floor) * weights / at.weights
+        assert gains - direction.floor + room == pytest.approx(barrier * share / at.weights)
+        scaling = limits.scaling
         for i in range(m):
-            w = scaling.point[:, 0, i] * [1, -1, -1]
-            square = scaling.stiffness[0, i] * (2 * np.outer(w, w) - np.diag([1, -1, -1]))
-            found = z[:, 0, i] + square @ step.ds[:, 0, i]
-            assert found == pytest.approx(
-                target[:, 0, i], rel=1e-5, abs=1e-6 * np.abs(square).max()
+            axis = scaling.w[:, 0, i] * [1, -1, -1]
+            square = scaling.per_square[0, i] * (2 * np.outer(axis, axis) - np.diag([1, -1, -1]))
+            assert z[:, 0, i] + square @ ds[:, 0, i] == pytest.approx(
+                goal[:, 0, i], rel=1e-5, abs=1e-6 * np.abs(square).max()
             )
 
 

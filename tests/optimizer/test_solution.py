@@ -83,6 +83,30 @@ def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:
     assert replace(solution, I_U=solution.I_U - 0.1).residuals()["(9) rate"] > 0.05
     assert replace(solution, H_rU=solution.H_rU * 1j).residuals()["(2) fading"] > 0.1
     assert replace(solution, w=solution.w + 1).residuals()["(13d) ends"] == pytest.approx(1)
+    assert solution.is_feasible()
+    assert not replace(solution, P_B=1.1 * solution.P_B).is_feasible()
+
+
+@pytest.mark.parametrize("least", [0.0, 9.0])
+def test_a_solution_knows_how_much_it_could_gain(small_plan: MakePlan, least: float) -> None:
+    """A least speed, which is not convex, is judged by the half-planes about the speeds flown."""
+    plan = small_plan(
+        {
+            "vehicle.min_speed": least,
+            "flight.duration": 20,
+            "flight.start_velocity": "free",
+            "flight.end_velocity": "free",
+            "radio.base_station.power_dbm": 0,
+            "radio.relay.power_dbm": 0,
+            "radio.fading": "none",
+            "optimizer.tolerance": 1e-6,
+            "optimizer.max_iterations": 200,
+        }
+    )
+    best = optimize(plan)
+    early = optimize(replace(plan, optimizer=replace(plan.optimizer, max_iterations=1)))
+    assert best.kkt_residual() < 0.1 * early.kkt_residual()
+    assert best.kkt_residual() < 2e-4
 
 
 def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None:

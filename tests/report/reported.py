@@ -9,7 +9,7 @@ from faao_mav import optimize
 from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
-from faao_mav.schedule.convert import Conversion, convert
+from faao_mav.schedule.conversion import Conversion, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level
 

@@ -8,7 +8,7 @@ from conftest import MakePlan
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.report.drawing import START, draw_mission
-from faao_mav.schedule.convert import convert
+from faao_mav.schedule.conversion import convert
 
 KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
 

@@ -16,9 +16,8 @@ from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
 from faao_mav.optimizer.algorithm1.trajectory_step import link_sum, optimize_trajectory
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.progress import Observer, Progress
 from faao_mav.optimizer.search.start import straight_flight
-from faao_mav.optimizer.solution import Solution, make_solution
+from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.precoder import SCHEMES
 
 MAX_CONES = 300_000

@@ -12,9 +12,9 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.errors import SolverError
 from faao_mav.optimizer.algorithm1.exponential import merge_equal, shrink
 from faao_mav.optimizer.algorithm1.surrogate import trajectory_exponents
-from faao_mav.optimizer.kinematics import Trajectory
+from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.scaled import LENGTH, flight_variables, solve
+from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.radio.rate import exponents
 
 MAX_STEPS = 20

@@ -1,19 +1,4 @@
-"""The best flight for a max-min of smooth stage rewards: a structured interior-point method.
-
-    maximise  min_j F_j(w),  F_j(w) = (1 / n) sum_n f_jn(w_n)  under (11), (12), (13d)-(13f)
-
-f may be non-concave: the method finds a local optimum near its start. A least speed is kept by
-the half-planes of `slow`, which turn with every step. The limits on ||v_n|| and
-||a_n|| are second-order cones with Nesterov-Todd scaling, a predictor and a corrector. t <= F_j
-is the barrier -mu c sum_j log(F_j - t), t at its optimum at every point. A start on the limits
-is widened by a margin that is driven to zero. A Newton step is one banded LU (`newton`). Where the
-curvature of sum_j lambda_j f_j has the wrong sign for a maximum it is cut to zero; where the
-rewards are then worse than modelled, a proximal term shortens the step. Repeated short steps
-mean that the iterates hug the limits: then the multipliers are centred anew.
-
-Inside, lengths are in 100 m, speeds in v_max, accelerations in a_max, rewards summed over the
-slots and divided by the largest gradient at the start.
-"""
+"""The best flight for a max-min of smooth stage rewards, from given starts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,15 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.rewards import ScaledRewards, Stage, StageValues
-from faao_mav.optimizer.interior.search import FAR, NEAR, Opening, Search
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory, settled
+from faao_mav.optimizer.interior.constraint import Constraint
+from faao_mav.optimizer.interior.limits import FlightLimits
+from faao_mav.optimizer.interior.min_speed import MinSpeedConstraint
+from faao_mav.optimizer.interior.rewards import ScaledRewards, Stage
+from faao_mav.optimizer.interior.search import COLD_START, Search, StartStrategy
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 
-__all__ = ["FAR", "NEAR", "Optimum", "Stage", "StageValues", "maximize", "maximize_all"]
+_ALLOWED = 1e-9
+"""The violation of a limit, relative to it, that a flight may have: rounding of 1,000s of slots."""
 
 
 @dataclass(frozen=True, slots=True)
-class Optimum:
+class LocalOptimum:
     """A feasible flight, its min_j F_j, and the multipliers of t <= F_j, which sum to one.
 
     `residual` is the largest of: the scaled gradient of the Lagrangian, the violation of a
@@ -49,19 +38,39 @@ def maximize(
     stage: Stage,
     start: Trajectory,
     *,
+    constraints: Sequence[Constraint] = (),
     tolerance: float = 1e-6,
     max_iterations: int = 100,
-    opening: Opening = FAR,
-) -> Optimum:
+    strategy: StartStrategy = COLD_START,
+) -> LocalOptimum:
     """Return a local optimum that is never worse than the feasible `start`.
 
-    Where no gain is to be had, as in saturation, or none was found, that is the start itself.
-    `stage` is called once for the start, once per trial step and once for the result.
+    `constraints` are kept beside those of `kin`, by `start` too. Where no gain is to be had, as in
+    saturation, or none was found, the optimum is the start itself. `stage` is called once for the
+    start, once per trial step and once for the result.
+
+    >>> from faao_mav.optimizer.interior.rewards import StageValues
+    >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
+    >>> def near(w):  # the reward falls with the squared distance from (50, 40), as 1 / km^2
+    ...     away = (w - np.array([50.0, 40.0]).reshape(2, *[1] * (w.ndim - 1)))[:, None]
+    ...     packed = np.array([-2e-6, 0, -2e-6]).reshape(3, *[1] * w.ndim)
+    ...     value = -1e-6 * (away * away).sum(axis=0)
+    ...     return StageValues(value, -2e-6 * away, np.broadcast_to(packed, (3, *value.shape)))
+    >>> start = kin.follow(np.full((41, 2), [5.0, 0.0]))
+    >>> best = maximize(kin, near, start)
+    >>> best.converged, best.trajectory.w[20].round().tolist()
+    (True, [50.0, 40.0])
     """
-    (found,) = maximize_all(
-        kin, stage, [start], tolerance=tolerance, max_iterations=max_iterations, opening=opening
+    (optimum,) = maximize_all(
+        kin,
+        stage,
+        [start],
+        constraints=constraints,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        strategy=strategy,
     )
-    return found
+    return optimum
 
 
 def maximize_all(
@@ -69,32 +78,73 @@ def maximize_all(
     stage: Stage,
     starts: Sequence[Trajectory],
     *,
+    constraints: Sequence[Constraint] = (),
     tolerance: float = 1e-6,
     max_iterations: int = 100,
-    opening: Opening = FAR,
-) -> list[Optimum]:
+    strategy: StartStrategy = COLD_START,
+) -> list[LocalOptimum]:
     """Return what `maximize` finds from each of the `starts`; the searches run side by side."""
     w, v = (np.stack(each, axis=1) for each in zip(*((s.w.T, s.v.T) for s in starts), strict=True))
     rewards = ScaledRewards(stage, w)
     first = rewards.first[..., 0]
-    search = Search(kin, rewards, w, v, tolerance=tolerance, opening=opening)
+    kept = (*constraints_of(kin), *constraints)
+    search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy)
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
-        ends = search.run(max_iterations)
-    flown = [
-        settled(kin, start, ends[k].v.T * kin.max_speed) if k in ends else start
+        results = search.run(max_iterations)
+    flights = [
+        feasible(kin, start, results[k].v.T * kin.max_speed, kept) if k in results else start
         for k, start in enumerate(starts)
     ]
-    means = stage(np.stack([flight.w.T for flight in flown], axis=1)).value.mean(axis=-1)
-    found = []
+    means = stage(np.stack([flight.w.T for flight in flights], axis=1)).value.mean(axis=-1)
+    optima = []
     for k, start in enumerate(starts):
         least = float(first[:, k].min())
-        if k not in ends:
+        if k not in results:
             lowest = first[:, k] == least
-            found.append(Optimum(start, least, lowest / lowest.sum(), 0, 0.0, True))
+            optima.append(LocalOptimum(start, least, lowest / lowest.sum(), 0, 0.0, True))
             continue
-        end, value = ends[k], float(means[:, k].min())
-        flight, value = (flown[k], value) if value >= least else (start, least)
-        found.append(
-            Optimum(flight, value, end.weights, end.iterations, end.residual, end.converged)
+        end, value = results[k], float(means[:, k].min())
+        flight, value = (flights[k], value) if value >= least else (start, least)
+        optima.append(
+            LocalOptimum(flight, value, end.weights, end.iterations, end.residual, end.converged)
         )
-    return found
+    return optima
+
+
+def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
+    """Return the constraints of `kin` itself, the limits on speed and acceleration first."""
+    if kin.min_speed > 0:
+        return FlightLimits(), MinSpeedConstraint(kin.min_speed / kin.max_speed)
+    return (FlightLimits(),)
+
+
+def feasible(
+    kin: Kinematics,
+    start: Trajectory,
+    v: Real,
+    constraints: Sequence[Constraint] | None = None,
+) -> Trajectory:
+    """Return the flight at the speeds v (n, 2), blended with `start` until it keeps the limits.
+
+    The share of `start` is the least of 0, 1e-9, 1e-8 ... 0.1 and 1 that will do.
+    """
+    kept = constraints_of(kin) if constraints is None else constraints
+
+    def excess(flight: Trajectory) -> float:
+        return max(constraint.excess(kin, flight) for constraint in kept)
+
+    exact, allowed = kin.follow(v), max(_ALLOWED, excess(start))
+    for share in (0.0, *10.0 ** np.arange(-9, 0)):
+        blend = Trajectory(
+            *(
+                (1 - share) * own + share * other
+                for own, other in (
+                    (exact.w, start.w),
+                    (exact.v, start.v),
+                    (exact.a, start.a),
+                )
+            )
+        )
+        if excess(blend) <= allowed:
+            return blend
+    return start

@@ -1,187 +1,210 @@
 """One Newton step of the interior-point method, by a banded LU and a border of J + 1.
 
-From (w, v, t), slacks (s, F - t) and multipliers (z, weights, y) the step solves
+From (w, v, t), constraints with multipliers z, slacks F - t with multipliers `weights`, and the
+multipliers y of the motion, the step solves
 
-    H dw + A_w^T y+ - G^T weights+ = 0            A (dw, dv) = -A (w, v)
-    A_v^T y+ - D^T z_1+ = 0                       ds = (-margin, D dv)
-    z+ + W^-2 ds = mu s^-1 - correction           sum weights+ = 1
-    G dw - dt + (F - t) weights+ / weights = mu c / weights
+    H dw + A_w^T y+ - G^T weights+ = forces of z+ on w     A (dw, dv) = -A (w, v)
+    A_v^T y+ = forces of z+ on v and a                     z+ + K ds = mu s^-1 - correction
+    G dw - dt + (F - t) weights+ / weights = mu c / weights     sum weights+ = 1
 
-with + for new multipliers, H = -sum_j weights_j Hessian(F_j), G the gradients of the F_j, W the
-scaling of `cones`, c the share of the barrier that keeps t below the F_j, and
-D v = (v, k (v_{n+1} - v_n)) what the limits bound. A least speed adds to D the half-planes of
-`slow`, whose own curvature is left out.
-
-Several flights take their steps side by side, each its own: see `iterate`.
+with + for new multipliers, H = -sum_j weights_j Hessian(F_j), G the gradients of the F_j, c the
+share of the barrier that keeps t below the F_j, and K, ds, s of every constraint: see
+`constraint`. Several flights take their steps side by side, each its own: see `iterate`.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.optimizer.interior import cones
-from faao_mav.optimizer.interior.banded import SIZE, Factors, Q, V, W, Y
-from faao_mav.optimizer.interior.iterate import NONE, FlightScale, Point, Step
+from faao_mav.optimizer.interior.banded import Factors, Q, V, W, Y
+from faao_mav.optimizer.interior.cones import TINY
+from faao_mav.optimizer.interior.constraint import (
+    Forces,
+    Move,
+    ScaledFlight,
+    Stiffness,
+    added,
+    quadratic,
+)
+from faao_mav.optimizer.interior.iterate import Direction, Iterate
 
-_TINY = float(np.finfo(float).tiny)
 _UNBOUNDED = np.array([1e20, 0.0, 1e20])[:, None, None]
+"""The compliance of an acceleration without a limit: large enough that its force is nothing."""
+
+_MIN_CURVATURE = 1e-8
+"""The least curvature along a direction, per squared length, that counts as that of a minimum.
+
+Chosen; what a change costs is not measured.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Newton:
-    """The factored system at a point; `curvature` (3, flights, n) is H with its proximal term.
+    """The factored system at an iterate; `curvature` (3, flights, n) is H with its proximal term.
 
-    `columns` are the solutions for the gradients of F_j, and for mu = 0 without correction.
+    `columns` are the solutions for the gradients of the F_j, and for mu = 0 without correction;
+    `border` (flights, J, J) is what the first ones leave for the weights.
     """
 
-    scale: FlightScale
-    point: Point
-    share: float
-    scaling: cones.Scaling
+    flight: ScaledFlight
+    at: Iterate
+    barrier_share: float
     curvature: Real
-    give: Real
+    compliance: Real
     factors: Factors
     columns: Real
     border: Real
 
     @classmethod
-    def at(
+    def factored(
         cls,
-        scale: FlightScale,
-        point: Point,
-        scaling: cones.Scaling,
+        flight: ScaledFlight,
+        at: Iterate,
         *,
-        share: float,
+        barrier_share: float,
         proximal: Real,
         cut: Flags,
     ) -> "Newton":
         """Factor the system, with the negative part of H cut where `cut` (flights, 1)."""
-        n, (links, flights) = scale.matrix.slots, point.total.shape[:2]
-        give = np.empty((3, flights, n))  # the last slot has none
-        give[..., :-1] = scaling.give()[..., n:] / scale.gain**2
-        if not scale.gains.all():
-            give[..., :-1] = np.where(scale.gains > 0, give[..., :-1], _UNBOUNDED)
-        curvature = -np.einsum("jb,cjbn->cbn", point.weights[..., 0], point.hessian)
+        matrix, (links, flights) = flight.matrix, at.total.shape[:2]
+        n = matrix.slots
+        curvature = -np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.hessian)
         if cut.any():
-            curvature = np.where(cut, _convex(curvature), curvature)
+            curvature = np.where(cut, _positive_part(curvature), curvature)
         curvature[::2] += proximal
-        at_v, forces, push = scaling.curvature[..., :n], scaling.lean() * point.margin, NONE
-        if point.slow is not None:
-            at_v, push = at_v + point.slow.stiffness(), point.slow.push(0.0, 0.0)
-        factors = scale.matrix.factor(curvature, at_v, give)
+        stiffness = [state.stiffness() for state in at.states]
+        compliance = np.empty((3, flights, n))  # the last slot has none
+        compliance[..., :-1] = _compliance(stiffness)
+        compliance[..., :-1] /= flight.gain**2
+        if not flight.gains.all():
+            compliance[..., :-1] = np.where(flight.gains > 0, compliance[..., :-1], _UNBOUNDED)
+        factors = matrix.factor(
+            np.asarray(added([curvature, *(each.w for each in stiffness)])),
+            np.asarray(added(each.v for each in stiffness)),
+            compliance,
+            [entry for each in stiffness for entry in each.entries],
+        )
 
-        right = np.zeros((links + 1, flights, n, SIZE))
-        right[:links, ..., W] = point.gradient.transpose(1, 2, 3, 0)
-        _load(right[links], scale, give, forces, push)
-        ahead = scale.matrix.dynamics(point.w, point.v)
+        right = np.zeros((links + 1, flights, n, matrix.size))
+        right[:links, ..., W] = at.gradient.transpose(1, 2, 3, 0)
+        _load(right[links], flight, compliance, [state.push(None) for state in at.states])
+        ahead = matrix.dynamics(at.w, at.v)
         np.negative(ahead.transpose(1, 2, 0), out=right[links, :, :-1, Y])
         columns = factors.solve(right)
 
-        border = np.einsum("cibn,jbnc->bij", point.gradient, columns[:links, ..., W])
-        room = (point.total - point.floor) / point.weights
+        border = np.einsum("cibn,jbnc->bij", at.gradient, columns[:links, ..., W])
+        room = (at.total - at.floor) / at.weights
         border[:, range(links), range(links)] += room[..., 0].T
-        return cls(scale, point, share, scaling, curvature, give, factors, columns, border)
+        return cls(flight, at, barrier_share, curvature, compliance, factors, columns, border)
 
-    def convex(self, step: Step) -> Flags:
+    def looks_convex(self, direction: Direction) -> Flags:
         """Tell whether the systems look like those of minima, by two signs, (flights, 1)."""
         both = self.border + np.swapaxes(self.border, 1, 2)
         both = np.where(np.isfinite(both).all(axis=(1, 2), keepdims=True), both, 0.0)
-        size = sum(np.einsum("cbn,cbn->b", x, x) for x in (step.dw, step.dv))
-        falls = self.decrease(step) > 1e-8 * size[:, None]
+        move = direction.move
+        size = sum(np.einsum("cbn,cbn->b", x, x) for x in (move.w, move.v))
+        falls = self.decrease(direction) > _MIN_CURVATURE * size[:, None]
         return np.asarray((np.linalg.eigvalsh(both)[:, :1] > 0) & falls)
 
-    def step(self, mu: Real, correction: Real | None = None, of_slow: Real = NONE) -> Step:
-        """Solve for `mu` (flights, 1), less the second-order `correction` (3, flights, m).
+    def predictor(self) -> Direction:
+        """Return the direction for mu = 0 without a correction."""
+        return self._direction(self.columns[-1], np.zeros((1, 1)), (None,) * len(self.at.states))
 
-        `of_slow` (flights, n) is that of `Slow`. Without a correction mu must be zero.
-        """
-        point, scaling, scale, slow = self.point, self.scaling, self.scale, self.point.slow
-        n, (links, flights) = scale.matrix.slots, point.total.shape[:2]
-        alone, target = self.columns[links], None
-        if correction is not None:
-            target = mu * cones.inverse(point.s) - correction
-            right, push = np.zeros((1, flights, n, SIZE)), NONE
-            if slow is not None:
-                push = slow.push(mu, of_slow) - slow.push(0.0, 0.0)
-            _load(right[0], scale, self.give, target[1:], push)
-            alone = alone + self.factors.solve(right)[0]
+    def corrector(self, mu: Real, ahead: Direction, share: Real) -> Direction:
+        """Return the direction for mu (flights, 1), corrected by `share` of `ahead`."""
+        targets = tuple(
+            state.target(mu, step, share)
+            for state, step in zip(self.at.states, ahead.steps, strict=True)
+        )
+        return self.aimed(mu, targets)
 
+    def aimed(self, mu: Real, targets: tuple[Any, ...]) -> Direction:
+        """Return the direction for mu (flights, 1) and the `targets` of the constraints."""
+        flight, states = self.flight, self.at.states
+        right = np.zeros((1, self.at.w.shape[1], flight.matrix.slots, flight.matrix.size))
+        pushes = [state.push(target) for state, target in zip(states, targets, strict=True)]
+        _load(right[0], flight, self.compliance, pushes)
+        return self._direction(self.columns[-1] + self.factors.solve(right)[0], mu, targets)
+
+    def _direction(self, alone: Real, mu: Real, targets: tuple[Any, ...]) -> Direction:
+        """Return the direction that is `alone` without the pull of the rewards."""
+        at, flight = self.at, self.flight
+        links, flights = at.total.shape[:2]
         # G dw - dt + (F - t) weights+ / weights = mu c / weights, and the weights sum to one
         system = np.ones((flights, links + 1, links + 1))
         system[:, :links, :links] = self.border
         system[:, :links, links], system[:, links, links] = -1, 0
-        wanted = np.ones((flights, links + 1, 1))
-        known = np.einsum("cjbn,bnc->bj", point.gradient, alone[..., W])
-        wanted[:, :links, 0] = (mu * self.share / point.weights)[..., 0].T - known
-        solved = np.linalg.solve(system, wanted).transpose(1, 0, 2)
-        weights, rise = solved[:links], solved[links]
-        found = alone + np.einsum("jb,jbnk->bnk", weights[..., 0], self.columns[:links])
+        right = np.ones((flights, links + 1, 1))
+        gained = np.einsum("cjbn,bnc->bj", at.gradient, alone[..., W])
+        right[:, :links, 0] = (mu * self.barrier_share / at.weights)[..., 0].T - gained
+        solved = np.linalg.solve(system, right).transpose(1, 0, 2)
+        weights, floor = solved[:links], solved[links]
+        unknowns = alone + np.einsum("jb,jbnk->bnk", weights[..., 0], self.columns[:links])
 
-        dw, dv, q, y = (found[..., part].transpose(2, 0, 1) for part in (W, V, Q, Y))
+        dw, dv, q, y = (unknowns[..., part].transpose(2, 0, 1) for part in (W, V, Q, Y))
         q, y = q[..., :-1], y[..., :-1]
-        moves = np.empty_like(point.pair)
-        z = moves[:, 1]
-        scale.enter(moves[:, 0], -point.margin, dv)
-        z[1:, :, n:] = q * scale.per_gain
-        # the multipliers of the speeds from stationarity, not from W^-2 ds: that keeps its digits
-        z[1:, :, :n] = scale.left_over(y, z[1:, :, n:])
-        of_least = NONE, NONE
-        if slow is not None:
-            slope = slow.slope(dv)
-            raised = slow.raised(slope, mu, of_slow)
-            z[1:, :, :n] -= slow.u * raised
-            of_least = slope, raised - slow.z
-        z[0] = scaling.radial(target, -point.margin, z[1:])
-        z -= point.z
-        return Step(
-            dw=dw,
-            dv=dv,
-            dy=y - point.y,
-            moves=moves,
-            slow=of_least,
-            dweights=weights - point.weights,
-            dtotal=np.einsum("cjbn,cbn->jb", point.gradient, dw)[..., None],
-            rise=rise,
+        on_a = q * flight.per_gain
+        rest, move = Forces(v=flight.forces_asked(y, on_a), a=on_a), Move(dw, dv, unknowns)
+        steps: list[Any] = []
+        for state, target in zip(at.states[:0:-1], targets[:0:-1], strict=True):
+            step, supplied = state.solved(move, target, rest)
+            rest = rest.less(supplied)
+            steps.append(step)
+        steps.append(at.states[0].solved(move, targets[0], rest)[0])
+        return Direction(
+            move=move,
+            y=y - at.y,
+            steps=tuple(reversed(steps)),
+            weights=weights - at.weights,
+            total=np.einsum("cjbn,cbn->jb", at.gradient, dw)[..., None],
+            floor=floor,
         )
 
-    def bend(self, step: Step) -> Real:
+    def bend(self, direction: Direction) -> Real:
         """Return dw^T H dw, (flights, 1)."""
-        return _quadratic(self.curvature, step.dw)
+        return quadratic(self.curvature, direction.move.w)
 
-    def decrease(self, step: Step) -> Real:
-        """Return the curvature of the whole model along `step`, (flights, 1)."""
-        point = self.point
-        kink = point.weights / (point.total - point.floor) * (step.dtotal - step.rise) ** 2
-        found = self.bend(step) + _quadratic(self.scaling.curvature, step.ds[1:]) + kink.sum(axis=0)
-        if point.slow is not None:
-            found += _quadratic(point.slow.stiffness(), step.dv)
-        return np.asarray(found)
+    def decrease(self, direction: Direction) -> Real:
+        """Return the curvature of the whole model along `direction`, (flights, 1)."""
+        at = self.at
+        kink = at.weights / (at.total - at.floor) * (direction.total - direction.floor) ** 2
+        of_constraints = [
+            state.curvature(step) for state, step in zip(at.states, direction.steps, strict=True)
+        ]
+        return np.asarray(self.bend(direction) + sum(of_constraints) + kink.sum(axis=0))
 
 
-def _load(right: Real, scale: FlightScale, give: Real, forces: Real, push: Real) -> None:
-    """Enter forces (2, flights, 2 n - 1) on what the limits bound, and a `push` on the speeds."""
-    n = scale.matrix.slots
-    x, y = scale.gains * forces[..., n:]
-    xx, xy, yy = give[..., :-1]
-    right[..., V] = (forces[..., :n] * scale.matrix.moves_v + push).transpose(1, 2, 0)
+def _load(right: Real, flight: ScaledFlight, compliance: Real, pushes: list[Forces]) -> None:
+    """Enter what the forces `pushes` of the constraints make of the right-hand side."""
+    matrix = flight.matrix
+    on_w, on_v, on_a = (added(getattr(push, part) for push in pushes) for part in "wva")
+    if isinstance(on_w, np.ndarray):
+        right[..., W] = (on_w * matrix.moves_w).transpose(1, 2, 0)
+    right[..., V] = (on_v * matrix.moves_v).transpose(1, 2, 0)
+    x, y = flight.gains * on_a
+    xx, xy, yy = compliance[..., :-1]
     right[:, :-1, Q.start] = xx * x + xy * y
     right[:, :-1, Q.start + 1] = xy * x + yy * y
+    for push, own in zip(pushes, flight.own, strict=True):
+        right[..., own] = push.own
 
 
-def _quadratic(packed: Real, x: Real) -> Real:
-    """Return sum_n x_n^T M_n x_n, (flights, 1), of M (3, flights, n) and x (2, flights, n)."""
-    xx, xy, yy = packed
-    east, north = x
-    each = xx * east * east + 2 * xy * east * north + yy * north * north
-    return np.asarray(each.sum(axis=-1, keepdims=True))
+def _compliance(stiffness: list[Stiffness]) -> Real:
+    """Return the inverse of the whole stiffness on the accelerations, (3, flights, n - 1)."""
+    acting = [each for each in stiffness if np.ndim(each.a)]
+    if len(acting) == 1 and acting[0].compliance is not None:
+        return acting[0].compliance
+    xx, xy, yy = np.asarray(added(each.a for each in acting))
+    return np.asarray(np.stack([yy, -xy, xx]) / (xx * yy - xy * xy))
 
 
-def _convex(packed: Real) -> Real:
+def _positive_part(packed: Real) -> Real:
     """Return the nearest positive semidefinite matrices, (3, flights, n)."""
     xx, xy, yy = packed
     middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     low = np.minimum(middle - radius, 0)
     # with eigenvalues low < 0 <= high: high (M - low I) / (high - low); with both < 0: zero
-    share = np.where(low < 0, np.maximum(middle + radius, 0) / np.maximum(2 * radius, _TINY), 1)
+    share = np.where(low < 0, np.maximum(middle + radius, 0) / np.maximum(2 * radius, TINY), 1)
     return np.stack([share * (xx - low), share * xy, share * (yy - low)])

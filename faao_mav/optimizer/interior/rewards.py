@@ -6,12 +6,10 @@ from typing import Protocol
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-
-LENGTH = 100.0
-"""Unit of length inside the solver, m."""
+from faao_mav.optimizer.interior.cones import TINY
+from faao_mav.optimizer.kinematics import LENGTH
 
 _FLAT = 1e-9  # a gain per 100 m, relative to the reward, that is not worth a detour
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +46,7 @@ class ScaledRewards:
         steepest = np.abs(self.values.gradient).max(axis=(0, -1))[..., None] * LENGTH
         above = self.first - self.first.min(axis=0)
         # an F_j far above the least one has no say in the unit
-        near = steepest / np.maximum(steepest + above, _TINY)
+        near = steepest / np.maximum(steepest + above, TINY)
         unit = (near * steepest).max(axis=0)
         self.flat: Flags = ~(unit > _FLAT * np.abs(self.first).max(axis=0))
         self.unit = np.where(self.flat, 1.0, unit)

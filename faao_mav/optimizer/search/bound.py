@@ -19,7 +19,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.kinematics import Kinematics
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
 from faao_mav.optimizer.rates.rate_model import best_curve
@@ -57,7 +57,7 @@ def upper_bound(problem: Problem, known: float = 0.0) -> Bound:
     """
     import cvxpy as cp
 
-    from faao_mav.optimizer.scaled import LENGTH, flight_variables, solve
+    from faao_mav.optimizer.scaled import flight_variables, solve
 
     kin = problem.kinematics
     ranges = [reachable_distances(kin, link.station) for link in problem.links]

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.maximize import Stage, StageValues, maximize_all
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory, followed, settled
+from faao_mav.optimizer.interior.maximize import feasible, maximize_all
+from faao_mav.optimizer.interior.rewards import Stage, StageValues
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 
 SLOTS = 60
 """Slots of the coarse copy: enough for a route's shape."""
@@ -77,7 +78,7 @@ def improved(
     if len(routes) > 1 and kin.slots >= WORTH_IT and kin.min_speed == 0:
         copy, reward = _coarse(kin), Blocks(stage, kin.slots, SLOTS)
         tolerance = max(tolerance, _COARSE)
-        on_copy = [followed(copy, _resampled(kin, flight, copy)) for flight in on_copy]
+        on_copy = [copy.follow(_resampled(kin, flight, copy)) for flight in on_copy]
     solved = maximize_all(copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations)
     found = dict(zip(routes, solved, strict=True))
     ranked = sorted(found, key=lambda name: -found[name].value)
@@ -92,7 +93,7 @@ def improved(
     flights = {name: optimum.trajectory for name, optimum in found.items()}
     if copy is not kin:
         flights = {
-            name: settled(kin, routes[name], _resampled(copy, flight, kin))
+            name: feasible(kin, routes[name], _resampled(copy, flight, kin))
             for name, flight in flights.items()
         }
     return Rough(flights, hopeful)

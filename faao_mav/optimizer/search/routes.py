@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory, followed
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.cruise import cruise_by
 from faao_mav.optimizer.search.start import even_speed, fewest_slots, straight_flight
 
@@ -116,4 +116,4 @@ def _flown(kin: Kinematics, legs: list[_Leg]) -> Trajectory | None:
     for k in range(stops):
         hover = spare // stops + (k < spare % stops)
         parts[k + 1] = np.vstack([np.zeros((hover, 2)), parts[k + 1][1:]])
-    return followed(kin, np.vstack(parts))
+    return kin.follow(np.vstack(parts))

@@ -1,0 +1,185 @@
+"""Constraints g(x_n) >= 0 on the position, the speed or the acceleration of every slot.
+
+g need not be linear: about x_n the method sees the half-plane u^T x >= u^T x_n - g(x_n) with u the
+gradient of g. Where g is convex that half-plane lies inside the true set, as for "faster than" and
+"outside a disc": a step that keeps the linear slack keeps the true one, which is larger. The
+half-planes turn with every step (successive convex approximation, one Newton step each), and the
+curvature of g is left out, for it misleads. Where x_n is fixed the slot is off: s = 1, z = 0, no
+force.
+
+A new constraint of this kind is one class with two members, `MinSpeedConstraint` for example:
+
+    class NorthOf(HalfPlanes):
+        quantity: ClassVar = "w"
+        def slack(self, x):
+            return x[1] - self.northing / LENGTH, np.array([0.0, 1.0])[:, None, None]
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.interior.cones import TINY
+from faao_mav.optimizer.interior.constraint import (
+    Constraint,
+    Forces,
+    Move,
+    ScaledFlight,
+    Start,
+    Stiffness,
+)
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+
+
+@dataclass(frozen=True)
+class Slacks:
+    """Scalar slacks s > 0 and multipliers z of inequalities, one per slot, with their margins.
+
+    `on` is one where the inequality holds and zero where there is none, s, z, margin alike
+    (flights, n). A step is (ds, dz), a target what z + z / s ds has to be, (flights, n).
+    """
+
+    on: Real
+    s: Real
+    z: Real
+    margin: Real
+
+    def count(self) -> Real:
+        """Return in how many slots the inequality holds, (flights, 1)."""
+        return np.asarray(self.on.sum(axis=-1, keepdims=True))
+
+    def gap(self, share: Real | float = 0.0, step: Any = None) -> Real:
+        """Return the sum of s z after `share` of `step`, (flights, 1)."""
+        ds, dz = (0.0, 0.0) if step is None else step[:2]
+        both = (self.s + share * ds * self.on) * (self.z + share * dz)
+        return np.asarray(both.sum(axis=-1, keepdims=True))
+
+    def size(self) -> Real:
+        """Return the sum of the multipliers, (flights, 1)."""
+        return np.asarray(self.z.sum(axis=-1, keepdims=True))
+
+    def violation(self) -> Real:
+        """Return the largest margin, (flights, 1)."""
+        return np.asarray(self.margin.max(axis=-1, keepdims=True))
+
+    def target(self, mu: Real, ahead: tuple[Real, Real], share: Real) -> Real:
+        """Return (mu - ds dz) / s at `share` of the step `ahead`."""
+        return np.asarray((self.on * mu - ahead[0] * ahead[1] * share**2) / self.s)
+
+    def raised(self, ds: Real, target: Real | None) -> Real:
+        """Return the new multipliers `target` - z / s ds, (flights, n)."""
+        change = -self.z * ds / self.s
+        return np.asarray(change if target is None else target + change)
+
+    def curvature(self, step: tuple[Real, Real]) -> Real:
+        """Return the sum of z / s ds^2, the margins left out, (flights, 1)."""
+        ds = step[0] + self.margin
+        return np.asarray((self.z / self.s * ds * ds).sum(axis=-1, keepdims=True))
+
+    def reach(self, step: tuple[Real, Real]) -> Real:
+        """Return the share of `step` at which a slack or a multiplier vanishes, (flights, 1)."""
+        falls = np.maximum(
+            -step[0] * self.on / self.s, -step[1] * self.on / np.maximum(self.z, TINY)
+        )
+        return np.asarray(1 / np.maximum(falls.max(axis=-1, keepdims=True), TINY))
+
+
+@dataclass(frozen=True)
+class HalfPlanesState(Slacks):
+    """A constraint g(x_n) >= 0 at an iterate: s = g + margin, its gradient u (2, flights, n)."""
+
+    constraint: "HalfPlanes"
+    flight: ScaledFlight
+    u: Real
+
+    def forces(self) -> Forces:
+        """Return u z."""
+        return self._on_quantity(self.z)
+
+    def stiffness(self) -> Stiffness:
+        """Return z / s u u^T."""
+        x, y = self.u
+        packed = self.z / self.s * np.stack([x * x, x * y, y * y])
+        return Stiffness(**{self.constraint.quantity: packed})
+
+    def push(self, target: Real | None) -> Forces:
+        """Return the forces u z+ where x stays: those of the margins, or of `target`."""
+        return self._on_quantity(self.raised(-self.margin, None) if target is None else target)
+
+    def solved(
+        self,
+        move: Move,
+        target: Real | None,
+        rest: Forces,  # noqa: ARG002
+    ) -> tuple[tuple[Real, Real], Forces]:
+        """Return the change of the linear slack along `move`, with that of its multiplier."""
+        dx = self.constraint.bounded(self.flight, move.w, move.v)
+        ds = np.asarray((self.u * dx).sum(axis=0) - self.margin)
+        z = self.raised(ds, target)
+        return (ds, z - self.z), self._on_quantity(z)
+
+    def moved(
+        self, w: Real, v: Real, share: Real | float, step: tuple[Real, Real]
+    ) -> "HalfPlanesState":
+        """Return the state after `share` of `step`, with g and u at w and v."""
+        g, u = self.constraint.slack(self.constraint.bounded(self.flight, w, v))
+        margin = self.margin * (1 - share)
+        s = np.where(self.on > 0, g - self.constraint.inside + margin, 1.0)
+        return replace(self, s=s, z=self.z + share * step[1], margin=margin, u=u * self.on)
+
+    def centred(self, mu: Real) -> "HalfPlanesState":
+        """Return the same slacks with z = mu / s."""
+        return replace(self, z=mu * self.on / self.s)
+
+    def _on_quantity(self, z: Real) -> Forces:
+        return Forces(**{self.constraint.quantity: self.u * z})
+
+
+class HalfPlanes(Constraint):
+    """A constraint g(x_n) >= 0 in solver units; subclasses say what x and g are."""
+
+    quantity: ClassVar[Literal["w", "v", "a"]]
+    """What x is: the scaled position w, speed v or acceleration a."""
+
+    @property
+    def inside(self) -> float:
+        """By how much the method's g is smaller, so that its result ends inside the true set.
+
+        Chosen: ten times the margin that a search to a tolerance of 1e-6 may leave.
+        """
+        return 1e-6
+
+    @property
+    def headroom(self) -> float:
+        """The slack that starts are given where they have less. Chosen, as 10 m or v_max / 10."""
+        return 0.1
+
+    def slack(self, x: Real) -> tuple[Real, Real]:
+        """Return g (flights, n) and its gradient (2, flights, n) at x (2, flights, n)."""
+        raise NotImplementedError
+
+    def bounded(self, flight: ScaledFlight, w: Real, v: Real) -> Real:
+        """Return x (2, flights, n) at scaled w and v, or its change at changes of them."""
+        return {"w": w, "v": v}[self.quantity] if self.quantity != "a" else flight.accelerations(v)
+
+    def begin(self, flight: ScaledFlight, start: Start) -> HalfPlanesState:
+        """Return the centred state at `start`, widened where g is less than `headroom`."""
+        x = self.bounded(flight, start.w, start.v)
+        matrix = flight.matrix
+        moves = {"w": matrix.moves_w, "v": matrix.moves_v, "a": 1.0 * (flight.gains > 0)}
+        on = np.broadcast_to(moves[self.quantity], x.shape[1:])
+        none = np.zeros(x.shape[1:])
+        margin = on * np.maximum(0, self.inside + self.headroom - self.slack(x)[0])
+        unset = HalfPlanesState(on, none, none, margin, self, flight, np.zeros(x.shape))
+        return unset.moved(start.w, start.v, 0.0, (none, none)).centred(start.mu)
+
+    def excess(self, kin: Kinematics, flight: Trajectory) -> float:
+        """Return the largest -g of the flight, 0 where there is none."""
+        x = {
+            "w": flight.w / LENGTH,
+            "v": flight.v / kin.max_speed,
+            "a": flight.a[kin.first_bounded_acceleration : -1] / kin.max_acceleration,
+        }[self.quantity]
+        return max(0.0, -float(self.slack(x.T[:, None])[0].min()))

@@ -1,0 +1,50 @@
+"""Both links' rates as functions of the UAV's position: what a flight maximises the means of."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.design import Design
+from faao_mav.optimizer.interior.rewards import StageValues
+from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.rates.place import PlaceRate, place
+from faao_mav.optimizer.rates.rate_model import rate_model
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RateField:
+    """The rates of the `links` by their models `rates`: a `Stage` of J = 2 rewards in bits."""
+
+    links: tuple[Link, ...]
+    rates: tuple[PlaceRate, ...]
+
+    def value(self, w: Real) -> Real:
+        """Return the rates (2, ..., n) at positions w (2, ..., n), bits."""
+        rates = []
+        for link, rate in zip(self.links, self.rates, strict=True):
+            at = place(link, w)
+            rates.append(rate.value(at.gain_log, at.cosine))
+        return np.stack(rates)
+
+    def __call__(self, w: Real) -> StageValues:
+        """Return rates, gradients and Hessians at positions w (2, ..., n), as `Stage` has them."""
+        shape = (len(self.links), *w.shape[1:])
+        value, gradient, hessian = np.empty(shape), np.empty((2, *shape)), np.empty((3, *shape))
+        for j, (link, rate) in enumerate(zip(self.links, self.rates, strict=True)):
+            at = place(link, w)
+            partials = rate.partials(at.gain_log, at.cosine)
+            value[j] = partials.value
+            gradient[:, j], hessian[:, j] = at.by_position(partials)
+        return StageValues(value, gradient, hessian)
+
+
+def rate_field(problem: Problem, design: Design) -> RateField:
+    """Return the rates of `problem` under `design`, as far as a flight can reach."""
+    kin = problem.kinematics
+    reach = kin.max_speed * kin.time_step * (kin.slots - 1)
+    rates = []
+    for link in problem.links:
+        from_ends = max(np.linalg.norm(end - link.station) for end in (kin.start, kin.end))
+        rates.append(rate_model(link, design, float(from_ends) + reach / 2))
+    return RateField(problem.links, tuple(rates))
