@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from conftest import SMALL, edited, free_port
-from stations import VEHICLE
 from typer.testing import CliRunner
 
 from faao_mav import download, upload
@@ -15,7 +14,7 @@ from faao_mav.cli.main import app
 from faao_mav.mavlink.messages import ParamRequestRead
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import running
-from faao_mav.mavlink.protocol import Result
+from faao_mav.mavlink.protocol import Address, Result
 from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
@@ -166,7 +165,7 @@ def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: b
 
 def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:
     port = free_port()
-    mock = MockAutopilot(home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1)
     mock.armed = True
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock, f"udpin:127.0.0.1:{port}"):
@@ -248,7 +247,7 @@ def test_the_mock_flies_by_its_parameters(
     assert run("autopilot", *listen, "--parameters", slow).exit_code == 0
     quick, late = (mock._fly(mission).t[-1] for mock in made)
     assert late > quick + 20
-    (answer,) = made[1].parameters.on(ParamRequestRead(VEHICLE, "WPNAV_ACCEL", -1))
+    (answer,) = made[1].parameters.on(ParamRequestRead(Address(1, 1), "WPNAV_ACCEL", -1))
     assert answer.param_value == read_parameters(slow)["WPNAV_ACCEL"]
     slow.write_text("WPNAV_ACCEL,0\n")
     refused = run("autopilot", *listen, "--parameters", slow)
