@@ -22,7 +22,6 @@ from faao_mav.mission.item import Home, Mission
 from faao_mav.optimizer.solution import load_solution
 from faao_mav.validate.comparison import compare_with_plan
 from faao_mav.vehicle import Track, Vehicle
-from faao_mav.vehicle.dialects import as_stored
 from faao_mav.vehicle.parameter_file import parameter_path, read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -119,7 +118,7 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
         assert [each for each in told["validation"] if each["level"] != "note"] == []
 
         mission, vehicle = read_mission(out), Vehicle(kind)
-        assert download(connection).items == tuple(as_stored(i, vehicle) for i in mission.items)
+        assert download(connection).items == tuple(map(vehicle.type.dialect.stored, mission.items))
 
         first = int(kind == "ardupilot")  # whose item 0 is home
         seen = watch(port, len(mission.items) - 2 + first)

@@ -7,18 +7,19 @@ from faao_mav.errors import LinkError
 from faao_mav.mavlink.machine import AskingMachine, Machine
 from faao_mav.mavlink.manners import autopilot_name
 from faao_mav.mavlink.messages import CommandLong, Envelope, Heartbeat, HomePosition, Message
-from faao_mav.mavlink.protocol import NO_AUTOPILOT, Address, MavState
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION_TYPE,
+    HOME_POSITION,
+    NO_AUTOPILOT,
+    Address,
+    MavCommand,
+    MavState,
+)
 from faao_mav.mission.item import Home
 from faao_mav.vehicle import VehicleType, vehicle_type_by_numbers
 
-_GCS = 6
-"""MAV_TYPE of ground stations."""
-
 _FIXED_WING, _VTOLS = 1, range(19, 26)
 """MAV_TYPEs: VTOLs take missions as planes do."""
-
-_HOME_POSITION, _REQUEST_MESSAGE = 242, 512
-"""Numbers of a message and a command (MAV_CMD_REQUEST_MESSAGE)."""
 
 _LOOK_AGAIN = 0.2
 """Seconds between two looks at whether all vehicles have booted: chosen, a fifth of a heartbeat's
@@ -81,7 +82,7 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message, sender = envelope.message, envelope.sender
-        if not isinstance(message, Heartbeat) or message.type == _GCS:
+        if not isinstance(message, Heartbeat) or message.type == GROUND_STATION_TYPE:
             return ()
         if message.autopilot == NO_AUTOPILOT or self._system not in (None, sender.system):
             return ()
@@ -115,7 +116,7 @@ class AskHome(AskingMachine[list[Home]]):
         self._vehicle = vehicle
 
     def _question(self) -> Message:
-        return CommandLong(self._vehicle, _REQUEST_MESSAGE, 0, float(_HOME_POSITION))
+        return CommandLong(self._vehicle, MavCommand.REQUEST_MESSAGE, 0, float(HOME_POSITION))
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
         message = envelope.message

@@ -11,16 +11,19 @@ from faao_mav.files import check_writable
 from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import Heartbeat, Message
-from faao_mav.mavlink.protocol import GROUND_STATION, NO_AUTOPILOT, Address, MavState
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION,
+    GROUND_STATION_TYPE,
+    NO_AUTOPILOT,
+    Address,
+    MavState,
+)
 from faao_mav.mavlink.transport import Transport, open_transport
 
 T = TypeVar("T")
 
 Observe: TypeAlias = Callable[[str, int, int], object]
 """Told what is going on, how much of it is done, and of how much."""
-
-_GCS = 6
-"""MAV_TYPE of ground stations."""
 
 _BEAT = 1.0
 """Seconds between two heartbeats: what the MAVLink guide asks for."""
@@ -142,7 +145,7 @@ class Link:
     def _beat(self, now: float) -> None:
         if now >= self._next_beat:
             self._next_beat = now + _BEAT
-            self._send([Heartbeat(_GCS, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)])
+            self._send([Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)])
 
     def _send(self, messages: Sequence[Message]) -> None:
         for message in messages:

@@ -45,6 +45,33 @@ class Result(IntEnum):
     OPERATION_CANCELLED = 15
 
 
+class MavSeverity(IntEnum):
+    """MAV_SEVERITY of status texts."""
+
+    CRITICAL = 2
+    WARNING = 4
+    INFO = 6
+
+
+class MavCommand(IntEnum):
+    """MAV_CMD outside of missions."""
+
+    SET_MODE = 176
+    SET_CURRENT = 224
+    REBOOT = 246
+    START = 300
+    ARM = 400
+    SET_INTERVAL = 511
+    REQUEST_MESSAGE = 512
+    REQUEST_CAPABILITIES = 520
+
+
+HOME_POSITION = 242
+"""The number of the message HOME_POSITION."""
+
+GROUND_STATION_TYPE = 6
+"""MAV_TYPE_GCS."""
+
 NO_AUTOPILOT = 8
 """MAV_AUTOPILOT_INVALID: what ground stations and other components say that they are."""
 

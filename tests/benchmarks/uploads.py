@@ -45,7 +45,7 @@ def ours(kind: MockKind, count: int, faults: Faults) -> tuple[str, float, float,
     with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
         try:
             report = upload(a_mission(count), f"udpout:127.0.0.1:{port}", system=1, observe=observe)
-            said = report.parts[0].verdict
+            said: str = report.parts[0].verdict
         except LinkError as error:
             said = str(error)
     end = time.monotonic()

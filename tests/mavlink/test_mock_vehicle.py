@@ -229,6 +229,8 @@ def test_parameters(kind: MockKind) -> None:
     values = desk.tell(ParamRequestList(TO))
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
+    told = {value.param_id: value.param_value for value in values}
+    assert told.items() >= desk.machine.vehicle.defaults().items()
     second = values[1]
     assert desk.tell(ParamRequestRead(TO, "", 1)) == [second]
     assert desk.tell(ParamRequestRead(TO, second.param_id, -1)) == [second]

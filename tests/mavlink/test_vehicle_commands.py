@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot, read_home
 from faao_mav.cli.download import download
-from faao_mav.cli.transfer_progress import transfer_progress
+from faao_mav.cli.progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
 from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of

@@ -18,11 +18,8 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.mock.firmware import MockFirmware
-from faao_mav.mavlink.protocol import ALL_TYPES, Address, MissionType, Result
+from faao_mav.mavlink.protocol import ALL_TYPES, Address, MavSeverity, MissionType, Result
 from faao_mav.vehicle.ardupilot.family import ARDUPILOT
-
-_WARNING = 4
-"""MAV_SEVERITY."""
 
 
 @dataclass(slots=True)
@@ -93,7 +90,7 @@ class ArduPilotFirmware(MockFirmware):
         for part, upload in list(self._uploads.items()):
             if now >= upload.last_item_time + self._manners.upload_patience:
                 del self._uploads[part]
-                out.append(Statustext(_WARNING, "Mission upload timeout"))
+                out.append(Statustext(MavSeverity.WARNING, "Mission upload timeout"))
                 out.append(MissionAck(upload.partner, part, Result.OPERATION_CANCELLED))
             elif now >= upload.last_request_time + self._manners.request_period:
                 out.append(self._ask(part, upload, now))
@@ -113,7 +110,7 @@ class ArduPilotFirmware(MockFirmware):
             return [MissionAck(sender, part, Result.DENIED)]
         result, limit = self.check_count(part, count), self.size_limit(part)
         if result != Result.ACCEPTED:
-            text = Statustext(_WARNING, f"Only {limit} items are supported")
+            text = Statustext(MavSeverity.WARNING, f"Only {limit} items are supported")
             return [MissionAck(sender, part, result), *([text] if count > limit else [])]
         if count == 0:
             self._lists.clear(part)

@@ -1,7 +1,6 @@
 """The mock autopilot: a vehicle without sockets or clock."""
 
 from collections.abc import Callable, Mapping, Sequence
-from enum import IntEnum
 from typing import TypeAlias
 
 import numpy as np
@@ -30,7 +29,10 @@ from faao_mav.mavlink.mock.parameters import ParameterServer
 from faao_mav.mavlink.protocol import (
     ARMED,
     GROUND_STATION,
+    HOME_POSITION,
     Address,
+    MavCommand,
+    MavSeverity,
     MavState,
     MissionType,
 )
@@ -44,24 +46,8 @@ ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 """MAV_RESULT."""
 
 
-class Cmd(IntEnum):
-    """MAV_CMD outside of missions."""
-
-    SET_MODE = 176
-    SET_CURRENT = 224
-    REBOOT = 246
-    START = 300
-    ARM = 400
-    SET_INTERVAL = 511
-    REQUEST_MESSAGE = 512
-    REQUEST_CAPABILITIES = 520
-
-
-_AUTOPILOT_VERSION, _HOME_POSITION = 148, 242
-"""Message numbers."""
-
-_INFO = 6
-"""MAV_SEVERITY."""
+_AUTOPILOT_VERSION = 148
+"""The number of the message AUTOPILOT_VERSION."""
 
 _CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
 """MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
@@ -171,7 +157,7 @@ class MockAutopilot(Machine[None]):
                 return self._on_command(sender, message, now)
             case SetMode(custom_mode=mode):
                 result = self._set_mode(mode, now)
-                return [CommandAck(sender, 11, result)]
+                return [CommandAck(sender, 11, result)]  # the number of the message SET_MODE
             case ParamRequestList() | ParamRequestRead() | ParamSet():
                 return self.parameters.on(message)
             case MissionSetCurrent(seq=seq):
@@ -198,25 +184,25 @@ class MockAutopilot(Machine[None]):
     def _on_command(self, sender: Address, command: CommandLong, now: float) -> list[Message]:
         result, answers = ACCEPTED, list[Message]()
         match command.command:
-            case Cmd.ARM:
+            case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
-            case Cmd.START:
+            case MavCommand.START:
                 self._mode = self._mission_mode
                 result = self._begin(now)
-            case Cmd.SET_MODE:
+            case MavCommand.SET_MODE:
                 result = self._set_mode(self._firmware.requested_mode(command), now)
-            case Cmd.SET_CURRENT:
+            case MavCommand.SET_CURRENT:
                 found = self._set_current(whole(command.param1))
                 result = ACCEPTED if found else DENIED
                 answers += found
-            case Cmd.REQUEST_MESSAGE | Cmd.REQUEST_CAPABILITIES as asked:
-                by_number = asked == Cmd.REQUEST_MESSAGE
+            case MavCommand.REQUEST_MESSAGE | MavCommand.REQUEST_CAPABILITIES as asked:
+                by_number = asked == MavCommand.REQUEST_MESSAGE
                 kind = whole(command.param1) if by_number else _AUTOPILOT_VERSION
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
-            case Cmd.SET_INTERVAL:
+            case MavCommand.SET_INTERVAL:
                 pass
-            case Cmd.REBOOT:
+            case MavCommand.REBOOT:
                 self.reboot(now)
             case _:
                 result = UNSUPPORTED
@@ -226,7 +212,7 @@ class MockAutopilot(Machine[None]):
     def _asked_for(self, kind: int) -> list[Message]:
         if kind == _AUTOPILOT_VERSION:
             return [AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
-        if kind == _HOME_POSITION:
+        if kind == HOME_POSITION:
             home = self.home
             place = (round(home.latitude * 1e7), round(home.longitude * 1e7))
             return [HomePosition(*place, round(home.altitude * 1000))]
@@ -275,7 +261,7 @@ class MockAutopilot(Machine[None]):
             out.append(self._mission_current())
         if now >= flight.end and flight.lands:
             self._flight, self.armed = None, False
-            out.append(Statustext(_INFO, "Landed, disarming"))
+            out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
             out.append(self._heartbeat())
         return out
 

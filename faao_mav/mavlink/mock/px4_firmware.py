@@ -17,13 +17,10 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.mock.firmware import MockFirmware, whole
-from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MissionType, Result
+from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MavSeverity, MissionType, Result
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import Mission
 from faao_mav.vehicle.px4 import PX4
-
-_CRITICAL, _INFO = 2, 6
-"""MAV_SEVERITY."""
 
 _POSITIONS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
 """Commands that PX4 counts as positions."""
@@ -212,7 +209,9 @@ class Px4Firmware(MockFirmware):
         done = transfer.next_sequence == transfer.count
         free = transfer.state == "idle" or (transfer.state == "sending" and (again or done))
         if not free or mission_type not in tuple(MissionType):
-            return [Statustext(_INFO, "Mission download request ignored, already active")]
+            return [
+                Statustext(MavSeverity.INFO, "Mission download request ignored, already active")
+            ]
         part = MissionType(mission_type)
         items = self._lists.items(part)
         self._transfer = _Transfer("sending", sender, part, 0, len(items), 0, now, items=items)
@@ -247,4 +246,4 @@ class Px4Firmware(MockFirmware):
 
 
 def _said(text: str) -> Statustext:
-    return Statustext(_CRITICAL, f"{text}\t")
+    return Statustext(MavSeverity.CRITICAL, f"{text}\t")
