@@ -178,12 +178,11 @@ class Newton:
 
 def _load(right: Real, flight: ScaledFlight, compliance: Real, pushes: list[Forces]) -> None:
     """Enter what the forces `pushes` of the constraints make of the right-hand side."""
-    matrix = flight.matrix
-    on_w, on_v, on_a = (added(getattr(push, part) for push in pushes) for part in "wva")
-    if isinstance(on_w, np.ndarray):
-        right[..., W] = (on_w * matrix.moves_w).transpose(1, 2, 0)
-    right[..., V] = (on_v * matrix.moves_v).transpose(1, 2, 0)
-    x, y = flight.gains * on_a
+    matrix, total = flight.matrix, Forces.total(pushes)
+    if isinstance(total.w, np.ndarray):
+        right[..., W] = (total.w * matrix.moves_w).transpose(1, 2, 0)
+    right[..., V] = (total.v * matrix.moves_v).transpose(1, 2, 0)
+    x, y = flight.gains * total.a
     xx, xy, yy = compliance[..., :-1]
     right[:, :-1, Q.start] = xx * x + xy * y
     right[:, :-1, Q.start + 1] = xy * x + yy * y
