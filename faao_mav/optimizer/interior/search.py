@@ -287,8 +287,10 @@ class Search:
         finite = np.isfinite(total.sum(axis=0) + _sum(gradient) + _sum(hessian))
         weights = at.weights + share * direction.weights
         missing = (weights * (at.total + share * direction.total - total)).sum(axis=0)
-        missing -= share**2 * newton.bend(direction) / 2
-        allowed = _MISFIT * share * np.maximum(newton.decrease(direction), 0) + self.rewards.noise
+        bend = newton.bend(direction)
+        missing -= share**2 * bend / 2
+        decrease = np.maximum(newton.decrease(direction, bend), 0)
+        allowed = _MISFIT * share * decrease + self.rewards.noise
         taken: Flags = asked & finite & (missing <= allowed)
         if not taken.any():
             return taken
