@@ -4,7 +4,7 @@ import contextlib
 import os
 import stat
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from faao_mav.errors import InputError
@@ -57,6 +57,16 @@ def check_writable(path: str | Path) -> None:
         raise InputError(f"{path}: is write-protected; give another name")
 
 
+PAGES = (".html", ".htm")
+"""What the name of a page may end in."""
+
+
+def check_ending(path: Path, option: str, endings: Sequence[str] | None) -> None:
+    """Raise `InputError` where `option` has a `path` that ends in none of `endings`."""
+    if endings is not None and path.suffix not in endings:
+        raise InputError(f"{option} {path}: give a name that ends in {', '.join(endings)}")
+
+
 def check_apart(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None]) -> None:
     """Raise `InputError` where one file would be written over another of the same command.
 
@@ -79,20 +89,37 @@ def write_whole(path: str | Path, content: bytes) -> None:
     A reader sees the old file or the new one, never a part; a symbolic link stays one. Raises
     `InputError`.
     """
-    target = Path(os.path.realpath(path))
+    write_together({path: content})
+
+
+def write_together(contents: Mapping[str | Path, bytes]) -> None:
+    """Write each content to its path, as `write_whole` does: all of them or none.
+
+    None takes the place of an older file before all are on the disk. Raises `InputError`.
+    """
+    staged: list[tuple[Path, Path]] = []
+    with contextlib.ExitStack() as cleaning:
+        for path, content in contents.items():
+            target = Path(os.path.realpath(path))
+            with _writing(path):
+                beside = f".{target.name[:_SHOWN]}."
+                handle, name = tempfile.mkstemp(prefix=beside, dir=target.parent)
+                cleaning.callback(Path(name).unlink, missing_ok=True)
+                with os.fdopen(handle, "wb") as file:
+                    file.write(content)
+                    file.flush()
+                    os.fsync(file.fileno())
+                Path(name).chmod(0o666 & ~_umask())
+            staged.append((Path(name), target))
+        for path, (temporary, target) in zip(contents, staged, strict=True):
+            with _writing(path):
+                temporary.replace(target)
+
+
+@contextlib.contextmanager
+def _writing(path: str | Path) -> Iterator[None]:
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name[:_SHOWN]}.", dir=target.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            Path(name).chmod(0o666 & ~_umask())
-            Path(name).replace(target)
-        except BaseException:
-            with contextlib.suppress(FileNotFoundError):
-                Path(name).unlink()
-            raise
+        yield
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 

@@ -22,7 +22,9 @@ from faao_mav.plan import (
     Relay,
     Vehicle,
 )
-from faao_mav.schedule import Conversion, assemble, convert, plan_route
+from faao_mav.schedule import Conversion, convert
+from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.initial_route import initial_route
 
 STEADY = settings(derandomize=True, deadline=None, max_examples=200)
 """The same examples on every run."""
@@ -72,7 +74,8 @@ def dash(begin: float, end: float, top: float, acceleration: float, t: Real) -> 
     fine = np.linspace(0.0, speeds[0][-1], 20_001)
     v = np.interp(fine, *speeds)
     s = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2 * np.diff(fine))])
-    return begin + np.interp(t, fine, s)
+    result: Real = begin + np.interp(t, fine, s)
+    return result
 
 
 def dash_hover_dash(hover: float = 40.0, step: float = 0.2) -> Trajectory:
@@ -103,7 +106,7 @@ def nearly_there(conversion: Conversion, w: Real, near: float = 2.0) -> float:
 
 def mission_of(t: Real, w: Real, plan: Plan) -> Mission:
     """Return the mission that flies a bare trajectory."""
-    return assemble(plan_route(t, w, plan), plan)
+    return assemble(initial_route(t, w, plan), plan)
 
 
 def items_of(mission: Mission, plan: Plan) -> tuple[Real, list[float], list[float]]:

@@ -66,6 +66,16 @@ def test_every_public_name_can_be_had() -> None:
         faao_mav.missing  # noqa: B018
 
 
+def test_public_names_are_typed_where_they_are() -> None:
+    typed = {
+        alias.asname: node.module
+        for node in ast.walk(ast.parse((PACKAGE / "__init__.py").read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("faao_mav")
+        for alias in node.names
+    }
+    assert typed == {name: f"faao_mav.{home}" for name, home in faao_mav._HOME.items()}
+
+
 @pytest.mark.parametrize(
     ("statement", "absent"),
     [

@@ -6,19 +6,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import SMALL, edited, free_port
+from conftest import MISSIONS, SMALL, edited, free_port
 from typer.testing import CliRunner
 
 from faao_mav import download, upload
 from faao_mav.cli.main import app
-from faao_mav.mavlink.messages import ParamRequestRead
-from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import Result
+from faao_mav.mavlink.messages import ParamRequestRead, ParamValue
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import Address, Result
 from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.plan.autopilots import autopilots, types
 from faao_mav.vehicle.parameter_file import read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -96,7 +97,7 @@ def test_a_mission_with_errors_is_kept_but_not_called_good(
 
 def test_upload_after_writing(plan: Path, out: Path) -> None:
     port = free_port()
-    mock = MockAutopilot(manners_of("px4"), home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1)
     plan.write_text(edited(GENTLE, {"vehicle.autopilot": "px4", "mission.parameters": "keep"}))
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", "--system", 1)
@@ -113,7 +114,7 @@ def test_a_download_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
         HOME,
         Fence(circles=(Circle((-35.36, 149.16), 90.0, inclusion=True),)),
     )
-    mock = MockAutopilot(manners_of("px4"), home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1)
     with running(mock, f"udpin:127.0.0.1:{port}"):
         assert upload(sent, f"udpout:127.0.0.1:{port}").verified
         result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out)
@@ -128,7 +129,7 @@ def test_a_planes_mission_on_a_plane(out: Path, tmp_path: Path) -> None:
     far = {"flight.start": [0, 200], "flight.end": [200, 0], "flight.time_step": 1}
     plan.write_text(edited(GENTLE, level | free | far | {"vehicle.max_speed": 16}))
     port = free_port()
-    mock = MockAutopilot(ardupilot(), aircraft="plane", home=HOME, beat=0.1)
+    mock = MockAutopilot(behaviour_of("ardupilot"), aircraft="plane", home=HOME, beat=0.1)
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", "--json")
     assert result.exit_code == 0, result.output
@@ -148,7 +149,9 @@ def test_options_of_an_upload_without_one(plan: Path, out: Path, option: tuple[s
 @pytest.mark.parametrize("as_json", [False, True])
 def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: bool) -> None:
     port = free_port()
-    mock = MockAutopilot(ardupilot(refusals={(0, 2): Result.UNSUPPORTED}), home=HOME, beat=0.1)
+    mock = MockAutopilot(
+        behaviour_of("ardupilot", refusals={(0, 2): Result.UNSUPPORTED}), home=HOME, beat=0.1
+    )
     with running(mock, f"udpin:127.0.0.1:{port}"):
         options = ["--json"] if as_json else []
         result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", *options)
@@ -163,8 +166,8 @@ def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: b
 
 def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:
     port = free_port()
-    mock = MockAutopilot(home=HOME, beat=0.1)
-    mock._armed = True
+    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1)
+    mock.armed = True
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock, f"udpin:127.0.0.1:{port}"):
         refused = run(plan, "--out", out, "--upload", connection)
@@ -237,17 +240,77 @@ def test_the_mock_flies_by_its_parameters(
         transport.close()
         made.append(mock)
 
-    monkeypatch.setattr("faao_mav.mavlink.runner.serve", serve)
+    monkeypatch.setattr("faao_mav.mavlink.mock.serve.serve", serve)
     listen = ["--listen", f"udpin:127.0.0.1:{free_port()}"]
     slow = tmp_path / "slow.param"
     slow.write_text("WPNAV_ACCEL,50\nWPNAV_SPEED,300\n")
     assert run("autopilot", *listen, "--parameters", out.with_suffix(".param")).exit_code == 0
     assert run("autopilot", *listen, "--parameters", slow).exit_code == 0
-    quick, late = (mock._fly(mission).t[-1] for mock in made)
+    flights = [mock._fly(mission) for mock in made if mock._fly is not None]
+    quick, late = (flight.t[-1] for flight in flights)
     assert late > quick + 20
-    (answer,) = made[1].parameters.on(ParamRequestRead(1, 1, "WPNAV_ACCEL", -1))
+    (answer,) = made[1].parameters.on(ParamRequestRead(Address(1, 1), "WPNAV_ACCEL", -1))
+    assert isinstance(answer, ParamValue)
     assert answer.param_value == read_parameters(slow)["WPNAV_ACCEL"]
     slow.write_text("WPNAV_ACCEL,0\n")
     refused = run("autopilot", *listen, "--parameters", slow)
     assert refused.exit_code == 2
     assert "WPNAV_ACCEL" in refused.stderr
+
+
+def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
+    plan: Path, out: Path, tmp_path: Path
+) -> None:
+    save, page = tmp_path / "r.npz", tmp_path / "r.html"
+    paper = MISSIONS / "paper_fig3.yaml"  # 100 m/s
+    told = run(paper, "--save", save, "--report", page)
+    assert (told.exit_code, told.stderr) == (0, "")
+    assert re.search(r"^checked      1 error, ", told.stdout, re.M)
+    assert "error: predicted" in told.stdout
+    assert save.exists()
+    assert page.exists()
+    flown = run(paper, "--out", out)
+    assert flown.exit_code == 1
+    assert "the mission does not pass validation; do not fly it" in flown.stderr
+
+
+def test_without_a_mission_there_is_a_result_where_none_is_asked_for(
+    plan: Path, out: Path, tmp_path: Path
+) -> None:
+    plan.write_text(edited(GENTLE, {"mission.max_items": 4}))
+    save, page, figure = (tmp_path / name for name in ("r.npz", "r.html", "r.png"))
+    told = run(plan, "--save", save, "--report", page, "--figure", figure)
+    assert (told.exit_code, told.stderr) == (0, "")
+    assert re.search(r"^mission      none: .*mission\.max_items", told.stdout, re.M)
+    assert save.exists()
+    assert "mission.max_items" in page.read_text()
+    assert figure.exists()
+    data = json.loads(run(plan, "--json").stdout)
+    assert data["mission"] is data["predicted"] is None
+    assert "mission.max_items" in data["no_mission"]
+    asked = run(plan, "--upload", "udpout:127.0.0.1:14550")
+    assert asked.exit_code == 1
+    assert "mission.max_items" in asked.stderr
+    assert asked.stdout == ""
+
+
+def test_a_plane_that_flies_at_no_such_speed_is_planned_but_gets_no_mission(
+    plan: Path, out: Path
+) -> None:
+    text = (MISSIONS / "plane_relay.yaml").read_text()
+    changes = {"vehicle.max_speed": 60, "radio.fading": "none", "flight.time_step": 1}
+    plan.write_text(edited(text, changes))
+    refused = run(plan, "--out", out)
+    assert refused.exit_code == 2
+    assert "vehicle.max_speed: 60 m/s; the plane flies" in refused.stderr
+    told = run(plan)
+    assert told.exit_code == 0
+    assert "mission      none: " in told.stdout
+    assert "vehicle.max_speed: 60 m/s; the plane flies" in told.stdout
+    plan.write_text(edited(text, {"vehicle.parameters": {"AIRSPEED_MIN": -1}}))
+    assert run(plan).exit_code == 2  # a value of no use is not information
+
+
+def test_the_help_names_every_autopilot_and_type_that_is_known() -> None:
+    shown = run("validate", "--help").stdout
+    assert all(name in shown for name in (*autopilots(), *types()))

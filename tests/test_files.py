@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from faao_mav.errors import InputError
-from faao_mav.files import check_apart, check_writable, write_whole
+from faao_mav.files import check_apart, check_writable, write_together, write_whole
 
 
 def test_content_arrives_and_replaces(tmp_path: Path) -> None:
@@ -88,3 +88,11 @@ def test_no_file_is_written_over_another_of_the_same_command(tmp_path: Path) -> 
             check_apart({"--out": tmp_path / name}, {"PLAN": plan})
     with pytest.raises(InputError, match=r"^--save .* is the file of --out too"):
         check_apart({"--out": other, "--save": other}, {"PLAN": plan})
+
+
+def test_files_that_belong_together_are_written_all_or_none(tmp_path: Path) -> None:
+    first, second = tmp_path / "a", tmp_path / "b"
+    write_together({first: b"1", second: b"2"})
+    with pytest.raises(InputError, match="absent/c: cannot be written"):
+        write_together({first: b"new", tmp_path / "absent" / "c": b"new"})
+    assert [path.read_bytes() for path in sorted(tmp_path.iterdir())] == [b"1", b"2"]

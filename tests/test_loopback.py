@@ -15,14 +15,13 @@ from typer.testing import CliRunner
 from faao_mav import download
 from faao_mav.cli.main import app
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mavlink.mock import MockAutopilot, manners_of
-from faao_mav.mavlink.runner import predicted, running
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mavlink.mock.serve import predicted, running
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home, Mission
 from faao_mav.optimizer.solution import load_solution
 from faao_mav.validate.comparison import compare_with_plan
 from faao_mav.vehicle import Track, Vehicle
-from faao_mav.vehicle.dialects import as_stored
 from faao_mav.vehicle.parameter_file import parameter_path, read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -106,7 +105,9 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
     def fly(mission: Mission) -> Track:
         return predicted(Vehicle(kind, parameters=read_parameters(tuned)))(mission)
 
-    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, speedup=SPEEDUP, rate=RATE, beat=0.1)
+    mock = MockAutopilot(
+        behaviour_of(kind), home=HOME, fly=fly, speedup=SPEEDUP, rate=RATE, beat=0.1
+    )
     with running(mock, f"udpin:127.0.0.1:{port}"):
         connection = f"udpout:127.0.0.1:{port}"
         arguments = (plan, "--out", out, "--save", save, "--upload", connection, "--json")
@@ -117,7 +118,7 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
         assert [each for each in told["validation"] if each["level"] != "note"] == []
 
         mission, vehicle = read_mission(out), Vehicle(kind)
-        assert download(connection).items == tuple(as_stored(i, vehicle) for i in mission.items)
+        assert download(connection).items == tuple(map(vehicle.type.dialect.stored, mission.items))
 
         first = int(kind == "ardupilot")  # whose item 0 is home
         seen = watch(port, len(mission.items) - 2 + first)

@@ -8,10 +8,10 @@ from conftest import MISSIONS, SMALL, MakePlan, edited
 
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
-from faao_mav.schedule.convert import Conversion, convert
+from faao_mav.schedule.conversion import Conversion, convert
 from faao_mav.schedule.prediction import predict_delivery
-from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check
+from faao_mav.workflow import plan_mission
 
 SHORT: dict[str, Any] = {
     "vehicle.max_speed": 8.0,
@@ -27,18 +27,11 @@ SHORT: dict[str, Any] = {
 
 
 def checked(text: str, changes: dict[str, Any]) -> tuple[Conversion, Check]:
-    plan = parse_plan(edited(text, changes))
-    solution = optimize(plan)
-    conversion = convert(solution)
-    limits = Limits(max_speed=plan.vehicle.max_speed)
-    found = check(
-        conversion.mission,
-        conversion.vehicle,
-        limits=limits,
-        solution=solution,
-        lead=conversion.schedule.route.lead,
-    )
-    promised = predict_delivery(solution, conversion)
+    result = plan_mission(parse_plan(edited(text, changes)))
+    conversion, found, promised = result.conversion, result.check, result.prediction
+    assert conversion is not None
+    assert found is not None
+    assert promised is not None
     assert found.link is not None
     assert found.link.predicted_rate == pytest.approx(promised.rates.R_avg, rel=0.005)
     assert found.link.rms_position_error == pytest.approx(promised.rms_position_error, abs=1.0)
@@ -55,7 +48,7 @@ def complaints(found: Check) -> list[str]:
 @pytest.mark.parametrize("name", ["copter_relay", "paper", "paper_active"])
 def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
     text = (MISSIONS / f"{name}.yaml").read_text()
-    changes = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
+    changes: dict[str, Any] = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
     if name == "copter_relay":
         changes["radio.fading_samples"] = 4
     _, found = checked(text, SHORT | changes)

@@ -2,31 +2,30 @@
 
 import math
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.options import SigningKey
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.shared import File, SigningKey, check_known, exit_status, option
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.messages import Row
+    from faao_mav.mavlink.messages import WireItem
     from faao_mav.mavlink.mock import MockAutopilot
-    from faao_mav.mavlink.transfer.protocol import MissionType
+    from faao_mav.mavlink.protocol import MissionType
     from faao_mav.mission.item import Home
-    from faao_mav.plan.autopilots import Autopilot
 
-_REST = 0.5  # s without a change, after which a list is told
+_REST = 0.5
+"""Seconds without a change after which a list is told; chosen: longer than between two items."""
 
 
+@exit_status()
 def autopilot(
     listen: Annotated[
         str,
-        typer.Option(
-            metavar="CONNECTION",
-            help="Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
+        option(
+            "CONNECTION",
+            "Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
             "udpout:HOST:PORT to call one.",
         ),
     ] = "udpin:127.0.0.1:14550",
@@ -35,100 +34,88 @@ def autopilot(
         typer.Option(help="Whose manners it has."),
     ] = "ardupilot",
     aircraft: Annotated[
-        Literal["copter", "plane"],
-        typer.Option("--type", help="What it flies: a copter, or with ardupilot a plane."),
+        str, option("NAME", "What it flies: a copter, or with ardupilot a plane.", "--type")
     ] = "copter",
-    system: Annotated[int, typer.Option(min=1, max=255, metavar="N", help="Its number.")] = 1,
+    system: Annotated[int, option("N", "Its number.", min=1, max=255)] = 1,
     home: Annotated[
-        str, typer.Option(metavar="LAT,LON,ALT", help="Where it stands: degrees, m AMSL.")
+        str, option("LAT,LON,ALT", "Where it stands: degrees, m AMSL.")
     ] = "-35.363262,149.165237,584",
     parameters: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Its parameters: it flies by them; without: defaults."),
+        File, option("FILE", "Its parameters: it flies by them; without: defaults.")
     ] = None,
-    speedup: Annotated[
-        float, typer.Option(min=0.01, metavar="X", help="Fly X times as fast as predicted.")
-    ] = 1.0,
-    boot: Annotated[float, typer.Option(min=0.0, metavar="S", help="Boot for S seconds.")] = 0.0,
-    drop: Annotated[
-        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Lose packets, both ways.")
-    ] = 0.0,
-    duplicate: Annotated[
-        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Repeat packets.")
-    ] = 0.0,
-    corrupt: Annotated[
-        float, typer.Option(min=0.0, max=1.0, metavar="P", help="Damage packets.")
-    ] = 0.0,
+    speedup: Annotated[float, option("X", "Fly X times as fast as predicted.", min=0.01)] = 1.0,
+    boot: Annotated[float, option("S", "Boot for S seconds.", min=0)] = 0.0,
+    drop: Annotated[float, option("P", "Lose packets, both ways.", min=0, max=1)] = 0.0,
+    duplicate: Annotated[float, option("P", "Repeat packets.", min=0, max=1)] = 0.0,
+    corrupt: Annotated[float, option("P", "Damage packets.", min=0, max=1)] = 0.0,
     delay: Annotated[
-        float,
-        typer.Option(min=0.0, metavar="S", help="Delay every other packet by up to S seconds."),
+        float, option("S", "Delay every other packet by up to S seconds.", min=0)
     ] = 0.0,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of what the link does.")] = 0,
+    seed: Annotated[int, option("N", "Of what the link does.")] = 0,
     signing_key: SigningKey = None,
 ) -> None:
     """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.
 
     It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
     """
-    with exit_status():
-        from faao_mav.mavlink.codec import read_key
-        from faao_mav.mavlink.faults import Faults
-        from faao_mav.mavlink.mock import MockAutopilot, manners_of
-        from faao_mav.mavlink.runner import predicted, serve
-        from faao_mav.mavlink.transfer.protocol import Address
-        from faao_mav.mavlink.transport import open_transport
-        from faao_mav.vehicle import Vehicle, flight_model
-        from faao_mav.vehicle.parameter_file import read_parameters
+    from faao_mav.mavlink.codec import read_key
+    from faao_mav.mavlink.faults import Faults
+    from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+    from faao_mav.mavlink.mock.serve import predicted, serve
+    from faao_mav.mavlink.protocol import Address
+    from faao_mav.mavlink.transport import open_transport
+    from faao_mav.vehicle import Vehicle
+    from faao_mav.vehicle.parameter_file import read_parameters
 
-        values = {} if parameters is None else read_parameters(parameters)
-        flown_by: Autopilot = "ardupilot" if kind == "ardupilot" else "px4"
-        source = str(parameters or "parameters")
-        vehicle = Vehicle(flown_by, aircraft, values, source)
-        flight_model(vehicle)  # useless parameters are refused here, not in flight
-        mock = MockAutopilot(
-            manners_of(kind),
-            aircraft=aircraft,
-            address=Address(system, 1),
-            home=read_home(home),
-            fly=predicted(vehicle),
-            parameters=values,
-            speedup=speedup,
-            boot=boot,
-        )
-        faults = Faults(
-            loss=drop,
-            duplication=duplicate,
-            corruption=corrupt,
-            reordering=0.5 if delay else 0.0,
-            delay=delay,
-            latency=0.0,
-            seed=seed,
-        )
-        key = None if signing_key is None else read_key(signing_key)
-        transport = open_transport(listen)
-        typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
-        diary = Diary()
-        try:
-            serve(mock, transport, faults=faults, key=key, observe=diary)
-        except KeyboardInterrupt:
-            diary.finish()
-            typer.echo("ended")
+    values = {} if parameters is None else read_parameters(parameters)
+    check_known(None, aircraft)
+    behaviour = behaviour_of(kind)
+    vehicle = Vehicle(behaviour.family.key, aircraft, values, str(parameters or "parameters"))
+    vehicle.flight_model()  # useless parameters are refused here, not in flight
+    mock = MockAutopilot(
+        behaviour,
+        aircraft=aircraft,
+        address=Address(system, 1),
+        home=read_home(home),
+        fly=predicted(vehicle),
+        parameters=values,
+        speedup=speedup,
+        boot=boot,
+    )
+    faults = Faults(
+        loss=drop,
+        duplication=duplicate,
+        corruption=corrupt,
+        reordering=0.5 if delay else 0.0,
+        delay=delay,
+        latency=0.0,
+        seed=seed,
+    )
+    key = None if signing_key is None else read_key(signing_key)
+    transport = open_transport(listen)
+    typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
+    diary = Diary()
+    try:
+        serve(mock, transport, faults=faults, key=key, observe=diary)
+    except KeyboardInterrupt:
+        diary.finish()
+        typer.echo("ended")
 
 
 class Diary:
     """Tells what changes on a mock autopilot, lists when they have come to rest."""
 
     def __init__(self) -> None:
-        self._told: dict[MissionType, tuple[Row, ...]] = {}
-        self._seen: dict[MissionType, tuple[Row, ...]] = {}
+        self._told: dict[MissionType, tuple[WireItem, ...]] = {}
+        self._seen: dict[MissionType, tuple[WireItem, ...]] = {}
         self._changed = 0.0
         self._armed = False
 
     def __call__(self, mock: "MockAutopilot") -> None:
         """Print what is new since the last call."""
-        from faao_mav.mavlink.transfer.protocol import MissionType
+        from faao_mav.mavlink.protocol import MissionType
 
-        lists = {part: mock.lists.rows(part) for part in MissionType}
+        lists = {part: mock.lists.items(part) for part in MissionType}
         if not self._told:
             self._told = self._seen = lists
         if lists != self._seen:
@@ -141,9 +128,9 @@ class Diary:
 
     def finish(self) -> None:
         """Print what has been seen and not told."""
-        for part, rows in self._seen.items():
-            if rows != self._told[part]:
-                typer.echo(f"{part.title}: {len(rows)} rows")
+        for part, items in self._seen.items():
+            if items != self._told[part]:
+                typer.echo(f"{part.title}: {len(items)} rows")
         self._told = self._seen
 
 

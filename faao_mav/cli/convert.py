@@ -2,42 +2,29 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from faao_mav.cli.outcome import exit_status, note
+from faao_mav.cli.shared import AsJson, Whose, check_known, exit_status, note, option
 from faao_mav.files import check_apart, check_writable, write_whole
 
-Autopilot = Literal["ardupilot", "px4"]
 
-
+@exit_status()
 def convert(
     mission_file: Annotated[
-        Path,
-        typer.Argument(metavar="MISSION", help="The mission: .waypoints, .txt or .plan."),
+        Path, typer.Argument(metavar="MISSION", help="The mission: .waypoints, .txt or .plan.")
     ],
-    out: Annotated[
-        Path,
-        typer.Option(metavar="OTHER", help="What to write: .waypoints, .txt, .plan or .kml."),
-    ],
-    autopilot: Annotated[
-        Autopilot | None,
-        typer.Option(help="Whom a .plan is for; else whom the mission read says it is for."),
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object instead of the summary.")
-    ] = False,
+    out: Annotated[Path, option("OTHER", "What to write: .waypoints, .txt, .plan or .kml.")],
+    autopilot: Whose = None,
+    as_json: AsJson = False,
 ) -> None:
     """Write a mission in another format, and say what that cannot hold.
 
+    Without --autopilot a .plan is for whom the mission that is read says it is for.
+
     Exit status: 0 done; 2 unusable arguments or input.
     """
-    with exit_status():
-        _run(mission_file, out, autopilot, as_json)
-
-
-def _run(mission_file: Path, out: Path, autopilot: Autopilot | None, as_json: bool) -> None:
     from faao_mav.mission.formats import (
         check_readable,
         check_suffix,
@@ -47,6 +34,7 @@ def _run(mission_file: Path, out: Path, autopilot: Autopilot | None, as_json: bo
     )
     from faao_mav.vehicle import Vehicle
 
+    check_known(autopilot, None)
     check_readable(mission_file)
     check_suffix(out)
     check_writable(out)

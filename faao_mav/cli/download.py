@@ -6,20 +6,23 @@ from typing import Annotated
 
 import typer
 
-from faao_mav.cli.options import Component, Log, SigningKey, System, Wait
-from faao_mav.cli.outcome import exit_status, note
+from faao_mav.cli.shared import (
+    VEHICLE,
+    Component,
+    Log,
+    SigningKey,
+    System,
+    Wait,
+    exit_status,
+    note,
+    option,
+)
 
 
+@exit_status()
 def download(
-    source: Annotated[
-        str,
-        typer.Option(
-            "--from",
-            metavar="CONNECTION",
-            help="The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD.",
-        ),
-    ],
-    out: Annotated[Path, typer.Option(metavar="MISSION", help="Write the mission.")],
+    source: Annotated[str, option("CONNECTION", VEHICLE, "--from")],
+    out: Annotated[Path, option("MISSION", "Write the mission.")],
     system: System = None,
     component: Component = None,
     log: Log = None,
@@ -31,27 +34,26 @@ def download(
     Exit status: 0 done; 1 there is no such vehicle, or a list did not come whole; 2 unusable
     arguments.
     """
-    with exit_status():
-        from faao_mav.cli.transfer_progress import transfer_progress
-        from faao_mav.files import check_writable, write_whole
-        from faao_mav.mavlink.client import download as run
-        from faao_mav.mission.formats import check_suffix, losses_in, render_mission
+    from faao_mav.cli.progress import transfer_progress
+    from faao_mav.files import check_writable, write_whole
+    from faao_mav.mavlink.client import download as run
+    from faao_mav.mission.formats import check_suffix, losses_in, render_mission
 
-        check_suffix(out)
-        check_writable(out)
-        with transfer_progress(shown=sys.stderr.isatty()) as observe:
-            mission = run(
-                source,
-                system=system,
-                component=component,
-                log=log,
-                signing_key=signing_key,
-                wait=timeout,
-                observe=observe,
-            )
-        write_whole(out, render_mission(mission, out).encode())
-        for line in losses_in(mission, out):
-            note(f"{out}: {line}")
+    check_suffix(out)
+    check_writable(out)
+    with transfer_progress(shown=sys.stderr.isatty()) as observe:
+        mission = run(
+            source,
+            system=system,
+            component=component,
+            log=log,
+            signing_key=signing_key,
+            wait=timeout,
+            observe=observe,
+        )
+    write_whole(out, render_mission(mission, out).encode())
+    for line in losses_in(mission, out):
+        note(f"{out}: {line}")
     fence = len(mission.fence.polygons) + len(mission.fence.circles)
     typer.echo(
         f"mission      {len(mission.items)} items, {fence} fence areas, "

@@ -7,8 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.options import AllowArmed, AsJson, Component, Log, SigningKey, System, Wait
-from faao_mav.cli.outcome import exit_status
+from faao_mav.cli.shared import (
+    VEHICLE,
+    AllowArmed,
+    AsJson,
+    Component,
+    Log,
+    SigningKey,
+    System,
+    Wait,
+    exit_status,
+    option,
+)
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
@@ -16,15 +26,10 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.transfer.verify import Difference
 
 
+@exit_status()
 def upload(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
-    to: Annotated[
-        str,
-        typer.Option(
-            metavar="CONNECTION",
-            help="The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD.",
-        ),
-    ],
+    to: Annotated[str, option("CONNECTION", VEHICLE)],
     as_json: AsJson = False,
     system: System = None,
     component: Component = None,
@@ -38,24 +43,23 @@ def upload(
     Exit status: 0 it is on the vehicle, whole and equal; 1 it is not, or that is not known; 2
     unusable arguments or input.
     """
-    with exit_status():
-        from faao_mav.cli.transfer_progress import transfer_progress
-        from faao_mav.mavlink.client import upload as run
-        from faao_mav.mission.formats import read_mission
+    from faao_mav.cli.progress import transfer_progress
+    from faao_mav.mavlink.client import upload as run
+    from faao_mav.mission.formats import read_mission
 
-        mission = read_mission(mission_file)
-        with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
-            report = run(
-                mission,
-                to,
-                system=system,
-                component=component,
-                allow_armed=allow_armed,
-                log=log,
-                signing_key=signing_key,
-                wait=timeout,
-                observe=observe,
-            )
+    mission = read_mission(mission_file)
+    with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
+        report = run(
+            mission,
+            to,
+            system=system,
+            component=component,
+            allow_armed=allow_armed,
+            log=log,
+            signing_key=signing_key,
+            wait=timeout,
+            observe=observe,
+        )
     typer.echo(json.dumps(as_dict(report), allow_nan=False) if as_json else as_text(report))
     if not report.verified:
         if not as_json:
@@ -83,7 +87,7 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
         "vehicle": {
             "system": vehicle.address.system,
             "component": vehicle.address.component,
-            "autopilot": vehicle.firmware,
+            "autopilot": vehicle.autopilot,
             "type": vehicle.kind,
         },
         "seconds": round(report.seconds, 3),
@@ -91,25 +95,20 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
         "lists": [
             {
                 "list": part.part.name.lower(),
-                "items": part.items,
-                "verdict": part.verdict,
-                "result": part.result,
-                "attempts": part.attempts,
-                "opaque_id": part.opaque_id,
+                **_fields(part, "items", "verdict", "result", "attempts", "opaque_id"),
                 "differences": [
-                    {
-                        "item": each.item,
-                        "field": each.field,
-                        "sent": _plain(each.sent),
-                        "found": _plain(each.found),
-                        "kind": each.kind,
-                    }
+                    _fields(each, "item", "field", "sent", "found", "kind")
                     for each in part.differences
                 ],
             }
             for part in report.parts
         ],
     }
+
+
+def _fields(record: object, *names: str) -> dict[str, Any]:
+    """Return fields of `record` by name, as JSON takes them."""
+    return {name: _plain(getattr(record, name)) for name in names}
 
 
 def _dropped(part: "PartReport") -> list[str]:
@@ -132,7 +131,7 @@ def _part_line(part: "PartReport") -> str:
 
 
 def _plain(value: Any) -> Any:
-    """NaN, which JSON does not have, is null."""
+    """Return `value` as JSON takes it: NaN, which JSON does not have, is None."""
     if isinstance(value, tuple):
         return [_plain(each) for each in value]
     return None if value != value else value

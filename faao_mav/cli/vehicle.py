@@ -36,7 +36,7 @@ def choose_vehicle(
     if whose != base.autopilot:
         values = {}
     beside = parameter_path(mission_file, whose)
-    if parameters is not None and given is not None:
+    if given is not None:
         theirs = autopilot_of(given)
         if theirs is not None and theirs != whose:
             raise InputError(

@@ -1,47 +1,51 @@
 """What a ground station does: upload and verify, download, clear."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypedDict, TypeVar, Unpack
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink.codec import read_key
 from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.link import Link, Observe
-from faao_mav.mavlink.rows import mission_of, rows_of
+from faao_mav.mavlink.machine import Machine, Script
+from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
-from faao_mav.mavlink.transfer.protocol import MissionType, Result, meaning
 from faao_mav.mavlink.transfer.session import (
+    Job,
     PartReport,
     clear_lists,
     download_lists,
     explain,
     upload_parts,
 )
-from faao_mav.mavlink.transfer.transfer import Peer, Script
+from faao_mav.mavlink.wire_items import mission_of, wire_items
 from faao_mav.mission.item import Mission
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.dialects import item_limit
+
+T = TypeVar("T")
 
 _ABSENT = (Result.UNSUPPORTED, Result.INVALID)
 """What a vehicle answers that has no such list at all."""
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
-    """How to talk to a vehicle: whom, how patiently, and what of it to keep.
+class LinkOptions(TypedDict, total=False):
+    """How to talk to a vehicle: what `upload`, `download` and `clear` have in common.
 
-    `system` and `component` choose among several autopilots, `log` is a `.tlog` file to write,
-    `signing_key` a file with the key for signed packets.
+    `system` and `component` choose among several autopilots; the vehicle is found by its heartbeat
+    within `wait` seconds (10). `log` is a `.tlog` file to write, `signing_key` a file with the key
+    for signed packets. `observe` is told what is going on, how much of it is done, and of how much.
     """
 
-    system: int | None = None
-    component: int | None = None
-    wait: float = 10.0
-    log: Path | None = None
-    signing_key: Path | None = None
-    timeouts: Timeouts = Timeouts()  # noqa: RUF009
+    system: int | None
+    component: int | None
+    log: Path | None
+    signing_key: Path | None
+    wait: float
+    timeouts: Timeouts | None
+    observe: Observe | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,79 +67,55 @@ def upload(
     mission: Mission,
     connection: str,
     *,
-    system: int | None = None,
-    component: int | None = None,
     allow_armed: bool = False,
-    log: Path | None = None,
-    signing_key: Path | None = None,
-    wait: float = 10.0,
-    timeouts: Timeouts | None = None,
-    observe: Observe | None = None,
+    **options: Unpack[LinkOptions],
 ) -> UploadReport:
     """Put `mission` on the vehicle at `connection`, read it back and compare.
 
     Fence and rally points follow where the mission has them; else those of the vehicle stay as
-    they are. The vehicle is found by its heartbeat within `wait` seconds, `system` and
-    `component` choose among several. Nothing is armed or started. `log` is a `.tlog` file to
-    write, `signing_key` a file with the key for signed packets.
+    they are. Nothing is armed or started. `options` are those of `LinkOptions`.
 
     Raises `LinkError` if there is no such vehicle, or it is armed (replacing the mission in
     flight needs `allow_armed`), or the link breaks; `InputError` for what cannot be sent.
     """
     if not mission.items:
         raise InputError("upload: the mission has no items; clear the vehicle's instead")
-    options = Options(system, component, wait, log, signing_key, timeouts or Timeouts())
-    with _open(connection, options) as link:
-        started = time.monotonic()
-        vehicle, peer = _find(link, connection, options, observe)
-        _check_disarmed(vehicle, connection, allow_armed)
-        lists = [(part, rows_of(mission, part, peer.firmware)) for part in MissionType]
-        parts = [(part, rows) for part, rows in lists if rows]
-        script = Script(upload_parts(parts, peer, vehicle.kind, options.timeouts))
-        reports = link.run(script, observe)
-        seconds = time.monotonic() - started
-        problems = _problems(reports, vehicle, peer, mission, link.lacks_key)
-    return UploadReport(vehicle, reports, seconds, problems)
+
+    def job(session: "_Session") -> Job[tuple[PartReport, ...]]:
+        vehicle = session.peer.vehicle
+        lists = [(part, wire_items(mission, part, vehicle)) for part in MissionType]
+        return upload_parts(
+            [(part, items) for part, items in lists if items], session.peer, session.timeouts
+        )
+
+    return _change(connection, mission, allow_armed, job, options)
 
 
-def download(
-    connection: str,
-    *,
-    system: int | None = None,
-    component: int | None = None,
-    log: Path | None = None,
-    signing_key: Path | None = None,
-    wait: float = 10.0,
-    timeouts: Timeouts | None = None,
-    observe: Observe | None = None,
-) -> Mission:
+def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
     """Return the mission, fence and rally points of the vehicle at `connection`.
 
-    Home is ArduPilot's row 0, or what PX4 says when asked. Arguments as in `upload`. Raises
-    `LinkError` if there is no such vehicle or a list does not come whole; a vehicle that has no
-    fence or rally points at all is one that has none stored.
+    Home is ArduPilot's item 0, or what PX4 says when asked. `options` are those of `LinkOptions`.
+    Raises `LinkError` if there is no such vehicle or a list does not come whole; a vehicle that
+    has no fence or rally points at all is one that has none stored.
     """
-    options = Options(system, component, wait, log, signing_key, timeouts or Timeouts())
-    with _open(connection, options) as link:
-        vehicle, peer = _find(link, connection, options, observe)
-        script = Script(download_lists(tuple(MissionType), peer, options.timeouts))
-        lists = link.run(script, observe)
+    with _Session(connection, options) as session:
+        peer = session.peer
+        lists = session.run(Script(download_lists(tuple(MissionType), peer, session.timeouts)))
         for part, outcome in lists.missing.items():
             absent = part is not MissionType.MISSION and outcome.result in _ABSENT
             if not absent:
                 reason = "the vehicle stopped answering"
                 if outcome.result is not None:
-                    reason = f"refused: {meaning(outcome.result, peer.firmware)}"
+                    reason = f"refused: {peer.manners.meaning(outcome.result)}"
                 raise LinkError(f"{connection}: {part.title}: not read: {reason}")
-        rows = [lists.rows.get(part, ()) for part in MissionType]
         try:
-            mission = mission_of(rows[0], rows[1], rows[2], peer.firmware)
+            mission = mission_of(lists.items, peer.vehicle)
         except InputError as error:
             raise LinkError(
                 f"{connection}: what the vehicle holds is no mission: {error}"
             ) from None
         if mission.home is None:
-            homes = link.run(AskHome(vehicle.address), observe)
+            homes = session.run(AskHome(peer.address))
             mission = replace(mission, home=homes[0] if homes else None)
     return mission
 
@@ -144,65 +124,76 @@ def clear(
     connection: str,
     *,
     types: Sequence[MissionType] = tuple(MissionType),
-    system: int | None = None,
-    component: int | None = None,
     allow_armed: bool = False,
-    log: Path | None = None,
-    signing_key: Path | None = None,
-    wait: float = 10.0,
-    timeouts: Timeouts | None = None,
-    observe: Observe | None = None,
+    **options: Unpack[LinkOptions],
 ) -> UploadReport:
     """Clear lists of the vehicle at `connection` and read back that they are empty.
 
     Arguments and errors as in `upload`.
     """
-    options = Options(system, component, wait, log, signing_key, timeouts or Timeouts())
-    with _open(connection, options) as link:
-        started = time.monotonic()
-        vehicle, peer = _find(link, connection, options, observe)
-        _check_disarmed(vehicle, connection, allow_armed)
-        script = Script(clear_lists(types, peer, options.timeouts))
-        reports = link.run(script, observe)
-        seconds = time.monotonic() - started
-        problems = _problems(reports, vehicle, peer, Mission(()), link.lacks_key)
-    return UploadReport(vehicle, reports, seconds, problems)
+
+    def job(session: "_Session") -> Job[tuple[PartReport, ...]]:
+        return clear_lists(types, session.peer, session.timeouts)
+
+    return _change(connection, Mission(()), allow_armed, job, options)
 
 
-def _open(connection: str, options: Options) -> Link:
-    key = None if options.signing_key is None else read_key(options.signing_key)
-    return Link(connection, key=key, log=options.log)
+class _Session:
+    """A link on which the vehicle has been found; to be used in a `with` statement."""
+
+    def __init__(self, connection: str, options: LinkOptions) -> None:
+        if unknown := set(options) - set(LinkOptions.__annotations__):
+            known = ", ".join(LinkOptions.__annotations__)
+            raise TypeError(f"there is no option {min(unknown)!r}; expected some of {known}")
+        key_file, self._observe = options.get("signing_key"), options.get("observe")
+        self.timeouts = options.get("timeouts") or Timeouts()
+        self.started = time.monotonic()
+        key = None if key_file is None else read_key(key_file)
+        self.link = Link(connection, key=key, log=options.get("log"))
+        try:
+            names = options.get("system"), options.get("component")
+            wait = options.get("wait", 10.0)
+            found = self.run(Discovery(*names, patience=wait, boot=self.timeouts.boot))
+            self.found = choose(found, connection, *names, wait)
+        except BaseException:
+            self.link.close()
+            raise
+        self.peer = Peer(self.link.address, self.found.address, self.found.vehicle)
+
+    def __enter__(self) -> "_Session":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.link.close()
+
+    def run(self, machine: Machine[T]) -> T:
+        return self.link.run(machine, self._observe)
 
 
-def _find(
-    link: Link, connection: str, options: Options, observe: Observe | None
-) -> tuple[FoundVehicle, Peer]:
-    search = Discovery(
-        options.system, options.component, patience=options.wait, boot=options.timeouts.boot
-    )
-    found = link.run(search, observe)
-    vehicle = choose(found, connection, options.system, options.component, options.wait)
-    return vehicle, Peer(link.address, vehicle.address, vehicle.firmware)
-
-
-def _check_disarmed(vehicle: FoundVehicle, connection: str, allow_armed: bool) -> None:
-    if vehicle.armed and not allow_armed:
-        raise LinkError(
-            f"{connection}: {vehicle}: the mission of an armed vehicle is not replaced; disarm "
-            "it, or allow it (--allow-armed)"
-        )
+def _change(
+    connection: str,
+    mission: Mission,
+    allow_armed: bool,
+    job: Callable[[_Session], Job[tuple[PartReport, ...]]],
+    options: LinkOptions,
+) -> UploadReport:
+    """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
+    with _Session(connection, options) as session:
+        if session.found.armed and not allow_armed:
+            raise LinkError(
+                f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
+                "disarm it, or allow it (--allow-armed)"
+            )
+        reports = session.run(Script(job(session)))
+        seconds = time.monotonic() - session.started
+        problems = _problems(reports, session.peer, mission, session.link.lacks_key)
+    return UploadReport(session.found, reports, seconds, problems)
 
 
 def _problems(
-    reports: Sequence[PartReport],
-    vehicle: FoundVehicle,
-    peer: Peer,
-    mission: Mission,
-    lacks_key: bool,
+    reports: Sequence[PartReport], peer: Peer, mission: Mission, lacks_key: bool
 ) -> tuple[str, ...]:
-    limit = 0
-    if peer.firmware != "generic":
-        limit = item_limit(Vehicle(peer.firmware, vehicle.kind)).sure
+    limit = 0 if peer.vehicle is None else peer.vehicle.dialect.items.sure
 
     def describe(item: int) -> str:
         if item < 0:

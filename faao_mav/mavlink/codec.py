@@ -1,8 +1,7 @@
 """Packets to messages and back, by pymavlink, always MAVLink 2."""
 
-import hashlib
 import math
-import struct
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -14,49 +13,35 @@ from faao_mav.mavlink import messages
 from faao_mav.mavlink.messages import (
     Envelope,
     Message,
-    MissionAck,
-    MissionCount,
     MissionItemInt,
     MissionRequestInt,
-    Row,
+    WireItem,
 )
-from faao_mav.mavlink.rows import coordinate_scale
-from faao_mav.mavlink.transfer.protocol import Address
+from faao_mav.mavlink.protocol import Address
+from faao_mav.mavlink.wire_items import coordinate_scale
 
 KEY_BYTES = 32
-_SIGNING_EPOCH = 1_420_070_400  # 2015-01-01, when the clock of signatures starts
-_SIGNING_TICKS = 100_000  # per second
+"""Length of a signing key (MAVLink 2, "Message Signing")."""
 
-_PLAIN: dict[str, type[Any]] = {
-    "HEARTBEAT": messages.Heartbeat,
-    "STATUSTEXT": messages.Statustext,
-    "MISSION_REQUEST_LIST": messages.MissionRequestList,
-    "MISSION_WRITE_PARTIAL_LIST": messages.MissionWritePartialList,
-    "MISSION_CLEAR_ALL": messages.MissionClearAll,
-    "MISSION_SET_CURRENT": messages.MissionSetCurrent,
-    "MISSION_CURRENT": messages.MissionCurrent,
-    "MISSION_ITEM_REACHED": messages.MissionItemReached,
-    "COMMAND_LONG": messages.CommandLong,
-    "COMMAND_ACK": messages.CommandAck,
-    "SET_MODE": messages.SetMode,
-    "PARAM_REQUEST_LIST": messages.ParamRequestList,
-    "PARAM_REQUEST_READ": messages.ParamRequestRead,
-    "PARAM_SET": messages.ParamSet,
-    "PARAM_VALUE": messages.ParamValue,
-    "AUTOPILOT_VERSION": messages.AutopilotVersion,
-    "GLOBAL_POSITION_INT": messages.GlobalPositionInt,
-    "LOCAL_POSITION_NED": messages.LocalPositionNed,
-    "ATTITUDE": messages.Attitude,
-    "HOME_POSITION": messages.HomePosition,
-}
-"""Messages whose fields travel as they are."""
+_SIGNING_EPOCH = 1_420_070_400
+"""Seconds from 1970 to the start of 2015, where the clock of signatures starts."""
 
-_NAMES = {kind: name for name, kind in _PLAIN.items()}
-_IDENTIFIED: dict[str, type[MissionCount | MissionAck]] = {
-    "MISSION_COUNT": MissionCount,
-    "MISSION_ACK": MissionAck,
+_SIGNING_TICKS = 100_000
+"""Ticks of the clock of signatures in a second."""
+
+_KINDS: dict[str, type[Message]] = {
+    re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).upper(): kind
+    for kind in vars(messages).values()
+    if isinstance(kind, type) and issubclass(kind, Message)
 }
-"""Messages that end in an opaque_id, which the dialects of pymavlink leave out."""
+"""Message types by their MAVLink names."""
+
+_NAMES = {kind: name for name, kind in _KINDS.items()}
+_LEGACY: dict[str, type[Message]] = {
+    "MISSION_REQUEST": MissionRequestInt,
+    "MISSION_ITEM": MissionItemInt,
+}
+"""Predecessors with the same fields."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +83,7 @@ class Codec:
         if signing.sign_outgoing:
             ticks = int((self._clock() - _SIGNING_EPOCH) * _SIGNING_TICKS)
             signing.timestamp = max(signing.timestamp, ticks)
-        packet: bytes = self._encode(message)
+        packet = self._encode(message)
         self._mav.seq = (self._mav.seq + 1) % 256
         return packet
 
@@ -110,60 +95,46 @@ class Codec:
         return [Packet(bytes(m.get_msgbuf()), self._envelope(m)) for m in found]
 
     def _encode(self, message: Message) -> bytes:
-        mav, dialect = self._mav, self._dialect
-        match message:
-            case MissionItemInt():
-                return bytes(_encode_item(dialect, message).pack(mav))
-            case MissionRequestInt():
-                kind = (
-                    dialect.MAVLink_mission_request_message
-                    if message.legacy
-                    else dialect.MAVLink_mission_request_int_message
-                )
-                target = (message.target_system, message.target_component)
-                return bytes(kind(*target, message.seq, message.mission_type).pack(mav))
-            case MissionCount(system, component, count, mission_type, opaque_id):
-                base = dialect.MAVLink_mission_count_message(system, component, count, mission_type)
-                payload = struct.pack("<HBBBI", count, system, component, mission_type, opaque_id)
-                return bytes(base._pack(mav, base.crc_extra, payload))
-            case MissionAck(system, component, result, mission_type, opaque_id):
-                base = dialect.MAVLink_mission_ack_message(system, component, result, mission_type)
-                payload = struct.pack("<BBBBI", system, component, result, mission_type, opaque_id)
-                return bytes(base._pack(mav, base.crc_extra, payload))
         name = _NAMES[type(message)]
-        kind = getattr(dialect, f"MAVLink_{name.lower()}_message")
-        return bytes(kind(*_values(kind, message)).pack(mav))
+        values = {field.name: getattr(message, field.name) for field in fields(message)}
+        if values.pop("legacy", False):
+            name = name.removesuffix("_INT")
+        if (target := values.pop("target", None)) is not None:
+            values |= {"target_system": target.system, "target_component": target.component}
+        if (item := values.pop("item", None)) is not None:
+            values |= _item_values(item, exact=name.endswith("_INT"))
+        kind = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
+        packet = kind(*_arguments(kind, values))
+        if (opaque_id := values.get("opaque_id")) is None:
+            return bytes(packet.pack(self._mav))
+        # The last field of the message, which the dialects of pymavlink leave out.
+        known = kind.unpacker.pack(*(values[field] for field in kind.ordered_fieldnames))
+        payload = known + opaque_id.to_bytes(4, "little")
+        return bytes(packet._pack(self._mav, packet.crc_extra, payload))
 
-    def _envelope(self, found: Any) -> Envelope | None:
-        name = found.get_type()
-        message: Message
-        if name in _PLAIN:
-            kind = _PLAIN[name]
-            message = kind(*(_clean(getattr(found, field.name)) for field in fields(kind)))
-        elif name in _IDENTIFIED:
-            message = _IDENTIFIED[name](
-                found.target_system,
-                found.target_component,
-                found.count if name == "MISSION_COUNT" else found.type,
-                found.mission_type,
-                _opaque_id(found),
-            )
-        elif name in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
-            message = MissionRequestInt(
-                found.target_system,
-                found.target_component,
-                found.seq,
-                found.mission_type,
-                legacy=name == "MISSION_REQUEST",
-            )
-        elif name in ("MISSION_ITEM", "MISSION_ITEM_INT"):
-            item = _decode_item(found, legacy=name == "MISSION_ITEM")
-            if item is None:
-                return None
-            message = item
-        else:
+    def _envelope(self, packet: Any) -> Envelope | None:
+        name = packet.get_type()
+        kind = _KINDS.get(name) or _LEGACY.get(name)
+        if kind is None:
             return None
-        return Envelope(Address(found.get_srcSystem(), found.get_srcComponent()), message)
+        legacy = name in _LEGACY
+        values: dict[str, Any] = {}
+        for field in fields(kind):
+            match field.name:
+                case "target":
+                    values["target"] = Address(packet.target_system, packet.target_component)
+                case "opaque_id":
+                    values["opaque_id"] = _opaque_id(packet)
+                case "legacy":
+                    values["legacy"] = legacy
+                case "item":
+                    values["item"] = _wire_item(packet, exact=not legacy)
+                    if values["item"] is None:
+                        return None
+                case plain:
+                    values[plain] = _text_or_number(getattr(packet, plain))
+        sender = Address(packet.get_srcSystem(), packet.get_srcComponent())
+        return Envelope(sender, kind(**values))
 
 
 def read_key(path: Path) -> bytes:
@@ -189,66 +160,56 @@ def read_key(path: Path) -> bytes:
     return key
 
 
-def key_of_phrase(phrase: str) -> bytes:
-    """Return the signing key that ground stations make of a pass phrase: its SHA-256."""
-    return hashlib.sha256(phrase.encode()).digest()
+def _item_values(item: WireItem, *, exact: bool) -> dict[str, Any]:
+    """Return the fields of MISSION_ITEM_INT, or of MISSION_ITEM (not `exact`), for `item`."""
+    values = {field.name: getattr(item, field.name) for field in fields(item)}
+    values |= {f"param{number}": value for number, value in enumerate(item.params, start=1)}
+    if exact:
+        return values
+    scale = coordinate_scale(item.frame)
+    return values | {"x": item.x / scale, "y": item.y / scale}
 
 
-def _encode_item(dialect: Any, item: MissionItemInt) -> Any:
-    row = item.row
-    x: float = row.x
-    y: float = row.y
-    kind = dialect.MAVLink_mission_item_int_message
-    if item.legacy:
-        kind = dialect.MAVLink_mission_item_message
-        scale = coordinate_scale(row.frame)
-        x, y = row.x / scale, row.y / scale
-    head = (item.target_system, item.target_component, item.seq, row.frame, row.command)
-    flags = (row.current, row.autocontinue)
-    return kind(*head, *flags, *row.params, x, y, row.z, item.mission_type)
-
-
-def _decode_item(found: Any, *, legacy: bool) -> MissionItemInt | None:
-    x, y = found.x, found.y
-    if legacy:
+def _wire_item(packet: Any, *, exact: bool) -> WireItem | None:
+    """Return the item that MISSION_ITEM_INT, or MISSION_ITEM (not `exact`), carries."""
+    x, y = packet.x, packet.y
+    if not exact:
         if not (math.isfinite(x) and math.isfinite(y)):
             return None
-        scale = coordinate_scale(found.frame)
+        scale = coordinate_scale(packet.frame)
         x, y = round(x * scale), round(y * scale)
-    params = (found.param1, found.param2, found.param3, found.param4)
-    flags = (found.current, found.autocontinue)
-    row = Row(found.command, found.frame, params, x, y, found.z, *flags)
-    target = (found.target_system, found.target_component)
-    return MissionItemInt(*target, found.seq, found.mission_type, row, legacy)
+    params = (packet.param1, packet.param2, packet.param3, packet.param4)
+    flags = (packet.current, packet.autocontinue)
+    return WireItem(packet.command, packet.frame, params, x, y, packet.z, *flags)
 
 
-def _values(kind: Any, message: Message) -> list[Any]:
-    """Return the arguments of pymavlink's `kind` for `message`; fields unknown here are zeros."""
+def _arguments(kind: Any, known: dict[str, Any]) -> list[Any]:
+    """Return the arguments of pymavlink's `kind`; fields that are not `known` are zeros."""
     sizes = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
-    values = []
+    arguments = []
     for name, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
-        value = getattr(message, name, None)
+        value = known.get(name)
         if isinstance(value, str):
             value = value.encode("ascii", "replace")[: sizes[name]]
         elif value is None:
             value = 0
             if sizes[name]:
                 value = b"" if type_name == "char" else [0] * sizes[name]
-        values.append(value)
-    return values
+        arguments.append(value)
+    return arguments
 
 
-def _clean(value: Any) -> Any:
+def _text_or_number(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.split(b"\0", 1)[0].decode("ascii", "replace")
     return value
 
 
-def _opaque_id(found: Any) -> int:
+def _opaque_id(packet: Any) -> int:
     """Return the last field of a packet that is longer than pymavlink knows it, or 0."""
-    packet = bytes(found.get_msgbuf())
-    if packet[0] != 0xFD:
+    raw = bytes(packet.get_msgbuf())
+    if raw[0] != 0xFD:
         return 0
-    payload = packet[10 : 10 + packet[1]]
-    tail = payload[found.unpacker.size :][:4]
+    payload = raw[10 : 10 + raw[1]]
+    tail = payload[packet.unpacker.size :][:4]
     return int.from_bytes(tail, "little")

@@ -4,38 +4,58 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from faao_mav.errors import LinkError
+from faao_mav.mavlink.machine import AskingMachine, Machine
+from faao_mav.mavlink.manners import autopilot_name
 from faao_mav.mavlink.messages import CommandLong, Envelope, Heartbeat, HomePosition, Message
-from faao_mav.mavlink.transfer.protocol import FIRMWARE_NAMES, Address, Autopilot, Firmware, State
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION_TYPE,
+    HOME_POSITION,
+    NO_AUTOPILOT,
+    Address,
+    MavCommand,
+    MavState,
+)
 from faao_mav.mission.item import Home
-from faao_mav.plan.autopilots import Kind
+from faao_mav.vehicle import VehicleType, vehicle_type_by_numbers
 
-_GCS = 6
-_PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25})  # fixed wing, VTOL
-_HOME_POSITION, _REQUEST_MESSAGE = 242, 512
+_FIXED_WING, _VTOLS = 1, range(19, 26)
+"""MAV_TYPEs: VTOLs take missions as planes do."""
+
+_LOOK_AGAIN = 0.2
+"""Seconds between two looks at whether all vehicles have booted: chosen, a fifth of a heartbeat's
+period."""
 
 
 @dataclass(frozen=True, slots=True)
 class FoundVehicle:
-    """An autopilot that was heard."""
+    """An autopilot that was heard; `vehicle` is None if its autopilot is not known here.
+
+    `kind` is its type, "copter" or "plane", whether or not the autopilot is known.
+    """
 
     address: Address
-    firmware: Firmware
-    kind: Kind
+    vehicle: VehicleType | None
+    kind: str
     armed: bool
     ready: bool
+
+    @property
+    def autopilot(self) -> str:
+        """The autopilot by its name in plans, or "generic"."""
+        return "generic" if self.vehicle is None else self.vehicle.family.key
 
     def __str__(self) -> str:
         state = "armed" if self.armed else "disarmed" if self.ready else "booting"
         where = f"system {self.address.system}, component {self.address.component}"
-        return f"{FIRMWARE_NAMES[self.firmware]} {self.kind} ({where}, {state})"
+        return f"{autopilot_name(self.vehicle)} {self.kind} ({where}, {state})"
 
 
-class Discovery:
+class Discovery(Machine[tuple[FoundVehicle, ...]]):
     """A machine that listens for heartbeats; its outcome is the autopilots heard, by address.
 
     With `system` (and `component`) it waits until that one is ready, else until `settle` seconds
-    after the first, to hear of others, and all are ready. It ends after `patience` without any,
-    and after `boot` in any case.
+    after the first, to hear of others, and all are ready. It ends after `patience` seconds without
+    any, and after `boot` seconds in any case.
     """
 
     progress = ("listening for a vehicle", 0, 0)
@@ -49,45 +69,35 @@ class Discovery:
         settle: float = 1.2,
         boot: float = 60.0,
     ) -> None:
-        self.outcome: tuple[FoundVehicle, ...] | None = None
+        super().__init__()
         self._system, self._component = system, component
         self._patience, self._settle, self._boot = patience, settle, boot
         self._found: dict[Address, FoundVehicle] = {}
-        self._due = self._end = 0.0
-
-    @property
-    def deadline(self) -> float | None:
-        """When `tick` is due."""
-        return None if self.outcome is not None else self._due
+        self._end = 0.0
 
     def start(self, now: float) -> Sequence[Message]:
         """Listen."""
         self._due, self._end = now + self._patience, now + self._boot
         return ()
 
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of a heartbeat."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message, sender = envelope.message, envelope.sender
-        if self.outcome is not None or not isinstance(message, Heartbeat):
+        if not isinstance(message, Heartbeat) or message.type == GROUND_STATION_TYPE:
             return ()
-        if message.type == _GCS or message.autopilot == Autopilot.INVALID:
-            return ()
-        if self._system not in (None, sender.system):
+        if message.autopilot == NO_AUTOPILOT or self._system not in (None, sender.system):
             return ()
         if self._component not in (None, sender.component):
             return ()
         if not self._found:
             self._due = now + (self._settle if self._system is None else 0.0)
-        self._found[sender] = _vehicle(sender, message)
+        self._found[sender] = _found_vehicle(sender, message)
         return self.tick(now)
 
-    def tick(self, now: float) -> Sequence[Message]:
-        """End when there is nothing more to wait for."""
-        if self.outcome is None and now >= self._due:
-            if all(found.ready for found in self._found.values()) or now >= self._end:
-                self.outcome = tuple(self._found[address] for address in sorted(self._found))
-            else:
-                self._due = min(now + 0.2, self._end)
+    def _time_out(self, now: float) -> Sequence[Message]:
+        if all(found.ready for found in self._found.values()) or now >= self._end:
+            self.outcome = tuple(self._found[address] for address in sorted(self._found))
+        else:
+            self._due = min(now + _LOOK_AGAIN, self._end)
         return ()
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
@@ -96,49 +106,32 @@ class Discovery:
         return ()
 
 
-class AskHome:
+class AskHome(AskingMachine[list[Home]]):
     """A machine that asks for HOME_POSITION; its outcome is a list with the home, or empty."""
 
     progress = ("asking for home", 0, 0)
 
     def __init__(self, vehicle: Address, wait: float = 1.0, retries: int = 2) -> None:
-        self.outcome: list[Home] | None = None
-        self._vehicle, self._wait, self._left = vehicle, wait, retries
-        self._due = 0.0
+        super().__init__(wait, retries)
+        self._vehicle = vehicle
 
-    @property
-    def deadline(self) -> float | None:
-        """When `tick` is due."""
-        return None if self.outcome is not None else self._due
+    def _question(self) -> Message:
+        return CommandLong(self._vehicle, MavCommand.REQUEST_MESSAGE, 0, float(HOME_POSITION))
 
-    def start(self, now: float) -> Sequence[Message]:
-        """Ask."""
-        self._due = now + self._wait
-        target = (self._vehicle.system, self._vehicle.component)
-        return [CommandLong(*target, _REQUEST_MESSAGE, 0, float(_HOME_POSITION))]
-
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Take the answer."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
         message = envelope.message
         if isinstance(message, HomePosition) and envelope.sender == self._vehicle:
             place = (message.latitude / 1e7, message.longitude / 1e7)
             self.outcome = [Home(*place, message.altitude / 1000)]
         return ()
 
-    def tick(self, now: float) -> Sequence[Message]:
-        """Ask again, or do without."""
-        if self.outcome is not None or now < self._due:
-            return ()
-        if self._left == 0:
-            self.outcome = []
-            return ()
-        self._left -= 1
-        return self.start(now)
-
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Do without."""
+    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         self.outcome = []
         return ()
+
+    def cancel(self, now: float) -> Sequence[Message]:
+        """Do without."""
+        return self._give_up(now)
 
 
 def choose(
@@ -164,13 +157,10 @@ def choose(
     return found[0]
 
 
-def _vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:
-    firmware: Firmware = "generic"
-    if heartbeat.autopilot == Autopilot.ARDUPILOT:
-        firmware = "ardupilot"
-    elif heartbeat.autopilot == Autopilot.PX4:
-        firmware = "px4"
-    kind: Kind = "plane" if heartbeat.type in _PLANES else "copter"
+def _found_vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:
+    mav_type = _FIXED_WING if heartbeat.type in _VTOLS else heartbeat.type
+    vehicle = vehicle_type_by_numbers(heartbeat.autopilot, mav_type)
+    kind = "plane" if mav_type == _FIXED_WING else "copter"
     # UNINIT is what simple vehicles say that do not tell their state.
-    ready = heartbeat.system_status not in (State.BOOT, State.CALIBRATING)
-    return FoundVehicle(sender, firmware, kind, heartbeat.armed, ready)
+    ready = heartbeat.system_status not in (MavState.BOOT, MavState.CALIBRATING)
+    return FoundVehicle(sender, vehicle, kind, heartbeat.armed, ready)

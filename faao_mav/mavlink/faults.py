@@ -1,9 +1,15 @@
 """A bad link: what it does to packets, from a seed."""
 
+import heapq
+import time
 from dataclasses import dataclass, field
+from itertools import count
 from random import Random
 
+from faao_mav.mavlink.transport import Transport
+
 _MAVLINK_2 = 0xFD
+"""First byte of a MAVLink 2 packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +69,9 @@ class Channel:
             if random.random() < faults.loss:
                 continue
             late = random.random() < faults.reordering
-            time = sent + faults.latency + (random.uniform(0.0, faults.delay) if late else 0.0)
+            arrival = sent + faults.latency + (random.uniform(0.0, faults.delay) if late else 0.0)
             damaged = random.random() < faults.corruption
-            arrivals.append((time, self._damaged(packet) if damaged else packet))
+            arrivals.append((arrival, self._damaged(packet) if damaged else packet))
         return arrivals
 
     def _sent(self, packet: bytes, now: float) -> float:
@@ -87,3 +93,53 @@ class Channel:
         place = self._random.randrange(len(content))
         content[place] ^= 1 << self._random.randrange(8)
         return bytes(content)
+
+
+class FaultyTransport:
+    """A transport that loses, repeats, delays and damages what passes it, both ways.
+
+    Over TCP and serial lines that is pieces of the stream, not packets.
+    """
+
+    def __init__(self, inner: Transport, faults: Faults) -> None:
+        self._inner = inner
+        self._channels = {way: Channel(faults, way) for way in ("in", "out")}
+        self._queues: dict[str, list[tuple[float, int, bytes]]] = {"in": [], "out": []}
+        self._order = count()
+        self._started = time.monotonic()
+
+    def read(self, timeout: float) -> list[bytes]:
+        """Return what has arrived by now, or within `timeout` seconds."""
+        self._flush()
+        end = self._now() + timeout
+        waiting = [queue[0][0] for queue in self._queues.values() if queue]
+        for data in self._inner.read(min([end, *waiting]) - self._now()):
+            self._push("in", data)
+        self._flush()
+        return self._due("in")
+
+    def write(self, data: bytes) -> None:
+        """Send `data` as the faults allow: late, damaged, twice or not at all."""
+        self._push("out", data)
+        self._flush()
+
+    def close(self) -> None:
+        """Close the transport beneath; what is under way is lost."""
+        self._inner.close()
+
+    def _now(self) -> float:
+        return time.monotonic() - self._started
+
+    def _push(self, way: str, data: bytes) -> None:
+        for when, arriving in self._channels[way].carry(data, self._now()):
+            heapq.heappush(self._queues[way], (when, next(self._order), arriving))
+
+    def _due(self, way: str) -> list[bytes]:
+        queue, now, due = self._queues[way], self._now(), []
+        while queue and queue[0][0] <= now:
+            due.append(heapq.heappop(queue)[2])
+        return due
+
+    def _flush(self) -> None:
+        for data in self._due("out"):
+            self._inner.write(data)

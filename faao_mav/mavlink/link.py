@@ -1,25 +1,58 @@
-"""A machine on a real link."""
+"""A machine on a real link, and the log of what passes it."""
 
+import struct
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import TypeAlias, TypeVar
 
-from faao_mav.errors import LinkError
+from faao_mav.errors import InputError, LinkError
+from faao_mav.files import check_writable
 from faao_mav.mavlink.codec import Codec
+from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import Heartbeat, Message
-from faao_mav.mavlink.tlog import Tlog
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, Autopilot, State
-from faao_mav.mavlink.transfer.transfer import Machine
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION,
+    GROUND_STATION_TYPE,
+    NO_AUTOPILOT,
+    Address,
+    MavState,
+)
 from faao_mav.mavlink.transport import Transport, open_transport
 
 T = TypeVar("T")
+
 Observe: TypeAlias = Callable[[str, int, int], object]
 """Told what is going on, how much of it is done, and of how much."""
 
-_GCS = 6  # MAV_TYPE
-_BEAT = 1.0  # s
+_BEAT = 1.0
+"""Seconds between two heartbeats: what the MAVLink guide asks for."""
+
+
+class Tlog:
+    """A `.tlog` file: before each packet the time since 1970, 8 bytes, big-endian, microseconds.
+
+    Raises `InputError` if the file cannot be written, or by its name is none of these: a slip of
+    the pen must not replace the mission. MAVProxy and Mission Planner write and read such files.
+    """
+
+    def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
+        if path.suffix != ".tlog":
+            raise InputError(f"--log {path}: give a name that ends in .tlog")
+        check_writable(path)
+        try:
+            self._file = path.open("wb")
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        self._clock = clock
+
+    def write(self, packet: bytes) -> None:
+        """Append `packet`, sent or received now."""
+        self._file.write(struct.pack(">Q", int(self._clock() * 1e6)) + packet)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
 
 
 class Link:
@@ -52,12 +85,11 @@ class Link:
     def __enter__(self) -> "Link":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the connection, finish the log."""
         self._transport.close()
         if self._log is not None:
             self._log.close()
@@ -94,7 +126,7 @@ class Link:
         return outcome
 
     def begin(self, machine: Machine[T]) -> None:
-        """Start `machine`, for who calls `step` himself."""
+        """Start `machine`; `step` then carries it on."""
         self._send(machine.start(time.monotonic()))
 
     def step(self, machine: Machine[T], until: float) -> None:
@@ -113,7 +145,7 @@ class Link:
     def _beat(self, now: float) -> None:
         if now >= self._next_beat:
             self._next_beat = now + _BEAT
-            self._send([Heartbeat(_GCS, Autopilot.INVALID, 0, 0, State.ACTIVE)])
+            self._send([Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)])
 
     def _send(self, messages: Sequence[Message]) -> None:
         for message in messages:

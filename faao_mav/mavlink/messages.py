@@ -6,15 +6,14 @@ wire, so that what was sent and what was found can be compared without rounding.
 """
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
-from faao_mav.mavlink.transfer.protocol import ARMED, Address
+from faao_mav.mavlink.protocol import ARMED, Address
 from faao_mav.mission.item import Params
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """What MISSION_ITEM_INT says about one item, apart from whom it is for.
+class WireItem:
+    """One item of a mission, fence or rally list as MISSION_ITEM_INT carries it.
 
     `x` and `y` are 1e-7 degrees in global frames, 1e-4 m in local ones and plain numbers in
     `Frame.MISSION`.
@@ -31,7 +30,162 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Heartbeat:
+class Message:
+    """What a packet says; each kind has a type of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Addressed(Message):
+    """A message for one system and component: `target_system` and `target_component`."""
+
+    target: Address
+
+
+@dataclass(frozen=True, slots=True)
+class ListMessage(Addressed):
+    """A message of the mission protocol: `mission_type` says which list it is about."""
+
+    mission_type: int
+
+
+@dataclass(frozen=True, slots=True)
+class MissionCount(ListMessage):
+    """MISSION_COUNT: so many items are to come, or are there."""
+
+    count: int
+    opaque_id: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class MissionRequestInt(ListMessage):
+    """MISSION_REQUEST_INT, or its predecessor MISSION_REQUEST (`legacy`)."""
+
+    seq: int
+    legacy: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItemInt(ListMessage):
+    """MISSION_ITEM_INT, or its predecessor MISSION_ITEM (`legacy`), which has single precision."""
+
+    seq: int
+    item: WireItem
+    legacy: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MissionAck(ListMessage):
+    """MISSION_ACK; `type` is a MAV_MISSION_RESULT."""
+
+    type: int
+    opaque_id: int = 0
+
+
+class MissionRequestList(ListMessage):
+    """MISSION_REQUEST_LIST."""
+
+
+class MissionClearAll(ListMessage):
+    """MISSION_CLEAR_ALL."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionWritePartialList(ListMessage):
+    """MISSION_WRITE_PARTIAL_LIST: items `start_index` to `end_index` are to be replaced."""
+
+    start_index: int
+    end_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class MissionSetCurrent(Addressed):
+    """MISSION_SET_CURRENT."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class MissionCurrent(Message):
+    """MISSION_CURRENT; `total` leaves out ArduPilot's home item, 0 is for none."""
+
+    seq: int
+    total: int
+    mission_state: int
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItemReached(Message):
+    """MISSION_ITEM_REACHED."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLong(Addressed):
+    """COMMAND_LONG."""
+
+    command: int
+    confirmation: int
+    param1: float = 0.0
+    param2: float = 0.0
+    param3: float = 0.0
+    param4: float = 0.0
+    param5: float = 0.0
+    param6: float = 0.0
+    param7: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAck(Addressed):
+    """COMMAND_ACK; `result` is a MAV_RESULT."""
+
+    command: int
+    result: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode(Message):
+    """SET_MODE, which is for all components of `target_system`."""
+
+    target_system: int
+    base_mode: int
+    custom_mode: int
+
+
+class ParamRequestList(Addressed):
+    """PARAM_REQUEST_LIST."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParamRequestRead(Addressed):
+    """PARAM_REQUEST_READ; `param_index` -1 asks by name."""
+
+    param_id: str
+    param_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class ParamSet(Addressed):
+    """PARAM_SET."""
+
+    param_id: str
+    param_value: float
+    param_type: int
+
+
+@dataclass(frozen=True, slots=True)
+class ParamValue(Message):
+    """PARAM_VALUE."""
+
+    param_id: str
+    param_value: float
+    param_type: int
+    param_count: int
+    param_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat(Message):
     """HEARTBEAT."""
 
     type: int
@@ -48,7 +202,7 @@ class Heartbeat:
 
 
 @dataclass(frozen=True, slots=True)
-class Statustext:
+class Statustext(Message):
     """STATUSTEXT."""
 
     severity: int
@@ -56,182 +210,7 @@ class Statustext:
 
 
 @dataclass(frozen=True, slots=True)
-class MissionCount:
-    """MISSION_COUNT: so many items are to come, or are there."""
-
-    target_system: int
-    target_component: int
-    count: int
-    mission_type: int
-    opaque_id: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class MissionRequestInt:
-    """MISSION_REQUEST_INT, or its predecessor MISSION_REQUEST (`legacy`)."""
-
-    target_system: int
-    target_component: int
-    seq: int
-    mission_type: int
-    legacy: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class MissionItemInt:
-    """MISSION_ITEM_INT, or its predecessor MISSION_ITEM (`legacy`), which has single precision."""
-
-    target_system: int
-    target_component: int
-    seq: int
-    mission_type: int
-    row: Row
-    legacy: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class MissionAck:
-    """MISSION_ACK; `type` is a MAV_MISSION_RESULT."""
-
-    target_system: int
-    target_component: int
-    type: int
-    mission_type: int
-    opaque_id: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class MissionRequestList:
-    """MISSION_REQUEST_LIST."""
-
-    target_system: int
-    target_component: int
-    mission_type: int
-
-
-@dataclass(frozen=True, slots=True)
-class MissionWritePartialList:
-    """MISSION_WRITE_PARTIAL_LIST: items `start_index` to `end_index` are to be replaced."""
-
-    target_system: int
-    target_component: int
-    start_index: int
-    end_index: int
-    mission_type: int
-
-
-@dataclass(frozen=True, slots=True)
-class MissionClearAll:
-    """MISSION_CLEAR_ALL."""
-
-    target_system: int
-    target_component: int
-    mission_type: int
-
-
-@dataclass(frozen=True, slots=True)
-class MissionSetCurrent:
-    """MISSION_SET_CURRENT."""
-
-    target_system: int
-    target_component: int
-    seq: int
-
-
-@dataclass(frozen=True, slots=True)
-class MissionCurrent:
-    """MISSION_CURRENT; `total` leaves out ArduPilot's home row, 0 is for none."""
-
-    seq: int
-    total: int
-    mission_state: int
-
-
-@dataclass(frozen=True, slots=True)
-class MissionItemReached:
-    """MISSION_ITEM_REACHED."""
-
-    seq: int
-
-
-@dataclass(frozen=True, slots=True)
-class CommandLong:
-    """COMMAND_LONG."""
-
-    target_system: int
-    target_component: int
-    command: int
-    confirmation: int
-    param1: float = 0.0
-    param2: float = 0.0
-    param3: float = 0.0
-    param4: float = 0.0
-    param5: float = 0.0
-    param6: float = 0.0
-    param7: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class CommandAck:
-    """COMMAND_ACK; `result` is a MAV_RESULT."""
-
-    command: int
-    result: int
-    target_system: int
-    target_component: int
-
-
-@dataclass(frozen=True, slots=True)
-class SetMode:
-    """SET_MODE."""
-
-    target_system: int
-    base_mode: int
-    custom_mode: int
-
-
-@dataclass(frozen=True, slots=True)
-class ParamRequestList:
-    """PARAM_REQUEST_LIST."""
-
-    target_system: int
-    target_component: int
-
-
-@dataclass(frozen=True, slots=True)
-class ParamRequestRead:
-    """PARAM_REQUEST_READ; `param_index` -1 asks by name."""
-
-    target_system: int
-    target_component: int
-    param_id: str
-    param_index: int
-
-
-@dataclass(frozen=True, slots=True)
-class ParamSet:
-    """PARAM_SET."""
-
-    target_system: int
-    target_component: int
-    param_id: str
-    param_value: float
-    param_type: int
-
-
-@dataclass(frozen=True, slots=True)
-class ParamValue:
-    """PARAM_VALUE."""
-
-    param_id: str
-    param_value: float
-    param_type: int
-    param_count: int
-    param_index: int
-
-
-@dataclass(frozen=True, slots=True)
-class AutopilotVersion:
+class AutopilotVersion(Message):
     """AUTOPILOT_VERSION, as much as ground stations look at."""
 
     capabilities: int
@@ -240,7 +219,7 @@ class AutopilotVersion:
 
 
 @dataclass(frozen=True, slots=True)
-class GlobalPositionInt:
+class GlobalPositionInt(Message):
     """GLOBAL_POSITION_INT: 1e-7 degrees, mm, cm/s north, east, down, heading in 0.01 degrees."""
 
     time_boot_ms: int
@@ -255,7 +234,7 @@ class GlobalPositionInt:
 
 
 @dataclass(frozen=True, slots=True)
-class LocalPositionNed:
+class LocalPositionNed(Message):
     """LOCAL_POSITION_NED: metres and m/s north, east, down of home."""
 
     time_boot_ms: int
@@ -268,7 +247,7 @@ class LocalPositionNed:
 
 
 @dataclass(frozen=True, slots=True)
-class Attitude:
+class Attitude(Message):
     """ATTITUDE: radians and rad/s."""
 
     time_boot_ms: int
@@ -281,45 +260,12 @@ class Attitude:
 
 
 @dataclass(frozen=True, slots=True)
-class HomePosition:
+class HomePosition(Message):
     """HOME_POSITION: 1e-7 degrees, mm above mean sea level."""
 
     latitude: int
     longitude: int
     altitude: int
-
-
-Transfer: TypeAlias = (
-    MissionCount
-    | MissionRequestInt
-    | MissionItemInt
-    | MissionAck
-    | MissionRequestList
-    | MissionClearAll
-    | MissionWritePartialList
-)
-"""What belongs to a transfer: it is addressed, and says which list it is about."""
-
-Message: TypeAlias = (
-    Transfer
-    | Heartbeat
-    | Statustext
-    | MissionSetCurrent
-    | MissionCurrent
-    | MissionItemReached
-    | CommandLong
-    | CommandAck
-    | SetMode
-    | ParamRequestList
-    | ParamRequestRead
-    | ParamSet
-    | ParamValue
-    | AutopilotVersion
-    | GlobalPositionInt
-    | LocalPositionNed
-    | Attitude
-    | HomePosition
-)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,9 +21,14 @@ FORMS = (
 )
 _KINDS = ("udpin", "udpout", "udp", "tcp", "tcpin")
 _CONNECT_TIMEOUT = 5.0
-_FORGET = 30.0  # s after which a silent UDP sender is not answered any more
+"""Seconds to wait for a TCP connection: chosen."""
+
+_FORGET = 30.0
+"""Seconds after which a silent UDP sender is not answered any more: chosen, 30 lost heartbeats."""
+
 _MAX_DATAGRAM = 65_535
 _DEFAULT_BAUD = 57_600
+"""Bits per second: what telemetry radios are delivered with."""
 
 
 class Transport(Protocol):
@@ -52,7 +57,11 @@ class Endpoint:
 
 
 def parse_connection(text: str) -> Endpoint:
-    """Return what the connection string `text` says; raises `InputError`."""
+    """Return what the connection string `text` says; raises `InputError`.
+
+    >>> parse_connection("udp:0.0.0.0:14550")
+    Endpoint(kind='udpin', host='0.0.0.0', port=14550)
+    """
     kind, colon, rest = text.partition(":")
     if colon and kind in _KINDS:
         host, colon, port = rest.rpartition(":")
@@ -88,10 +97,8 @@ def open_transport(text: str) -> Transport:
                 return _Udp(host_port, None)
             case "udpout":
                 return _Udp(None, host_port)
-            case "tcp":
-                return _Tcp(host_port)
             case _:
-                return _TcpServer(host_port)
+                return _Tcp(host_port, listens=endpoint.kind == "tcpin")
     except OSError as error:
         raise LinkError(f"connection {text!r}: {_reason(error)}") from None
 
@@ -156,79 +163,58 @@ class _Udp:
 
 
 class _Tcp:
-    """A TCP connection."""
+    """TCP: the connection that this end made, or all that others make to a listening socket."""
 
-    def __init__(self, target: tuple[str, int]) -> None:
-        self._name = f"tcp:{target[0]}:{target[1]}"
-        self._socket = socket.create_connection(target, timeout=_CONNECT_TIMEOUT)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def read(self, timeout: float) -> list[bytes]:
-        if not select.select([self._socket], [], [], max(timeout, 0.0))[0]:
-            return []
-        try:
-            data = self._socket.recv(_MAX_DATAGRAM)
-        except OSError as error:
-            raise self._broken(error) from None
-        if not data:
-            raise self._broken(None)
-        return [data]
-
-    def write(self, data: bytes) -> None:
-        try:
-            self._socket.sendall(data)
-        except OSError as error:
-            raise self._broken(error) from None
-
-    def close(self) -> None:
-        self._socket.close()
-
-    def _broken(self, error: OSError | None) -> LinkError:
-        if error is None or isinstance(error, ConnectionError):
-            return LinkError(f"{self._name}: the other side closed the connection")
-        return LinkError(f"{self._name}: {error.strerror or error}")
-
-
-class _TcpServer:
-    """A listening TCP socket and whoever has connected to it."""
-
-    def __init__(self, listen: tuple[str, int]) -> None:
-        self._listener = socket.create_server(listen)
-        self._listener.setblocking(False)
-        self._clients: list[socket.socket] = []
+    def __init__(self, address: tuple[str, int], *, listens: bool) -> None:
+        self._name = f"tcp:{address[0]}:{address[1]}"
+        self._listener = socket.create_server(address) if listens else None
+        self._peers: list[socket.socket] = []
+        if self._listener is not None:
+            self._listener.setblocking(False)
+        else:
+            self._peers.append(socket.create_connection(address, timeout=_CONNECT_TIMEOUT))
+            self._peers[0].setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def read(self, timeout: float) -> list[bytes]:
-        ready = select.select([self._listener, *self._clients], [], [], max(timeout, 0.0))[0]
         found: list[bytes] = []
-        for ready_socket in ready:
-            if ready_socket is self._listener:
+        for ready in select.select(self._sockets(), [], [], max(timeout, 0.0))[0]:
+            if ready is self._listener:
                 with contextlib.suppress(OSError):
-                    self._clients.append(self._listener.accept()[0])
+                    self._peers.append(ready.accept()[0])
                 continue
-            data = b""
-            with contextlib.suppress(OSError):
-                data = ready_socket.recv(_MAX_DATAGRAM)
+            try:
+                data, error = ready.recv(_MAX_DATAGRAM), None
+            except OSError as broken:
+                data, error = b"", broken
             if data:
                 found.append(data)
             else:
-                self._drop(ready_socket)
+                self._drop(ready, error)
         return found
 
     def write(self, data: bytes) -> None:
-        for client in list(self._clients):
+        for peer in list(self._peers):
             try:
-                client.sendall(data)
-            except OSError:
-                self._drop(client)
+                peer.sendall(data)
+            except OSError as error:
+                self._drop(peer, error)
 
     def close(self) -> None:
-        for client in list(self._clients):
-            self._drop(client)
-        self._listener.close()
+        for each in self._sockets():
+            each.close()
 
-    def _drop(self, client: socket.socket) -> None:
-        self._clients.remove(client)
-        client.close()
+    def _sockets(self) -> list[socket.socket]:
+        return self._peers if self._listener is None else [self._listener, *self._peers]
+
+    def _drop(self, peer: socket.socket, error: OSError | None) -> None:
+        """Forget one of several peers; raise `LinkError` for the only one there can be."""
+        if self._listener is not None:
+            self._peers.remove(peer)
+            peer.close()
+        elif error is None or isinstance(error, ConnectionError):
+            raise LinkError(f"{self._name}: the other side closed the connection") from None
+        else:
+            raise LinkError(f"{self._name}: {error.strerror or error}") from None
 
 
 class _Serial:

@@ -1,6 +1,6 @@
-"""Figures, and the page that tells of a flight without a network."""
+"""Figures, the page that tells of a flight without a network, and the lines that both say."""
 
-from faao_mav.report.data import ReportData
 from faao_mav.report.page import render_report
+from faao_mav.report.summary import summary
 
-__all__ = ["ReportData", "render_report"]
+__all__ = ["render_report", "summary"]

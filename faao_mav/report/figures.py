@@ -1,28 +1,34 @@
-"""The figures of one flight, as matplotlib figures: metres, seconds, m/s, bit/s/Hz, watts."""
+"""The figures of one flight, of a plan or of a mission alone: m, s, m/s, bit/s/Hz, watts."""
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.mission.command import FLOWN_TO
+from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
-from faao_mav.report.route_map import route_map
-from faao_mav.report.style import MUTED, SERIES, label, legend_above, new_figure, styled
-from faao_mav.report.waypoint_numbers import number_waypoints
-from faao_mav.schedule.convert import Conversion
+from faao_mav.report.route_map import (
+    draw_fence,
+    draw_waypoints,
+    outlines_of,
+    places_of,
+    route_map,
+    show_all,
+    write_numbers,
+)
+from faao_mav.report.style import MUTED, SERIES, drawing, label, legend_above
+from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
+from faao_mav.vector import lengths
+from faao_mav.vehicle import Track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["convergence", "flight_figure", "motion", "precoder_power", "rates", "route"]
-
-_PLAN, _PREDICTED = SERIES[0], SERIES[1]
 _WIDTH = 4.2
 """Inches: a page makes it as wide as a phone, where 9 points must still be read."""
-_BENEATH: dict[str, Any] = {"color": _PLAN, "linewidth": 3.6, "alpha": 0.45}
-"""How a curve looks that another one may cover."""
 
 
 def flight_figure(
@@ -31,51 +37,43 @@ def flight_figure(
     prediction: Prediction | None = None,
 ) -> "Figure":
     """Return the flight in one figure, as `--figure` saves it: map, speed, and both rates."""
-    with styled():
-        figure = new_figure(9.6, 5.6)
+    with drawing(9.6, 5.6) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=[1.15, 1.0])
         plot = figure.add_subplot(grid[:, 0])
-        route_map(solution, conversion, plot)
-        plot.set_title("Route")
         speed = figure.add_subplot(grid[0, 1])
         to_uav = figure.add_subplot(grid[1, 1], sharex=speed)
         to_user = figure.add_subplot(grid[2, 1], sharex=speed, sharey=to_uav)
         _speed(speed, solution, conversion)
         _rates((to_uav, to_user), solution, prediction)
         _share_time(speed, to_uav)
-        number_waypoints(solution, conversion, plot)
-        return figure
+        route_map(solution, conversion, plot, "Route")
+    return figure
 
 
 def route(solution: Solution, conversion: Conversion | None = None) -> "Figure":
     """Return the map of the route: see `route_map`."""
-    with styled():
-        figure = new_figure(_WIDTH, 4.2)
-        plot = figure.subplots()
-        route_map(solution, conversion, plot)
-        number_waypoints(solution, conversion, plot)
-        return figure
+    with drawing(_WIDTH, 4.2) as figure:
+        route_map(solution, conversion, figure.subplots())
+    return figure
 
 
 def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure":
     """Return speed and acceleration over time with v_max, v_min and a_max."""
-    with styled():
-        figure = new_figure(_WIDTH, 4.4)
+    with drawing(_WIDTH, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         _speed(upper, solution, conversion)
         _acceleration(lower, solution)
         _share_time(upper)
-        return figure
+    return figure
 
 
 def rates(solution: Solution, prediction: Prediction | None = None) -> "Figure":
     """Return I_U and I_G of (7), (8) in every slot: planned, and where the flight is predicted."""
-    with styled():
-        figure = new_figure(_WIDTH, 4.4)
+    with drawing(_WIDTH, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, sharey=True)
         _rates((upper, lower), solution, prediction)
         _share_time(upper)
-        return figure
+    return figure
 
 
 def precoder_power(solution: Solution) -> "Figure":
@@ -84,47 +82,74 @@ def precoder_power(solution: Solution) -> "Figure":
     Streams are numbered by their power in each slot: the rate does not depend on their order.
     Precoders that know the draw are averaged over the draws.
     """
-    with styled():
-        figure = new_figure(_WIDTH, 4.4)
-        radio = solution.plan.radio
-        stations = (
-            ("Base station", solution.P_B, radio.base_station.power, "W_B"),
-            ("UAV", solution.P_U, radio.relay.power, "W_U"),
-        )
+    radio = solution.plan.radio
+    stations = (
+        ("Base station", solution.P_B, radio.base_station.power, "W_B"),
+        ("UAV", solution.P_U, radio.relay.power, "W_U"),
+    )
+    with drawing(_WIDTH, 4.4) as figure:
         plots = figure.subplots(2, 1, sharex=True)
         for plot, (name, P, power, limit) in zip(plots, stations, strict=True):
-            shares = _stream_powers(P)
+            streams = _stream_powers(P).T
             unit, scale = _watts(power)
             _limit(plot, power * scale, limit)
-            for k, share in enumerate(shares.T):
+            for k, stream in enumerate(streams):
                 plot.plot(
                     solution.t,
-                    share * scale,
+                    stream * scale,
                     color=SERIES[k % len(SERIES)],
                     linewidth=2.4 if k == 0 else 1.2,
                     label=f"stream {k + 1}",
                 )
             plot.set_ylim(bottom=0)
             label(plot, name, "time, s", f"power, {unit}")
-            if len(shares.T) <= len(SERIES):
+            if len(streams) <= len(SERIES):
                 legend_above(plot)
         _share_time(plots[0])
-        return figure
+    return figure
 
 
 def convergence(solution: Solution) -> "Figure":
     """Return R_avg after each iteration of the method."""
     from matplotlib.ticker import MaxNLocator
 
-    with styled():
-        figure = new_figure(_WIDTH, 2.6)
+    with drawing(_WIDTH, 2.6) as figure:
         plot = figure.subplots()
         steps = np.arange(len(solution.history))
-        plot.plot(steps, solution.history, color=_PLAN, marker="o", markersize=3.5)
+        plot.plot(steps, solution.history, color=SERIES[0], marker="o", markersize=3.5)
         plot.xaxis.set_major_locator(MaxNLocator(integer=True))
         plot.ticklabel_format(axis="y", useOffset=False)
         label(plot, "", "iteration", "rate R_avg, bit/s/Hz")
-        return figure
+    return figure
+
+
+def mission_map(mission: Mission, track: Track) -> "Figure":
+    """Return the map: the predicted flight, the places of the items with numbers, the fence.
+
+    East and north in metres about the origin of the track's frame; items count from 1.
+    """
+    flown = track.position[:, :2]
+    numbers, places = places_of(mission, track.frame, FLOWN_TO)
+    with drawing(_WIDTH, 4.2) as figure:
+        plot = figure.subplots()
+        outlines = list(outlines_of(mission.fence, track.frame))
+        draw_fence(plot, outlines)
+        plot.plot(*flown.T, color=SERIES[0], label="predicted")
+        draw_waypoints(plot, places, "item")
+        show_all(plot, np.concatenate([flown, places]), outlines)
+        write_numbers(plot, numbers, places, [flown], np.empty((0, 2)))
+    return figure
+
+
+def mission_motion(track: Track) -> "Figure":
+    """Return ground speed, m/s, and height above home, m, over time, s."""
+    with drawing(_WIDTH, 4.4) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        upper.plot(track.t, lengths(track.velocity[:, :2]), color=SERIES[0])
+        label(upper, "", "", "ground speed, m/s")
+        lower.plot(track.t, track.position[:, 2], color=SERIES[0])
+        label(lower, "", "time, s", "height above home, m")
+    return figure
 
 
 def _speed(plot: "Axes", solution: Solution, conversion: Conversion | None) -> None:
@@ -132,30 +157,30 @@ def _speed(plot: "Axes", solution: Solution, conversion: Conversion | None) -> N
     _limit(plot, vehicle.max_speed, "v_max")
     if vehicle.min_speed > 0:
         _limit(plot, vehicle.min_speed, "v_min")
-    plot.plot(solution.t, _lengths(solution.v), **_planned(conversion))
+    flown = None
     if conversion is not None:
         schedule = conversion.schedule
         track = schedule.track()
         t = track["predicted_t"]
         over = solution.t[-1] + max(0.0, schedule.clock.late(schedule.flown))
         inside = (t >= solution.t[0]) & (t <= over)
-        speed = _lengths(track["predicted_v"])[inside]
-        plot.plot(t[inside], speed, color=_PREDICTED, linewidth=1.1, label="predicted")
+        flown = t[inside], lengths(track["predicted_v"])[inside]
+    _curves(plot, (solution.t, lengths(solution.v)), flown)
     plot.set_ylim(bottom=0)
     label(plot, "Speed", "time, s", "speed, m/s")
     legend_above(plot)
 
 
 def _acceleration(plot: "Axes", solution: Solution) -> None:
-    limit, lengths = solution.plan.vehicle.max_acceleration, _lengths(solution.a)
+    limit, needed = solution.plan.vehicle.max_acceleration, lengths(solution.a)
     _limit(plot, limit, "a_max")
-    plot.plot(solution.t, lengths, color=_PLAN, label="planned")
+    _curves(plot, (solution.t, needed), None)
     plot.set_ylim(bottom=0)
-    top = 1.2 * max(limit, float(lengths[1:].max()))
-    if lengths[0] > top:  # a(0) has no bound in the paper: it would flatten all the rest
+    top = 1.2 * max(limit, float(needed[1:].max()))
+    if needed[0] > top:  # a(0) has no bound in the paper: it would flatten all the rest
         plot.set_ylim(top=top)
         plot.annotate(
-            f"a(0): {lengths[0]:.3g} m/s²",
+            f"a(0): {needed[0]:.3g} m/s²",
             (0.0, 1.0),
             xytext=(12, -4),
             xycoords=plot.get_xaxis_transform(),
@@ -168,22 +193,23 @@ def _acceleration(plot: "Axes", solution: Solution) -> None:
 
 def _rates(plots: "tuple[Axes, Axes]", solution: Solution, prediction: Prediction | None) -> None:
     """Draw each link on its own plot: over known fading, one would hide the other."""
+    t = solution.t
     planned = (("Base station to UAV", solution.I_U), ("UAV to user", solution.I_G))
-    flown = (prediction.I_U, prediction.I_G) if prediction is not None else (None, None)
-    curves = [values for _, values in planned] + [values for values in flown if values is not None]
-    top = max(float(values.max()) for values in curves) or 1.0
-    for plot, (name, values), predicted in zip(plots, planned, flown, strict=True):
-        plot.plot(solution.t, values, **_planned(predicted))
-        if predicted is not None:
-            plot.plot(solution.t, predicted, color=_PREDICTED, linewidth=1.1, label="predicted")
+    flown = [prediction.I_U, prediction.I_G] if prediction is not None else []
+    top = max(float(values.max()) for values in (solution.I_U, solution.I_G, *flown)) or 1.0
+    for k, (plot, (name, values)) in enumerate(zip(plots, planned, strict=True)):
+        _curves(plot, (t, values), (t, flown[k]) if flown else None)
         plot.set_ylim(0, 1.08 * top)
         label(plot, name, "time, s", "rate, bit/s/Hz")
         legend_above(plot)
 
 
-def _planned(flown: object) -> dict[str, Any]:
-    """Return how a curve of the plan looks: as a band where there is one of the flight on it."""
-    return {"label": "planned"} | ({"color": _PLAN} if flown is None else _BENEATH)
+def _curves(plot: "Axes", planned: tuple[Real, Real], flown: tuple[Real, Real] | None) -> None:
+    """Draw a curve of the plan, and as a band beneath it where there is one of the flight."""
+    beneath: dict[str, Any] = {"linewidth": 3.6, "alpha": 0.45} if flown is not None else {}
+    plot.plot(*planned, color=SERIES[0], label="planned", **beneath)
+    if flown is not None:
+        plot.plot(*flown, color=SERIES[1], linewidth=1.1, label="predicted")
 
 
 def _share_time(*upper: "Axes") -> None:
@@ -195,10 +221,6 @@ def _share_time(*upper: "Axes") -> None:
 
 def _limit(plot: "Axes", value: float, name: str) -> None:
     plot.axhline(value, color=MUTED, linestyle=":", linewidth=1.2, label=name)
-
-
-def _lengths(vectors: Real) -> Real:
-    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
 
 
 def _stream_powers(P: Complex) -> Real:

@@ -1,18 +1,21 @@
 """The route on a map: planned with its speeds, predicted, waypoints, stations, fence."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import Command
 from faao_mav.mission.fence import Fence
+from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.report.style import INK, MUTED, SERIES, label, legend_above, mark_stations
-from faao_mav.report.waypoint_numbers import waypoints
-from faao_mav.schedule.convert import Conversion
+from faao_mav.schedule.conversion import Conversion
+from faao_mav.schedule.schedule import positions_at
+from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,46 +23,81 @@ if TYPE_CHECKING:
 Outline: TypeAlias = tuple[Real, bool]
 """Corners (k, 2), m, closed, and whether the aircraft has to stay inside."""
 
+WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+"""The commands of a relay route, whose items are numbered on its map."""
+
 _PIECES = 240
 """Pieces of the route with a colour each, at most: more cannot be told apart."""
 _LEVELS = 32
+"""Colours on the scale of speeds; chosen: the steps cannot be seen."""
 _SHADES = (0.85, 0.3)
 """Slow and fast on the scale of viridis: its ends vanish on white and on black paper."""
 _ROUND = 72
+"""Corners that a circle is drawn with; chosen: 5 degrees each."""
+
+_SIZE = 8.0
+"""Height of a number, points."""
+_DIGIT = 0.66
+"""Width of a digit in the widest usual font, of its size."""
+_GAP = 5.0
+"""Points between a waypoint and its number."""
+_CLEAR = 2.5
+"""Points between a number and the middle of a line: half the width that routes are drawn with."""
+_MARK = 4.0
+"""Half of a station's mark, points."""
+_SIDES = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0)])
+"""Where a number may stand beside its waypoint, right and up of it, the first that is free."""
 
 
-def route_map(solution: Solution, conversion: Conversion | None, plot: "Axes") -> None:
+def route_map(
+    solution: Solution, conversion: Conversion | None, plot: "Axes", title: str = ""
+) -> None:
     """Draw the map on `plot`: east and north in metres, speeds as colours with a bar.
 
-    It shows all of the flight and both stations, and of a wider fence what is near them.
+    It shows all of the flight and both stations, and of a wider fence what is near them. It is
+    drawn when all else in its figure is, for the waypoints' numbers are fitted in.
     """
-    plan = solution.plan
-    radio = plan.radio
+    radio, origin = solution.plan.radio, solution.plan.origin
     stations = np.array([radio.base_station.position, radio.ground_user.position])
-    seen = [solution.w, stations]
+    marked = zip(("base station", "user"), stations.tolist(), "s^", strict=True)
     outlines: list[Outline] = []
+    lines, places = [solution.w], np.empty((0, 2))
+    numbers: list[int] = []
     if conversion is not None:
-        frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-        outlines = list(outlines_of(conversion.mission.fence, frame))
-        draw_fence(plot, outlines)
+        frame, mission = LocalFrame(origin.latitude, origin.longitude), conversion.mission
+        outlines = list(outlines_of(mission.fence, frame))
+        numbers, places = places_of(mission, frame, WAYPOINTS)
+        lines.append(conversion.schedule.track()["predicted_w"])
+    draw_fence(plot, outlines)
     _coloured(plot, solution)
     if conversion is not None:
-        track = conversion.schedule.track()["predicted_w"]
-        plot.plot(*track.T, "--", color=INK, linewidth=0.9, label="predicted")
-        _, places = waypoints(conversion.mission, plan)
-        plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label="waypoint")
-        legend_above(plot, 2)
-        seen += [track, places]
-    mark_stations(
-        plot,
-        (
-            ("base station", radio.base_station.position, "s"),
-            ("user", radio.ground_user.position, "^"),
-        ),
-    )
-    plot.set_aspect("equal", adjustable="datalim")
-    show_all(plot, np.concatenate(seen), outlines)
-    label(plot, "", "east, m", "north, m")
+        plot.plot(*lines[1].T, "--", color=INK, linewidth=0.9, label="predicted")
+        draw_waypoints(plot, places, "waypoint")
+    mark_stations(plot, list(marked))
+    show_all(plot, np.concatenate([*lines, stations, places]), outlines, title)
+    write_numbers(plot, numbers, places, lines, stations)
+
+
+def places_of(
+    mission: Mission, frame: LocalFrame, commands: Collection[int]
+) -> tuple[list[int], Real]:
+    """Return the numbers of the items with one of `commands` and a place, and the places (k, 2).
+
+    Items count from 1; places are metres about the origin of `frame`.
+    """
+    found = [
+        (number, item.x, item.y)
+        for number, item in enumerate(mission.items, 1)
+        if item.command in commands and (item.x or item.y)
+    ]
+    numbers, latitudes, longitudes = zip(*found, strict=True) if found else ((), (), ())
+    return list(numbers), frame.to_local(latitudes, longitudes)
+
+
+def draw_waypoints(plot: "Axes", places: Real, name: str) -> None:
+    """Draw the waypoints at `places` (k, 2), m, as dots, with a legend for all that is drawn."""
+    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)
+    legend_above(plot, 2)
 
 
 def draw_fence(plot: "Axes", outlines: Sequence[Outline]) -> None:
@@ -80,16 +118,21 @@ def draw_fence(plot: "Axes", outlines: Sequence[Outline]) -> None:
             plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
 
 
-def show_all(plot: "Axes", seen: Real, outlines: Sequence[Outline]) -> None:
-    """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it."""
+def show_all(plot: "Axes", seen: Real, outlines: Sequence[Outline], title: str = "") -> None:
+    """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it.
+
+    A metre is as long to the east as to the north.
+    """
     low, high = seen.min(axis=0), seen.max(axis=0)
     width = float((high - low).max()) or 1.0
     if outlines:
         corners = np.concatenate([corners for corners, _ in outlines])
         corners = np.clip(corners, low - width / 2, high + width / 2)
         low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+    plot.set_aspect("equal", adjustable="datalim")
     plot.dataLim.set_points(np.array([low, high]))
     plot.margins(0.08)
+    label(plot, title, "east, m", "north, m")
 
 
 def _coloured(plot: "Axes", solution: Solution) -> None:
@@ -101,7 +144,7 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     step = max(1, -(-(len(solution.w) - 1) // _PIECES))
     ends = np.unique(np.append(np.arange(0, len(solution.w), step), len(solution.w) - 1))
     pieces = [solution.w[a : b + 1] for a, b in itertools.pairwise(ends)]
-    speeds = np.hypot(*solution.v.T)
+    speeds = lengths(solution.v)
     means = np.array([speeds[a : b + 1].mean() for a, b in itertools.pairwise(ends)])
     colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
     lines = LineCollection(pieces, cmap=colours, linewidths=5, capstyle="round")
@@ -125,3 +168,58 @@ def outlines_of(fence: Fence, frame: LocalFrame) -> Iterator[Outline]:
         center = frame.to_local(*circle.center)
         ring = np.column_stack([np.cos(angles), np.sin(angles)])
         yield center + circle.radius * ring, circle.inclusion
+
+
+def write_numbers(
+    plot: "Axes",
+    numbers: Sequence[int],
+    places: Real,
+    lines: Sequence[Real],
+    marks: Real,
+) -> None:
+    """Write `numbers` beside their `places` (k, 2), m, on a map on which all else is drawn.
+
+    A number stands clear of the `lines` (n, 2), m, of the `marks` (j, 2), m, of texts and of other
+    numbers. Where that leaves it no room, it is left out.
+    """
+    figure = plot.get_figure(root=True)
+    if figure is None or not numbers:
+        return
+    from matplotlib.transforms import Bbox
+
+    figure.draw_without_rendering()  # the scale of the map is known only now
+    points = 72.0 / figure.dpi
+
+    def on_paper(at: Real) -> Real:
+        return np.asarray(plot.transData.transform(at) * points)
+
+    paper = Bbox(plot.get_window_extent().get_points() * points)
+    taken = [Bbox(text.get_window_extent().get_points() * points) for text in plot.texts]
+    taken += [Bbox([mark - _MARK, mark + _MARK]) for mark in on_paper(marks)]
+    occupied = np.concatenate([_dense(on_paper(line)) for line in lines])
+    for number, place, at in zip(numbers, places.tolist(), on_paper(places), strict=True):
+        size = np.array([_DIGIT * _SIZE * len(str(number)), _SIZE])
+        for side in _SIDES:
+            shift = side * (size / 2 + (_GAP if 0 in side else 0.6 * _GAP))
+            box = Bbox([at + shift - size / 2, at + shift + size / 2])
+            inside = paper.contains(*box.min) and paper.contains(*box.max)
+            crossed = box.padded(_CLEAR).count_contains(occupied) > 0
+            if inside and not crossed and not any(map(box.overlaps, taken)):
+                taken.append(box)
+                written = plot.annotate(
+                    str(number),
+                    place,
+                    xytext=shift,
+                    textcoords="offset points",
+                    ha="center",
+                    va="center",
+                    fontsize=_SIZE,
+                )
+                written.set_in_layout(False)  # the map stays as it was measured
+                break
+
+
+def _dense(line: Real) -> Real:
+    """Return points of `line` (n, 2) that are at most about a point apart."""
+    along = np.append(0.0, np.cumsum(lengths(np.diff(line, axis=0))))
+    return positions_at(np.linspace(0.0, along[-1], int(along[-1]) + 2), along, line)

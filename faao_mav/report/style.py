@@ -1,28 +1,38 @@
-"""How figures look: colours, sizes, and the same bytes for the same figure.
+"""How figures look: colours, sizes, and the same bytes for the same figure, in a file or a page.
 
 Figures are matplotlib's, made without pyplot: there is no global state and no window.
 """
 
+import html
 import io
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from faao_mav.errors import InputError
-from faao_mav.files import write_whole
+from faao_mav.files import check_ending, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
+"""Colours of text, of what is secondary, of grids and of the paper; a page replaces them."""
+
 SERIES = ("#1769aa", "#c2500a", "#16825d", "#9a3d9c", "#8a6d00", "#c03352", "#54606e")
-"""Colours in fixed order, apart for the colour-blind and on both papers."""
+"""Colours of curves in fixed order: the colour-blind tell them apart, on light and dark paper."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+"""Markers of curves, in the order of `SERIES`."""
 
 FORMATS = (".png", ".svg", ".pdf")
+"""What the name of a figure may end in."""
+
+_ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
+    colour: f"--s{k}" for k, colour in enumerate(SERIES)
+}
+"""The custom property of the page for each colour of the figures."""
 
 _SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -63,14 +73,16 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float = 5.4, height: float = 3.4) -> "Figure":
-    """Return an empty figure of so many inches."""
+@contextmanager
+def drawing(width: float, height: float) -> Iterator["Figure"]:
+    """Give an empty figure of `width` by `height` inches, to be drawn within this."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+    with styled():
+        figure = Figure(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
 
 
 def label(axes: "Axes", title: str, x: str, y: str) -> None:
@@ -113,12 +125,6 @@ def mark_stations(axes: "Axes", places: Sequence[tuple[str, tuple[float, float],
         )
 
 
-def check_figure_path(path: Path, option: str) -> None:
-    """Raise `InputError` unless `path` ends in a format that figures can be saved in."""
-    if path.suffix not in FORMATS:
-        raise InputError(f"{option} {path}: give a name that ends in {', '.join(FORMATS)}")
-
-
 def render(figure: "Figure", suffix: str) -> bytes:
     """Return `figure` as .png, .svg or .pdf; the same figure gives the same bytes."""
     buffer = io.BytesIO()
@@ -130,5 +136,31 @@ def render(figure: "Figure", suffix: str) -> bytes:
 
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write `figure` to `path`, whole or not at all, in the format of its ending."""
-    check_figure_path(path, "figure")
+    check_ending(path, "figure", FORMATS)
     write_whole(path, render(figure, path.suffix))
+
+
+def inline_svg(figure: "Figure", name: str, title: str) -> str:
+    """Return `figure` as an `<svg>` element of an HTML page, described by `title`.
+
+    The colours of the style become the page's custom properties, so that they follow light and
+    dark. `name` keeps the identifiers of one figure apart from those of the others.
+    """
+    text = render(figure, ".svg").decode()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    opening, rest = text.split(">", 1)
+    box = re.search(r'viewBox="[^"]*"', opening)
+    assert box is not None
+    rest = re.sub(r'\bid="([^"]*)"', rf'id="{name}-\1"', rest)
+    rest = re.sub(r'(?:xlink:)?href="#([^"]*)"', rf'href="#{name}-\1"', rest)
+    rest = re.sub(r"url\(#([^)]*)\)", rf"url(#{name}-\1)", rest)
+    rest = re.sub(r"font: ([\d.]+px)[^;\"]*", r"font-size: \1", rest)
+    rest = re.sub(r"font-family: [^;\"]*;? ?", "", rest)
+    for colour, role in _ROLES.items():
+        rest = rest.replace(colour, f"var({role})")
+    label = f"{name}-title"
+    return (
+        f'<svg {box[0]} role="img" aria-labelledby="{label}">'
+        f'<title id="{label}">{html.escape(title)}</title>{rest.strip()}'
+    )

@@ -12,13 +12,14 @@ from faao_mav.vehicle import vehicle_of
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
 
-_DECIMALS = 9  # of a degree: 0.1 mm
+_DECIMALS = 9
+"""Decimals of a latitude or longitude in degrees: 0.1 mm."""
 
 _AIRSPEED, _GROUND_SPEED = 0.0, 1.0
 """Types of DO_CHANGE_SPEED. ArduPlane takes the second for the least ground speed."""
 
 _PITCH = 15.0
-"""Degrees by which a plane climbs at least until it is at its altitude."""
+"""The least pitch of a plane's climb after take-off, degrees; chosen."""
 
 
 def assemble(route: Route, plan: "Plan") -> Mission:
@@ -41,31 +42,27 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         for x, y in zip(latitudes, longitudes, strict=True)
     ]
 
-    vehicle_type = vehicle_of(plan).type
-    plane, whole_seconds = not vehicle_type.hovers, vehicle_type.whole_second_holds
-    axis = _AIRSPEED if plane else _GROUND_SPEED
+    vehicle = vehicle_of(plan).type
+    axis = _GROUND_SPEED if vehicle.hovers else _AIRSPEED
     items = []
     if plan.mission.takeoff:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
         here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
-        items.append(_at(Command.NAV_TAKEOFF, here, altitude, _PITCH if plane else 0.0))
-    commanded = (
-        float(route.speeds[0]) if plane else min(plan.vehicle.max_speed, vehicle_type.fastest)
-    )
+        items.append(_at(Command.NAV_TAKEOFF, here, altitude, 0.0 if vehicle.hovers else _PITCH))
+    fastest = min(plan.vehicle.max_speed, vehicle.fastest)
+    commanded = fastest if vehicle.hovers else float(route.speeds[0])
     items.append(_change_speed(commanded, axis))
+    holds, delays = route.holds_and_delays(whole_seconds=vehicle.whole_second_holds)
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
         if speed != commanded:
             items.append(_change_speed(speed, axis))
             commanded = speed
-        hold, delay = float(route.holds[k]), float(route.delays[k])
-        if not whole_seconds:
-            hold, delay = hold + delay, 0.0
-        items.append(
-            _waypoint(place, altitude, hold, float(route.radii[k]), spline=bool(route.splines[k]))
-        )
-        if delay > 0:
-            items.append(MissionItem(Command.NAV_DELAY, Frame.MISSION, (delay, -1.0, -1.0, -1.0)))
+        command = Command.NAV_SPLINE_WAYPOINT if route.splines[k] else Command.NAV_WAYPOINT
+        items.append(_at(command, place, altitude, float(holds[k]), float(route.radii[k])))
+        if delays[k] > 0:
+            params = (float(delays[k]), -1.0, -1.0, -1.0)
+            items.append(MissionItem(Command.NAV_DELAY, Frame.MISSION, params))
     items.append(_finish(plan, places[-1]))
 
     rows = len(items) + 1
@@ -88,20 +85,13 @@ def _finish(plan: "Plan", place: tuple[float, float]) -> MissionItem:
             return _at(Command.NAV_LOITER_UNLIM, place, plan.flight.altitude)
 
 
-def _waypoint(
-    place: tuple[float, float], altitude: float, hold: float, radius: float, *, spline: bool
-) -> MissionItem:
-    command = Command.NAV_SPLINE_WAYPOINT if spline else Command.NAV_WAYPOINT
-    frame = Frame.GLOBAL_RELATIVE_ALT
-    params = (hold, radius, 0.0, 0.0)
-    return MissionItem(command, frame, params, *place, float(altitude))
-
-
 def _at(
-    command: Command, place: tuple[float, float], altitude: float, param1: float = 0.0
+    command: Command, place: tuple[float, float], altitude: float, *params: float
 ) -> MissionItem:
+    """Return an item at `place` (degrees) whose first parameters are `params`."""
     frame = Frame.GLOBAL_RELATIVE_ALT
-    return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), *place, float(altitude))
+    first, second, third, fourth = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return MissionItem(command, frame, (first, second, third, fourth), *place, float(altitude))
 
 
 def _change_speed(speed: float, axis: float) -> MissionItem:

@@ -1,11 +1,12 @@
-"""A route for an aeroplane whose predicted flight keeps the plan's path, then its time.
+"""Missions for aeroplanes: waypoints that keep the plan's path, then speeds that keep its time.
 
 An aeroplane aims at a point far ahead on its track: it cuts into bends and swings out of them. So
-its waypoints are moved by what the predicted flight strays, again and again; then the speeds are
-fitted. It cannot wait, and it is slow to change its speed: what it loses it cannot always make up.
+its waypoints are moved against its predicted offsets from the plan, again and again; then the
+speeds are fitted. It cannot wait, and it is slow to change its speed: time that it loses it cannot
+always make up for.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,25 +14,25 @@ from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
 
-_MOVES = 12
-_GAIN = 0.5
-"""Of what the aircraft strays: more, and neighbouring waypoints overdo it together."""
+_MOVES = 12  # times that the waypoints are moved; chosen, what more would bring is not measured
+
+# The share of its offset from the plan by which a waypoint is moved the other way: with more,
+# neighbouring waypoints correct the same offset and overdo it.
+_MOVE_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneScheduler(Scheduler):
     """As `Scheduler`, for an aircraft that neither waits nor turns on the spot."""
 
-    def first(self, route: Route) -> Schedule:
+    def _first(self, route: Route) -> Schedule:
         """Return `route` with the waypoints that keep the path best, at the plan's speeds."""
         points = np.arange(route.first + 1, route.last + 1)
-        positions = route.positions.copy()
-        now = best = self.flight(route)
+        schedule = best = self.flight(route)
         for _ in range(_MOVES):
-            positions[points] -= _GAIN * self.astray(now, points)
-            now = self.flight(replace(route, positions=positions.copy()))
-            if now.cost < best.cost:
-                best = now
+            schedule = self.flight(self.moved(schedule, points, _MOVE_SHARE))
+            if schedule.cost < best.cost:
+                best = schedule
         return best
 
     def refined(self, first: Schedule) -> Schedule:

@@ -1,11 +1,9 @@
 """The precoders of every slot as a table that a radio can go by: by time or by position."""
 
-import csv
 import io
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
@@ -30,30 +28,14 @@ def precoder_table(solution: Solution) -> str:
     frame = LocalFrame(origin.latitude, origin.longitude)
     latitude, longitude = frame.to_geodetic(solution.w)
     names = ["slot", "t_s", "east_m", "north_m", "latitude_deg", "longitude_deg"]
-    columns = [solution.t, *solution.w.T, latitude, longitude]
+    columns = [np.arange(len(solution.t)), solution.t, *solution.w.T, latitude, longitude]
     for name, P in (("P_B", solution.P_B), ("P_U", solution.P_U)):
-        names += _names(name, P)
-        columns += list(_parts(P))
+        rows, entries = P.shape[1:]
+        places = [f"{i + 1}_{j + 1}" for i in range(rows) for j in range(entries)]
+        names += [f"{name}_{place}_{part}" for place in places for part in ("re", "im")]
+        flat = P.reshape(len(P), -1)
+        columns += list(np.stack([flat.real, flat.imag], axis=-1).reshape(len(P), -1).T)
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    for slot, row in enumerate(zip(*columns, strict=True)):
-        writer.writerow([slot, *(f"{value:.12g}" for value in row)])
+    formats = ["%d"] + ["%.12g"] * (len(names) - 1)
+    np.savetxt(text, np.stack(columns, axis=1), formats, ",", header=",".join(names), comments="")
     return text.getvalue()
-
-
-def _names(name: str, P: Complex) -> list[str]:
-    rows, columns = P.shape[1:]
-    return [
-        f"{name}_{i + 1}_{j + 1}_{part}"
-        for i in range(rows)
-        for j in range(columns)
-        for part in ("re", "im")
-    ]
-
-
-def _parts(P: Complex) -> Real:
-    """Return real and imaginary parts of the entries of `P` (n, r, c), alternating, (2 r c, n)."""
-    flat = P.reshape(len(P), -1)
-    parts: Real = np.stack([flat.real, flat.imag], axis=-1).reshape(len(P), -1)
-    return parts.T

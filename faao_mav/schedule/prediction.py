@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Integers, Real
+from faao_mav.errors import InputError
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Rates, Solution
-from faao_mav.schedule.convert import Conversion
-from faao_mav.schedule.delivery import delivered, nearest_slots
-from faao_mav.schedule.deviation import deviation, settled
+from faao_mav.schedule.conversion import Conversion
+from faao_mav.schedule.schedule import deviation, positions_at
+from faao_mav.vector import lengths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,24 +40,19 @@ class Prediction:
 
 
 def predict_delivery(solution: Solution, conversion: Conversion) -> Prediction:
-    """Price the channel of `solution` along the flight that its mission is predicted to make."""
-    schedule = conversion.schedule
-    t = schedule.flown.t - schedule.clock.start(schedule.flown)
-    return price_flight(solution, t, schedule.flown.position[:, :2])
+    """Return what the channel of `solution` delivers along the predicted flight of its mission."""
+    track = conversion.schedule.track()
+    return price_flight(solution, track["predicted_t"], track["predicted_w"])
 
 
 def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
-    """Price the channel of `solution` along a flight that is at `w` (k, 2) m at times `t` (k,) s.
+    """Return what the channel of `solution` delivers along a flight.
 
-    The times are the plan's: 0 when its first slot begins. They increase.
+    The aircraft is at `w` (k, 2), m, at the plan's times `t` (k,), s: 0 when the plan's first slot
+    begins. They increase.
     """
-    at = np.stack([np.interp(solution.t, t, x) for x in w.T], axis=-1)
-    near, end = solution.plan.mission.path_tolerance, solution.w[-1]
-    due = float(solution.t[-1])
-    late = settled(t, w, end, near, due) - settled(solution.t, solution.w, end, near, due)
-    # a path flown late is the same path: it counts up to w_F
-    within = (t >= solution.t[0]) & (t <= due + max(0.0, late))
-    apart = deviation(solution.w, at, w[within] if within.any() else at)
+    at = positions_at(solution.t, t, w)
+    errors = deviation(solution.t, solution.w, t, w, solution.plan.mission.path_tolerance)
     I_U, I_G = delivered(solution, at)
     near_U, near_G = delivered(solution, at, nearest_slots(solution, at))
     return Prediction(
@@ -63,8 +60,31 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
         I_U=I_U,
         I_G=I_G,
         by_position=Rates(float(np.mean(near_U)), float(np.mean(near_G))),
-        duration=solution.plan.flight.duration + late,
-        max_path_error=apart.path,
-        max_position_error=apart.max,
-        rms_position_error=apart.rms,
+        duration=solution.plan.flight.duration + errors.late,
+        max_path_error=errors.path,
+        max_position_error=errors.max,
+        rms_position_error=errors.rms,
     )
+
+
+def delivered(solution: Solution, w: Real, slots: Integers | None = None) -> tuple[Real, Real]:
+    """Return I_U (7) and I_G (8), bits, each (n,), where the aircraft is at `w` (n, 2) in slot n.
+
+    Each slot keeps its fading; the line of sight and the path gain are those at `w`. The
+    precoders are those of the same slot, or of `slots` (n,), as `nearest_slots` gives for a radio
+    that goes by position. Precoders that know the draw of an averaged fading stay with the draw.
+    Raises `InputError` unless `w` has one position per slot.
+    """
+    if w.shape != solution.w.shape:
+        raise InputError(f"positions {w.shape}; expected one per slot, {solution.w.shape}")
+    links = build_problem(solution.plan).links
+    I_U, I_G = (
+        link.rates(w, link.small_scale(w), P if slots is None else P[..., slots, :, :])
+        for link, P in zip(links, (solution.P_B, solution.P_U), strict=True)
+    )
+    return I_U, I_G
+
+
+def nearest_slots(solution: Solution, w: Real) -> Integers:
+    """Return for each of `w` (n, 2), m, the slot (n,) that is planned nearest to it."""
+    return np.array([int(np.argmin(lengths(solution.w - place))) for place in w], dtype=int)

@@ -1,35 +1,38 @@
-"""The relay route, before it becomes mission items."""
+"""The relay route: waypoints, when the plan passes them, and what the mission commands there."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.vector import lengths
+from faao_mav.vehicle import FlightPath
+
+_SPEED_DIGITS = 3
+"""Decimals of a commanded speed in m/s: with two, a flight of 300 s ended 0.25 s off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """Waypoints with their planned times, and what is commanded for them.
+    """The relay route as m >= 1 waypoints and the m - 1 legs between them.
 
-    `positions` (m, 2) are local east-north metres, m >= 1. `arrivals` and `departures` (m,), s,
-    say when the plan reaches and leaves each waypoint; they differ at hovers. `speeds` (m - 1,),
-    m/s, are commanded, one for each leg; `holds` (m,), whole seconds, how long the aircraft waits
-    at each waypoint, and `delays` (m,), s, how much longer, less than one; `radii` (m,), m, the
-    acceptance radii, 0 for the autopilot's own; `splines` (m,) tells which are spline waypoints.
+    `positions` (m, 2) are local east-north metres. The plan reaches waypoint k at `arrivals[k]`
+    and leaves it at `departures[k]`, s; the two differ at hovers. The mission commands a speed for
+    each leg, `speeds` (m - 1,), m/s, and for each waypoint how long to wait there, `waits` (m,), s,
+    and an acceptance radius, `radii` (m,), m, 0 for the autopilot's own. `splines` (m,) marks the
+    spline waypoints.
 
-    The aircraft sets out `lead` seconds before the plan does.
-
-    The relay route goes from waypoint `first`, w_I, to waypoint `last`, w_F: one before it is
-    flown to be at speed there, one after it to be still at speed there.
+    The plan's flight begins at waypoint `first`, w_I, and ends at waypoint `last`, w_F. A waypoint
+    before `first` lets the aircraft reach w_I at speed, one after `last` lets it leave w_F at
+    speed. The aircraft leaves w_I `lead` seconds before the plan does.
     """
 
     positions: Real
     arrivals: Real
     departures: Real
     speeds: Real
-    holds: Real
-    delays: Real
+    waits: Real
     radii: Real
     splines: Flags
     first: int
@@ -43,31 +46,69 @@ class Route:
 
     @property
     def distance(self) -> float:
-        """Length of the relay route, m: without the way to w_I and from w_F."""
+        """Length of the route from w_I to w_F, m."""
         return float(self.leg_lengths[self.first : self.last].sum())
 
     @property
     def turns(self) -> Real:
-        """By how much the way turns at each waypoint, (m,), rad; 0 at both ends."""
+        """Change of heading at each waypoint, (m,), rad, 0 to pi; 0 at both ends."""
         headings = np.arctan2(*np.diff(self.positions, axis=0).T[::-1])
         turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
         return np.concatenate([[0.0], turns, [0.0]])[: len(self.positions)]
 
-    def with_waypoints(self, at: Integers, positions: Real, times: Real, speeds: Real) -> "Route":
-        """Return the route with plain waypoints before those that are at indices `at` (k,) now.
+    def holds_and_delays(self, *, whole_seconds: bool) -> tuple[Real, Real]:
+        """Return `waits` as holds, which waypoints command, and delays of items after them.
 
-        `positions` (k, 2) are passed at `times` (k,); `speeds` (k,) are those of the new legs that
-        end there, or, behind the last waypoint, begin there. `first` and `last` stay.
+        Both (m,), s. An autopilot that keeps only `whole_seconds` of a hold needs a delay for the
+        fraction; for others the delays are 0.
         """
-        still = np.zeros(len(at))
-        return replace(
-            self,
-            positions=np.insert(self.positions, at, positions, axis=0),
-            arrivals=np.insert(self.arrivals, at, times),
-            departures=np.insert(self.departures, at, times),
-            speeds=np.insert(self.speeds, np.minimum(at, len(self.speeds)), speeds),
-            holds=np.insert(self.holds, at, still),
-            delays=np.insert(self.delays, at, still),
-            radii=np.insert(self.radii, at, still),
-            splines=np.insert(self.splines, at, False),
+        holds = np.floor(self.waits) if whole_seconds else self.waits
+        return holds, np.round(self.waits - holds, 9)
+
+    def path(self, *, whole_seconds: bool) -> FlightPath:
+        """Return the legs as a flight model takes them, all at height 0."""
+        holds, delays = self.holds_and_delays(whole_seconds=whole_seconds)
+        return FlightPath(
+            points=np.column_stack([self.positions, np.zeros(len(self.positions))]),
+            speeds=self.speeds,
+            holds=holds,
+            delays=delays,
+            splines=self.splines,
+            radii=self.radii,
         )
+
+    def insert(self, at: Integers, positions: Real, times: Real, speeds: Real) -> "Route":
+        """Return the route with plain waypoints before those that now have the indices `at` (k,).
+
+        The plan passes the new waypoints, `positions` (k, 2), at `times` (k,), s, without a wait.
+        `speeds` (k,), m/s, are those of the legs that begin there; behind the last waypoint, of the
+        leg that ends there. `first` and `last` stay with their waypoints.
+        """
+        values: dict[str, Any] = {
+            "positions": positions,
+            "arrivals": times,
+            "departures": times,
+            "speeds": speeds,
+            "waits": 0.0,
+            "radii": 0.0,
+            "splines": False,
+        }
+        arrays = {name: getattr(self, name) for name in values}
+        longer = {
+            name: np.insert(array, np.minimum(at, len(array)), values[name], axis=0)
+            for name, array in arrays.items()
+        }
+        first = self.first + int(np.sum(at <= self.first))
+        last = self.last + int(np.sum(at <= self.last))
+        return replace(self, **longer, first=first, last=last)
+
+
+def sent_speeds(speeds: Real, max_speed: float) -> Real:
+    """Return `speeds` (k,), m/s, as they are sent: to a millimetre a second, within `max_speed`.
+
+    >>> sent_speeds(np.array([4.00049, 7.9999]), 7.9999)
+    array([4.   , 7.999])
+    """
+    scale = 10**_SPEED_DIGITS
+    limit = np.floor(max_speed * scale + 1e-6) / scale or max_speed
+    return np.minimum(np.round(speeds, _SPEED_DIGITS), limit)

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
-from faao_mav.report.style import MARKERS, SERIES, label, mark_stations, new_figure, styled
-from faao_mav.study.compare import spreads
-from faao_mav.study.rows import Row
+from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
+from faao_mav.study.rows import StudyRow, spreads
 from faao_mav.study.sweep import OVERRIDES, Value
 
 if TYPE_CHECKING:
@@ -21,7 +20,11 @@ _AXES = {
     "flight.altitude": "height H, m",
     "radio.rician_factor": "Rician factor K",
 }
+"""The label of the axis along which a key is varied; other keys are their own labels."""
+
 _SHORT = {"power_dbm": ("W", " dBm"), "flight.duration": ("T", " s"), "radio.modulation": ("", "")}
+"""The symbol and the unit of a varied key in legends; an empty symbol leaves the value alone."""
+
 _SCHEMES = {
     "faao": "FAAO",
     "algorithm1": "FAAO, Algorithm 1",
@@ -31,6 +34,8 @@ _SCHEMES = {
     "waterfilling": "water-filling",
     "gaussian": "designed for Gaussian inputs",
 }
+"""The names of the schemes in legends."""
+
 _ALPHABETS = {
     "bpsk": "BPSK",
     "qpsk": "QPSK",
@@ -38,28 +43,30 @@ _ALPHABETS = {
     "16qam": "16-QAM",
     "64qam": "64-QAM",
 }
+"""The names of the alphabets in legends."""
+
 _LOOKS = {name: k for k, name in enumerate(("faao", "gaussian", "mrt", "mmse", "zf"))}
+"""The place of a scheme in `SERIES` and `MARKERS`, the same in every figure."""
 
 
-def can_draw(rows: Sequence[Row], kind: str) -> bool:
+def can_draw(rows: Sequence[StudyRow], kind: str) -> bool:
     """Tell whether there is something to draw: results, and for rates an axis of numbers."""
     if all(row.R_avg is None for row in rows):
         return False
     return kind == "trajectories" or _axis(rows) is not None
 
 
-def study_figure(rows: Sequence[Row], plan: Plan, kind: str) -> "Figure":
+def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     """Return the figure `kind` of `rows`, `rate` or `trajectories`.
 
     Raises `InputError` where `can_draw` says no.
     """
     if not can_draw(rows, kind):
         raise InputError("nothing to draw: no result, or no key varied over two numbers or more")
-    with styled():
-        return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan)
+    return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan)
 
 
-def _axis(rows: Sequence[Row]) -> str | None:
+def _axis(rows: Sequence[StudyRow]) -> str | None:
     """Return the varied key with the most numbers, at least two."""
     counts = {}
     for key in rows[0].values:
@@ -70,33 +77,34 @@ def _axis(rows: Sequence[Row]) -> str | None:
     return best if best is not None and counts[best] > 1 else None
 
 
-def _rates(rows: Sequence[Row], plan: Plan) -> "Figure":
+def _rates(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
     """Draw R_avg over the axis: a line for each scheme, a panel for each of the other values."""
     axis = _axis(rows)
     assert axis is not None
     others = [key for key in rows[0].values if key != axis]
-    panels: dict[str, list[Row]] = {}
+    panels: dict[str, list[StudyRow]] = {}
     for row in rows:
         panels.setdefault(_named({key: row.values[key] for key in others}), []).append(row)
     across = min(len(panels), 3)
     down = -(-len(panels) // across)
     width = 5.4 if across == 1 else 3.3 * across
-    figure = new_figure(width, 0.5 + (3.4 if across == 1 else 2.9) * down)
-    grid = figure.subplots(down, across, squeeze=False, sharex=True)
-    plots = list(grid.flat)
-    for plot, (name, inside) in zip(plots, panels.items(), strict=False):
-        _lines(plot, inside, axis)
-        title = name or plan.name or "rate by scheme"
-        label(plot, title, _AXES.get(axis, axis), "rate R_avg, bit/s/Hz")
-        plot.tick_params(labelbottom=True)  # the plot beneath may be none
-    for plot in plots[len(panels) :]:
-        plot.remove()
-    handles, labels = plots[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
+    height = 0.5 + (3.4 if across == 1 else 2.9) * down
+    with drawing(width, height) as figure:
+        grid = figure.subplots(down, across, squeeze=False, sharex=True)
+        plots = list(grid.flat)
+        for plot, (name, inside) in zip(plots, panels.items(), strict=False):
+            _lines(plot, inside, axis)
+            title = name or plan.name or "rate by scheme"
+            label(plot, title, _AXES.get(axis, axis), "rate R_avg, bit/s/Hz")
+            plot.tick_params(labelbottom=True)  # the plot beneath may be none
+        for plot in plots[len(panels) :]:
+            plot.remove()
+        handles, labels = plots[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
     return figure
 
 
-def _lines(plot: "Axes", rows: Sequence[Row], axis: str) -> None:
+def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str) -> None:
     """Draw mean and spread over seeds."""
     at = list(rows[0].values).index(axis)
     found = spreads(rows)
@@ -116,38 +124,38 @@ def _lines(plot: "Axes", rows: Sequence[Row], axis: str) -> None:
     plot.set_ylim(bottom=0)
 
 
-def _routes(rows: Sequence[Row], plan: Plan) -> "Figure":
+def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
     """Draw the routes on a map, a colour for each combination of values and scheme.
 
     Each is thinner than those before it, which can so be seen where they run together.
     """
-    figure = new_figure(5.4, 4.9)
-    plot = figure.subplots()
-    several = len({row.scheme for row in rows}) > 1
-    colours: dict[str, str] = {}
-    for row in rows:
-        if not row.route:
-            continue
-        name = _named(row.values)
-        if several or not name:
-            name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
-        east, north = zip(*row.route, strict=True)
-        new = name not in colours
-        colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
-        width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
-        plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
-    radio, flight = plan.radio, plan.flight
-    places = (
-        ("base station", radio.base_station.position, "s"),
-        ("user", radio.ground_user.position, "^"),
-        ("start", flight.start, "o"),
-        ("end", flight.end, "o"),
-    )
-    mark_stations(plot, places)
-    plot.set_aspect("equal", adjustable="datalim")
-    plot.margins(0.1)
-    label(plot, plan.name or "routes", "east, m", "north, m")
-    figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
+    with drawing(5.4, 4.9) as figure:
+        plot = figure.subplots()
+        several = len({row.scheme for row in rows}) > 1
+        colours: dict[str, str] = {}
+        for row in rows:
+            if not row.route:
+                continue
+            name = _named(row.values)
+            if several or not name:
+                name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
+            east, north = zip(*row.route, strict=True)
+            new = name not in colours
+            colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
+            width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
+            plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
+        radio, flight = plan.radio, plan.flight
+        places = (
+            ("base station", radio.base_station.position, "s"),
+            ("user", radio.ground_user.position, "^"),
+            ("start", flight.start, "o"),
+            ("end", flight.end, "o"),
+        )
+        mark_stations(plot, places)
+        plot.set_aspect("equal", adjustable="datalim")
+        plot.margins(0.1)
+        label(plot, plan.name or "routes", "east, m", "north, m")
+        figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
     return figure
 
 

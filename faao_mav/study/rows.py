@@ -1,4 +1,4 @@
-"""The rows of a study: kept as they finish, and as a table."""
+"""The rows of a study: kept as they finish, as a table, and side by side."""
 
 import csv
 import io
@@ -6,22 +6,25 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from statistics import fmean, stdev
 from typing import Any
 
 from faao_mav.errors import InputError
 from faao_mav.files import write_whole
-from faao_mav.study.sweep import Case, Value
+from faao_mav.study.sweep import StudyCase, Value
 
 ROWS, TABLE = "rows.jsonl", "table.csv"
-_BEGINNING = b'{"key": "'  # of every row: what is cut off must not be somebody's text
+_BEGINNING = b'{"key": "'
+"""How the line of every row begins: a last line without an end that does not is no row cut off."""
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """What one case of a study led to: rates in bit/s/Hz, `seconds` of the optimiser.
+class StudyRow:
+    """What one case of a study led to.
 
-    Without a result `error` says why and the numbers are None. `route` is w (n, 2), m, one pair
-    for each slot.
+    Rates and mutual information are bit/s/Hz, `seconds` is the time of the optimiser. Where there
+    is no result `error` says why and the numbers are None. `route` is w (n, 2), m, one pair for
+    each slot.
     """
 
     key: str
@@ -43,14 +46,15 @@ _RESULTS = (
     *("scheme", "seed", "R_avg", "R_U", "R_G", "mutual_information"),
     *("seconds", "iterations", "converged", "error"),
 )
+"""The fields of a row that are columns of the table."""
 
 
-def as_dict(row: Row) -> dict[str, Any]:
-    """Return `row` for people's programs: varied keys, then the columns of the table."""
+def as_dict(row: StudyRow) -> dict[str, Any]:
+    """Return `row` as an object of `--json`: varied keys, then the columns of the table."""
     return {**row.values, **{name: getattr(row, name) for name in _RESULTS}}
 
 
-def append_row(row: Row, directory: Path) -> None:
+def append_row(row: StudyRow, directory: Path) -> None:
     """Add `row` to the directory's rows by one write: another reader sees all of it or nothing.
 
     Raises `InputError`.
@@ -64,7 +68,7 @@ def append_row(row: Row, directory: Path) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def load_rows(directory: Path) -> dict[str, Row]:
+def load_rows(directory: Path) -> dict[str, StudyRow]:
     """Return the finished rows in `directory` by key.
 
     A last line that was cut off when the machine stopped is dropped from the file. Raises
@@ -83,14 +87,14 @@ def load_rows(directory: Path) -> dict[str, Row]:
         raise InputError(f"{path}: its last line is no row of a study; give another directory")
     if rest:
         write_whole(path, whole)
-    rows: dict[str, Row] = {}
-    names = {field.name for field in fields(Row)}
+    rows: dict[str, StudyRow] = {}
+    names = {field.name for field in fields(StudyRow)}
     for number, line in enumerate(whole.splitlines(), 1):
         try:
             data = json.loads(line)
             if set(data) != names:
                 raise ValueError
-            rows[data["key"]] = Row(**data)
+            rows[data["key"]] = StudyRow(**data)
         except (ValueError, TypeError):
             raise InputError(
                 f"{path}: line {number}: no row of a study; give another directory"
@@ -98,7 +102,7 @@ def load_rows(directory: Path) -> dict[str, Row]:
     return rows
 
 
-def table(rows: Sequence[Row]) -> str:
+def table(rows: Sequence[StudyRow]) -> str:
     """Return the rows as CSV: varied keys, scheme, seed, what came out, and the error if any."""
     varied = list(dict.fromkeys(key for row in rows for key in row.values))
     out = io.StringIO()
@@ -108,6 +112,67 @@ def table(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def in_order(cases: Sequence[Case], rows: Mapping[str, Row]) -> tuple[Row, ...]:
+def in_order(cases: Sequence[StudyCase], rows: Mapping[str, StudyRow]) -> tuple[StudyRow, ...]:
     """Return the rows of `cases` that there are, in the order of the grid."""
     return tuple(rows[case.key] for case in cases if case.key in rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Mean and standard deviation (0 of a single seed) of R_avg, bit/s/Hz, over `count` seeds."""
+
+    mean: float
+    deviation: float
+    count: int
+
+
+def spreads(rows: Sequence[StudyRow]) -> dict[tuple[tuple[Value, ...], str], Spread | None]:
+    """Return the spread of R_avg over seeds by values and scheme, in order; None: all failed."""
+    groups: dict[str, tuple[tuple[tuple[Value, ...], str], list[float]]] = {}
+    for row in rows:
+        place = (tuple(row.values.values()), row.scheme)
+        _, rates = groups.setdefault(json.dumps(place), (_hashable(place), []))
+        if row.R_avg is not None:
+            rates.append(row.R_avg)
+    return {
+        place: Spread(fmean(rates), stdev(rates) if len(rates) > 1 else 0.0, len(rates))
+        if rates
+        else None
+        for place, rates in groups.values()
+    }
+
+
+def _hashable(place: tuple[tuple[Value, ...], str]) -> tuple[tuple[Value, ...], str]:
+    """Positions are lists in a plan; tuples can be looked up."""
+    values, scheme = place
+    return tuple(tuple(v) if isinstance(v, list) else v for v in values), scheme
+
+
+def comparison(rows: Sequence[StudyRow]) -> str:
+    """Return a table for people: values down, schemes across, mean and spread of R_avg."""
+    varied = list(dict.fromkeys(key for row in rows for key in row.values))
+    schemes = list(dict.fromkeys(row.scheme for row in rows))
+    found = spreads(rows)
+    lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
+    for values in dict.fromkeys(values for values, _ in found):
+        cells = (_cell(found.get((values, scheme))) for scheme in schemes)
+        lines.append([*(json.dumps(v).strip('"') for v in values), *cells])
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    text = ["R_avg, bit/s/Hz"]
+    text += [
+        "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
+        for line in lines
+    ]
+    failed = [row for row in rows if row.error]
+    if failed:
+        text.append(f"{len(failed)} of {len(rows)} rows failed, first: {failed[0].error}")
+    loose = sum(row.converged is False for row in rows)
+    if loose:
+        text.append(f"{loose} of {len(rows)} rows did not converge")
+    return "\n".join(text)
+
+
+def _cell(spread: Spread | None) -> str:
+    if spread is None:
+        return "-"
+    return f"{spread.mean:.4f}" + (f" +- {spread.deviation:.4f}" if spread.count > 1 else "")

@@ -1,53 +1,46 @@
 """All cases of a study over all cores, each kept as soon as it is done."""
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_whole
-from faao_mav.study.rows import TABLE, Row, append_row, in_order, load_rows, table
-from faao_mav.study.sweep import Case
+from faao_mav.study.rows import TABLE, StudyRow, append_row, in_order, load_rows, table
+from faao_mav.study.sweep import StudyCase
 
 _CONNECTING = 10
-"""Seconds that a cluster has to answer."""
+"""Seconds that a cluster has to answer; chosen: a scheduler that runs answers in one."""
 
 
-def run_case(case: Case) -> Row:
+def run_case(case: StudyCase) -> StudyRow:
     """Return the row of `case`; whatever goes wrong becomes the row's error."""
     from threadpoolctl import threadpool_limits
 
+    empty = StudyRow(case.key, dict(case.values), case.scheme, case.seed)
     try:
         with threadpool_limits(1):  # the cores are taken by other cases
-            return _solved(case)
+            return _filled(empty, case)
     except FaaoError as error:
-        reason = str(error)
+        return replace(empty, error=str(error))
     except Exception as error:  # a fault in one case must not cost the others
-        reason = f"{type(error).__name__}: {error}"
-    return Row(case.key, dict(case.values), case.scheme, case.seed, error=reason)
+        return replace(empty, error=f"{type(error).__name__}: {error}")
 
 
-def _solved(case: Case) -> Row:
-    from faao_mav.optimizer.optimize import optimize
-    from faao_mav.optimizer.pricing import price
+def _filled(row: StudyRow, case: StudyCase) -> StudyRow:
     from faao_mav.plan import parse_plan
+    from faao_mav.workflow import optimize_plan
 
-    plan = parse_plan(case.text, case.source)
-    started = time.perf_counter()
-    solution = optimize(plan)
-    seconds = time.perf_counter() - started
-    rates = solution.rates
-    return Row(
-        key=case.key,
-        values=dict(case.values),
-        scheme=case.scheme,
-        seed=case.seed,
+    result = optimize_plan(parse_plan(case.text, case.source))
+    solution, rates, information = result.solution, result.solution.rates, result.information
+    return replace(
+        row,
         R_avg=rates.R_avg,
         R_U=rates.R_U,
         R_G=rates.R_G,
-        mutual_information=price(solution).average,
-        seconds=round(seconds, 3),
+        mutual_information=information.average if information else None,
+        seconds=round(result.seconds_optimize, 3),
         iterations=solution.iterations,
         converged=solution.converged,
         route=solution.w.round(3).tolist(),
@@ -55,13 +48,13 @@ def _solved(case: Case) -> Row:
 
 
 def run_study(
-    cases: Sequence[Case],
+    cases: Sequence[StudyCase],
     *,
     jobs: int = -1,
     cluster: str | None = None,
     directory: Path | None = None,
-    observe: Callable[[Row], None] | None = None,
-) -> tuple[Row, ...]:
+    observe: Callable[[StudyRow], None] | None = None,
+) -> tuple[StudyRow, ...]:
     """Return the rows of `cases` in their order.
 
     `jobs` processes, -1 for one on each core; or the workers of the Dask `cluster` at an address as
@@ -86,7 +79,7 @@ def run_study(
     return rows
 
 
-def _rows(cases: Sequence[Case], jobs: int, cluster: str | None) -> Iterator[Row]:
+def _rows(cases: Sequence[StudyCase], jobs: int, cluster: str | None) -> Iterator[StudyRow]:
     """Run `cases`; yield their rows as they finish."""
     from joblib import Parallel, delayed, effective_n_jobs
 
@@ -120,7 +113,7 @@ def _connected(address: str) -> Iterator[None]:
         yield
 
 
-def _prepare(directory: Path) -> dict[str, Row]:
+def _prepare(directory: Path) -> dict[str, StudyRow]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except FileExistsError:

@@ -18,9 +18,10 @@ from faao_mav.plan.model import StudyScheme
 from faao_mav.plan.yaml_text import load_yaml
 
 Value: TypeAlias = Any
-"""What YAML holds: a number, a word, a list."""
+"""The value of a varied key, as YAML reads it: a number, a word, a list."""
 
 MAX_ROWS = 100_000
+"""The most rows of a study; chosen: a day of one core at a second each, and an end of typos."""
 
 OVERRIDES: Mapping[str, Mapping[str, str]] = {
     "algorithm1": {"method": "algorithm1", "precoder": "faao", "inputs": "alphabet"},
@@ -29,15 +30,17 @@ OVERRIDES: Mapping[str, Mapping[str, str]] = {
     name: {"method": "direct", "precoder": name, "inputs": "alphabet"}
     for name in ("faao", "mmse", "mrt", "zf", "waterfilling")
 }
-"""`optimizer.*` of each scheme: all but `algorithm1` by the direct method, route included."""
+"""What each scheme sets of the plan's `optimizer` section, by the scheme's name.
+
+All schemes but `algorithm1` optimise route and precoders by the direct method."""
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class StudyCase:
     """One row of a study before it has run.
 
-    `values` are the varied keys in order, `text` the plan with them, the scheme and the seed put
-    in; `key` is a hash of the scheme, of `text` and of the version of the program.
+    `values` are the varied keys with their values, in order. `text` is the plan with these values,
+    the scheme and the seed put in; `source` names the plan in messages.
     """
 
     values: tuple[tuple[str, Value], ...]
@@ -48,13 +51,17 @@ class Case:
 
     @property
     def key(self) -> str:
-        """The same for the same work, on any machine."""
+        """A hash of scheme, `text` and program version, which is the same on any machine."""
         content = "\0".join((version("faao-mav"), self.scheme, self.text))
         return hashlib.sha256(content.encode()).hexdigest()[:20]
 
 
 def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
-    """Read `key=values`; see `parse_values`. Raises `InputError`."""
+    """Return the key and the values of `key=values`; see `parse_values`. Raises `InputError`.
+
+    >>> parse_vary("flight.duration=60:120:30")
+    ('flight.duration', (60, 90, 120))
+    """
     key, sign, values = text.partition("=")
     if not sign:
         raise InputError(f"--vary {text}: give key=start:stop:step or key=value,value")
@@ -65,14 +72,14 @@ def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
 
 
 def join_grid(options: Sequence[tuple[str, tuple[Value, ...]]]) -> dict[str, tuple[Value, ...]]:
-    """Return the values by key. Raises `InputError` where two options vary the same."""
+    """Return the values by key. Raises `InputError` where two options vary the same key."""
     if both := varied_twice(key for key, _ in options):
         raise InputError(f"--vary {both}: varied twice; give all values in one option")
     return dict(options)
 
 
 def parse_values(text: str, option: str) -> tuple[Value, ...]:
-    """Read `start:stop:step`, the end included, or `value,value,...` as YAML reads them.
+    """Return the values of `start:stop:step`, the end included, or of `value,value,...` in YAML.
 
     `option` names the place in messages. Raises `InputError`.
     """
@@ -91,7 +98,7 @@ def parse_values(text: str, option: str) -> tuple[Value, ...]:
 
 
 def parse_schemes(text: str) -> tuple[str, ...]:
-    """Read `faao,mmse,...`. Raises `InputError`."""
+    """Return the schemes of `faao,mmse,...`. Raises `InputError` for a name that is none."""
     schemes = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     known = get_args(StudyScheme)
     for name in schemes:
@@ -132,7 +139,7 @@ def make_cases(
     schemes: Sequence[str] = ("faao",),
     seeds: int = 1,
     source: str = "plan",
-) -> tuple[Case, ...]:
+) -> tuple[StudyCase, ...]:
     """Return the grid of all values, schemes and seeds, in this order, the seeds fastest.
 
     `text` is a sound plan, `source` names it. Seeds count up from its `radio.seed`. Raises
@@ -153,7 +160,7 @@ def make_cases(
             # what is varied goes before what the scheme would have
             changed = _changed(data, chosen | changes | seeded)
             plan = yaml.safe_dump(changed, sort_keys=False)
-            made.append(Case(pairs, scheme, seed, plan, source))
+            made.append(StudyCase(pairs, scheme, seed, plan, source))
     return tuple(made)
 
 

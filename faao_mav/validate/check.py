@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track, Vehicle
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
@@ -15,12 +14,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
-    """What was found: `unpredicted` says why there is no `track`, `link` needs a plan."""
+    """What was found in `mission` for `vehicle`.
 
-    track: Track | None
-    unpredicted: str
-    link: LinkCheck | None
-    findings: tuple[Finding, ...]
+    `track` is the predicted flight; where there is none `unpredicted` says why. `link` is what the
+    flight makes of a plan, None without a plan or a track. `findings` are the worst first.
+    """
+
+    mission: Mission
+    vehicle: Vehicle
+    track: Track | None = None
+    unpredicted: str = ""
+    link: LinkCheck | None = None
+    findings: tuple[Finding, ...] = ()
 
     def of(self, level: Level) -> tuple[Finding, ...]:
         """Return the findings of `level`."""
@@ -37,9 +42,16 @@ def check(
 ) -> Check:
     """Predict the flight of `mission` by `vehicle` and judge both by all rules.
 
-    With a `solution` also by what the flight makes of that plan, which begins `lead` seconds after
-    the flight does where that is known. A mission that cannot be
-    predicted is judged by its items alone; nothing is raised.
+    With a `solution` the flight is judged by what it makes of that plan too. `lead`, where it is
+    known, is by how many seconds the aircraft sets out before the plan does. A mission that cannot
+    be predicted is judged by its items alone; nothing is raised.
+
+    >>> from faao_mav.mission import Mission, MissionItem
+    >>> from faao_mav.vehicle import Vehicle
+    >>> land = MissionItem(command=21, frame=3, x=47.4, y=8.5)
+    >>> found = check(Mission(items=(land,)), Vehicle("px4"))
+    >>> [finding.rule for finding in found.of(Level.ERROR)]
+    ['px4-starts-with-land']
     """
     track, unpredicted = _track(mission, vehicle)
     link = None
@@ -48,7 +60,7 @@ def check(
 
         link = compare_with_plan(solution, track, lead=lead)
     findings = validate(mission, vehicle, track=track, limits=limits, link=link)
-    return Check(track, unpredicted, link, findings)
+    return Check(mission, vehicle, track, unpredicted, link, findings)
 
 
 def _track(mission: Mission, vehicle: Vehicle) -> tuple[Track | None, str]:

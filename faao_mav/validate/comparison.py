@@ -9,29 +9,31 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
-from faao_mav.schedule.deviation import passing
-from faao_mav.schedule.outline import set_out
+from faao_mav.schedule.initial_route import begins_at_speed, set_out
 from faao_mav.schedule.prediction import Prediction, price_flight
-from faao_mav.schedule.run_in import begins_at_speed
+from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.link import LinkCheck, Stretch
 from faao_mav.vector import lengths
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track
 
 _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
+"""Seconds by which the aircraft may set out before the plan, of which the best fit is taken.
+
+The step of 0.1 s is that of predicted flights."""
 
 _LEAST = 1e-6
-"""bit/s/Hz: less is not lost but rounded."""
+"""The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
 
 
 def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = None) -> LinkCheck:
     """Return what the flight `track` makes of the plan that `solution` solves.
 
-    The plan leaves w_I when the flight leaves the item nearest to it (of several the one that
-    brings both closest at equal times, rms), or `lead` seconds later. Without one, as a mission
-    does not say by how much the aircraft sets out before the plan, it is what brings both closest,
-    up to `timing.MOST_LEAD`. A plan that begins at speed does when the flight passes w_I. A track
-    that is nowhere near is compared all the same.
+    The plan's clock is put on the flight's: the plan begins when the flight leaves the item nearest
+    to w_I, or `lead` seconds later. A mission does not say its lead; without one it is that, up to
+    `MOST_LEAD`, for which plan and flight are closest at equal times, rms. So is the item, where
+    several are as near. A plan that begins at speed does when the flight passes w_I. A flight that
+    is nowhere near the plan is compared all the same.
     """
     w = _in_frame_of(solution, track)
     start = _start(solution, track, w, lead)
@@ -62,19 +64,18 @@ def _in_frame_of(solution: Solution, track: Track) -> Real:
 
 
 def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> float:
-    """Return when, on the clock of `track`, the plan's reads 0."""
+    """Return the time, s, on the clock of `track` at which the plan begins."""
     waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
     moving = waited == 0 and begins_at_speed(solution.t, solution.w)
     left = track.reached[np.isfinite(track.reached)]
     if len(left) == 0:
         return float(track.t[0])
-    where = np.stack([np.interp(left, track.t, x) for x in w.T], axis=-1)
-    away = lengths(where - solution.w[0])
+    away = lengths(positions_at(left, track.t, w) - solution.w[0])
     near = left[away <= away.min() + solution.plan.mission.path_tolerance] - waited
 
     def apart(start: float) -> float:
-        at = [np.interp(solution.t + start, track.t, x) for x in w.T]
-        return float(np.mean(np.sum((np.stack(at, axis=-1) - solution.w) ** 2, axis=1)))
+        at = positions_at(solution.t + start, track.t, w)
+        return float(np.mean(np.sum((at - solution.w) ** 2, axis=1)))
 
     nearest = min(map(float, near), key=apart)
     if moving:
@@ -86,12 +87,9 @@ def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> flo
 
 def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
     """Return the stretch of slots that costs the link that limits the rate most."""
-    planned, found = (
-        (solution.I_U, flown.I_U)
-        if flown.rates.R_U <= flown.rates.R_G
-        else (solution.I_G, flown.I_G)
-    )
-    lost = np.concatenate([[0.0], np.cumsum(planned - found)]) / len(planned)
+    first = flown.rates.R_U <= flown.rates.R_G
+    loss = solution.I_U - flown.I_U if first else solution.I_G - flown.I_G
+    lost = np.concatenate([[0.0], np.cumsum(loss)]) / len(loss)
     # The sum from slot i to slot j - 1 is lost[j] - lost[i], the greatest over the least before.
     least = np.minimum.accumulate(lost)
     end = int(np.argmax(lost - least))
@@ -99,5 +97,6 @@ def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
     if lost[end] - lost[begin] < _LEAST:
         return None
     step = float(solution.t[1] - solution.t[0])
-    first, last = float(solution.t[begin]), float(solution.t[end - 1]) + step
-    return Stretch(first, last, float(lost[end] - lost[begin]))
+    return Stretch(
+        float(solution.t[begin]), float(solution.t[end - 1]) + step, float(lost[end] - lost[begin])
+    )

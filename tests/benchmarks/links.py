@@ -13,7 +13,7 @@ from statistics import fmean
 sys.path.insert(0, str(Path(__file__).parent.parent))
 sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
 
-from stations import firmware_of, mock_of, rows_for, there_and_back, upload_to
+from stations import mock_of, rows_for, there_and_back, upload_to
 
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.mock import MockKind
@@ -39,9 +39,7 @@ def main() -> None:
                 faults = Faults(
                     loss=loss, latency=options.round_trip / 2, rate=options.rate, seed=seed
                 )
-                report, _ = upload_to(
-                    mock_of(kind), rows_for(firmware_of(kind), options.items), faults
-                )
+                report, _ = upload_to(mock_of(kind), rows_for(kind, options.items), faults)
                 verified += report is not None and report.verified
                 courses.append(there_and_back(kind, options.items, faults))
             cells = [kind, f"{loss:.0%}", f"{verified}/{options.seeds}"]

@@ -17,7 +17,7 @@ import yaml
 
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import Plan, parse_plan
-from faao_mav.schedule.convert import convert
+from faao_mav.schedule.conversion import convert
 from faao_mav.schedule.prediction import predict_delivery
 
 SAMPLE = Path(__file__).parents[2] / "missions" / "copter_relay.yaml"

@@ -10,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from faao_mav.plan import read_plan
-from faao_mav.study import Case, Row, make_cases, run_study
+from faao_mav.study import StudyCase, StudyRow, make_cases, run_study
 
 PLAN = Path(__file__).parent.parent.parent / "missions" / "paper_fig4.yaml"
 
 
-def cases(seeds: int) -> tuple[Case, ...]:
+def cases(seeds: int) -> tuple[StudyCase, ...]:
     plan = read_plan(PLAN)
     assert plan.study is not None
     return make_cases(
@@ -23,7 +23,7 @@ def cases(seeds: int) -> tuple[Case, ...]:
     )
 
 
-def timed(grid: tuple[Case, ...], jobs: int) -> tuple[float, list[Row]]:
+def timed(grid: tuple[StudyCase, ...], jobs: int) -> tuple[float, list[StudyRow]]:
     started = time.perf_counter()
     rows = run_study(grid, jobs=jobs)
     return time.perf_counter() - started, [replace(row, seconds=None) for row in rows]

@@ -27,10 +27,10 @@ from stations import HOME, a_mission, places
 from faao_mav.errors import LinkError
 from faao_mav.mavlink import upload
 from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import MissionType
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import MissionType
+from faao_mav.mavlink.wire_items import wire_items
 
 KINDS: tuple[MockKind, ...] = ("px4", "ardupilot")
 
@@ -45,7 +45,7 @@ def ours(kind: MockKind, count: int, faults: Faults) -> tuple[str, float, float,
     with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
         try:
             report = upload(a_mission(count), f"udpout:127.0.0.1:{port}", system=1, observe=observe)
-            said = report.parts[0].verdict
+            said: str = report.parts[0].verdict
         except LinkError as error:
             said = str(error)
     end = time.monotonic()
@@ -56,7 +56,7 @@ def ours(kind: MockKind, count: int, faults: Faults) -> tuple[str, float, float,
 def mavsdk(kind: MockKind, count: int, faults: Faults) -> tuple[str, float, float, bool]:
     """Return the same of MAVSDK, which does not read back."""
     mock, port = a_mock(kind), free_port()
-    rows = rows_of(a_mission(count), MissionType.MISSION, mock.lists.vehicle.autopilot)
+    rows = wire_items(a_mission(count), MissionType.MISSION, mock.vehicle)
     items = [
         SdkItem(seq, r.frame, r.command, r.current, 1, *r.params, r.x, r.y, r.z, 0)
         for seq, r in enumerate(rows)
@@ -87,12 +87,12 @@ def a_mavsdk(port: int) -> Iterator[Mavsdk]:
 
 
 def a_mock(kind: MockKind) -> MockAutopilot:
-    return MockAutopilot(manners_of(kind), home=HOME, beat=0.1)
+    return MockAutopilot(behaviour_of(kind), home=HOME, beat=0.1)
 
 
 def is_right(mock: MockAutopilot, count: int) -> bool:
-    rows = rows_of(a_mission(count), MissionType.MISSION, mock.lists.vehicle.autopilot)
-    return places(mock.lists.rows(MissionType.MISSION)) == places(rows)
+    rows = wire_items(a_mission(count), MissionType.MISSION, mock.vehicle)
+    return places(mock.lists.items(MissionType.MISSION)) == places(rows)
 
 
 Client = Callable[[MockKind, int, Faults], tuple[str, float, float, bool]]

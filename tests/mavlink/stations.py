@@ -1,28 +1,32 @@
 """Missions, peers and short ways to run machines for the tests of the wire."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
+
+from simulate import Station, simulate
 
 from faao_mav.mavlink.faults import Faults
+from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.messages import (
     Envelope,
     Message,
     MissionItemInt,
     MissionRequestInt,
-    Row,
+    WireItem,
 )
-from faao_mav.mavlink.mock import Manners, MockAutopilot, MockKind, manners_of
-from faao_mav.mavlink.rows import rows_of
+from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType
 from faao_mav.mavlink.transfer.download import Download
+from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, Firmware, MissionType
-from faao_mav.mavlink.transfer.session import PartReport, upload_parts
-from faao_mav.mavlink.transfer.simulate import Station, simulate
-from faao_mav.mavlink.transfer.transfer import Machine, Peer, Script
+from faao_mav.mavlink.transfer.session import upload_parts
 from faao_mav.mavlink.transfer.upload import Upload
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.vehicle import VehicleType, vehicle_type
 
 VEHICLE = Address(1, 1)
 FOREIGN = Address(250, 190)
@@ -35,12 +39,20 @@ FENCE = Fence(
 RALLY = (RallyPoint(-35.36, 149.16, 30.0), RallyPoint(-35.37, 149.17, 40.0))
 
 
-def firmware_of(kind: MockKind) -> Firmware:
-    return "ardupilot" if kind == "ardupilot" else "px4"
+def vehicle_of(kind: str) -> VehicleType | None:
+    """Return the copter of a kind of mock autopilot; None for "generic"."""
+    if kind == "generic":
+        return None
+    return vehicle_type("ardupilot" if kind == "ardupilot" else "px4", "copter")
 
 
-def peer_of(firmware: Firmware) -> Peer:
-    return Peer(GROUND_STATION, VEHICLE, firmware)
+def peer_of(kind: str) -> Peer:
+    return Peer(GROUND_STATION, VEHICLE, vehicle_of(kind))
+
+
+def signing_key(phrase: str) -> bytes:
+    """Return the key that ground stations make of a pass phrase."""
+    return hashlib.sha256(phrase.encode()).digest()
 
 
 def a_mission(count: int, shift: float = 0.0, **more: Any) -> Mission:
@@ -53,12 +65,12 @@ def a_mission(count: int, shift: float = 0.0, **more: Any) -> Mission:
     return Mission((start, *way, MissionItem(20, 2)), HOME, **more)
 
 
-def rows_for(firmware: Firmware, count: int = 5, shift: float = 0.0) -> tuple[Row, ...]:
+def rows_for(kind: str, count: int = 5, shift: float = 0.0) -> tuple[WireItem, ...]:
     """Return the rows of a mission of `count` items."""
-    return rows_of(a_mission(count, shift), MissionType.MISSION, firmware)
+    return wire_items(a_mission(count, shift), MissionType.MISSION, vehicle_of(kind))
 
 
-def places(rows: Sequence[Row]) -> list[tuple[int, int, int, float]]:
+def places(rows: Sequence[WireItem]) -> list[tuple[int, int, int, float]]:
     """Return what tells rows apart and no autopilot changes."""
     return [(row.command, row.x, row.y, row.z) for row in rows]
 
@@ -66,22 +78,22 @@ def places(rows: Sequence[Row]) -> list[tuple[int, int, int, float]]:
 class Desk:
     """A machine on a table: told things by hand, one at a time."""
 
-    def __init__(self, machine: Machine[Any], sender: Address = VEHICLE) -> None:
+    def __init__(self, machine: Any, sender: Address = VEHICLE) -> None:
         self.machine, self.sender = machine, sender
         self.now = 0.0
         self.sent: list[Message] = []
 
-    def start(self) -> list[Message]:
+    def start(self) -> list[Any]:
         return self._note(self.machine.start(self.now))
 
-    def tell(self, message: Message, sender: Address | None = None) -> list[Message]:
+    def tell(self, message: Message, sender: Address | None = None) -> list[Any]:
         """Return the answer to `message`."""
         envelope = Envelope(sender or self.sender, message)
         return self._note(self.machine.on(envelope, self.now))
 
-    def wait(self, seconds: float) -> list[Message]:
+    def wait(self, seconds: float) -> list[Any]:
         """Return what is sent within `seconds` of silence."""
-        end, out = self.now + seconds, list[Message]()
+        end, out = self.now + seconds, list[Any]()
         while (due := self.machine.deadline) is not None and due <= end:
             if self.machine.outcome is not None:
                 break
@@ -90,40 +102,40 @@ class Desk:
         self.now = end
         return out
 
-    def _note(self, messages: Sequence[Message]) -> list[Message]:
+    def _note(self, messages: Sequence[Message]) -> list[Any]:
         self.sent += messages
         return list(messages)
 
 
 def upload_to(
     mock: MockAutopilot,
-    rows: Sequence[Row],
+    rows: Sequence[WireItem],
     faults: Faults | None = None,
     *,
     part: MissionType = MissionType.MISSION,
     timeouts: Timeouts | None = None,
     until: float = 600.0,
     **more: Any,
-) -> tuple[PartReport | None, float]:
+) -> tuple[Any, float]:
     """Upload `rows` to `mock` over a simulated link, verified; report and time taken."""
-    peer = peer_of(firmware_of(mock.manners.kind))
+    peer = peer_of(mock.behaviour.family.key)
     script = Script(upload_parts([(part, tuple(rows))], peer, timeouts=timeouts))
     client = Station(script, GROUND_STATION)
     took = simulate(client, Station(mock, VEHICLE), faults, until, **more)
     return (script.outcome[0] if script.outcome else None), took
 
 
-def mock_of(kind: MockKind | Manners, **options: Any) -> MockAutopilot:
+def mock_of(kind: str | Behaviour, **options: Any) -> MockAutopilot:
     """Return a mock autopilot that sends no position reports."""
-    manners = kind if isinstance(kind, Manners) else manners_of(kind)
-    return MockAutopilot(manners, home=HOME, rate=0.0, **options)
+    behaviour = kind if isinstance(kind, Behaviour) else behaviour_of(cast(MockKind, kind))
+    return MockAutopilot(behaviour, home=HOME, rate=0.0, **options)
 
 
 @dataclass
 class Counted:
     """A machine, and what it sends."""
 
-    machine: Machine[Any]
+    machine: Any
     sent: list[Message] = field(default_factory=list)
 
     def __getattr__(self, name: str) -> Any:
@@ -162,10 +174,10 @@ def there_and_back(
     kind: MockKind, count: int, faults: Faults, telemetry: float = 0.0
 ) -> list[Course]:
     """Return the courses of an upload of `count` rows and of reading them back."""
-    mock = MockAutopilot(manners_of(kind), home=HOME, rate=telemetry)
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, rate=telemetry)
     mock.tick(0.0)
-    peer = peer_of(firmware_of(kind))
-    rows = rows_for(firmware_of(kind), count)[:count]
+    peer = peer_of(kind)
+    rows = rows_for(kind, count)[:count]
     courses = []
     machines: tuple[Machine[Any], ...] = (Upload(rows, peer), Download(peer))
     for machine in machines:
@@ -173,6 +185,6 @@ def there_and_back(
         stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
         took = simulate(*stations, faults, until=2000.0)
         courses.append(Course(client.outcome.status, took, client.number(), server.number()))
-        if client.outcome.rows:
-            assert client.outcome.rows == mock.lists.rows(MissionType.MISSION)
+        if client.outcome.items:
+            assert client.outcome.items == mock.lists.items(MissionType.MISSION)
     return courses

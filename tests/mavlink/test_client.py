@@ -5,24 +5,25 @@ import select
 import socket
 import threading
 import time
+from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import free_port
 from mock_flights import fly
 from pymavlink import mavutil
-from stations import FENCE, HOME, RALLY, a_mission, places
+from stations import FENCE, HOME, RALLY, a_mission, places, signing_key, vehicle_of
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink import Timeouts, clear, download, upload
-from faao_mav.mavlink.codec import key_of_phrase
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.link import Link
-from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.mock import COUNT, MockAutopilot, ardupilot, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import Address, MissionType, Result
+from faao_mav.mavlink.messages import WireItem
+from faao_mav.mavlink.mock import COUNT, Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import Address, MissionType, Result
 from faao_mav.mavlink.transport import open_transport, parse_connection
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 
 MISSION = MissionType.MISSION
@@ -30,32 +31,36 @@ BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 
 
 @pytest.fixture
-def port():
+def port() -> int:
     return free_port()
 
 
-def mock_of(kind, **options):
-    manners = manners_of(kind) if isinstance(kind, str) else kind
-    return MockAutopilot(manners, home=HOME, fly=fly, beat=0.1, **options)
+def mock_of(kind: MockKind | Behaviour, **options: Any) -> MockAutopilot:
+    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
+    return MockAutopilot(behaviour, home=HOME, fly=fly, beat=0.1, **options)
 
 
 @BOTH
 @pytest.mark.parametrize("loss", [0.0, 0.05, 0.2])
-def test_a_mission_there_and_back(kind, loss, port):
+def test_a_mission_there_and_back(kind: MockKind, loss: float, port: int) -> None:
     mission = a_mission(8)
     faults = Faults(loss=loss, latency=0.0, seed=3)
     with running(mock_of(kind), f"udpin:127.0.0.1:{port}", faults=faults) as mock:
         connection, timeouts = f"udpout:127.0.0.1:{port}", Timeouts(response=0.4)
         report = upload(mission, connection, system=1, timeouts=timeouts)
         assert report.verified, report.problems
-        assert places(mock.lists.rows(MISSION)) == places(rows_of(mission, MISSION, kind))
+        assert places(mock.lists.items(MISSION)) == places(
+            wire_items(mission, MISSION, vehicle_of(kind))
+        )
         found = download(connection, system=1, timeouts=timeouts)
-    assert places(rows_of(found, MISSION, kind)) == places(rows_of(mission, MISSION, kind))
+    assert places(wire_items(found, MISSION, vehicle_of(kind))) == places(
+        wire_items(mission, MISSION, vehicle_of(kind))
+    )
     assert found.home == HOME
 
 
 @BOTH
-def test_all_three_lists(kind, port):
+def test_all_three_lists(kind: MockKind, port: int) -> None:
     mission = a_mission(5, fence=FENCE, rally=RALLY)
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock_of(kind), f"udpin:127.0.0.1:{port}") as mock:
@@ -75,13 +80,13 @@ def test_all_three_lists(kind, port):
 @pytest.mark.parametrize(
     ("listen", "to"), [("tcpin", "tcp"), ("udpout", "udpin")], ids=["tcp", "vehicle calls"]
 )
-def test_other_ways_to_connect(listen, to):
+def test_other_ways_to_connect(listen: str, to: str) -> None:
     port = free_port(socket.SOCK_STREAM)
     with running(mock_of("px4"), f"{listen}:127.0.0.1:{port}"):
         assert upload(a_mission(5), f"{to}:127.0.0.1:{port}", system=1).verified
 
 
-def test_what_storage_drops_is_in_the_report(port):
+def test_what_storage_drops_is_in_the_report(port: int) -> None:
     item = MissionItem(16, 3, (2.7, 0.0, 0.0, 30.0), -35.36, 149.16, 20.0)
     mission = Mission((item,), HOME)
     with running(mock_of("ardupilot"), f"udpin:127.0.0.1:{port}"):
@@ -103,8 +108,8 @@ def test_what_storage_drops_is_in_the_report(port):
         ({(0, COUNT): Result.DENIED}, "another ground station is uploading"),
     ],
 )
-def test_a_refusal_says_what_is_wrong_and_where(refusals, told, port):
-    with running(mock_of(ardupilot(refusals=refusals)), f"udpin:127.0.0.1:{port}"):
+def test_a_refusal_says_what_is_wrong_and_where(refusals: Any, told: str, port: int) -> None:
+    with running(mock_of(behaviour_of("ardupilot", refusals=refusals)), f"udpin:127.0.0.1:{port}"):
         report = upload(a_mission(5), f"udpout:127.0.0.1:{port}", system=1)
     assert not report.verified
     (problem,) = report.problems
@@ -112,7 +117,7 @@ def test_a_refusal_says_what_is_wrong_and_where(refusals, told, port):
     assert ("old and new items mixed" in problem) == ((0, 2) in refusals)
 
 
-def test_no_space_says_the_limit_and_the_count(port):
+def test_no_space_says_the_limit_and_the_count(port: int) -> None:
     with running(mock_of("ardupilot"), f"udpin:127.0.0.1:{port}"):
         report = upload(a_mission(700), f"udpout:127.0.0.1:{port}", system=1)
     (problem,) = report.problems
@@ -120,10 +125,10 @@ def test_no_space_says_the_limit_and_the_count(port):
     assert "The vehicle says: Only 655 items are supported" in problem
 
 
-def test_the_mission_of_an_armed_vehicle_is_left_alone(port):
+def test_the_mission_of_an_armed_vehicle_is_left_alone(port: int) -> None:
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock_of("px4"), f"udpin:127.0.0.1:{port}") as mock:
-        mock._armed = True
+        mock.armed = True
         changes = (upload, a_mission(5), connection), (clear, connection)
         for change, *arguments in changes:
             with pytest.raises(LinkError, match="armed vehicle is not replaced; disarm it"):
@@ -132,17 +137,17 @@ def test_the_mission_of_an_armed_vehicle_is_left_alone(port):
         assert upload(a_mission(5), connection, system=1, allow_armed=True).verified
 
 
-def test_a_booting_vehicle_is_waited_for(port):
+def test_a_booting_vehicle_is_waited_for(port: int) -> None:
     with running(mock_of("ardupilot", boot=1.5), f"udpin:127.0.0.1:{port}"):
         assert upload(a_mission(5), f"udpout:127.0.0.1:{port}", system=1).verified
 
 
-def test_several_vehicles_and_other_ground_stations(port):
+def test_several_vehicles_and_other_ground_stations(port: int) -> None:
     """Two autopilots and a second ground station behind one port, like behind a router."""
     connection = f"udpin:127.0.0.1:{port}"
     stop = threading.Event()
 
-    def chatter():
+    def chatter() -> None:
         other = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=254)
         while not stop.wait(0.02):
             other.mav.heartbeat_send(6, 8, 0, 0, 4)
@@ -165,8 +170,8 @@ def test_several_vehicles_and_other_ground_stations(port):
     assert one.mission().items == ()
 
 
-def test_a_vehicle_that_holds_nonsense(port):
-    vertex = Row(5001, 0, (4.0, 0.0, 0.0, 0.0), -350_000_000, 1_490_000_000, 0.0)
+def test_a_vehicle_that_holds_nonsense(port: int) -> None:
+    vertex = WireItem(5001, 0, (4.0, 0.0, 0.0, 0.0), -350_000_000, 1_490_000_000, 0.0)
     mock = mock_of("px4")
     mock.lists.replace(MissionType.FENCE, [vertex] * 3)
     with (
@@ -176,7 +181,7 @@ def test_a_vehicle_that_holds_nonsense(port):
         download(f"udpout:127.0.0.1:{port}", system=1)
 
 
-def test_no_vehicle(port):
+def test_no_vehicle(port: int) -> None:
     with pytest.raises(LinkError, match=r"no heartbeat of an autopilot within 0\.3 s"):
         download(f"udpout:127.0.0.1:{port}", wait=0.3)
     with (
@@ -188,12 +193,12 @@ def test_no_vehicle(port):
         download(f"udpout:127.0.0.1:{port}", component=7, wait=0.3)
 
 
-def test_an_empty_mission_is_not_uploaded():
+def test_an_empty_mission_is_not_uploaded() -> None:
     with pytest.raises(InputError, match="no items; clear the vehicle's instead"):
         upload(Mission(()), "udpout:127.0.0.1:9")
 
 
-def test_a_log_does_not_replace_a_mission(tmp_path):
+def test_a_log_does_not_replace_a_mission(tmp_path: Path) -> None:
     path = tmp_path / "m.waypoints"
     path.write_text("QGC WPL 110\n")
     with pytest.raises(InputError, match=r"m\.waypoints: give a name that ends in \.tlog"):
@@ -201,7 +206,7 @@ def test_a_log_does_not_replace_a_mission(tmp_path):
     assert path.read_text() == "QGC WPL 110\n"
 
 
-def test_the_log_is_one_that_pymavlink_reads(port, tmp_path):
+def test_the_log_is_one_that_pymavlink_reads(port: int, tmp_path: Path) -> None:
     path = tmp_path / "exchange.tlog"
     before = time.time()
     with running(mock_of("px4"), f"udpin:127.0.0.1:{port}"):
@@ -220,13 +225,15 @@ def test_the_log_is_one_that_pymavlink_reads(port, tmp_path):
     assert stamps == sorted(stamps)
 
 
-def test_a_log_that_cannot_be_written_is_an_error_before_anything_is_sent(tmp_path, port):
+def test_a_log_that_cannot_be_written_is_an_error_before_anything_is_sent(
+    tmp_path: Path, port: int
+) -> None:
     with pytest.raises(InputError, match="there is no directory"):
         upload(a_mission(5), f"udpout:127.0.0.1:{port}", log=tmp_path / "no" / "x.tlog")
 
 
-def test_signed(port, tmp_path):
-    key = key_of_phrase("open sesame")
+def test_signed(port: int, tmp_path: Path) -> None:
+    key = signing_key("open sesame")
     path = tmp_path / "key"
     path.write_bytes(key)
     connection = f"udpout:127.0.0.1:{port}"
@@ -238,11 +245,11 @@ def test_signed(port, tmp_path):
         assert "signs its packets" in report.problems[-1]
 
 
-def test_interrupted_from_the_keyboard(port):
+def test_interrupted_from_the_keyboard(port: int) -> None:
     mock = mock_of("px4")
     connection = f"udpout:127.0.0.1:{port}"
 
-    def observe(what, done, total):
+    def observe(what: str, done: int, total: int) -> None:
         if what.startswith("uploading") and done == 3:
             raise KeyboardInterrupt
 
@@ -255,7 +262,7 @@ def test_interrupted_from_the_keyboard(port):
         assert time.monotonic() - started < 2.5
 
 
-def test_the_ground_station_makes_itself_known_and_arms_nothing(port):
+def test_the_ground_station_makes_itself_known_and_arms_nothing(port: int) -> None:
     heard = []
     listener = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     with pytest.raises(LinkError):
@@ -282,12 +289,12 @@ def test_the_ground_station_makes_itself_known_and_arms_nothing(port):
         ("/dev/ttyNONE,57600", "there is no such device"),
     ],
 )
-def test_connections_that_are_none(text, told):
+def test_connections_that_are_none(text: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
         open_transport(text)
 
 
-def test_connections_by_name():
+def test_connections_by_name() -> None:
     assert parse_connection("udp:0.0.0.0:14550").kind == "udpin"
     serial = parse_connection("/dev/ttyACM0,115200")
     assert (serial.kind, serial.host, serial.port) == ("serial", "/dev/ttyACM0", 115_200)
@@ -295,7 +302,7 @@ def test_connections_by_name():
     assert parse_connection("/dev/ttyUSB0").port == 57_600
 
 
-def test_connections_that_cannot_be_opened():
+def test_connections_that_cannot_be_opened() -> None:
     with pytest.raises(LinkError, match=r"there is no host no-such-host\.invalid"):
         open_transport("udpout:no-such-host.invalid:14550")
     port = free_port(socket.SOCK_STREAM)
@@ -310,11 +317,11 @@ def test_connections_that_cannot_be_opened():
             first.close()
 
 
-def test_a_tcp_link_that_is_closed():
+def test_a_tcp_link_that_is_closed() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         connection = f"tcp:127.0.0.1:{server.getsockname()[1]}"
 
-        def hang_up():
+        def hang_up() -> None:
             server.accept()[0].close()
 
         thread = threading.Thread(target=hang_up)
@@ -324,7 +331,7 @@ def test_a_tcp_link_that_is_closed():
         thread.join()
 
 
-def test_a_serial_line():
+def test_a_serial_line() -> None:
     """A pseudo terminal: the same bytes as over a radio."""
     pty, os = pytest.importorskip("pty"), pytest.importorskip("os")
     tty = pytest.importorskip("tty")
@@ -333,14 +340,14 @@ def test_a_serial_line():
     tty.setraw(theirs)
 
     class Radio:
-        def read(self, timeout):
+        def read(self, timeout: float) -> list[bytes]:
             ready = select.select([ours], [], [], max(timeout, 0))[0]
             return [os.read(ours, 4096)] if ready else []
 
-        def write(self, data):
+        def write(self, data: bytes) -> None:
             os.write(ours, data)
 
-        def close(self):
+        def close(self) -> None:
             pass
 
     try:
@@ -352,7 +359,13 @@ def test_a_serial_line():
         os.close(theirs)
 
 
-def test_a_link_in_use_is_let_go_of(port):
+def test_a_link_in_use_is_let_go_of(port: int) -> None:
     for _ in range(2):
         with Link(f"udpin:127.0.0.1:{port}"):
             pass
+
+
+def test_an_option_that_there_is_none_of_is_an_error() -> None:
+    options: Any = {"sytem": 1}
+    with pytest.raises(TypeError, match="no option 'sytem'; expected some of system, component"):
+        download("udpout:127.0.0.1:9", **options)

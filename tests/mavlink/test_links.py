@@ -4,8 +4,8 @@ import pytest
 from stations import mock_of, rows_for, there_and_back, upload_to
 
 from faao_mav.mavlink.faults import Faults, Lost
-from faao_mav.mavlink.mock import ardupilot, px4
-from faao_mav.mavlink.transfer.protocol import MissionType, Result
+from faao_mav.mavlink.mock import MockKind, behaviour_of
+from faao_mav.mavlink.protocol import MissionType, Result
 
 MISSION = MissionType.MISSION
 KINDS = ["ardupilot", "px4"]
@@ -16,7 +16,9 @@ REQUEST_INT = 51
 @pytest.mark.parametrize(
     ("loss", "seconds", "messages"), [(0.0, 5, 1), (0.05, 10, 1.3), (0.2, 30, 2)]
 )
-def test_600_items_over_a_quick_link(kind, loss, seconds, messages):
+def test_600_items_over_a_quick_link(
+    kind: MockKind, loss: float, seconds: float, messages: float
+) -> None:
     for seed in range(3):
         courses = there_and_back(kind, 600, Faults(loss=loss, seed=seed))
         assert sum(course.took for course in courses) < seconds
@@ -38,7 +40,7 @@ SLOW = {
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", SLOW)
-def test_a_slow_link_is_not_flooded(kind, name):
+def test_a_slow_link_is_not_flooded(kind: MockKind, name: str) -> None:
     up, back = there_and_back(kind, 100, SLOW[name])
     assert back.ours <= 1.2 * 100
     # PX4 asks again after 0.25 s, and is answered each time.
@@ -47,7 +49,7 @@ def test_a_slow_link_is_not_flooded(kind, name):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_radio_that_is_busy_with_telemetry_is_not_flooded(kind):
+def test_a_radio_that_is_busy_with_telemetry_is_not_flooded(kind: MockKind) -> None:
     """20 reports a second take two thirds of what this line can carry."""
     for course in there_and_back(kind, 100, Faults(latency=0.03, rate=2500.0), telemetry=20.0):
         assert course.ours <= 1.3 * 100
@@ -55,7 +57,7 @@ def test_a_radio_that_is_busy_with_telemetry_is_not_flooded(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_slow_link_that_loses_packets_is_not_flooded(kind):
+def test_a_slow_link_that_loses_packets_is_not_flooded(kind: MockKind) -> None:
     for name, faults in SLOW.items():
         lossy = Faults(loss=0.1, latency=faults.latency, rate=faults.rate, seed=1)
         up, back = there_and_back(kind, 100, lossy)
@@ -64,27 +66,27 @@ def test_a_slow_link_that_loses_packets_is_not_flooded(kind):
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-def test_ardupilot_is_read_several_rows_at_a_time(loss):
+def test_ardupilot_is_read_several_rows_at_a_time(loss: float) -> None:
     faults = Faults(latency=0.15, loss=loss, seed=2)
     one_by_one, several = (there_and_back(kind, 100, faults)[1] for kind in ("px4", "ardupilot"))
     assert several.took < one_by_one.took / 2.5
     assert several.ours < 1.1 * one_by_one.ours
 
 
-def test_a_request_that_px4_lost_is_not_waited_for():
+def test_a_request_that_px4_lost_is_not_waited_for() -> None:
     """It would ask again after 0.25 s."""
     plain = there_and_back("px4", 30, Faults())[0].took
     lost = there_and_back("px4", 30, Faults(lost=(Lost(REQUEST_INT, 12),)))[0].took
     assert plain < lost < plain + 0.1
 
 
-@pytest.mark.parametrize("make", [ardupilot, px4])
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 @pytest.mark.parametrize("seq", [5, 6, 7])
-def test_the_item_that_is_refused_is_named_whatever_is_lost(make, seq):
+def test_the_item_that_is_refused_is_named_whatever_is_lost(kind: MockKind, seq: int) -> None:
     for loss in (0.0, 0.2, 0.4):
         for seed in range(10):
-            mock = mock_of(make(refusals={(MISSION, seq): Result.INVALID_PARAM2}))
-            rows = rows_for(mock.lists.vehicle.autopilot, 12)[:12]
+            mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): Result.INVALID_PARAM2}))
+            rows = rows_for(mock.vehicle.family.key, 12)[:12]
             report, _ = upload_to(mock, rows, Faults(loss=loss, seed=seed))
             assert not report.verified
             if report.result == Result.INVALID_PARAM2:

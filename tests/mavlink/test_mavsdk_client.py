@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from conftest import free_port
@@ -16,14 +17,14 @@ from mock_flights import fly
 from stations import FENCE, HOME, RALLY, a_mission, places
 
 from faao_mav.mavlink import upload
-from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import MissionType
+from faao_mav.mavlink.messages import WireItem
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import MissionType
+from faao_mav.mavlink.wire_items import wire_items
 
 
-def sdk_items(rows: tuple[Row, ...], part: MissionType) -> list[SdkItem]:
+def sdk_items(rows: tuple[WireItem, ...], part: MissionType) -> list[SdkItem]:
     return [
         SdkItem(
             seq,
@@ -49,7 +50,7 @@ def found_places(items: list[SdkItem]) -> list[tuple[int, int, int, float]]:
 def flown(request: pytest.FixtureRequest) -> Iterator[tuple[MockAutopilot, MissionRaw]]:
     kind: MockKind = request.param
     port = free_port()
-    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, beat=0.1, speedup=40.0)
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, beat=0.1, speedup=40.0)
     sdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     try:
         sdk.add_any_connection(f"udpin://127.0.0.1:{port}")
@@ -63,39 +64,39 @@ def flown(request: pytest.FixtureRequest) -> Iterator[tuple[MockAutopilot, Missi
         sdk.destroy()
 
 
-def test_mavsdk_uploads_downloads_and_clears_a_mission(flown):
+def test_mavsdk_uploads_downloads_and_clears_a_mission(flown: Any) -> None:
     mock, client = flown
-    rows = rows_of(a_mission(8), MissionType.MISSION, mock.lists.vehicle.autopilot)
+    rows = wire_items(a_mission(8), MissionType.MISSION, mock.vehicle)
     client.upload_mission(sdk_items(rows, MissionType.MISSION))
-    assert places(mock.lists.rows(MissionType.MISSION)) == places(rows)
+    assert places(mock.lists.items(MissionType.MISSION)) == places(rows)
     assert found_places(client.download_mission()) == places(rows)
     client.clear_mission()
     assert mock.mission().items == ()
 
 
-def test_mavsdk_uploads_and_downloads_a_fence(flown):
+def test_mavsdk_uploads_and_downloads_a_fence(flown: Any) -> None:
     mock, client = flown
-    rows = rows_of(a_mission(3, fence=FENCE), MissionType.FENCE, mock.lists.vehicle.autopilot)
+    rows = wire_items(a_mission(3, fence=FENCE), MissionType.FENCE, mock.vehicle)
     client.upload_geofence(sdk_items(rows, MissionType.FENCE))
     assert mock.mission().fence == FENCE
     assert found_places(client.download_geofence()) == places(rows)
 
 
-def test_mavsdk_uploads_and_downloads_rally_points(flown):
+def test_mavsdk_uploads_and_downloads_rally_points(flown: Any) -> None:
     mock, client = flown
-    rows = rows_of(a_mission(3, rally=RALLY), MissionType.RALLY, mock.lists.vehicle.autopilot)
+    rows = wire_items(a_mission(3, rally=RALLY), MissionType.RALLY, mock.vehicle)
     client.upload_rally_points(sdk_items(rows, MissionType.RALLY))
     assert mock.mission().rally == RALLY
     assert found_places(client.download_rallypoints()) == places(rows)
 
 
-def test_mavsdk_arms_and_flies_the_mission(flown):
+def test_mavsdk_arms_and_flies_the_mission(flown: Any) -> None:
     mock, client = flown
-    rows = rows_of(a_mission(8), MissionType.MISSION, mock.lists.vehicle.autopilot)
+    rows = wire_items(a_mission(8), MissionType.MISSION, mock.vehicle)
     client.upload_mission(sdk_items(rows, MissionType.MISSION))
     reached = threading.Event()
 
-    def progress(now, _):
+    def progress(now: Any, _: object) -> None:
         if now.current == len(rows) - 1:
             reached.set()
 
@@ -112,12 +113,12 @@ def test_mavsdk_arms_and_flies_the_mission(flown):
     assert not mock.armed, "it has not landed"
 
 
-def test_our_client_uploads_to_mavsdks_server():
+def test_our_client_uploads_to_mavsdks_server() -> None:
     port = free_port()
     received: list[list[SdkItem]] = []
     arrived = threading.Event()
 
-    def incoming(result, plan, _):
+    def incoming(result: object, plan: Any, _: object) -> None:
         received.append(plan.mission_items)
         arrived.set()
 
@@ -131,9 +132,9 @@ def test_our_client_uploads_to_mavsdks_server():
         report = upload(mission, f"udpin:127.0.0.1:{port}", system=1)
         assert arrived.wait(5)
         assert report.verified
-        assert report.vehicle.firmware == "generic"
+        assert report.vehicle.autopilot == "generic"
         assert found_places(received[0]) == places(
-            rows_of(mission, MissionType.MISSION, report.vehicle.firmware)
+            wire_items(mission, MissionType.MISSION, report.vehicle.vehicle)
         )
         server.destroy()
     finally:

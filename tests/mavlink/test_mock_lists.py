@@ -1,9 +1,13 @@
 """The mock autopilots' side of the mission protocol, as the real ones have it."""
 
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
 import pytest
 from stations import FOREIGN, HOME, VEHICLE, Desk, mock_of, places, rows_for
 
 from faao_mav.mavlink.messages import (
+    Message,
     MissionAck,
     MissionClearAll,
     MissionCount,
@@ -11,45 +15,52 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
     MissionWritePartialList,
-    Row,
     Statustext,
+    WireItem,
 )
-from faao_mav.mavlink.mock import ardupilot, px4
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType, Result
+from faao_mav.mavlink.mock import Behaviour, MockKind, behaviour_of
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
 
 MISSION, FENCE, RALLY = MissionType
-TO = (VEHICLE.system, VEHICLE.component)
+T = TypeVar("T", bound=Message)
+
+TO = VEHICLE
 PLACE = (-353_000_000, 1_491_000_000)
-RALLY_ROW = Row(5100, 3, (0.0, 0.0, 0.0, 0.0), *PLACE, 30.0)
+RALLY_ROW = WireItem(5100, 3, (0.0, 0.0, 0.0, 0.0), *PLACE, 30.0)
 
 
-def desk_for(kind, **options):
+def desk_for(kind: str | Behaviour, **options: Any) -> Desk:
     desk = Desk(mock_of(kind, **options), GROUND_STATION)
     desk.start()
     return desk
 
 
-def count(n, part=MISSION):
-    return MissionCount(*TO, n, part)
+def count(n: int, part: int = MISSION) -> MissionCount:
+    return MissionCount(TO, part, n)
 
 
-def item(seq, row, part=MISSION):
-    return MissionItemInt(*TO, seq, part, row)
+def item(seq: int, row: WireItem, part: MissionType = MISSION) -> MissionItemInt:
+    return MissionItemInt(TO, part, seq, row)
 
 
-def answers(messages, kind):
+def answers(messages: Sequence[Message], kind: type[T]) -> list[T]:
     return [message for message in messages if isinstance(message, kind)]
 
 
-def results(messages):
+def results(messages: Sequence[Message]) -> list[int]:
     return [message.type for message in answers(messages, MissionAck)]
 
 
-def asked(messages):
+def asked(messages: Sequence[Message]) -> list[int]:
     return [message.seq for message in answers(messages, MissionRequestInt)]
 
 
-def upload(desk, rows, part=MISSION, sender=GROUND_STATION):
+def upload(
+    desk: Desk,
+    rows: Sequence[WireItem],
+    part: MissionType = MISSION,
+    sender: Address = GROUND_STATION,
+) -> list[int]:
     """Upload without a fault and return the last answer's results."""
     out = desk.tell(count(len(rows), part), sender)
     for seq, row in enumerate(rows):
@@ -58,41 +69,41 @@ def upload(desk, rows, part=MISSION, sender=GROUND_STATION):
     return results(out)
 
 
-def stored(desk, part=MISSION):
-    return places(desk.machine.lists.rows(part))
+def stored(desk: Desk, part: MissionType = MISSION) -> list[tuple[int, int, int, float]]:
+    return places(desk.machine.lists.items(part))
 
 
 @pytest.mark.parametrize(
     ("kind", "legacy"), [("ardupilot", True), ("px4", False), ("px4-legacy-first", True)]
 )
-def test_who_asks_with_which_message(kind, legacy):
+def test_who_asks_with_which_message(kind: MockKind, legacy: bool) -> None:
     (request,) = desk_for(kind).tell(count(3))
     assert request.legacy is legacy
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_what_is_uploaded_can_be_downloaded(kind):
+def test_what_is_uploaded_can_be_downloaded(kind: MockKind) -> None:
     desk, rows = desk_for(kind), rows_for(kind, 4)
     assert upload(desk, rows) == [Result.ACCEPTED]
-    (found,) = desk.tell(MissionRequestList(*TO, 0))
+    (found,) = desk.tell(MissionRequestList(TO, 0))
     assert found.count == len(rows)
     for seq, row in enumerate(rows):
-        (answer,) = desk.tell(MissionRequestInt(*TO, seq, 0))
-        assert places([answer.row]) == places([row])
-    desk.tell(MissionAck(*TO, Result.ACCEPTED, 0))
+        (answer,) = desk.tell(MissionRequestInt(TO, 0, seq))
+        assert places([answer.item]) == places([row])
+    desk.tell(MissionAck(TO, 0, Result.ACCEPTED))
 
 
-def test_ardupilot_keeps_its_own_home_in_row_0():
+def test_ardupilot_keeps_its_own_home_in_row_0() -> None:
     desk = desk_for("ardupilot")
     rows = rows_for("ardupilot", 3)
-    elsewhere = Row(16, 0, (0.0, 0.0, 0.0, 0.0), *PLACE, 1.0)
+    elsewhere = WireItem(16, 0, (0.0, 0.0, 0.0, 0.0), *PLACE, 1.0)
     upload(desk, (elsewhere, *rows[1:]))
-    home = desk.machine.lists.rows(MISSION)[0]
+    home = desk.machine.lists.items(MISSION)[0]
     assert (home.x, home.y, home.z) == (round(HOME.latitude * 1e7), 1_491_652_370, 584.0)
 
 
-def test_storage_loses_what_the_real_one_loses():
-    fussy = Row(16, 6, (2.75, 5.0, 1.0, 30.0), *PLACE, 20.123)
+def test_storage_loses_what_the_real_one_loses() -> None:
+    fussy = WireItem(16, 6, (2.75, 5.0, 1.0, 30.0), *PLACE, 20.123)
     for kind, params, frame in (
         ("ardupilot", (2.0, 0.0, 0.0, 0.0), 3),
         ("px4", (2.75, 5.0, 0.0, 30.0), 6),
@@ -100,11 +111,11 @@ def test_storage_loses_what_the_real_one_loses():
         desk = desk_for(kind)
         first = rows_for(kind, 2)[:1]
         upload(desk, (*first, fussy))
-        found = desk.machine.lists.rows(MISSION)[1]
+        found = desk.machine.lists.items(MISSION)[1]
         assert (found.params, found.frame) == (params, frame)
 
 
-def test_ardupilot_asks_again_after_1_s_and_gives_up_after_8():
+def test_ardupilot_asks_again_after_1_s_and_gives_up_after_8() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
     assert asked(desk.wait(0.99)) == []
@@ -116,7 +127,7 @@ def test_ardupilot_asks_again_after_1_s_and_gives_up_after_8():
     assert upload(desk, rows_for("ardupilot")) == [Result.ACCEPTED]
 
 
-def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5():
+def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5() -> None:
     desk = desk_for("px4")
     desk.tell(count(3))
     assert asked(desk.wait(1.01)) == [0] * 4
@@ -126,7 +137,7 @@ def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5():
     assert asked(desk.wait(6)) == []
 
 
-def test_ardupilot_says_so_of_a_wrong_item_and_goes_on():
+def test_ardupilot_says_so_of_a_wrong_item_and_goes_on() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     desk.tell(count(4))
     assert results(desk.tell(item(2, rows[2]))) == [Result.INVALID_SEQUENCE]
@@ -134,20 +145,20 @@ def test_ardupilot_says_so_of_a_wrong_item_and_goes_on():
         assert asked(desk.tell(item(seq, rows[seq]))) == [seq + 1]
 
 
-def test_px4_passes_over_a_wrong_item():
+def test_px4_passes_over_a_wrong_item() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 3)
     desk.tell(count(3))
     assert desk.tell(item(2, rows[2])) == []
     assert asked(desk.tell(item(0, rows[0]))) == [1]
 
 
-def test_the_last_item_again_is_an_error_for_ardupilot():
+def test_the_last_item_again_is_an_error_for_ardupilot() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     upload(desk, rows)
     assert results(desk.tell(item(len(rows) - 1, rows[-1]))) == [Result.ERROR]
 
 
-def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error():
+def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 3)
     upload(desk, rows)
     assert results(desk.tell(item(2, rows[2]))) == [Result.ACCEPTED]
@@ -155,8 +166,8 @@ def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error():
 
 
 @pytest.mark.parametrize("complete_only", [True, False])
-def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only):
-    desk, rows = desk_for(px4(complete_only=complete_only)), rows_for("px4", 3)
+def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only: bool) -> None:
+    desk, rows = desk_for(behaviour_of("px4", complete_only=complete_only)), rows_for("px4", 3)
     desk.tell(count(3))
     desk.tell(item(0, rows[0]))
     desk.wait(6)
@@ -165,7 +176,7 @@ def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only):
     assert stored(desk) == []
 
 
-def test_ardupilot_is_left_with_old_and_new_items_px4_is_not():
+def test_ardupilot_is_left_with_old_and_new_items_px4_is_not() -> None:
     for kind, mixed in (("ardupilot", True), ("px4", False)):
         desk = desk_for(kind)
         old, new = rows_for(kind, 4), rows_for(kind, 4, shift=0.1)
@@ -178,7 +189,7 @@ def test_ardupilot_is_left_with_old_and_new_items_px4_is_not():
         assert stored(desk) == expected
 
 
-def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4():
+def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4() -> None:
     for kind, refusal in (("ardupilot", Result.DENIED), ("px4", Result.ERROR)):
         desk, rows = desk_for(kind), rows_for(kind, 3)
         desk.tell(count(len(rows)))
@@ -189,14 +200,14 @@ def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4():
         assert asked(out) == [1]
 
 
-def test_a_count_again_begins_anew_for_ardupilot():
+def test_a_count_again_begins_anew_for_ardupilot() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     desk.tell(count(4))
     desk.tell(item(0, rows[0]))
     assert asked(desk.tell(count(4))) == [0]
 
 
-def test_a_count_again_is_an_error_for_px4_once_it_has_an_item():
+def test_a_count_again_is_an_error_for_px4_once_it_has_an_item() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 3)
     desk.tell(count(3))
     assert asked(desk.tell(count(3))) == [0]
@@ -205,18 +216,18 @@ def test_a_count_again_is_an_error_for_px4_once_it_has_an_item():
     assert asked(desk.tell(item(1, rows[1]))) == [2]
 
 
-def test_downloading_during_an_upload():
+def test_downloading_during_an_upload() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
-    assert results(desk.tell(MissionRequestList(*TO, 0))) == [Result.DENIED]
+    assert results(desk.tell(MissionRequestList(TO, 0))) == [Result.DENIED]
     desk = desk_for("px4")
     desk.tell(count(3))
-    out = desk.tell(MissionRequestList(*TO, 0))
+    out = desk.tell(MissionRequestList(TO, 0))
     assert results(out) == []
     assert answers(out, MissionCount) == []
 
 
-def test_ardupilot_takes_two_lists_at_once_px4_does_not():
+def test_ardupilot_takes_two_lists_at_once_px4_does_not() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
     assert asked(desk.tell(count(1, RALLY))) == [0]
@@ -230,7 +241,7 @@ def test_ardupilot_takes_two_lists_at_once_px4_does_not():
     assert results(desk.tell(count(1, RALLY))) == [Result.ERROR]
 
 
-def test_too_many_items():
+def test_too_many_items() -> None:
     for kind, limit in (("ardupilot", 655), ("px4", 1000)):
         desk = desk_for(kind)
         assert results(desk.tell(count(16_000))) == [Result.NO_SPACE]
@@ -238,52 +249,52 @@ def test_too_many_items():
         assert asked(desk.tell(count(limit))) == [0]
 
 
-def test_an_unknown_list():
+def test_an_unknown_list() -> None:
     assert results(desk_for("ardupilot").tell(count(1, 230))) == [Result.UNSUPPORTED]
     assert results(desk_for("px4").tell(count(1, 230))) == [Result.INVALID]
 
 
-def test_ardupilot_has_no_space_while_it_boots():
+def test_ardupilot_has_no_space_while_it_boots() -> None:
     desk = desk_for("ardupilot", boot=5.0)
     assert results(desk.tell(count(3))) == [Result.NO_SPACE]
     desk.wait(5.1)
     assert asked(desk.tell(count(3))) == [0]
 
 
-def test_partial_lists():
+def test_partial_lists() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 4)
     upload(desk, rows)
-    wrong = MissionWritePartialList(*TO, 2, 99, 0)
+    wrong = MissionWritePartialList(TO, 0, 2, 99)
     assert results(desk.tell(wrong)) == [Result.ERROR]
-    assert asked(desk.tell(MissionWritePartialList(*TO, 2, 3, 0))) == [2]
+    assert asked(desk.tell(MissionWritePartialList(TO, 0, 2, 3))) == [2]
     other = rows_for("ardupilot", 4, shift=0.1)
     desk.tell(item(2, other[2]))
     assert results(desk.tell(item(3, other[3]))) == [Result.ACCEPTED]
     assert stored(desk) == places((*rows[:2], *other[2:4], *rows[4:]))
 
 
-def test_clearing_one_list_leaves_the_others():
+def test_clearing_one_list_leaves_the_others() -> None:
     for kind in ("ardupilot", "px4"):
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
         upload(desk, (RALLY_ROW,), RALLY)
-        assert results(desk.tell(MissionClearAll(*TO, 0))) == [Result.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(TO, 0))) == [Result.ACCEPTED]
         assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
         assert len(stored(desk, RALLY)) == 1
-        assert results(desk.tell(MissionClearAll(*TO, 255))) == [Result.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(TO, 255))) == [Result.ACCEPTED]
         assert stored(desk, RALLY) == []
 
 
-def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothing():
+def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothing() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
-    assert results(desk.tell(MissionClearAll(*TO, 0))) == [Result.ERROR]
+    assert results(desk.tell(MissionClearAll(TO, 0))) == [Result.ERROR]
     desk = desk_for("px4")
     desk.tell(count(3))
-    assert results(desk.tell(MissionClearAll(*TO, 0))) == []
+    assert results(desk.tell(MissionClearAll(TO, 0))) == []
 
 
-def test_a_count_of_none_clears():
+def test_a_count_of_none_clears() -> None:
     for kind in ("ardupilot", "px4"):
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
@@ -291,42 +302,42 @@ def test_a_count_of_none_clears():
         assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
 
 
-def test_px4_changes_its_request_when_told_unsupported():
+def test_px4_changes_its_request_when_told_unsupported() -> None:
     desk = desk_for("px4-legacy-first")
     (request,) = desk.tell(count(3))
-    (other,) = desk.tell(MissionAck(*TO, Result.UNSUPPORTED, 0))
+    (other,) = desk.tell(MissionAck(TO, 0, Result.UNSUPPORTED))
     assert (request.legacy, other.legacy) == (True, False)
     assert other.seq == 0
 
 
-def test_px4_is_freed_by_a_cancellation():
+def test_px4_is_freed_by_a_cancellation() -> None:
     desk = desk_for("px4")
     desk.tell(count(3))
-    desk.tell(MissionAck(*TO, Result.OPERATION_CANCELLED, 0))
+    desk.tell(MissionAck(TO, 0, Result.OPERATION_CANCELLED))
     assert asked(desk.wait(3)) == []
     assert asked(desk.tell(count(3), FOREIGN)) == [0]
 
 
-def test_px4_downloads_in_order_only():
+def test_px4_downloads_in_order_only() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 4)
     upload(desk, rows)
-    assert desk.tell(MissionRequestInt(*TO, 0, 0)) == []
-    desk.tell(MissionRequestList(*TO, 0))
+    assert desk.tell(MissionRequestInt(TO, 0, 0)) == []
+    desk.tell(MissionRequestList(TO, 0))
     for seq in (0, 0, 1):
-        (answer,) = desk.tell(MissionRequestInt(*TO, seq, 0))
+        (answer,) = desk.tell(MissionRequestInt(TO, 0, seq))
         assert answer.seq == seq
-    assert results(desk.tell(MissionRequestInt(*TO, 3, 0))) == [Result.ERROR]
-    assert desk.tell(MissionRequestInt(*TO, 1, 0)) == []
+    assert results(desk.tell(MissionRequestInt(TO, 0, 3))) == [Result.ERROR]
+    assert desk.tell(MissionRequestInt(TO, 0, 1)) == []
 
 
-def test_ardupilot_downloads_in_any_order():
+def test_ardupilot_downloads_in_any_order() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     upload(desk, rows)
     for seq in (3, 0, 2):
-        (answer,) = desk.tell(MissionRequestInt(*TO, seq, 0, legacy=True))
+        (answer,) = desk.tell(MissionRequestInt(TO, 0, seq, legacy=True))
         assert (answer.seq, answer.legacy) == (seq, True)
-    assert results(desk.tell(MissionRequestInt(*TO, 9, 0))) == [Result.ERROR]
-    assert results(desk.tell(MissionRequestInt(*TO, 9, 2))) == [Result.INVALID_SEQUENCE]
+    assert results(desk.tell(MissionRequestInt(TO, 0, 9))) == [Result.ERROR]
+    assert results(desk.tell(MissionRequestInt(TO, 2, 9))) == [Result.INVALID_SEQUENCE]
 
 
 NAN = float("nan")
@@ -335,57 +346,57 @@ NAN = float("nan")
 @pytest.mark.parametrize(
     ("kind", "row", "result"),
     [
-        ("ardupilot", Row(16, 1, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
-        ("ardupilot", Row(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("ardupilot", Row(1, 3, (0.0,) * 4, *PLACE, 9.0), Result.INVALID),
-        ("ardupilot", Row(16, 3, (0.0, NAN, 0.0, 0.0), *PLACE, 9.0), Result.INVALID_PARAM2),
-        ("ardupilot", Row(16, 3, (0.0,) * 4, 910_000_000, 0, 9.0), Result.INVALID_PARAM5_X),
-        ("ardupilot", Row(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("ardupilot", Row(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
-        ("px4", Row(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
-        ("px4", Row(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED),
-        ("px4", Row(178, 2, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
-        ("px4", Row(178, 10, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED_FRAME),
-        ("px4", Row(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
-        ("px4", Row(16, 2, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
-        ("px4", Row(16, 3, (NAN,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("px4", Row(20, 3, (0.0,) * 4, 0, 0, 0.0), Result.UNSUPPORTED),
-        ("px4", Row(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0), Result.ERROR),
-        ("px4", Row(16, 3, (0.0,) * 4, 0, 1_810_000_000, 9.0), Result.INVALID_PARAM6_Y),
+        ("ardupilot", WireItem(16, 1, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
+        ("ardupilot", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
+        ("ardupilot", WireItem(1, 3, (0.0,) * 4, *PLACE, 9.0), Result.INVALID),
+        ("ardupilot", WireItem(16, 3, (0.0, NAN, 0.0, 0.0), *PLACE, 9.0), Result.INVALID_PARAM2),
+        ("ardupilot", WireItem(16, 3, (0.0,) * 4, 910_000_000, 0, 9.0), Result.INVALID_PARAM5_X),
+        ("ardupilot", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
+        ("ardupilot", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
+        ("px4", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
+        ("px4", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED),
+        ("px4", WireItem(178, 2, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
+        ("px4", WireItem(178, 10, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED_FRAME),
+        ("px4", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
+        ("px4", WireItem(16, 2, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
+        ("px4", WireItem(16, 3, (NAN,) * 4, *PLACE, 9.0), Result.ACCEPTED),
+        ("px4", WireItem(20, 3, (0.0,) * 4, 0, 0, 0.0), Result.UNSUPPORTED),
+        ("px4", WireItem(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0), Result.ERROR),
+        ("px4", WireItem(16, 3, (0.0,) * 4, 0, 1_810_000_000, 9.0), Result.INVALID_PARAM6_Y),
     ],
 )
-def test_which_items_are_refused(kind, row, result):
+def test_which_items_are_refused(kind: MockKind, row: WireItem, result: Result) -> None:
     desk = desk_for(kind)
     first = rows_for(kind, 2)[:1]
     assert upload(desk, (*first, row)) == [result]
 
 
-def test_a_fence_is_checked_and_replaced_as_a_whole():
+def test_a_fence_is_checked_and_replaced_as_a_whole() -> None:
     desk = desk_for("ardupilot")
-    corner = Row(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
+    corner = WireItem(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
     upload(desk, (corner,) * 3, FENCE)
     desk.tell(count(3, FENCE))
-    desk.tell(item(0, Row(5003, 0, (9.0, 0.0, 0.0, 0.0), *PLACE, 0.0), FENCE))
+    desk.tell(item(0, WireItem(5003, 0, (9.0, 0.0, 0.0, 0.0), *PLACE, 0.0), FENCE))
     desk.wait(10)
     assert stored(desk, FENCE) == places((corner,) * 3)
-    thin = Row(5001, 0, (2.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
+    thin = WireItem(5001, 0, (2.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
     for kind, result in (("ardupilot", Result.INVALID_PARAM1), ("px4", Result.ERROR)):
         assert upload(desk_for(kind), (thin,), FENCE) == [result]
 
 
-def test_refusals_can_be_prescribed():
-    manners = ardupilot(refusals={(MISSION, 1): Result.INVALID_PARAM3})
+def test_refusals_can_be_prescribed() -> None:
+    manners = behaviour_of("ardupilot", refusals={(MISSION, 1): Result.INVALID_PARAM3})
     desk = desk_for(manners)
     rows = rows_for("ardupilot", 2)
     assert upload(desk, rows[:2]) == [Result.INVALID_PARAM3]
 
 
-def test_numbers_tell_px4_lists_apart():
+def test_numbers_tell_px4_lists_apart() -> None:
     desk = desk_for("px4")
     numbers = []
     for shift in (0.0, 0.1, 0.0):
         upload(desk, rows_for("px4", 3, shift))
-        (found,) = desk.tell(MissionRequestList(*TO, 0))
-        desk.tell(MissionAck(*TO, Result.ACCEPTED, 0))
+        (found,) = desk.tell(MissionRequestList(TO, 0))
+        desk.tell(MissionAck(TO, 0, Result.ACCEPTED))
         numbers.append(found.opaque_id)
     assert numbers[0] == numbers[2] != numbers[1]

@@ -1,10 +1,12 @@
 """The rest of the mock autopilot: heartbeats, commands, parameters, flight."""
 
 import dataclasses
+from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import pytest
 from mock_flights import fly
-from stations import HOME, VEHICLE, Desk, a_mission, rows_for
+from stations import HOME, VEHICLE, Desk, a_mission, rows_for, vehicle_of
 
 from faao_mav.mavlink.messages import (
     AutopilotVersion,
@@ -14,6 +16,7 @@ from faao_mav.mavlink.messages import (
     Heartbeat,
     HomePosition,
     LocalPositionNed,
+    Message,
     MissionClearAll,
     MissionCurrent,
     MissionItemReached,
@@ -24,48 +27,50 @@ from faao_mav.mavlink.messages import (
     ParamValue,
     SetMode,
 )
-from faao_mav.mavlink.mock import MockAutopilot, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, MissionType, Result
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 
-TO = (VEHICLE.system, VEHICLE.component)
-MISSION = (MissionType.MISSION, "ardupilot")
+T = TypeVar("T", bound=Message)
+
+TO = VEHICLE
+MISSION = (MissionType.MISSION, vehicle_of("ardupilot"))
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
 
 
-def desk_for(kind, mission=None, **options):
-    mock = MockAutopilot(manners_of(kind), home=HOME, fly=fly, **options)
+def desk_for(kind: MockKind, mission: Mission | None = None, **options: Any) -> Desk:
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, **options)
     desk = Desk(mock, GROUND_STATION)
     desk.start()
     if mission is not None:
-        rows = rows_of(mission, MissionType.MISSION, kind)
+        rows = wire_items(mission, MissionType.MISSION, vehicle_of(kind))
         mock.lists.replace(MissionType.MISSION, rows)
     return desk
 
 
-def command(number, *params):
-    return CommandLong(*TO, number, 0, *map(float, params))
+def command(number: int, *params: float) -> CommandLong:
+    return CommandLong(TO, number, 0, *map(float, params))
 
 
-def result(messages):
+def result(messages: Sequence[Message]) -> int:
     (ack,) = [message for message in messages if isinstance(message, CommandAck)]
     return ack.result
 
 
-def only(messages, kind):
+def only(messages: Sequence[Message], kind: type[T]) -> list[T]:
     return [message for message in messages if isinstance(message, kind)]
 
 
-def take_off(desk, kind):
+def take_off(desk: Desk, kind: MockKind) -> None:
     assert result(desk.tell(command(400, 1))) == 0
     assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
 
 
 @BOTH
-def test_a_heartbeat_a_second_that_tells_booting_from_ready(kind):
+def test_a_heartbeat_a_second_that_tells_booting_from_ready(kind: MockKind) -> None:
     desk = desk_for(kind, boot=3.0)
     desk.wait(6.0)
     states = [beat.system_status for beat in only(desk.sent, Heartbeat)]
@@ -76,7 +81,7 @@ def test_a_heartbeat_a_second_that_tells_booting_from_ready(kind):
 
 
 @BOTH
-def test_a_whole_flight(kind):
+def test_a_whole_flight(kind: MockKind) -> None:
     mission = a_mission(12)
     desk = desk_for(kind, mission, speedup=10.0)
     take_off(desk, kind)
@@ -94,7 +99,7 @@ def test_a_whole_flight(kind):
     assert only(out, Heartbeat)[-1].base_mode & 128 == 0
 
 
-def test_a_plane_has_its_own_number_modes_and_storage():
+def test_a_plane_has_its_own_number_modes_and_storage() -> None:
     items = list(a_mission(5).items)
     items[2] = dataclasses.replace(items[2], params=(7.0, 40.0, 0.0, 0.0))
     desk = desk_for("ardupilot", Mission(tuple(items), HOME), aircraft="plane", speedup=20.0)
@@ -105,13 +110,13 @@ def test_a_plane_has_its_own_number_modes_and_storage():
     assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt > 0
     assert only(desk.wait(1.5), Heartbeat)[-1].type == 1
     desk.machine.lists.put(
-        MissionType.MISSION, 3, rows_of(Mission(tuple(items), HOME), *MISSION)[3]
+        MissionType.MISSION, 3, wire_items(Mission(tuple(items), HOME), *MISSION)[3]
     )
-    kept = desk.machine.lists.rows(MissionType.MISSION)[3]
+    kept = desk.machine.lists.items(MissionType.MISSION)[3]
     assert kept.params[:2] == (0.0, 40.0)
 
 
-def test_positions_are_those_of_the_track():
+def test_positions_are_those_of_the_track() -> None:
     mission = a_mission(12)
     desk = desk_for("px4", mission)
     take_off(desk, "px4")
@@ -126,7 +131,7 @@ def test_positions_are_those_of_the_track():
     assert (local.vz < 0) == (place.vz < 0)
 
 
-def test_a_waypoint_before_a_do_item_is_told_by_the_do_items_number():
+def test_a_waypoint_before_a_do_item_is_told_by_the_do_items_number() -> None:
     items = list(a_mission(4).items)
     items.insert(2, MissionItem(178, 2, (1.0, 5.0, -1.0, 0.0)))
     desk = desk_for("ardupilot", Mission(tuple(items), HOME), speedup=50.0)
@@ -137,7 +142,7 @@ def test_a_waypoint_before_a_do_item_is_told_by_the_do_items_number():
 
 
 @BOTH
-def test_it_does_not_fly_without_being_armed_and_told_to(kind):
+def test_it_does_not_fly_without_being_armed_and_told_to(kind: MockKind) -> None:
     desk = desk_for(kind, a_mission(5))
     assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
     assert only(desk.wait(5.0), GlobalPositionInt)[-1].relative_alt == 0
@@ -149,13 +154,13 @@ def test_it_does_not_fly_without_being_armed_and_told_to(kind):
 
 
 @BOTH
-def test_without_a_mission_there_is_nothing_to_fly(kind):
+def test_without_a_mission_there_is_nothing_to_fly(kind: MockKind) -> None:
     desk = desk_for(kind)
     assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 2
     assert result(desk.tell(command(300))) == 2
 
 
-def test_px4_takes_what_it_will_not_fly():
+def test_px4_takes_what_it_will_not_fly() -> None:
     mission = a_mission(5)
     low = dataclasses.replace(mission.items[0], z=0.0)
     for items in (
@@ -169,15 +174,15 @@ def test_px4_takes_what_it_will_not_fly():
     assert result(desk_for("px4", mission).tell(command(176, 1, 4, 4))) == 0
 
 
-def test_ardupilot_does_not_clear_what_it_flies():
+def test_ardupilot_does_not_clear_what_it_flies() -> None:
     desk = desk_for("ardupilot", a_mission(5))
     take_off(desk, "ardupilot")
-    (ack,) = desk.tell(MissionClearAll(*TO, 0))
+    (ack,) = desk.tell(MissionClearAll(TO, 0))
     assert ack.type == Result.ERROR
 
 
 @BOTH
-def test_disarming_ends_the_flight(kind):
+def test_disarming_ends_the_flight(kind: MockKind) -> None:
     desk = desk_for(kind, a_mission(5))
     take_off(desk, kind)
     desk.wait(3.0)
@@ -186,7 +191,7 @@ def test_disarming_ends_the_flight(kind):
 
 
 @BOTH
-def test_another_mode_ends_the_mission(kind):
+def test_another_mode_ends_the_mission(kind: MockKind) -> None:
     desk = desk_for(kind, a_mission(5))
     take_off(desk, kind)
     assert result(desk.tell(SetMode(1, 1, 0))) == 0
@@ -195,7 +200,7 @@ def test_another_mode_ends_the_mission(kind):
 
 
 @BOTH
-def test_what_ground_stations_ask_for(kind):
+def test_what_ground_stations_ask_for(kind: MockKind) -> None:
     desk = desk_for(kind)
     ack, version = desk.tell(command(512, 148))
     assert (ack.result, type(version)) == (0, AutopilotVersion)
@@ -210,7 +215,7 @@ def test_what_ground_stations_ask_for(kind):
 
 @BOTH
 @pytest.mark.parametrize("number", [176, 224, 300, 400, 511, 512, 520, 16, 0, 65_535])
-def test_no_command_brings_it_down(kind, number):
+def test_no_command_brings_it_down(kind: MockKind, number: int) -> None:
     nan, inf = float("nan"), float("inf")
     for value in (nan, inf, -1.0, 1e30):
         desk = desk_for(kind, a_mission(3))
@@ -219,54 +224,56 @@ def test_no_command_brings_it_down(kind, number):
 
 
 @BOTH
-def test_parameters(kind):
+def test_parameters(kind: MockKind) -> None:
     desk = desk_for(kind)
-    values = desk.tell(ParamRequestList(*TO))
+    values = desk.tell(ParamRequestList(TO))
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
+    told = {value.param_id: value.param_value for value in values}
+    assert told.items() >= desk.machine.vehicle.defaults().items()
     second = values[1]
-    assert desk.tell(ParamRequestRead(*TO, "", 1)) == [second]
-    assert desk.tell(ParamRequestRead(*TO, second.param_id, -1)) == [second]
-    assert desk.tell(ParamRequestRead(*TO, "NO_SUCH", -1)) == []
-    assert desk.tell(ParamRequestRead(*TO, "", 999)) == []
-    (changed,) = desk.tell(ParamSet(*TO, second.param_id, 7.0, 9))
+    assert desk.tell(ParamRequestRead(TO, "", 1)) == [second]
+    assert desk.tell(ParamRequestRead(TO, second.param_id, -1)) == [second]
+    assert desk.tell(ParamRequestRead(TO, "NO_SUCH", -1)) == []
+    assert desk.tell(ParamRequestRead(TO, "", 999)) == []
+    (changed,) = desk.tell(ParamSet(TO, second.param_id, 7.0, 9))
     assert isinstance(changed, ParamValue)
     assert changed.param_value == 7.0
 
 
 @BOTH
-def test_the_current_item(kind):
+def test_the_current_item(kind: MockKind) -> None:
     desk = desk_for(kind, a_mission(5))
-    (current,) = desk.tell(MissionSetCurrent(*TO, 3))
+    (current,) = desk.tell(MissionSetCurrent(TO, 3))
     assert (current.seq, current.total) == (3, 5)
-    assert desk.tell(MissionSetCurrent(*TO, 99)) == []
+    assert desk.tell(MissionSetCurrent(TO, 99)) == []
     assert result(desk.tell(command(224, 2))) == 0
     assert result(desk.tell(command(224, 99))) == 2
 
 
-def test_a_reboot_keeps_what_is_stored():
+def test_a_reboot_keeps_what_is_stored() -> None:
     desk = desk_for("px4", a_mission(5), boot=2.0)
     desk.wait(3.0)
     take_off(desk, "px4")
     assert result(desk.tell(command(246, 1))) == 0
     assert not desk.machine.armed
     assert result(desk.tell(command(400, 1))) == 1
-    assert len(desk.machine.lists.rows(MissionType.MISSION)) == 5
+    assert len(desk.machine.lists.items(MissionType.MISSION)) == 5
     desk.wait(2.5)
     assert result(desk.tell(command(400, 1))) == 0
 
 
-def test_commands_to_others_are_not_obeyed():
+def test_commands_to_others_are_not_obeyed() -> None:
     desk = desk_for("px4")
-    assert desk.tell(CommandLong(2, 1, 400, 0, 1.0)) == []
-    assert desk.tell(CommandLong(1, 154, 400, 0, 1.0)) == []
+    assert desk.tell(CommandLong(Address(2, 1), 400, 0, 1.0)) == []
+    assert desk.tell(CommandLong(Address(1, 154), 400, 0, 1.0)) == []
     assert not desk.machine.armed
 
 
-def test_what_it_holds_as_a_mission():
+def test_what_it_holds_as_a_mission() -> None:
     mission = a_mission(5)
     for kind in ("ardupilot", "px4"):
         held = desk_for(kind, mission).machine.mission()
         assert [item.x for item in held.items] == pytest.approx([i.x for i in mission.items])
         assert held.fence == Fence()
-    assert rows_for("px4", 5) == rows_of(mission, MissionType.MISSION, "px4")
+    assert rows_for("px4", 5) == wire_items(mission, MissionType.MISSION, vehicle_of("px4"))

@@ -1,6 +1,7 @@
 """When questions are repeated: on quick, slow, jittery and lossy links."""
 
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -53,11 +54,11 @@ def waits(asker: Asker, count: int) -> list[float]:
     return found
 
 
-def test_before_any_answer_the_time_of_the_guide_is_doubled():
+def test_before_any_answer_the_time_of_the_guide_is_doubled() -> None:
     assert waits(Asker(), 5) == [0.25, 0.5, 1.0, 1.5, 1.5]
 
 
-def test_the_time_is_that_of_rfc_6298():
+def test_the_time_is_that_of_rfc_6298() -> None:
     asker = Asker()
     asker.ask(0.1)
     assert asker.pace.wait == pytest.approx(0.1 + 4 * 0.05)
@@ -67,22 +68,22 @@ def test_the_time_is_that_of_rfc_6298():
     assert asker.pace.wait == pytest.approx(0.11 + 4 * (0.75 * 0.0375 + 0.25 * 0.08))
 
 
-def test_a_quick_link_is_not_asked_again_sooner_than_the_quickest():
+def test_a_quick_link_is_not_asked_again_sooner_than_the_quickest() -> None:
     assert waits(settled(0.001), 1) == [TIMES.quickest]
 
 
-def test_the_first_repetition_is_a_probe_and_further_ones_double():
+def test_the_first_repetition_is_a_probe_and_further_ones_double() -> None:
     assert waits(settled(0.001), 7) == [0.02, 0.02, 0.04, 0.08, 0.16, 0.32, 0.5]
 
 
-def test_after_a_loss_the_next_question_waits_as_usual():
+def test_after_a_loss_the_next_question_waits_as_usual() -> None:
     asker = settled(0.001)
     for _ in range(4):
         asker.ask(0.001, lost=3)
         assert asker.pace.wait == TIMES.quickest
 
 
-def test_after_losses_in_a_row_it_waits_until_a_question_is_answered_at_once():
+def test_after_losses_in_a_row_it_waits_until_a_question_is_answered_at_once() -> None:
     asker = settled(0.001)
     for _ in range(6):
         asker.ask(0.001, lost=1)
@@ -93,14 +94,14 @@ def test_after_losses_in_a_row_it_waits_until_a_question_is_answered_at_once():
 
 @pytest.mark.parametrize("before", [0.002, 0.03, 0.1])
 @pytest.mark.parametrize("after", [0.05, 0.075, 0.15, 0.24, 0.3, 0.45])
-def test_a_link_that_becomes_slower_is_learned(before, after):
+def test_a_link_that_becomes_slower_is_learned(before: Any, after: Any) -> None:
     asker = settled(before)
     assert asker.ask_many(50, after) <= 50 + 40
     assert asker.ask_many(50, after) <= 52
 
 
 @pytest.mark.parametrize("after", [0.3, 0.7, 1.0, 1.4])
-def test_answers_that_come_twice_tell_how_slow_it_has_become(after):
+def test_answers_that_come_twice_tell_how_slow_it_has_become(after: Any) -> None:
     asker = settled(0.002)
     puts = 0
     for _ in range(20):
@@ -111,7 +112,7 @@ def test_answers_that_come_twice_tell_how_slow_it_has_become(after):
     assert puts <= 20 + 12
 
 
-def test_one_answer_that_comes_twice_is_counted_once():
+def test_one_answer_that_comes_twice_is_counted_once() -> None:
     one, two = settled(0.05), settled(0.05)
     for asker, times in ((one, 1), (two, 3)):
         asker.ask(0.4)
@@ -122,14 +123,14 @@ def test_one_answer_that_comes_twice_is_counted_once():
     assert one.pace.wait == two.pace.wait
 
 
-def test_what_comes_twice_after_an_answer_at_once_says_nothing():
+def test_what_comes_twice_after_an_answer_at_once_says_nothing() -> None:
     asker = settled(0.05)
     wait = asker.pace.wait
     asker.pace.answer_again()
     assert asker.pace.wait == wait
 
 
-def test_who_asks_again_by_himself_is_not_taken_for_slow():
+def test_who_asks_again_by_himself_is_not_taken_for_slow() -> None:
     """ArduPilot's request was lost; it asks again after a second, of which an item is no cause."""
     asker = Asker(insists=1.0)
     asker.ask_many(20, 0.002)
@@ -139,18 +140,18 @@ def test_who_asks_again_by_himself_is_not_taken_for_slow():
         assert asker.pace.wait == TIMES.quickest
 
 
-def test_a_question_put_once_more_on_request_measures_nothing():
+def test_a_question_put_once_more_on_request_measures_nothing() -> None:
     asker = settled(0.1)
     wait = asker.pace.wait
     question = asker.pace.ask(asker.now)
-    question.put_again(asker.now)
+    question.send_again(asker.now)
     asker.pace.answer(question, asker.now + 0.001)
     assert asker.pace.wait == pytest.approx(wait)
 
 
 @settings(max_examples=300)
 @given(st.floats(0.001, 0.7), st.floats(0, 1), st.floats(0, 0.5), st.integers(0, 2**32))
-def test_a_link_is_never_flooded(least, jitter, loss, seed):
+def test_a_link_is_never_flooded(least: float, jitter: float, loss: float, seed: int) -> None:
     """Without duplicates to learn from: a tenth more questions than needed, once it is known."""
     random, asker = Random(seed), Asker()
     puts = needed = 0

@@ -1,5 +1,8 @@
 """The uploading client, told everything that a vehicle or a link may do to it."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import pytest
 from stations import FOREIGN, VEHICLE, Desk, peer_of, rows_for
 
@@ -11,30 +14,42 @@ from faao_mav.mavlink.messages import (
     MissionItemInt,
     MissionRequestInt,
     Statustext,
+    WireItem,
 )
-from faao_mav.mavlink.transfer.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION,
+    Address,
+    MissionType,
+    Result,
+)
 from faao_mav.mavlink.transfer.upload import Upload
 
-ME = (GROUND_STATION.system, GROUND_STATION.component)
+ME = GROUND_STATION
 ROWS = rows_for("px4", 3)
 BOTH = pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 
 
-def request(seq, *, legacy=False, target=ME, mission_type=0):
-    return MissionRequestInt(*target, seq, mission_type, legacy)
+def request(
+    seq: int, *, legacy: bool = False, target: Address = ME, mission_type: int = 0
+) -> MissionRequestInt:
+    return MissionRequestInt(target, mission_type, seq, legacy)
 
 
-def ack(result, *, target=ME, mission_type=0, opaque_id=0):
-    return MissionAck(*target, result, mission_type, opaque_id)
+def ack(
+    result: Result, *, target: Address = ME, mission_type: int = 0, opaque_id: int = 0
+) -> MissionAck:
+    return MissionAck(target, mission_type, result, opaque_id)
 
 
-def desk_for(firmware, rows=ROWS, part=MissionType.MISSION):
+def desk_for(
+    firmware: str, rows: Sequence[WireItem] = ROWS, part: MissionType = MissionType.MISSION
+) -> Desk:
     desk = Desk(Upload(rows, peer_of(firmware), part))
     desk.start()
     return desk
 
 
-def asked_for_all(firmware):
+def asked_for_all(firmware: str) -> Desk:
     desk = desk_for(firmware)
     for seq in range(3):
         desk.tell(request(seq))
@@ -42,24 +57,24 @@ def asked_for_all(firmware):
 
 
 @BOTH
-def test_a_whole_upload(firmware):
+def test_a_whole_upload(firmware: str) -> None:
     desk = desk_for(firmware)
-    assert desk.sent == [MissionCount(1, 1, 3, 0)]
+    assert desk.sent == [MissionCount(VEHICLE, 0, 3)]
     for seq in range(3):
-        assert desk.tell(request(seq)) == [MissionItemInt(1, 1, seq, 0, ROWS[seq])]
+        assert desk.tell(request(seq)) == [MissionItemInt(VEHICLE, 0, seq, ROWS[seq])]
     desk.tell(ack(Result.ACCEPTED, opaque_id=77))
     assert desk.machine.outcome.status == "accepted"
     assert desk.machine.outcome.opaque_id == 77
     assert desk.machine.deadline is None
 
 
-def test_an_empty_list_is_not_uploaded():
+def test_an_empty_list_is_not_uploaded() -> None:
     with pytest.raises(InputError, match="clear the list instead"):
         Upload((), peer_of("px4"))
 
 
 @BOTH
-def test_both_requests_are_answered_with_the_precise_item(firmware):
+def test_both_requests_are_answered_with_the_precise_item(firmware: str) -> None:
     desk = desk_for(firmware)
     (item,) = desk.tell(request(0, legacy=True))
     assert isinstance(item, MissionItemInt)
@@ -67,24 +82,24 @@ def test_both_requests_are_answered_with_the_precise_item(firmware):
 
 
 @BOTH
-def test_any_row_is_sent_as_often_as_asked_for_in_any_order(firmware):
+def test_any_row_is_sent_as_often_as_asked_for_in_any_order(firmware: str) -> None:
     desk = desk_for(firmware)
     for seq in (0, 0, 2, 1, 1, 0, 2):
-        assert desk.tell(request(seq)) == [MissionItemInt(1, 1, seq, 0, ROWS[seq])]
+        assert desk.tell(request(seq)) == [MissionItemInt(VEHICLE, 0, seq, ROWS[seq])]
     assert desk.tell(request(3)) == []
 
 
 @BOTH
-def test_the_count_is_repeated_then_given_up(firmware):
+def test_the_count_is_repeated_then_given_up(firmware: str) -> None:
     desk = desk_for(firmware)
     assert desk.wait(1.49) == []
-    assert desk.wait(1.51) == [MissionCount(1, 1, 3, 0)] * 2
+    assert desk.wait(1.51) == [MissionCount(VEHICLE, 0, 3)] * 2
     desk.wait(60)
-    assert desk.sent == [MissionCount(1, 1, 3, 0)] * 6
+    assert desk.sent == [MissionCount(VEHICLE, 0, 3)] * 6
     assert desk.machine.outcome.status == "silent"
 
 
-def test_a_slow_vehicle_is_no_silent_one():
+def test_a_slow_vehicle_is_no_silent_one() -> None:
     desk = desk_for("px4")
     for seq in range(3):
         desk.wait(0.8 * 1.5)
@@ -92,26 +107,26 @@ def test_a_slow_vehicle_is_no_silent_one():
     desk.wait(0.8 * 1.5)
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
-    assert desk.sent.count(MissionCount(1, 1, 3, 0)) == 1
+    assert desk.sent.count(MissionCount(VEHICLE, 0, 3)) == 1
 
 
 @BOTH
-def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware):
+def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware: str) -> None:
     desk = desk_for(firmware)
     desk.tell(request(0))
     desk.wait(8.9)
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     sent = desk.wait(2.0)
-    assert sent[-1] == MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)
+    assert sent[-1] == MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)
     assert desk.machine.outcome.status == "silent"
-    assert desk.machine.outcome.item == 0
+    assert desk.machine.outcome.last_requested == 0
 
 
-def seqs(messages):
+def seqs(messages: Sequence[Any]) -> list[int]:
     return [message.seq for message in messages]
 
 
-def test_px4_is_sent_the_next_item_and_the_same_again_it_takes_one_of_them():
+def test_px4_is_sent_the_next_item_and_the_same_again_it_takes_one_of_them() -> None:
     desk = desk_for("px4", rows_for("px4", 9))
     desk.tell(request(0))
     assert seqs(desk.wait(0.3)) == [1, 0]
@@ -121,17 +136,17 @@ def test_px4_is_sent_the_next_item_and_the_same_again_it_takes_one_of_them():
     assert seqs(desk.tell(request(2))) == [2]
 
 
-def test_px4_is_never_sent_the_last_item_before_it_asks():
+def test_px4_is_never_sent_the_last_item_before_it_asks() -> None:
     desk = desk_for("px4", rows_for("px4", 4))
     desk.tell(request(1))
     assert seqs(desk.wait(0.8)) == [2, 1, 2, 1]
     desk.tell(request(2))
     assert seqs(desk.wait(1.1)) == [2]
     desk.tell(ack(Result.ACCEPTED))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
-def test_what_px4_has_taken_unasked_is_sent():
+def test_what_px4_has_taken_unasked_is_sent() -> None:
     desk = desk_for("px4", rows_for("px4", 5))
     desk.tell(request(0))
     desk.wait(0.3)
@@ -142,7 +157,7 @@ def test_what_px4_has_taken_unasked_is_sent():
     assert desk.machine.progress == ("uploading mission", 5, 5)
 
 
-def test_an_unknown_autopilot_is_sent_nothing_unasked():
+def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
     desk = desk_for("generic", rows_for("px4", 9))
     for seq in range(3):
         desk.tell(request(seq))
@@ -150,22 +165,22 @@ def test_an_unknown_autopilot_is_sent_nothing_unasked():
 
 
 @pytest.mark.parametrize("result", [Result.INVALID_PARAM1, Result.ERROR])
-def test_which_item_px4_refuses_is_found_out(result):
+def test_which_item_px4_refuses_is_found_out(result: Result) -> None:
     desk = desk_for("px4", rows_for("px4", 9))
     desk.tell(request(0))
     desk.wait(0.3)
     desk.tell(ack(result))  # of item 0, or of item 1
-    assert MissionCount(1, 1, 9, 0) in desk.wait(1.6)
+    assert MissionCount(VEHICLE, 0, 9) in desk.wait(1.6)
     desk.tell(request(0))
     desk.tell(request(1))
     assert set(seqs(desk.wait(0.6))) == {1}
     desk.tell(ack(result))
     desk.wait(1.6)
     outcome = desk.machine.outcome
-    assert (outcome.status, outcome.result, outcome.item) == ("refused", result, 1)
+    assert (outcome.status, outcome.result, outcome.last_requested) == ("refused", result, 1)
 
 
-def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that():
+def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that() -> None:
     desk = desk_for("ardupilot", rows_for("ardupilot", 5))
     desk.tell(request(0))
     again = desk.wait(0.3)
@@ -177,10 +192,12 @@ def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that():
 
 
 @pytest.mark.parametrize(("count", "ahead"), [(9, [2, 3, 4]), (4, [2])])
-def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(count, ahead):
+def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(
+    count: int, ahead: list[int]
+) -> None:
     desk = desk_for("ardupilot", rows_for("ardupilot", 9)[:count])
     desk.tell(request(1))
-    sent = []
+    sent: list[int] = []
     for _ in range(5):
         desk.wait(1.6)
         sent += seqs(desk.tell(ack(Result.INVALID_SEQUENCE)))
@@ -188,53 +205,53 @@ def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(count, ahead):
     assert set(seqs(desk.wait(1.6))) == {ahead[-1]}
 
 
-def test_invalid_sequence_from_ardupilot_ends_nothing():
+def test_invalid_sequence_from_ardupilot_ends_nothing() -> None:
     desk = asked_for_all("ardupilot")
     desk.tell(ack(Result.INVALID_SEQUENCE))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
 
-def test_a_lost_last_answer_of_px4_is_asked_for_by_the_last_item():
+def test_a_lost_last_answer_of_px4_is_asked_for_by_the_last_item() -> None:
     desk = asked_for_all("px4")
-    assert desk.wait(0.3) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
+    assert desk.wait(0.3) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])]
     desk.tell(ack(Result.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
 
-def test_without_any_last_answer_of_px4_it_is_unknown_what_it_holds():
+def test_without_any_last_answer_of_px4_it_is_unknown_what_it_holds() -> None:
     desk = asked_for_all("px4")
-    assert desk.wait(60) == [MissionItemInt(1, 1, 2, 0, ROWS[2])] * 5
+    assert desk.wait(60) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])] * 5
     assert desk.machine.outcome.status == "unknown"
 
 
-def test_ardupilot_is_never_sent_the_last_item_unasked():
+def test_ardupilot_is_never_sent_the_last_item_unasked() -> None:
     desk = asked_for_all("ardupilot")
-    assert desk.wait(60) == [MissionItemInt(1, 1, 1, 0, ROWS[1])] * 5
+    assert desk.wait(60) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])] * 5
     assert desk.machine.outcome.status == "unknown"
 
 
-def test_ardupilot_tells_by_the_item_before_whether_it_waits_for_the_last():
+def test_ardupilot_tells_by_the_item_before_whether_it_waits_for_the_last() -> None:
     desk = asked_for_all("ardupilot")
     assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []  # of something earlier
-    assert desk.wait(0.3) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
-    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == [MissionItemInt(1, 1, 2, 0, ROWS[2])]
-    assert desk.wait(0.6) == [MissionItemInt(1, 1, 1, 0, ROWS[1])]
+    assert desk.wait(0.3) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])]
+    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])]
+    assert desk.wait(0.6) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])]
     desk.tell(ack(Result.ERROR))
     desk.wait(0.6)
     outcome = desk.machine.outcome
     assert (outcome.status, outcome.result) == ("unknown", Result.ERROR)
 
 
-def test_of_a_single_item_there_is_none_before():
+def test_of_a_single_item_there_is_none_before() -> None:
     desk = desk_for("ardupilot", rows_for("ardupilot", 2)[:1])
     desk.tell(request(0))
     assert desk.wait(60) == []
     assert desk.machine.outcome.status == "unknown"
 
 
-def test_an_error_after_everything_was_sent_leaves_it_to_reading_back():
+def test_an_error_after_everything_was_sent_leaves_it_to_reading_back() -> None:
     # ArduPilot says it of a duplicate of the last item; ACCEPTED may have been lost before.
     desk = asked_for_all("ardupilot")
     desk.tell(ack(Result.ERROR))
@@ -243,12 +260,12 @@ def test_an_error_after_everything_was_sent_leaves_it_to_reading_back():
     assert desk.machine.outcome.result == Result.ERROR
 
 
-def test_an_early_acceptance_is_about_something_else():
+def test_an_early_acceptance_is_about_something_else() -> None:
     desk = desk_for("px4")
     desk.tell(ack(Result.ACCEPTED))
     desk.tell(request(0))
     desk.tell(ack(Result.ACCEPTED))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
 FINAL = sorted(
@@ -260,7 +277,7 @@ FINAL = sorted(
 @BOTH
 @pytest.mark.parametrize("result", FINAL)
 @pytest.mark.parametrize("requests", [0, 1, 3])
-def test_a_refusal_is_final_at_any_moment(firmware, result, requests):
+def test_a_refusal_is_final_at_any_moment(firmware: str, result: Result, requests: int) -> None:
     desk = desk_for(firmware)
     for seq in range(requests):
         desk.tell(request(seq))
@@ -270,11 +287,11 @@ def test_a_refusal_is_final_at_any_moment(firmware, result, requests):
     desk.wait(0.5)
     outcome = desk.machine.outcome
     assert (outcome.status, outcome.result, outcome.said) == ("refused", result, ("because",))
-    assert outcome.item == (requests - 1 if requests else None)
+    assert outcome.last_requested == (requests - 1 if requests else None)
     assert desk.tell(request(0)) == []
 
 
-def test_an_error_is_final_when_nothing_more_is_asked_for():
+def test_an_error_is_final_when_nothing_more_is_asked_for() -> None:
     desk = desk_for("px4")
     desk.tell(request(0))
     desk.tell(ack(Result.ERROR))
@@ -282,38 +299,38 @@ def test_an_error_is_final_when_nothing_more_is_asked_for():
     assert desk.machine.outcome.status == "refused"
 
 
-def test_an_error_about_a_duplicate_count_does_not_end_the_transfer():
+def test_an_error_about_a_duplicate_count_does_not_end_the_transfer() -> None:
     desk = desk_for("px4")
     desk.tell(request(0))
     desk.tell(ack(Result.ERROR))
     desk.wait(0.2)
     desk.tell(request(1))
     desk.wait(5)
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
-def test_a_busy_px4_is_asked_again_until_it_is_free():
+def test_a_busy_px4_is_asked_again_until_it_is_free() -> None:
     desk = desk_for("px4")
     for _ in range(3):
         desk.tell(ack(Result.ERROR))
-        assert desk.wait(1.5) == [MissionCount(1, 1, 3, 0)]
-    assert desk.tell(request(0)) == [MissionItemInt(1, 1, 0, 0, ROWS[0])]
+        assert desk.wait(1.5) == [MissionCount(VEHICLE, 0, 3)]
+    assert desk.tell(request(0)) == [MissionItemInt(VEHICLE, 0, 0, ROWS[0])]
 
 
-def test_a_px4_that_stays_busy_has_refused():
+def test_a_px4_that_stays_busy_has_refused() -> None:
     desk = desk_for("px4")
     desk.tell(ack(Result.ERROR))
     desk.wait(60)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", Result.ERROR)
 
 
-def test_no_space_while_booting_means_not_yet():
+def test_no_space_while_booting_means_not_yet() -> None:
     desk = desk_for("ardupilot")
     desk.tell(Heartbeat(2, 3, 0, 0, 2))
     desk.tell(ack(Result.NO_SPACE))
     assert desk.wait(20) == []
     desk.tell(Heartbeat(2, 3, 0, 0, 2))
-    assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(1, 1, 3, 0)]
+    assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(VEHICLE, 0, 3)]
     desk.tell(ack(Result.NO_SPACE))
     desk.wait(0.5)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
@@ -322,7 +339,7 @@ def test_no_space_while_booting_means_not_yet():
     )
 
 
-def test_booting_for_ever_ends_too():
+def test_booting_for_ever_ends_too() -> None:
     desk = desk_for("ardupilot")
     desk.tell(Heartbeat(2, 3, 0, 0, 1))
     desk.tell(ack(Result.NO_SPACE))
@@ -336,41 +353,43 @@ def test_booting_for_ever_ends_too():
         (request(0), FOREIGN),
         (request(0), Address(2, 1)),
         (request(0), Address(1, 2)),
-        (request(0, target=(250, 190)), VEHICLE),
-        (request(0, target=(255, 1)), VEHICLE),
+        (request(0, target=FOREIGN), VEHICLE),
+        (request(0, target=Address(255, 1)), VEHICLE),
         (request(0, mission_type=1), VEHICLE),
         (ack(Result.DENIED), FOREIGN),
-        (ack(Result.DENIED, target=(250, 190)), VEHICLE),
+        (ack(Result.DENIED, target=FOREIGN), VEHICLE),
         (ack(Result.DENIED, mission_type=2), VEHICLE),
-        (MissionCount(*ME, 3, 0), VEHICLE),
+        (MissionCount(ME, 0, 3), VEHICLE),
         (Heartbeat(2, 3, 128, 0, 4), VEHICLE),
     ],
 )
-def test_what_is_said_to_others_or_about_other_lists_is_ignored(message, sender):
+def test_what_is_said_to_others_or_about_other_lists_is_ignored(
+    message: Any, sender: Address
+) -> None:
     desk = desk_for("px4")
     assert desk.tell(message, sender) == []
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     assert desk.tell(request(0)) != []
 
 
 @BOTH
-def test_acceptance_by_another_vehicle_is_none(firmware):
+def test_acceptance_by_another_vehicle_is_none(firmware: str) -> None:
     desk = asked_for_all(firmware)
     desk.tell(ack(Result.ACCEPTED), Address(2, 1))
-    desk.tell(ack(Result.ACCEPTED, target=(250, 190)))
+    desk.tell(ack(Result.ACCEPTED, target=FOREIGN))
     desk.tell(ack(Result.ACCEPTED, mission_type=1))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
 
 
-def test_who_gives_up_tells_the_vehicle():
+def test_who_gives_up_tells_the_vehicle() -> None:
     desk = desk_for("px4")
     desk.tell(request(0))
-    assert desk.machine.cancel(desk.now) == [MissionAck(1, 1, Result.OPERATION_CANCELLED, 0)]
+    assert desk.machine.cancel(desk.now) == [MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)]
     assert desk.machine.outcome.status == "cancelled"
     assert desk.machine.cancel(desk.now) == ()
 
 
-def test_the_vehicle_may_give_up_as_well():
+def test_the_vehicle_may_give_up_as_well() -> None:
     desk = desk_for("ardupilot")
     desk.tell(request(0))
     desk.tell(ack(Result.OPERATION_CANCELLED))
@@ -378,7 +397,7 @@ def test_the_vehicle_may_give_up_as_well():
     assert (outcome.status, outcome.result) == ("cancelled", Result.OPERATION_CANCELLED)
 
 
-def test_progress_counts_rows():
+def test_progress_counts_rows() -> None:
     desk = desk_for("px4")
     assert desk.machine.progress == ("uploading mission", 0, 3)
     desk.tell(request(0))
@@ -388,8 +407,8 @@ def test_progress_counts_rows():
 
 
 @pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
-def test_other_lists_go_the_same_way(part):
+def test_other_lists_go_the_same_way(part: MissionType) -> None:
     desk = desk_for("px4", part=part)
-    assert desk.sent == [MissionCount(1, 1, 3, part)]
+    assert desk.sent == [MissionCount(VEHICLE, part, 3)]
     assert desk.tell(request(0)) == []
-    assert desk.tell(request(0, mission_type=part)) == [MissionItemInt(1, 1, 0, part, ROWS[0])]
+    assert desk.tell(request(0, mission_type=part)) == [MissionItemInt(VEHICLE, part, 0, ROWS[0])]

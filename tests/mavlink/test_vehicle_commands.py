@@ -3,22 +3,25 @@
 import json
 import threading
 import time
+from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
 from conftest import free_port
-from stations import FENCE, HOME, a_mission, places
-from typer.testing import CliRunner
+from stations import FENCE, HOME, a_mission, places, vehicle_of
+from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot, read_home
 from faao_mav.cli.download import download
-from faao_mav.cli.transfer_progress import transfer_progress
+from faao_mav.cli.progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
-from faao_mav.mavlink.mock import MockAutopilot, ardupilot, manners_of
-from faao_mav.mavlink.rows import rows_of
-from faao_mav.mavlink.runner import running
-from faao_mav.mavlink.transfer.protocol import MissionType, Result
+from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.mavlink.protocol import MissionType
+from faao_mav.mavlink.protocol import Result as MissionResult
+from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import read_mission, write_wpl
 
@@ -28,28 +31,28 @@ app.command()(download)
 app.command()(autopilot)
 
 
-def run(*arguments):
+def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(each) for each in arguments])
 
 
 @pytest.fixture
-def mission_file(tmp_path):
+def mission_file(tmp_path: Path) -> Path:
     path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(a_mission(6)))
     return path
 
 
 @pytest.fixture
-def port():
+def port() -> int:
     return free_port()
 
 
-def a_mock(kind="ardupilot", **options):
-    manners = manners_of(kind) if isinstance(kind, str) else kind
-    return MockAutopilot(manners, home=HOME, beat=0.1, **options)
+def a_mock(kind: MockKind | Behaviour = "ardupilot", **options: Any) -> MockAutopilot:
+    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
+    return MockAutopilot(behaviour, home=HOME, beat=0.1, **options)
 
 
-def test_upload_and_download(mission_file, port, tmp_path):
+def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> None:
     with running(a_mock(), f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
         assert result.exit_code == 0, result.output
@@ -64,11 +67,13 @@ def test_upload_and_download(mission_file, port, tmp_path):
     assert "mission      6 items, 0 fence areas, 0 rally points" in result.stdout
     found, sent = read_mission(out), read_mission(mission_file)
     assert found.home == sent.home
-    rows, sent_rows = (rows_of(each, MissionType.MISSION, "ardupilot") for each in (found, sent))
+    rows, sent_rows = (
+        wire_items(each, MissionType.MISSION, vehicle_of("ardupilot")) for each in (found, sent)
+    )
     assert places(rows) == places(sent_rows)
 
 
-def test_json_is_one_object(mission_file, port):
+def test_json_is_one_object(mission_file: Path, port: int) -> None:
     with running(a_mock("px4"), f"udpin:127.0.0.1:{port}"):
         connection = f"udpout:127.0.0.1:{port}"
         result = run("upload", mission_file, "--to", connection, "--json", "--system", 1)
@@ -83,7 +88,7 @@ def test_json_is_one_object(mission_file, port):
     assert mission["opaque_id"] > 0
 
 
-def test_json_has_no_nan(tmp_path, port):
+def test_json_has_no_nan(tmp_path: Path, port: int) -> None:
     item = MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36, 149.16, 20.0)
     path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(Mission((item,), HOME)))
@@ -100,7 +105,7 @@ def test_json_has_no_nan(tmp_path, port):
     }
 
 
-def test_what_is_not_kept_is_told_once_for_each_field(tmp_path, port):
+def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path, port: int) -> None:
     items = tuple(
         MissionItem(16, 3, (2.5, 0.0, 0.0, 0.0), -35.36 + k * 1e-4, 149.16, 20.0) for k in range(4)
     )
@@ -114,8 +119,8 @@ def test_what_is_not_kept_is_told_once_for_each_field(tmp_path, port):
     ]
 
 
-def test_a_refused_upload_is_status_1(mission_file, port):
-    mock = a_mock(ardupilot(refusals={(0, 3): Result.INVALID_PARAM7}))
+def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
+    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): MissionResult.INVALID_PARAM7}))
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
     assert result.exit_code == 1
@@ -125,7 +130,7 @@ def test_a_refused_upload_is_status_1(mission_file, port):
     assert "verified     " not in result.stdout
 
 
-def test_no_vehicle_is_status_1(mission_file, port):
+def test_no_vehicle_is_status_1(mission_file: Path, port: int) -> None:
     result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--timeout", 0.3)
     assert result.exit_code == 1
     assert result.stdout == ""
@@ -147,35 +152,37 @@ def test_no_vehicle_is_status_1(mission_file, port):
         (["autopilot", "--home", "91,2,3"], "latitude"),
     ],
 )
-def test_unusable_input_is_status_2(arguments, told, mission_file):
+def test_unusable_input_is_status_2(arguments: list[str], told: str, mission_file: Path) -> None:
     result = run(*(mission_file if each == "FILE" else each for each in arguments))
     assert result.exit_code == 2
     assert told in result.stderr
     assert "Traceback" not in result.output
 
 
-def test_a_port_in_use_is_status_1(port):
+def test_a_port_in_use_is_status_1(port: int) -> None:
     with running(a_mock(), f"udpin:127.0.0.1:{port}"):
         result = run("autopilot", "--listen", f"udpin:127.0.0.1:{port}")
     assert result.exit_code == 1
     assert "the port is in use" in result.stderr
 
 
-def test_the_mock_autopilot_as_a_command(mission_file, port, monkeypatch):
+def test_the_mock_autopilot_as_a_command(
+    mission_file: Path, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its diary tells what it was given; it ends by the keyboard."""
-    from faao_mav.mavlink import runner
+    from faao_mav.mavlink.mock import serve as serving
 
     ended = threading.Event()
-    serve = runner.serve
+    serve = serving.serve
 
-    def until_ended(mock, connection, **options):
+    def until_ended(mock: MockAutopilot, connection: str, **options: Any) -> None:
         serve(mock, connection, **options, stop=ended.is_set)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runner, "serve", until_ended)
+    monkeypatch.setattr(serving, "serve", until_ended)
     results = []
 
-    def serve_it():
+    def serve_it() -> None:
         results.append(
             run("autopilot", "--listen", f"udpin:127.0.0.1:{port}", "--kind", "px4", "--drop", 0.05)
         )
@@ -197,16 +204,17 @@ def test_the_mock_autopilot_as_a_command(mission_file, port, monkeypatch):
     assert lines[1:] == ["mission: 6 rows", "fence: 4 rows", "ended"]
 
 
-def test_progress_is_drawn_on_a_terminal_only(capsys):
+def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]) -> None:
     with transfer_progress(shown=False) as nothing:
         assert nothing is None
     with transfer_progress(shown=True) as observe:
+        assert observe is not None
         observe("uploading mission", 3, 9)
         observe("asking for home", 0, 0)
     assert capsys.readouterr().out == ""
 
 
-def test_homes_are_read():
+def test_homes_are_read() -> None:
     home = read_home("47.397742, 8.545594, 488")
     assert (home.latitude, home.longitude, home.altitude) == (47.397742, 8.545594, 488.0)
     with pytest.raises(InputError, match="finite"):

@@ -7,8 +7,8 @@ from conftest import MakePlan
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.report.drawing import START, draw_mission
-from faao_mav.schedule.convert import convert
+from faao_mav.schedule.conversion import convert
+from faao_mav.workflow import DRAWING_START, draw_mission
 
 KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
 
@@ -26,7 +26,7 @@ def test_the_flight_and_the_stations_are_where_the_plan_has_them(small_plan: Mak
         [float(x) for x in (element.text or "").split()] for element in root.iter(f"{GX}coord")
     ]
     assert len(whens) == len(coordinates) > 60
-    assert whens[0].startswith(START.strftime("%Y-%m-%dT%H:%M:%S"))
+    assert whens[0].startswith(DRAWING_START.strftime("%Y-%m-%dT%H:%M:%S"))
     assert whens == sorted(whens)
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     places = frame.to_local([c[1] for c in coordinates], [c[0] for c in coordinates])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import MakePlan
-from reported import flown
+from reported import conversion, flown, prediction
 
 from faao_mav import optimize
 from faao_mav.errors import InputError
@@ -17,14 +17,13 @@ from faao_mav.report.style import save_figure
 
 
 def every() -> list[Any]:
-    found = flown()
-    solution, conversion, prediction = found.solution, found.conversion, found.prediction
+    solution = flown().solution
     return [
-        figures.flight_figure(solution, conversion, prediction),
+        figures.flight_figure(solution, conversion(), prediction()),
         figures.flight_figure(solution),
-        figures.route(solution, conversion),
-        figures.motion(solution, conversion),
-        figures.rates(solution, prediction),
+        figures.route(solution, conversion()),
+        figures.motion(solution, conversion()),
+        figures.rates(solution, prediction()),
         figures.precoder_power(solution),
         figures.convergence(solution),
     ]
@@ -69,21 +68,21 @@ def test_legends_hide_no_curve() -> None:
 def test_the_curves_are_the_flight() -> None:
     found = flown()
     solution = found.solution
-    speed, acceleration = figures.motion(solution, found.conversion).axes
+    speed, acceleration = figures.motion(solution, conversion()).axes
     planned = lines(speed)["planned"]
     np.testing.assert_array_equal(planned.get_xdata(), solution.t)
     np.testing.assert_array_equal(planned.get_ydata(), np.hypot(*solution.v.T))
     assert set(lines(speed)["v_max"].get_ydata()) == {solution.plan.vehicle.max_speed}
     assert set(lines(acceleration)["a_max"].get_ydata()) == {5.0}
-    to_uav, to_user = figures.rates(solution, found.prediction).axes
+    to_uav, to_user = figures.rates(solution, prediction()).axes
     np.testing.assert_array_equal(lines(to_uav)["planned"].get_ydata(), solution.I_U)
-    np.testing.assert_array_equal(lines(to_user)["predicted"].get_ydata(), found.prediction.I_G)
+    np.testing.assert_array_equal(lines(to_user)["predicted"].get_ydata(), prediction().I_G)
 
 
 def test_a_flight_that_ends_late_is_drawn_to_its_end() -> None:
     found = flown()
-    speed, _ = figures.motion(found.solution, found.conversion).axes
-    late = found.prediction.duration - found.solution.plan.flight.duration
+    speed, _ = figures.motion(found.solution, conversion()).axes
+    late = prediction().duration - found.solution.plan.flight.duration
     assert late > 1
     over = lines(speed)["predicted"].get_xdata()[-1]
     assert over == pytest.approx(found.solution.t[-1] + late, abs=0.2)
@@ -123,22 +122,21 @@ def test_precoders_for_every_draw_are_averaged(small_plan: MakePlan) -> None:
 
 def test_the_map_has_stations_waypoints_and_fence() -> None:
     found = flown()
-    axes = figures.route(found.solution, found.conversion).axes[0]
+    axes = figures.route(found.solution, conversion()).axes[0]
     names = {text.get_text() for text in axes.texts}
-    items = enumerate(found.conversion.mission.items, 1)
+    items = enumerate(conversion().mission.items, 1)
     numbers = {str(number) for number, item in items if item.command == 16}
     assert len(numbers) > 1
     assert {"base station", "user"} < names <= {"base station", "user"} | numbers
-    ring = next(line for line in axes.lines if line.get_linestyle() == "-" and
-                len(line.get_xdata()) > 20)  # fmt: skip
-    east, north = np.asarray(ring.get_xdata()), np.asarray(ring.get_ydata())
+    drawn = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "-"]
+    (east, north), *_ = [np.asarray(line).T for line in drawn if np.size(line) > 40]
     np.testing.assert_allclose(np.ptp(east), 10.0, rtol=1e-3)
     np.testing.assert_allclose(north.mean(), 0.0002 * 110_950, rtol=0.05)  # m per degree
 
 
 def test_a_fence_of_kilometres_leaves_the_route_to_be_seen() -> None:
     found = flown()
-    figure = figures.route(found.solution, found.conversion)
+    figure = figures.route(found.solution, conversion())
     figure.draw_without_rendering()
     plot = figure.axes[0]
     assert np.ptp(plot.dataLim.intervalx) < 3 * np.ptp(found.solution.w[:, 0])
@@ -148,8 +146,8 @@ def test_a_fence_of_kilometres_leaves_the_route_to_be_seen() -> None:
 def test_what_is_written_on_the_map_stays_apart() -> None:
     found = flown()
     for figure in (
-        figures.route(found.solution, found.conversion),
-        figures.flight_figure(found.solution, found.conversion, found.prediction),
+        figures.route(found.solution, conversion()),
+        figures.flight_figure(found.solution, conversion(), prediction()),
     ):
         figure.draw_without_rendering()
         plot = figure.axes[0]

@@ -3,18 +3,22 @@
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from conftest import SMALL
-from reported import FINDINGS, HOSTILE, flown
+from reported import HOSTILE, conversion, flown, prediction
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
+from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.optimizer.search.bound import Bound
-from faao_mav.report import ReportData, render_report
+from faao_mav.report import render_report, summary
+from faao_mav.validate.check import Check
+from faao_mav.workflow import Result
 
 VOID = {"meta", "br", "link", "img", "input", "hr"}
 FIGURES = ("Route", "Motion", "Link", "Precoders", "Convergence")
@@ -53,8 +57,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def full() -> str:
-    found = flown()
-    return render_report(ReportData(found.solution, found.conversion, found.prediction, FINDINGS))
+    return render_report(flown())
 
 
 def test_every_section_is_there(full: str) -> None:
@@ -79,47 +82,74 @@ def test_every_section_is_there(full: str) -> None:
     titles = {a["id"] for tag, a in page.elements if tag == "title" and "id" in a}
     assert titles == {picture["aria-labelledby"] for picture in pictures}
     shown = " ".join(text for _, text in page.texts)
-    solution, prediction = flown().solution, flown().prediction
-    assert f"{solution.rates.R_avg:.4f} bit/s/Hz" in shown
-    assert f"{prediction.duration:.1f} s" in shown
+    assert f"{flown().solution.rates.R_avg:.4f} bit/s/Hz" in shown
+    assert f"{prediction().duration:.1f} s" in shown
     assert "v_max" in shown
     assert page.of("text").count("predicted") == 4  # map, speed, and both rates
-    wanted = flown().conversion.parameters
+    wanted = conversion().parameters
     assert wanted
     cells = page.of("td")
     assert set(wanted) | {f"{value:g}" for value in wanted.values()} <= set(cells)
     assert re.search(r"faao-mav \d.*numpy \d.*Python \d", shown)
 
 
+def facts(about: Result | Check) -> dict[str, list[str]]:
+    """The facts of a page by their label."""
+    found: dict[str, list[str]] = {}
+    for tag, text in Page(render_report(about)).texts:
+        if tag == "dt":
+            found[label := text] = []
+        elif tag == "dd":
+            found[label].append(text)
+    return found
+
+
 def test_what_the_plan_is_worth_by_other_measures() -> None:
-    data = ReportData(
-        solution=flown().solution,
+    solution = flown().solution
+    result = Result(
+        solution=solution,
         information=MutualInformation(1.9, 1.8, 0.004),
         fresh=FreshRates(1.7, 1.6, 0.01, 0.02),
         saturation=Saturation(2.0, 3.2),
         bound=Bound(1.95, exact=False),
     )
-    page = Page(render_report(data))
-    told = dict(zip(page.of("dt"), page.of("dd"), strict=True))
-    assert told["mutual information"] == "1.800 ± 0.004 bit/s/Hz"
-    assert told["on fading that was not planned on"] == "1.6000 ± 0.02 bit/s/Hz"
-    assert told["at most, by the alphabet"] == "2 bit/s/Hz"
-    assert told["saturated"] == "3.2 dB less power would do"
-    assert told["no route can exceed"] == "1.9500 bit/s/Hz (numerical)"
-    exact = Page(render_report(ReportData(saturation=Saturation(2.0, 0.0), bound=Bound(2.0, True))))
-    assert exact.of("dt") == ["at most, by the alphabet", "no route can exceed"]
-    assert exact.of("dd")[-1] == "2.0000 bit/s/Hz"
+    told = facts(result)
+    assert "bit/s/Hz of at most 2 (base station to UAV" in told["rate"][0]
+    assert "mutual information 1.800 ± 0.004" in told["rate"][1]
+    assert told["rate"][2] == "1.6000 ± 0.02 on fading that was not planned on"
+    assert "3.2 dB less power at both stations would do" in told["saturated"][0]
+    assert "1.9500 bit/s/Hz (numerical)" in told["bound"][0]
+    exact = facts(Result(solution, saturation=Saturation(2.0, 0.0), bound=Bound(2.0, True)))
+    assert exact.keys() == {"rate", "bound", "starts", "optimiser"}
+    assert exact["bound"][0].endswith("2.0000 bit/s/Hz")
+
+
+def test_the_page_says_what_the_summary_says_but_how_long_it_took() -> None:
+    told = [text for texts in facts(flown()).values() for text in texts]
+    said = summary(flown()).replace(" +- ", " ± ")
+    assert [text for text in told if text not in said] == [
+        line for line in told if line.startswith("converged after")
+    ]
+    later = replace(flown(), seconds_optimize=99.0, seconds_total=100.0)
+    assert render_report(later) == render_report(flown())
+
+
+def test_a_flight_without_a_mission_says_why() -> None:
+    none = Result(flown().solution, no_mission=InfeasibleError("too many items"))
+    assert facts(none)["mission"] == ["none: too many items"]
+    assert "Findings" not in Page(render_report(none)).of("h2")
 
 
 def test_a_part_that_is_not_there_leaves_its_sections_out() -> None:
-    solution = flown().solution
-    alone = Page(render_report(ReportData(solution)))
+    alone = Page(render_report(Result(flown().solution)))
     assert "Findings" not in alone.of("h2")
     assert "predicted" not in " ".join(alone.of("text"))
-    checked = Page(render_report(ReportData(findings=(), title="Checked")))
-    assert checked.of("h2") == ["Findings"]
+    sound = Check(conversion().mission, conversion().vehicle, unpredicted="no model")
+    checked = Page(render_report(sound, title="Checked"))
+    assert checked.of("h2") == ["Result", "Findings"]
     assert checked.of("h1") == ["Checked"]
-    assert Page(render_report(ReportData())).of("h1") == ["Relay flight"]
+    assert facts(sound)["flight not predicted"] == ["no model"]
+    assert Page(render_report(sound)).of("h1") == ["Relay flight"]
 
 
 def test_nothing_comes_from_elsewhere(full: str) -> None:
@@ -156,15 +186,13 @@ def test_names_and_messages_are_text(full: str) -> None:
     assert page.of("h1") == [HOSTILE]
     assert page.of("title")[0] == HOSTILE
     assert "<script" not in full
-    assert "the leg is <b>outside</b> (item 4) [fence-leg]" in "".join(page.of("li"))
+    assert "item 4: the leg is <b>outside</b> [fence-leg]" in "".join(page.of("li"))
     assert page.of("b") == ["error", "note"]
     assert "".join(page.of("pre")) == flown().solution.plan.text
 
 
 def test_the_same_flight_gives_the_same_page(full: str) -> None:
-    found = flown()
-    data = ReportData(found.solution, found.conversion, found.prediction, FINDINGS)
-    assert render_report(data) == full
+    assert render_report(flown()) == full
 
 
 def test_dark_paper_has_every_colour_of_the_light(full: str) -> None:

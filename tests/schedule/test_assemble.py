@@ -9,10 +9,11 @@ from relay_flights import dash_hover_dash, items_of, mission_of, plan_with
 from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home
-from faao_mav.schedule import assemble, plan_route
+from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.initial_route import initial_route
 
 
-def test_the_items_of_a_mission():
+def test_the_items_of_a_mission() -> None:
     t, w = dash_hover_dash()
     plan = plan_with()
     mission = mission_of(t, w, plan)
@@ -27,7 +28,7 @@ def test_the_items_of_a_mission():
     assert all(item.x == round(item.x, 9) and item.y == round(item.y, 9) for item in mission.items)
 
 
-def test_a_take_off_is_left_out_on_request():
+def test_a_take_off_is_left_out_on_request() -> None:
     mission = mission_of(*dash_hover_dash(), plan_with(takeoff=False))
     assert mission.items[0].command == Command.DO_CHANGE_SPEED
     assert mission.items[1].command == Command.NAV_WAYPOINT
@@ -37,7 +38,7 @@ def test_a_take_off_is_left_out_on_request():
     ("on_finish", "command", "frame", "z"),
     [("rtl", 20, 2, 0.0), ("land", 21, 3, 0.0), ("hover", 17, 3, 100.0)],
 )
-def test_endings(on_finish, command, frame, z):
+def test_endings(on_finish: str, command: int, frame: int, z: float) -> None:
     t, w = dash_hover_dash()
     last = mission_of(t, w, plan_with(on_finish=on_finish)).items[-1]
     assert (last.command, last.frame, last.z) == (command, frame, z)
@@ -46,7 +47,7 @@ def test_endings(on_finish, command, frame, z):
         assert place == pytest.approx(w[-1], abs=1e-3)
 
 
-def test_too_many_items_are_counted():
+def test_too_many_items_are_counted() -> None:
     t, w = dash_hover_dash()
     rows = len(mission_of(t, w, plan_with()).items) + 1
     mission_of(t, w, plan_with(max_items=rows))
@@ -55,17 +56,16 @@ def test_too_many_items_are_counted():
         mission_of(t, w, plan_with(max_items=rows - 1))
 
 
-def test_a_speed_is_commanded_where_it_changes():
+def test_a_speed_is_commanded_where_it_changes() -> None:
     plan = plan_with()
-    route = plan_route(*dash_hover_dash(), plan)
+    route = initial_route(*dash_hover_dash(), plan)
     places = np.array([[0.0, 0.0], [50, 0], [100, 0], [150, 0], [200, 0], [250, 0]])
     still = np.zeros(len(places))
     route = replace(
         route,
         positions=places,
         speeds=np.array([8.0, 5.5, 5.5, 3.0, 8.0]),
-        holds=still,
-        delays=still,
+        waits=still,
         radii=still,
         splines=still > 0,
     )
@@ -77,12 +77,10 @@ def test_a_speed_is_commanded_where_it_changes():
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-def test_a_wait_of_a_fraction_is_what_the_autopilot_keeps(autopilot):
+def test_a_wait_of_a_fraction_is_what_the_autopilot_keeps(autopilot: str) -> None:
     plan = plan_with(autopilot=autopilot)
-    route = plan_route(*dash_hover_dash(), plan)
-    delays = np.where(np.arange(len(route.holds)) == 1, 0.7, 0.0)
-    holds = np.array([0.0, 39.0, 5.0])
-    mission = assemble(replace(route, holds=holds, delays=delays), plan)
+    route = initial_route(*dash_hover_dash(), plan)
+    mission = assemble(replace(route, waits=np.array([0.0, 39.7, 5.0])), plan)
     _, _, waits = items_of(mission, plan)
     assert waits == pytest.approx([0.0, 39.7, 5.0])
     commands = [item.command for item in mission.items]
@@ -94,17 +92,17 @@ def test_a_wait_of_a_fraction_is_what_the_autopilot_keeps(autopilot):
         assert delay.params == pytest.approx((0.7, -1.0, -1.0, -1.0))
 
 
-def test_acceptance_radii_are_passed_on():
+def test_acceptance_radii_are_passed_on() -> None:
     plan = plan_with(autopilot="px4")
-    route = plan_route(*dash_hover_dash(), plan)
+    route = initial_route(*dash_hover_dash(), plan)
     mission = assemble(replace(route, radii=np.array([0.0, 3.5, 0.0])), plan)
     waypoints = [item for item in mission.items if item.command == Command.NAV_WAYPOINT]
     assert [item.params[1] for item in waypoints] == [0.0, 3.5, 0.0]
 
 
-def test_spline_points_are_spline_waypoints():
+def test_spline_points_are_spline_waypoints() -> None:
     plan = plan_with()
-    route = plan_route(*dash_hover_dash(), plan)
+    route = initial_route(*dash_hover_dash(), plan)
     mission = assemble(replace(route, splines=np.array([False, True, False])), plan)
     placed = [item for item in mission.items if item.command in (16, 82)]
     assert [item.command for item in placed] == [16, 82, 16]

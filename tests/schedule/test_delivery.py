@@ -14,8 +14,8 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.rate import cutoff_rate
-from faao_mav.schedule.delivery import delivered, nearest_slots
 from faao_mav.schedule.precoder_table import precoder_table
+from faao_mav.schedule.prediction import delivered, nearest_slots
 
 FADINGS: list[dict[str, Any]] = [
     {"radio.fading": "none"},

@@ -10,16 +10,13 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
 from faao_mav.plan import Plan
-from faao_mav.schedule import Conversion, plan_route
-from faao_mav.schedule.convert import check_vehicle
+from faao_mav.schedule import Conversion
+from faao_mav.schedule.conversion import check_vehicle
+from faao_mav.schedule.initial_route import initial_route, with_run_in
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
-from faao_mav.schedule.run_in import with_run_in
-from faao_mav.vehicle import vehicle_of
-from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
-from faao_mav.vehicle.flight_path import FlightPath
-from faao_mav.vehicle.legs import legs_of
+from faao_mav.vehicle import FlightPath, Track, vehicle_of
+from faao_mav.vehicle.ardupilot.plane import ArduPlane
 from faao_mav.vehicle.predict import predict
-from faao_mav.vehicle.track import Track
 
 STEP = 0.2
 
@@ -52,9 +49,8 @@ def circle() -> Trajectory:
 def followed_unmoved(t: np.ndarray, w: np.ndarray, plan: Plan) -> float:
     """How far the flight strays whose waypoints lie on the path, m."""
     vehicle = vehicle_of(plan)
-    legs, model = legs_of(vehicle), ArduPlane.from_vehicle(vehicle)
-    scheduler = PlaneScheduler(t, w, model, legs, 16.0, 5.0, 12.0)
-    route = with_run_in(plan_route(t, w, plan, share=0.4), t, w, legs, 16.0)
+    scheduler = PlaneScheduler(t, w, vehicle, ArduPlane.from_vehicle(vehicle), 12.0, 16.0, 5.0)
+    route = with_run_in(initial_route(t, w, plan, share=0.4), t, w, vehicle.legs, 16.0)
     return scheduler.flight(route).deviation.path
 
 

@@ -8,8 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule import convert
-from faao_mav.schedule.delivery import delivered
-from faao_mav.schedule.prediction import predict_delivery, price_flight
+from faao_mav.schedule.prediction import delivered, predict_delivery, price_flight
 
 GENTLE = {
     "vehicle.max_speed": 8,
@@ -48,7 +47,7 @@ def test_a_mission_delivers_nearly_the_plan(solution: Solution) -> None:
     I_U, I_G = delivered(solution, found.w)
     assert found.I_U == pytest.approx(I_U)
     assert found.rates.R_G == pytest.approx(I_G.mean())
-    assert found.rms_position_error == pytest.approx(conversion.schedule.rms)
+    assert found.rms_position_error == pytest.approx(conversion.schedule.deviation.rms)
     assert 0 < found.rms_position_error <= found.max_position_error
     assert found.max_path_error <= found.max_position_error + 1e-9
 

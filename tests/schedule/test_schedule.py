@@ -1,6 +1,7 @@
 """From a trajectory to the mission whose predicted flight keeps it, in space and time."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -18,11 +19,11 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
-from faao_mav.schedule import Conversion, assemble, plan_route
-from faao_mav.schedule.outline import Splines
-from faao_mav.schedule.scheduler import Scheduler
+from faao_mav.schedule import Conversion
+from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.copter_scheduler import CopterScheduler
+from faao_mav.schedule.initial_route import Splines, initial_route
 from faao_mav.vehicle import copter_model, vehicle_of
-from faao_mav.vehicle.legs import legs_of
 from faao_mav.vehicle.predict import predict
 
 STEP = 0.2
@@ -57,18 +58,20 @@ def line_at_speed() -> Trajectory:
     return t, np.outer(6 * t, [1.0, 0.0])
 
 
-def at(conversion: Conversion, t: float) -> tuple[Real, Real]:
+def at(conversion: Conversion, t: float) -> list[Real]:
     """The predicted position and velocity at the plan's time `t`."""
     track = conversion.schedule.track()
-    return tuple(
+    return [
         np.array([np.interp(t, track["predicted_t"], x) for x in track[name].T])
         for name in ("predicted_w", "predicted_v")
-    )
+    ]
 
 
 @pytest.mark.parametrize("flight", [dash_hover_dash, eight, back_and_forth, with_long_ends])
 @pytest.mark.parametrize("recommend", [True, False])
-def test_arducopter_keeps_the_plan_in_space_and_time(flight, recommend):
+def test_arducopter_keeps_the_plan_in_space_and_time(
+    flight: Callable[[], Trajectory], recommend: bool
+) -> None:
     t, w = flight()
     plan = plan_with(recommend=recommend)
     conversion = converted(t, w, plan)
@@ -79,7 +82,7 @@ def test_arducopter_keeps_the_plan_in_space_and_time(flight, recommend):
     assert len(conversion.mission.items) < 60
 
 
-def test_px4_keeps_the_plan_in_space_and_time():
+def test_px4_keeps_the_plan_in_space_and_time() -> None:
     t, w = dash_hover_dash(hover=10.0)
     plan = plan_with(autopilot="px4", recommend=True)
     conversion = converted(t, w, plan)
@@ -94,7 +97,9 @@ def test_px4_keeps_the_plan_in_space_and_time():
 
 
 @pytest.mark.parametrize("flight", [circle_at_speed, line_at_speed])
-def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in(flight):
+def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in(
+    flight: Callable[[], Trajectory],
+) -> None:
     t, w = flight()
     conversion = converted(t, w, plan_with(recommend=True))
     route = conversion.schedule.route
@@ -104,18 +109,18 @@ def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in(flight):
         place, velocity = at(conversion, t[n])
         assert np.hypot(*velocity) == pytest.approx(np.hypot(*planned), abs=0.5)
         assert place == pytest.approx(w[n], abs=1.2)
-    assert conversion.schedule.rms < 1
+    assert conversion.schedule.deviation.rms < 1
     assert route.distance == pytest.approx(np.hypot(*np.diff(w, axis=0).T).sum(), rel=0.02)
-    assert route.holds[route.first] == route.holds[route.last] == 0
+    assert route.waits[route.first] == route.waits[route.last] == 0
 
 
-def test_a_plan_that_speeds_up_from_rest_gets_none():
+def test_a_plan_that_speeds_up_from_rest_gets_none() -> None:
     route = converted(*dash_hover_dash(), plan_with(recommend=True)).schedule.route
     assert (route.first, route.last) == (0, len(route.positions) - 1)
-    assert route.holds[0] == 6  # a hold of a second leaves the aircraft drifting
+    assert route.waits[0] == 6  # a hold of a second leaves the aircraft drifting
 
 
-def test_recommended_parameters_have_the_names_of_both_generations():
+def test_recommended_parameters_have_the_names_of_both_generations() -> None:
     conversion = converted(*dash_hover_dash(), plan_with(recommend=True))
     found = conversion.parameters
     assert found["WPNAV_SPEED"] == 800
@@ -126,54 +131,56 @@ def test_recommended_parameters_have_the_names_of_both_generations():
     assert conversion.vehicle.parameters == found
 
 
-def test_recommended_parameters_stand_beside_those_of_the_vehicle():
+def test_recommended_parameters_stand_beside_those_of_the_vehicle() -> None:
     own = {"WPNAV_ACCEL": 120.0, "RTL_ALT": 4000.0}
     conversion = converted(*dash_hover_dash(), plan_with(recommend=True, parameters=own))
     assert "RTL_ALT" not in conversion.parameters
     assert conversion.vehicle.parameters == {**own, **conversion.parameters}
 
 
-def test_kept_parameters_are_those_of_the_vehicle():
+def test_kept_parameters_are_those_of_the_vehicle() -> None:
     own = {"WPNAV_ACCEL": 400.0, "WPNAV_JERK": 10.0}
     conversion = converted(*dash_hover_dash(), plan_with(parameters=own))
     assert conversion.parameters == {}
     assert conversion.vehicle.parameters == own
 
 
-def test_a_vehicle_that_is_slow_to_speed_up_is_later_than_one_with_good_parameters():
+def test_a_vehicle_that_is_slow_to_speed_up_is_later_than_one_with_good_parameters() -> None:
     sluggish = plan_with(parameters={"WPNAV_ACCEL": 50.0})
     good = plan_with(recommend=True)
-    worse, better = (converted(*back_and_forth(), plan).schedule.rms for plan in (sluggish, good))
+    worse, better = (
+        converted(*back_and_forth(), plan).schedule.deviation.rms for plan in (sluggish, good)
+    )
     assert worse > 1.5 * better
 
 
-def test_useless_parameters_are_refused():
+def test_useless_parameters_are_refused() -> None:
     with pytest.raises(InputError, match=r"vehicle\.parameters.*WPNAV_JERK: 0"):
         converted(*dash_hover_dash(), plan_with(parameters={"WPNAV_JERK": 0.0}))
 
 
-def test_too_many_items_for_the_limit():
+def test_too_many_items_for_the_limit() -> None:
     with pytest.raises(InfeasibleError, match="max_items is 4"):
         converted(*dash_hover_dash(), plan_with(recommend=True, max_items=4))
 
 
 @pytest.mark.parametrize("flight", [dash_hover_dash, circle_at_speed])
-def test_values_are_what_is_sent(flight):
+def test_values_are_what_is_sent(flight: Callable[[], Trajectory]) -> None:
     plan = plan_with(recommend=True)
     conversion = converted(*flight(), plan)
     route = conversion.schedule.route
     positions, speeds, waits = items_of(conversion.mission, plan)
     assert positions == pytest.approx(route.positions, abs=1e-3)
     assert speeds == list(route.speeds)
-    assert waits[1:] == pytest.approx((route.holds + route.delays)[1:])
-    assert (route.holds == np.round(route.holds)).all()
+    assert waits[1:] == pytest.approx((route.waits)[1:])
+    assert (route.waits == np.round(route.waits, 1)).all()
     assert np.round(route.speeds, 3) == pytest.approx(route.speeds, abs=1e-12)
     assert route.speeds.min() > 0
     assert route.speeds.max() <= 1.1 * plan.vehicle.max_speed
 
 
 @pytest.mark.parametrize("flight", [dash_hover_dash, eight, circle_at_speed])
-def test_the_whole_mission_flies_the_schedule(flight):
+def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) -> None:
     """What is predicted of the items is what the schedule says of its route."""
     t, w = flight()
     plan = plan_with(recommend=True)
@@ -197,13 +204,12 @@ def test_the_whole_mission_flies_the_schedule(flight):
     assert apart.max() < 2.0  # 0.2 s: the mission leaves w_I from a hold, the schedule from rest
 
 
-def test_a_flight_over_splines_keeps_the_plan_and_never_delays_after_one():
+def test_a_flight_over_splines_keeps_the_plan_and_never_delays_after_one() -> None:
     t, w = eight()
     plan = plan_with()
     vehicle = vehicle_of(plan)
-    scheduler = Scheduler(t, w, copter_model(vehicle), legs_of(vehicle), 8.0, 2.0)
-    outline = plan_route(t, w, plan, splines=Splines(15.0, 12.0))
-    first = scheduler.first(outline)
+    scheduler = CopterScheduler(t, w, vehicle, copter_model(vehicle), 0.1, 8.0, 2.0)
+    first = scheduler.first(initial_route(t, w, plan, splines=Splines(15.0, 12.0)))
     schedule = scheduler.refined(first)
     route = schedule.route
     assert route.splines.tolist() == [False] + [True] * (len(route.positions) - 1)
@@ -215,7 +221,7 @@ def test_a_flight_over_splines_keeps_the_plan_and_never_delays_after_one():
     assert Command.NAV_DELAY not in commands
 
 
-def test_own_parameters_take_splines_through_a_bend():
+def test_own_parameters_take_splines_through_a_bend() -> None:
     t = np.arange(0.0, 75.0, STEP)
     s = dash(0.0, 520.0, 8.0, 1.5, t)
     bend = np.clip((s - 200) / 50, 0, np.pi / 2)
@@ -229,22 +235,22 @@ def test_own_parameters_take_splines_through_a_bend():
         assert found.path < 2
 
 
-def test_a_flight_that_stays_is_one_hold():
+def test_a_flight_that_stays_is_one_hold() -> None:
     t = np.arange(0.0, 60.0, STEP)
     conversion = converted(t, np.full((len(t), 2), 12.5), plan_with(recommend=True))
-    assert conversion.schedule.rms == pytest.approx(0, abs=1e-9)
+    assert conversion.schedule.deviation.rms == pytest.approx(0, abs=1e-9)
     _, _, waits = items_of(conversion.mission, plan_with())
     assert waits == [pytest.approx(60, abs=2)]
 
 
-def test_two_samples_are_enough():
+def test_two_samples_are_enough() -> None:
     for end in ([0.0, 0.0], [0.3, 0.0], [30.0, 0.0]):
         conversion = converted(
             np.array([0.0, 10.0]), np.array([[0.0, 0.0], end]), plan_with(recommend=True)
         )
-        assert math.isfinite(conversion.schedule.rms)
+        assert math.isfinite(conversion.schedule.deviation.rms)
 
 
-def test_the_same_plan_gives_the_same_mission():
+def test_the_same_plan_gives_the_same_mission() -> None:
     first, second = (converted(*eight(), plan_with(recommend=True)).mission for _ in range(2))
     assert first == second

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faao_mav.arrays import Real
-from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD, Clock, fit
+from faao_mav.schedule.schedule import Clock
+from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD, fit
 from faao_mav.vehicle import FlightPath
 from faao_mav.vehicle.ardupilot.copter import ArduCopter
 
@@ -36,7 +37,7 @@ def plan_of(path: FlightPath, *, ahead: float = 0.0) -> Clock:
     flown = MODEL.fly(path)
     t = np.arange(0.0, flown.departures[-1] - ahead, 0.2)
     w = np.stack([np.interp(t + ahead, flown.t, x) for x in flown.position.T[:2]], axis=-1)
-    return Clock(t=t, w=w, point=0, at=0.0, leaving=True, near=2.0)
+    return Clock(t=t, w=w, waypoint=0, at=0.0, leaving=True, tolerance=2.0)
 
 
 def fitted(
@@ -110,7 +111,7 @@ def test_a_flight_that_begins_at_speed_has_no_lead() -> None:
     path = path_with(SPEEDS, WAITS)
     flown = MODEL.fly(path)
     clock = plan_of(path, ahead=0.8)
-    passing = replace(clock, point=1, at=float(flown.arrivals[1]) - 0.8, leaving=False)
+    passing = replace(clock, waypoint=1, at=float(flown.arrivals[1]) - 0.8, leaving=False)
     assert fitted(passing, path)[2] == 0
 
 

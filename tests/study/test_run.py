@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.plan import parse_plan
 from faao_mav.report.style import save_figure
-from faao_mav.study import Row, load_rows, make_cases, run_study
+from faao_mav.study import StudyRow, load_rows, make_cases, run_study
 from faao_mav.study.figure import study_figure
 from faao_mav.study.rows import append_row
 
@@ -28,7 +28,7 @@ QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]}
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
 
 
-def timeless(rows: tuple[Row, ...]) -> list[Row]:
+def timeless(rows: tuple[StudyRow, ...]) -> list[StudyRow]:
     return [replace(row, seconds=None) for row in rows]
 
 
@@ -48,12 +48,12 @@ def plan(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[Row, ...]]:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[StudyRow, ...]]:
     directory = tmp_path_factory.mktemp("whole")
     return directory, run_study(CASES, jobs=1, directory=directory)
 
 
-def test_a_row_is_what_the_plan_gives(whole: tuple[Path, tuple[Row, ...]]) -> None:
+def test_a_row_is_what_the_plan_gives(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     from faao_mav import optimize, price
 
     row, solution = whole[1][2], optimize(parse_plan(CASES[2].text))
@@ -65,11 +65,11 @@ def test_a_row_is_what_the_plan_gives(whole: tuple[Path, tuple[Row, ...]]) -> No
 
 
 def test_a_resumed_study_is_the_uninterrupted_one(
-    tmp_path: Path, whole: tuple[Path, tuple[Row, ...]]
+    tmp_path: Path, whole: tuple[Path, tuple[StudyRow, ...]]
 ) -> None:
-    seen: list[Row] = []
+    seen: list[StudyRow] = []
 
-    def stop(row: Row) -> None:
+    def stop(row: StudyRow) -> None:
         seen.append(row)
         if len(seen) == 2:
             raise KeyboardInterrupt
@@ -87,13 +87,14 @@ def test_a_resumed_study_is_the_uninterrupted_one(
     assert [row["scheme"] for row in table_in(tmp_path)] == (["faao", "mrt"] * 3)
 
 
-def test_processes_do_not_change_the_result(whole: tuple[Path, tuple[Row, ...]]) -> None:
+def test_processes_do_not_change_the_result(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     assert timeless(run_study(CASES, jobs=2)) == timeless(whole[1])
 
 
-def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[Row, ...]]) -> None:
+def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     local = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": None}
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, **local) as cluster:
+    start: Any = LocalCluster
+    with start(n_workers=1, threads_per_worker=1, processes=False, **local) as cluster:
         rows = run_study(CASES, cluster=cluster.scheduler_address)
     assert timeless(rows) == timeless(whole[1])
 
@@ -185,16 +186,20 @@ def test_what_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> No
 def test_a_row_that_cannot_be_kept_is_an_input_error(tmp_path: Path) -> None:
     (tmp_path / "rows.jsonl").mkdir()
     with pytest.raises(InputError, match=r"rows\.jsonl: cannot be written"):
-        append_row(Row("k", {}, "faao", 0), tmp_path)
+        append_row(StudyRow("k", {}, "faao", 0), tmp_path)
 
 
 def test_there_are_no_more_processes_than_cases(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
 
-    def undo(work: Iterable[tuple[Any, Any, Any]]) -> list[Row]:
+    def undo(work: Iterable[tuple[Any, Any, Any]]) -> list[StudyRow]:
         return [call(*arguments, **named) for call, arguments, named in work]
 
-    monkeypatch.setattr("joblib.Parallel", lambda n_jobs, **_: asked.append(n_jobs) or undo)
+    def parallel(n_jobs: int, **_: object) -> Callable[..., list[StudyRow]]:
+        asked.append(n_jobs)
+        return undo
+
+    monkeypatch.setattr("joblib.Parallel", parallel)
     run_study(CASES, jobs=100_000)
     assert asked == [len(CASES)]
 
@@ -222,7 +227,9 @@ def test_figures_are_written_and_labelled(plan: Path, tmp_path: Path) -> None:
     assert (out / "figure.svg").read_bytes() == again
 
 
-def test_routes_are_drawn_on_a_map(whole: tuple[Path, tuple[Row, ...]], tmp_path: Path) -> None:
+def test_routes_are_drawn_on_a_map(
+    whole: tuple[Path, tuple[StudyRow, ...]], tmp_path: Path
+) -> None:
     name = "中 $\\frac"
     figure = study_figure(whole[1], parse_plan(edited(QUICK, {"name": name})), "trajectories")
     save_figure(figure, tmp_path / "f.svg")
@@ -233,7 +240,7 @@ def test_routes_are_drawn_on_a_map(whole: tuple[Path, tuple[Row, ...]], tmp_path
     assert {"base station", "user", "start", "end"} <= set(names)
 
 
-def test_routes_that_run_together_are_all_seen(whole: tuple[Path, tuple[Row, ...]]) -> None:
+def test_routes_that_run_together_are_all_seen(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     one = whole[1][0]
     rows = tuple(replace(one, values={"power_dbm": power}) for power in (0, 10, 20))
     (axes,) = study_figure(rows, parse_plan(QUICK), "trajectories").axes
@@ -244,7 +251,7 @@ def test_routes_that_run_together_are_all_seen(whole: tuple[Path, tuple[Row, ...
     assert [line.get_zorder() for line in routes] == [routes[0].get_zorder()] * 3
 
 
-def test_every_panel_has_its_name_and_its_axis(whole: tuple[Path, tuple[Row, ...]]) -> None:
+def test_every_panel_has_its_name_and_its_axis(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     names = ("bpsk", "qpsk", "8psk", "16qam")
     rows = tuple(
         replace(row, values={"power_dbm": row.values["power_dbm"], "radio.modulation": name})
@@ -259,7 +266,7 @@ def test_every_panel_has_its_name_and_its_axis(whole: tuple[Path, tuple[Row, ...
 
 
 def test_without_results_there_is_nothing_to_draw() -> None:
-    failed = (Row("k", {"power_dbm": 1}, "faao", 0, error="no"),)
+    failed = (StudyRow("k", {"power_dbm": 1}, "faao", 0, error="no"),)
     with pytest.raises(InputError, match="nothing to draw"):
         study_figure(failed, parse_plan(QUICK), "trajectories")
 

@@ -199,7 +199,7 @@ def test_rules_are_listed(run: Run) -> None:
 def test_a_terminal_gets_tables(broken: Path) -> None:
     from rich.console import Console
 
-    from faao_mav.cli.findings import Verdict, show, show_rules
+    from faao_mav.cli.findings import CheckedFile, show, show_rules
     from faao_mav.mission.formats import read_mission
     from faao_mav.validate import validate as findings_of
     from faao_mav.validate.check import Check
@@ -207,7 +207,7 @@ def test_a_terminal_gets_tables(broken: Path) -> None:
     content = read_mission(broken)
     found = findings_of(content, Vehicle())
     console = Console(force_terminal=True, width=100, record=True, file=sys.stderr)
-    show(Verdict(broken, 3, Vehicle(), "asked", Check(LEVEL, "", None, found)), console)
+    show(CheckedFile(broken, "asked", Check(content, Vehicle(), LEVEL, findings=found)), console)
     show_rules(RULES, console)
     shown = console.export_text()
     assert "refused-on-upload" in shown

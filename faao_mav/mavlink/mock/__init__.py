@@ -1,6 +1,28 @@
 """A mock autopilot to test ground stations against."""
 
-from faao_mav.mavlink.mock.autopilot import Fly, MockAutopilot
-from faao_mav.mavlink.mock.manners import COUNT, Manners, MockKind, ardupilot, manners_of, px4
+from dataclasses import replace
+from typing import Any, Literal, TypeAlias
 
-__all__ = ["COUNT", "Fly", "Manners", "MockAutopilot", "MockKind", "ardupilot", "manners_of", "px4"]
+from faao_mav.mavlink.mock.ardupilot_firmware import ArduPilotFirmware
+from faao_mav.mavlink.mock.firmware import COUNT, Behaviour
+from faao_mav.mavlink.mock.mock_autopilot import Fly, MockAutopilot
+from faao_mav.mavlink.mock.px4_firmware import Px4Firmware
+
+__all__ = ["COUNT", "Behaviour", "Fly", "MockAutopilot", "MockKind", "behaviour_of"]
+
+MockKind: TypeAlias = Literal["ardupilot", "px4", "px4-legacy-first"]
+
+_BEHAVIOURS: dict[MockKind, Behaviour] = {
+    "ardupilot": Behaviour(ArduPilotFirmware, legacy_first=True),
+    "px4": Behaviour(Px4Firmware),
+    "px4-legacy-first": Behaviour(Px4Firmware, legacy_first=True),
+}
+
+
+def behaviour_of(kind: MockKind, **changes: Any) -> Behaviour:
+    """Return the behaviour of `kind`, with some fields changed.
+
+    >>> behaviour_of("px4", complete_only=False).family.name
+    'PX4'
+    """
+    return replace(_BEHAVIOURS[kind], **changes)

@@ -9,40 +9,16 @@ from faao_mav.mavlink.messages import (
     ParamSet,
     ParamValue,
 )
-from faao_mav.mavlink.transfer.protocol import Firmware
 
 _REAL32 = 9
-
-_DEFAULTS: dict[Firmware, dict[str, float]] = {
-    "ardupilot": {
-        "SYSID_THISMAV": 1,
-        "FRAME_CLASS": 1,
-        "FENCE_ENABLE": 0,
-        "WPNAV_SPEED": 1000,
-        "WPNAV_SPEED_UP": 250,
-        "WPNAV_SPEED_DN": 150,
-        "WPNAV_ACCEL": 250,
-        "WPNAV_JERK": 1,
-        "WPNAV_RADIUS": 200,
-        "ANGLE_MAX": 3000,
-    },
-    "px4": {
-        "MIS_TAKEOFF_ALT": 2.5,
-        "MPC_ACC_HOR": 3,
-        "MPC_JERK_AUTO": 4,
-        "MPC_XY_CRUISE": 5,
-        "MPC_XY_VEL_MAX": 12,
-        "NAV_ACC_RAD": 2,
-        "NAV_MC_ALT_RAD": 0.8,
-    },
-}
+"""MAV_PARAM_TYPE of single-precision numbers."""
 
 
-class Parameters:
-    """A few parameters by name, and those that were given; all are single-precision numbers."""
+class ParameterServer:
+    """Parameters by name, in the autopilot's own units; all are single-precision numbers."""
 
-    def __init__(self, firmware: Firmware, given: Mapping[str, float] | None = None) -> None:
-        self.values = _DEFAULTS.get(firmware, {}) | dict(given or {})
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self.values = dict(values)
 
     def on(self, message: ParamRequestList | ParamRequestRead | ParamSet) -> list[Message]:
         """Return the answer to a request; unknown names get none."""

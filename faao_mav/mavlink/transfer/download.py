@@ -1,34 +1,36 @@
-"""Downloading one list: MISSION_REQUEST_LIST, then its rows."""
+"""Downloading one list: MISSION_REQUEST_LIST, then its items."""
 
 from collections.abc import Sequence
 from typing import Literal
 
+from faao_mav.mavlink.machine import Progress
 from faao_mav.mavlink.messages import (
-    Envelope,
+    ListMessage,
     Message,
     MissionAck,
     MissionCount,
     MissionItemInt,
     MissionRequestInt,
     MissionRequestList,
-    Row,
+    WireItem,
 )
+from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.transfer.exchange import Exchange, Peer, Status
 from faao_mav.mavlink.transfer.pace import Pace, Question, Timeouts
-from faao_mav.mavlink.transfer.protocol import MissionType, Result
-from faao_mav.mavlink.transfer.transfer import Exchange, Outcome, Peer, Status
 
-_WINDOW = 5  # rows
+_WINDOW = 5
+"""Items asked for at once where the autopilot answers each request by itself: MAVProxy's number."""
 
 
 class Download(Exchange):
     """A machine that downloads a list and acknowledges it.
 
-    - PX4 gives the row that it expects to be asked for, or the one before, and ends the transfer
-      at any other request (`handle_mission_request_both`): it is asked for one row at a time, and
+    - PX4 gives the item that it expects to be asked for, or the one before, and ends the transfer
+      at any other request (`handle_mission_request_both`): it is asked for one item at a time, and
       so are autopilots that are not known. ArduPilot answers each request by itself
-      (`handle_mission_request_int`): like MAVProxy, this asks it for up to five rows at once,
+      (`handle_mission_request_int`): like MAVProxy, this asks it for up to five items at once,
       unless the link is not known yet or may have become slow.
-    - A row is asked for again after the time that `Pace` gives, or at once when a later request
+    - An item is asked for again after the time that `Pace` gives, or at once when a later request
       has been answered: links rarely change the order (as in RFC 8985, until one does).
     - After `Timeouts.silence`, or an error (which may be about a duplicate, and makes PX4 forget
       the transfer), it begins anew, `Timeouts.attempts` times. UNSUPPORTED changes to
@@ -42,150 +44,138 @@ class Download(Exchange):
         timeouts: Timeouts | None = None,
     ) -> None:
         super().__init__(peer, mission_type, timeouts)
-        self._attempts = self._timeouts.attempts
+        self._attempts_done = 0
         self._phase: Literal["list", "items", "resting"] = "list"
         self._legacy = False
-        self._rows: dict[int, Row] = {}
-        self._asked: dict[int, Question] = {}
+        self._count = self._opaque_id = 0
+        self._items: dict[int, WireItem] = {}
+        self._requests: dict[int, Question] = {}
+        self._next_sequence = 0
         self._presumed_lost: set[int] = set()
         self._in_order = True
-        self._next = 0
-        self._count = 0
-        self._opaque_id = 0
         self._pace = Pace(self._timeouts)
-        self._heard = 0.0
-        self._left = 0
-        self._refusal: int | None = None
+        self._last_progress = 0.0
 
     @property
-    def progress(self) -> tuple[str, int, int]:
-        """Rows received, of all."""
-        return f"reading {self._type.title}", len(self._rows), self._count
+    def progress(self) -> Progress:
+        """Items received, of all."""
+        return f"reading {self._type.title}", len(self._items), self._count
+
+    def _question(self) -> Message:
+        return MissionRequestList(self._peer.address, self._type)
 
     def start(self, now: float) -> Sequence[Message]:
         """Ask for the list."""
         self._phase = "list"
-        self._attempts -= 1
-        self._left = self._timeouts.retries
-        return self._ask_list(now)
+        self._attempts_done += 1
+        return super().start(now)
 
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take the count or a row, ask for more."""
-        if self.outcome is not None:
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
+        if self._phase == "resting":
             return ()
-        self._texts.note(envelope)
-        if self._phase == "resting" or not self._peer.said(envelope, self._type):
-            return ()
-        match envelope.message:
-            case MissionCount(count=count, opaque_id=opaque_id):
-                return self._on_count(count, opaque_id, now)
-            case MissionItemInt(seq=seq, row=row) if self._phase == "items":
-                return self._on_item(seq, row, now)
-            case MissionAck(type=result):
-                return self._on_ack(result, now)
+        match message:
+            case MissionCount():
+                return self._on_count(message.count, message.opaque_id, now)
+            case MissionItemInt() if self._phase == "items":
+                return self._on_item(message.seq, message.item, now)
+            case MissionAck():
+                return self._on_ack(message.type, now)
         return ()
 
-    def tick(self, now: float) -> Sequence[Message]:
-        """Ask again, begin anew, or end."""
-        if self.outcome is not None or now < self._due:
-            return ()
-        if self._phase == "resting":
-            return self.start(now)
-        if self._phase == "list":
-            if self._left == 0:
-                return self._again(now)
-            self._left -= 1
-            return self._ask_list(now)
-        if now - self._heard >= self._timeouts.silence:
-            return self._again(now)
+    def _time_out(self, now: float) -> Sequence[Message]:
+        match self._phase:
+            case "resting":
+                return self.start(now)
+            case "list":
+                return super()._time_out(now)
+        if now - self._last_progress >= self._timeouts.silence:
+            return self._give_up(now)
         return self._repeat(now)
+
+    def _give_up(self, now: float) -> Sequence[Message]:
+        if self._attempts_done < self._timeouts.attempts:
+            return self.start(now)
+        self._finish()
+        return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
 
     def _on_count(self, count: int, opaque_id: int, now: float) -> Sequence[Message]:
         if self._phase == "items":
             # A repeated answer; another number means that the list has changed meanwhile.
-            return () if count == self._count else self._again(now)
+            return () if count == self._count else self._give_up(now)
         self._phase, self._count, self._opaque_id = "items", count, opaque_id
-        self._rows, self._asked, self._next = {}, {}, 0
+        self._items, self._requests, self._next_sequence = {}, {}, 0
         return self._proceed(now)
 
-    def _on_item(self, seq: int, row: Row, now: float) -> Sequence[Message]:
-        if seq in self._rows:
+    def _on_item(self, seq: int, item: WireItem, now: float) -> Sequence[Message]:
+        if seq in self._items:
             self._pace.answer_again()
             self._in_order = self._in_order and seq not in self._presumed_lost
-        if seq not in self._asked:
+        if seq not in self._requests:
             return ()
-        earlier = list(self._asked)[: list(self._asked).index(seq)] if self._in_order else []
+        earlier = list(self._requests)[: list(self._requests).index(seq)] if self._in_order else []
         self._presumed_lost.update(earlier)
-        self._pace.answer(self._asked.pop(seq), now)
-        self._rows[seq] = row
-        return [*(self._put_again(lost, now) for lost in earlier), *self._proceed(now)]
+        self._pace.answer(self._requests.pop(seq), now)
+        self._items[seq] = item
+        return [*(self._send_again(lost, now) for lost in earlier), *self._proceed(now)]
 
     def _on_ack(self, result: int, now: float) -> Sequence[Message]:
         if result == Result.ACCEPTED:
             return ()
         if result == Result.UNSUPPORTED and self._phase == "items" and not self._legacy:
             self._legacy = True
-            return [self._put_again(seq, now) for seq in list(self._asked)]
-        self._refusal = result
-        if self._attempts == 0:
-            self._end("refused")
+            return [self._send_again(seq, now) for seq in list(self._requests)]
+        self._result = result
+        if self._attempts_done == self._timeouts.attempts:
+            self._finish()
             return ()
         # Not at once: more may be on the way that is about the same.
         self._phase, self._due = "resting", now + self._timeouts.item
         return ()
 
     def _proceed(self, now: float) -> Sequence[Message]:
-        self._refusal = None
-        self._heard = now
-        if len(self._rows) == self._count:
-            self._end("accepted")
-            # Twice for PX4: until it hears this, nobody else can begin a transfer for 5 s.
-            times = 2 if self._peer.firmware == "px4" else 1
-            return [self._peer.ack(Result.ACCEPTED, self._type)] * times
-        wide = self._peer.firmware == "ardupilot" and not self._pace.is_doubtful
+        self._result = None
+        self._last_progress = now
+        if len(self._items) == self._count:
+            self._finish()
+            return [self._peer.ack(Result.ACCEPTED, self._type)] * self._peer.manners.final_acks
+        wide = self._peer.manners.any_request_order and not self._pace.is_doubtful
         out = []
-        while self._next < self._count and len(self._asked) < (_WINDOW if wide else 1):
-            self._asked[self._next] = self._pace.ask(now)
-            out.append(self._request(self._next))
-            self._next += 1
+        while self._next_sequence < self._count and len(self._requests) < (_WINDOW if wide else 1):
+            self._requests[self._next_sequence] = self._pace.ask(now)
+            out.append(self._request(self._next_sequence))
+            self._next_sequence += 1
         self._schedule()
         return out
 
     def _repeat(self, now: float) -> Sequence[Message]:
         """Ask again for what is due; for one of them less often from now on."""
-        due = [seq for seq, asked in self._asked.items() if asked.put + self._pace.wait <= now]
+        due = [
+            seq
+            for seq, request in self._requests.items()
+            if request.last_sent + self._pace.wait <= now
+        ]
         if due:
-            self._pace.repeat(self._asked[due[0]], now)
-        out = [self._put_again(seq, now) for seq in due]
+            self._pace.repeat(self._requests[due[0]], now)
+        out = [self._send_again(seq, now) for seq in due]
         self._schedule()
         return out
 
-    def _put_again(self, seq: int, now: float) -> Message:
-        self._asked[seq] = self._asked.pop(seq)
-        self._asked[seq].put_again(now)
+    def _send_again(self, seq: int, now: float) -> Message:
+        self._requests[seq] = self._requests.pop(seq)
+        self._requests[seq].send_again(now)
         self._schedule()
         return self._request(seq)
 
     def _schedule(self) -> None:
-        self._due = min(asked.put for asked in self._asked.values()) + self._pace.wait
-
-    def _again(self, now: float) -> Sequence[Message]:
-        if self._attempts == 0:
-            self._end("silent" if self._refusal is None else "refused")
-            return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
-        return self.start(now)
-
-    def _ask_list(self, now: float) -> Sequence[Message]:
-        self._due = now + self._timeouts.response
-        vehicle = self._peer.vehicle
-        return [MissionRequestList(vehicle.system, vehicle.component, self._type)]
+        self._due = min(request.last_sent for request in self._requests.values()) + self._pace.wait
 
     def _request(self, seq: int) -> Message:
-        target = (self._peer.vehicle.system, self._peer.vehicle.component)
-        return MissionRequestInt(*target, seq, self._type, self._legacy)
+        return MissionRequestInt(self._peer.address, self._type, seq, self._legacy)
 
-    def _end(self, status: Status) -> None:
-        whole = status == "accepted"
-        rows = tuple(self._rows[seq] for seq in range(self._count)) if whole else ()
-        said = self._texts.all()
-        self.outcome = Outcome(status, self._refusal, len(self._rows), rows, said, self._opaque_id)
+    def _finish(self) -> None:
+        whole = self._phase == "items" and len(self._items) == self._count
+        items = tuple(self._items[seq] for seq in range(self._count)) if whole else ()
+        status: Status = "accepted"
+        if not whole:
+            status = "silent" if self._result is None else "refused"
+        self._end(status, self._result, len(self._items), items, self._opaque_id)

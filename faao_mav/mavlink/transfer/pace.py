@@ -3,7 +3,9 @@
 import math
 from dataclasses import dataclass
 
-_DOUBTFUL = 5  # questions in a row that only a repetition got an answer to
+_DOUBTFUL = 5
+"""Questions in a row that only a repetition got an answer to, after which the link may have become
+slow; chosen; what another number costs is not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,19 +31,20 @@ class Timeouts:
 
 @dataclass(slots=True)
 class Question:
-    """What wants an answer: when it was `asked` first, and `put` last.
+    """A question to the vehicle: `first_sent` and `last_sent` are times, s.
 
-    `repeats` are for want of an answer; `ambiguous` tells that it was put more than once.
+    `repeats` counts how often it was sent again for want of an answer; `ambiguous` tells that it
+    was sent more than once, for whatever reason.
     """
 
-    asked: float
-    put: float
+    first_sent: float
+    last_sent: float
     repeats: int = 0
     ambiguous: bool = False
 
-    def put_again(self, now: float) -> None:
-        """Note that it is put once more, for another reason than that time has passed."""
-        self.put, self.ambiguous = now, True
+    def send_again(self, now: float) -> None:
+        """Note that it is sent once more, for another reason than that time has passed."""
+        self.last_sent, self.ambiguous = now, True
 
 
 class Pace:
@@ -52,8 +55,8 @@ class Pace:
     - The first repetition is a probe and changes nothing (RFC 8985, 7); each further one doubles
       the time (RFC 6298, 5.5), up to half a second or twice the usual.
     - An answer to a repeated question tells nothing of the time that it took (Karn's rule), nor
-      does one that took `insists` seconds: so long after its last question the other end asks
-      again by itself. With loss both are common, and the next question is asked in the usual
+      does one that took `request_period` seconds: so long after its last question the other end
+      asks again by itself. With loss both are common, and the next question is asked in the usual
       time. But of a link that has become slow there would never be a measurement: before the
       first one, and after five such answers in a row, what was doubled stays doubled until a
       question is answered at once (RFC 8961, 4).
@@ -61,61 +64,60 @@ class Pace:
       first answer was to the first asking, and is measured after all (RFC 3708).
     """
 
-    def __init__(self, timeouts: Timeouts, insists: float = math.inf) -> None:
+    def __init__(self, timeouts: Timeouts, request_period: float = math.inf) -> None:
         self.wait = timeouts.item
-        self._timeouts, self._insists = timeouts, insists
+        self._timeouts, self._request_period = timeouts, request_period
         self._mean: float | None = None
         self._deviation = 0.0
-        self._unsure_of: float | None = None
-        self._in_a_row = 0
+        self._ambiguous_time: float | None = None
+        self._ambiguous_in_a_row = 0
 
     @property
     def is_doubtful(self) -> bool:
         """Whether the link is not known, or may have become slow."""
-        return self._mean is None or self._in_a_row >= _DOUBTFUL
+        return self._mean is None or self._ambiguous_in_a_row >= _DOUBTFUL
 
     def ask(self, now: float) -> Question:
         """Return a new question."""
         return Question(now, now)
 
     def repeat(self, question: Question, now: float) -> None:
-        """Note that it is put once more because no answer came."""
-        question.put_again(now)
+        """Note that it is sent once more because no answer came."""
+        question.send_again(now)
         question.repeats += 1
         if question.repeats > 1 or self.is_doubtful:
-            self.wait = min(2 * self.wait, self._most())
+            self.wait = min(2 * self.wait, self._longest_wait())
 
     def answer(self, question: Question, now: float) -> None:
         """Note its answer."""
-        took = now - question.asked
-        if not question.ambiguous and took < self._insists:
-            self._learn(took)
+        duration = now - question.first_sent
+        if not question.ambiguous and duration < self._request_period:
+            self._learn(duration)
             return
-        self._unsure_of = took
-        self._in_a_row += 1
+        self._ambiguous_time = duration
+        self._ambiguous_in_a_row += 1
         if not self.is_doubtful:
-            self.wait = self._least()
+            self.wait = self._shortest_wait()
 
     def answer_again(self) -> None:
         """Note that the answer before came twice."""
-        if self._unsure_of is not None:
-            self._learn(self._unsure_of)
+        if self._ambiguous_time is not None:
+            self._learn(self._ambiguous_time)
 
-    def _learn(self, took: float) -> None:
+    def _learn(self, duration: float) -> None:
         if self._mean is None:
-            self._mean, self._deviation = took, took / 2
+            self._mean, self._deviation = duration, duration / 2
         else:
-            self._deviation += (abs(took - self._mean) - self._deviation) / 4
-            self._mean += (took - self._mean) / 8
-        self._unsure_of, self._in_a_row = None, 0
-        self.wait = self._least()
+            self._deviation += (abs(duration - self._mean) - self._deviation) / 4
+            self._mean += (duration - self._mean) / 8
+        self._ambiguous_time, self._ambiguous_in_a_row = None, 0
+        self.wait = self._shortest_wait()
 
-    def _least(self) -> float:
-        least = (self._mean or 0.0) + 4 * self._deviation
-        return min(max(least, self._timeouts.quickest), self._timeouts.response)
+    def _shortest_wait(self) -> float:
+        wait = (self._mean or 0.0) + 4 * self._deviation
+        return min(max(wait, self._timeouts.quickest), self._timeouts.response)
 
-    def _most(self) -> float:
-        most = self._timeouts.response
-        if self._mean is not None:
-            most = min(2 * max(self._timeouts.item, self._least()), most)
-        return most
+    def _longest_wait(self) -> float:
+        if self._mean is None:
+            return self._timeouts.response
+        return min(2 * max(self._timeouts.item, self._shortest_wait()), self._timeouts.response)

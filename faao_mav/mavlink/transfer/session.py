@@ -6,21 +6,24 @@ one alike.
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, TypeVar
 
-from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.transfer.clear import Clear
+from faao_mav.mavlink.machine import Machine
+from faao_mav.mavlink.manners import autopilot_name
+from faao_mav.mavlink.messages import WireItem
+from faao_mav.mavlink.protocol import MissionType, Result
 from faao_mav.mavlink.transfer.download import Download
+from faao_mav.mavlink.transfer.exchange import Clear, Outcome, Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
-from faao_mav.mavlink.transfer.protocol import MissionType, Result, meaning
-from faao_mav.mavlink.transfer.transfer import Machine, Outcome, Peer
 from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.transfer.verify import Difference, compare
-from faao_mav.plan.autopilots import Kind
+from faao_mav.mavlink.wire_items import home_items
+
+T = TypeVar("T")
+Job: TypeAlias = Generator[Machine[Any], Outcome, T]
+"""What `Script` runs: yields exchanges, is sent their outcomes, returns its own."""
 
 Verdict: TypeAlias = Literal["verified", "different", "unread", "refused", "silent", "cancelled"]
-
-Steps: TypeAlias = Generator[Machine[Any], Outcome, "Lists"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +32,9 @@ class PartReport:
 
     `verdict`: "verified": the list was read back, and is what was sent but for what `differences`
     tell as dropped; "different": it is not; "unread": accepted, but could not be read back;
-    otherwise it is not known to be there. `items` leaves out the home row. `attempts` counts
-    uploads, `said` are the vehicle's own words.
+    otherwise it is not known to be there. `items` leaves out the home item; `item`, the number of
+    the item last asked for, does not. `attempts` counts uploads, `said` are the vehicle's own
+    words.
     """
 
     part: MissionType
@@ -51,28 +55,26 @@ class PartReport:
 
 @dataclass(frozen=True, slots=True)
 class Lists:
-    """What was downloaded; `missing` says why a list is not among `rows`."""
+    """What was downloaded; `missing` says why a list is not among `items`."""
 
-    rows: dict[MissionType, tuple[Row, ...]]
+    items: dict[MissionType, tuple[WireItem, ...]]
     missing: dict[MissionType, Outcome]
 
 
 def upload_parts(
-    parts: Sequence[tuple[MissionType, tuple[Row, ...]]],
+    parts: Sequence[tuple[MissionType, tuple[WireItem, ...]]],
     peer: Peer,
-    kind: Kind = "copter",
     timeouts: Timeouts | None = None,
-) -> Generator[Machine[Any], Outcome, tuple[PartReport, ...]]:
+) -> Job[tuple[PartReport, ...]]:
     """Upload lists one after the other, read each back and compare; stop at the first failure.
 
     A transfer that the link broke is begun again, and one whose last answer was lost or whose
     list reads back differently too, at most `Timeouts.attempts` times and not if it reads back
-    the same again. A refusal is final,
-    except an ERROR, which may be about something else.
+    the same again. A refusal is final, except an ERROR, which may be about something else.
     """
     reports: list[PartReport] = []
-    for part, rows in parts:
-        report = yield from _upload_part(part, rows, peer, kind, timeouts or Timeouts())
+    for part, items in parts:
+        report = yield from _upload_part(part, items, peer, timeouts or Timeouts())
         reports.append(report)
         if not report.verified:
             break
@@ -81,25 +83,25 @@ def upload_parts(
 
 def download_lists(
     types: Sequence[MissionType], peer: Peer, timeouts: Timeouts | None = None
-) -> Steps:
+) -> Job["Lists"]:
     """Download the lists of `types`; stop at the first that does not come, unless refused."""
-    rows: dict[MissionType, tuple[Row, ...]] = {}
+    items: dict[MissionType, tuple[WireItem, ...]] = {}
     missing: dict[MissionType, Outcome] = {}
     for part in types:
         outcome = yield Download(peer, part, timeouts)
         if outcome.status == "accepted":
-            rows[part] = outcome.rows
+            items[part] = outcome.items
             continue
         missing[part] = outcome
         if outcome.status != "refused":
             break
-    return Lists(rows, missing)
+    return Lists(items, missing)
 
 
 def clear_lists(
     types: Sequence[MissionType], peer: Peer, timeouts: Timeouts | None = None
-) -> Generator[Machine[Any], Outcome, tuple[PartReport, ...]]:
-    """Clear the lists of `types`, and read back that they are empty (but for the home row)."""
+) -> Job[tuple[PartReport, ...]]:
+    """Clear the lists of `types`, and read back that they are empty (but for the home item)."""
     reports = []
     for part in types:
         cleared = yield Clear(peer, part, timeouts)
@@ -107,13 +109,11 @@ def clear_lists(
         if cleared.status in ("accepted", "silent"):
             read = yield Download(peer, part, timeouts)
             if read.status == "accepted":
-                left = len(read.rows) - _home_rows(part, peer)
-                gone = Difference(part, None, "count", 0, left, "wrong")
-                report = replace(
-                    report,
-                    verdict="different" if left > 0 else "verified",
-                    differences=(gone,) if left > 0 else (),
+                differences = compare(
+                    read.items[: home_items(peer.vehicle, part)], read.items, part, peer.vehicle
                 )
+                verdict: Verdict = "different" if differences else "verified"
+                report = replace(report, verdict=verdict, differences=differences)
         reports.append(report)
         if report.verdict in ("silent", "cancelled"):
             break
@@ -121,17 +121,17 @@ def clear_lists(
 
 
 def _upload_part(
-    part: MissionType, rows: tuple[Row, ...], peer: Peer, kind: Kind, timeouts: Timeouts
-) -> Generator[Machine[Any], Outcome, PartReport]:
-    items = len(rows) - _home_rows(part, peer)
+    part: MissionType, items: tuple[WireItem, ...], peer: Peer, timeouts: Timeouts
+) -> Job[PartReport]:
+    number = len(items) - home_items(peer.vehicle, part)
     last: PartReport | None = None
     for attempt in range(1, timeouts.attempts + 1):
-        sent = yield Upload(rows, peer, part, timeouts)
-        report = _failed(part, items, sent, attempt)
+        sent = yield Upload(items, peer, part, timeouts)
+        report = _failed(part, number, sent, attempt)
         if sent.status in ("accepted", "unknown"):
             read = yield Download(peer, part, timeouts)
             if read.status == "accepted":
-                differences = compare(rows, read.rows, part, peer.firmware, kind)
+                differences = compare(items, read.items, part, peer.vehicle)
                 wrong = any(difference.kind == "wrong" for difference in differences)
                 report = replace(
                     report,
@@ -167,7 +167,7 @@ def _failed(part: MissionType, items: int, outcome: Outcome, attempts: int) -> P
     }
     verdict = verdicts[outcome.status]
     result, said = outcome.result, outcome.said
-    return PartReport(part, items, verdict, (), result, outcome.item, attempts, said)
+    return PartReport(part, items, verdict, (), result, outcome.last_requested, attempts, said)
 
 
 def _by_us(outcome: Outcome) -> bool:
@@ -178,17 +178,13 @@ def _alike(one: PartReport, other: PartReport | None) -> bool:
     return other is not None and bool(one.differences) and one.differences == other.differences
 
 
-def _home_rows(part: MissionType, peer: Peer) -> int:
-    return int(part is MissionType.MISSION and peer.firmware == "ardupilot")
-
-
 def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int], str]) -> str:
     """Return in words why `report` is not verified.
 
-    `limit` is how many rows the vehicle is thought to hold, `describe(item)` names an item.
+    `limit` is how many items the vehicle is thought to hold, `describe(item)` names an item.
     """
     part = report.part.title
-    home = _home_rows(report.part, peer)
+    home = home_items(peer.vehicle, report.part)
     text = f"{part}: "
     match report.verdict:
         case "different":
@@ -207,7 +203,7 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
             text += "" if report.result is None else " by the vehicle"
         case _:
             assert report.result is not None
-            text += f"refused: {meaning(report.result, peer.firmware)}"
+            text += f"refused: {peer.manners.meaning(report.result)}"
             if report.result == Result.NO_SPACE:
                 text += f": {report.items + home} rows"
                 text += " with home" if home else ""
@@ -217,6 +213,7 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
     if report.said:
         text += f". The vehicle says: {'; '.join(report.said)}"
     begun = report.item is not None and report.verdict in ("silent", "cancelled", "refused")
-    if peer.firmware == "ardupilot" and begun:
-        text += ". ArduPilot may now hold old and new items mixed: upload again before flying"
+    if begun and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
+        text += f". {autopilot_name(peer.vehicle)} may now hold old and new items mixed: upload "
+        text += "again before flying"
     return text

@@ -5,30 +5,35 @@ from collections.abc import Sequence
 from typing import Literal
 
 from faao_mav.errors import InputError
+from faao_mav.mavlink.machine import Progress
 from faao_mav.mavlink.messages import (
     Envelope,
     Heartbeat,
+    ListMessage,
     Message,
     MissionAck,
     MissionCount,
     MissionItemInt,
     MissionRequestInt,
-    Row,
+    WireItem,
 )
+from faao_mav.mavlink.protocol import MavState, MissionType, Result
+from faao_mav.mavlink.transfer.exchange import Exchange, Peer, Status
 from faao_mav.mavlink.transfer.pace import Pace, Question, Timeouts
-from faao_mav.mavlink.transfer.protocol import Firmware, MissionType, Result, State
-from faao_mav.mavlink.transfer.transfer import Exchange, Outcome, Peer, Status
 
-_REASONS = 0.3  # s: a vehicle that refuses says why a little later
-_AHEAD = 3  # items beyond the one that was asked for
-_INSISTS: dict[Firmware, float] = {"px4": 0.25, "ardupilot": 1.0}
-"""How long after its last request a vehicle asks again, s."""
+_REASONS = 0.3
+"""Seconds to wait after a refusal for the status text that gives the reason: chosen, above what
+ArduPilot and PX4 took in simulation."""
+
+_AHEAD = 3
+"""Items that are sent beyond the one that was asked for, at most: chosen; each costs a packet for
+each repetition."""
 
 
 class Upload(Exchange):
-    """A machine that uploads `rows`; the vehicle leads.
+    """A machine that uploads `items`; the vehicle leads.
 
-    - Any row below the count is sent whenever it is asked for, by either request, as
+    - Any item below the count is sent whenever it is asked for, by either request, as
       MISSION_ITEM_INT.
     - INVALID_SEQUENCE is no end for ArduPilot: it says so of duplicates and goes on asking. An
       ERROR may be about a duplicate too (PX4: of MISSION_COUNT, ArduPilot: of the last item): it
@@ -49,92 +54,92 @@ class Upload(Exchange):
       that it is asked for shows that the vehicle has the others. Other autopilots lead alone.
     - NO_SPACE from an ArduPilot that is still booting means "not yet".
 
-    Raises `InputError` without rows: an empty list is what `Clear` is for.
+    Raises `InputError` without items: an empty list is what `Clear` is for.
     """
 
     def __init__(
         self,
-        rows: Sequence[Row],
+        items: Sequence[WireItem],
         peer: Peer,
         mission_type: MissionType = MissionType.MISSION,
         timeouts: Timeouts | None = None,
     ) -> None:
-        if not rows:
+        if not items:
             raise InputError(f"upload: no {mission_type.title} items; clear the list instead")
         super().__init__(peer, mission_type, timeouts)
-        self._rows = tuple(rows)
+        self._items, self._manners = tuple(items), peer.manners
         self._phase: Literal["count", "items", "booting", "refused"] = "count"
-        self._left = 0
-        self._sent: set[int] = set()
-        self._heard = 0.0
-        self._pace = Pace(self._timeouts, _INSISTS.get(peer.firmware, math.inf))
-        self._question = Question(0.0, 0.0)
-        self._asked_for, self._ahead = -1, 0
-        self._most_ahead, self._guessing = _AHEAD, False
         self._booting = False
-        self._doubt: int | None = None
+        self._sent: set[int] = set()
+        # The item asked for last, the items sent beyond it, and how many those may be.
+        self._last_requested, self._ahead = -1, 0
+        self._most_ahead, self._sent_unasked = _AHEAD, False
+        self._pace = Pace(self._timeouts, self._manners.request_period)
+        self._unanswered = Question(0.0, 0.0)
+        self._last_progress = 0.0
 
     @property
-    def progress(self) -> tuple[str, int, int]:
-        """Rows sent, of all."""
-        return f"uploading {self._type.title}", len(self._sent), len(self._rows)
+    def progress(self) -> Progress:
+        """Items sent, of all."""
+        return f"uploading {self._type.title}", len(self._sent), len(self._items)
+
+    def _question(self) -> Message:
+        return MissionCount(self._peer.address, self._type, len(self._items))
 
     def start(self, now: float) -> Sequence[Message]:
-        """Announce the rows."""
-        self._phase, self._sent, self._doubt = "count", set(), None
-        self._asked_for, self._ahead, self._guessing = -1, 0, False
-        self._left = self._timeouts.retries
-        return self._announce(now)
+        """Announce the items."""
+        self._phase, self._sent, self._result = "count", set(), None
+        self._last_requested, self._ahead, self._sent_unasked = -1, 0, False
+        return super().start(now)
 
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Answer a request, take an acknowledgement."""
-        if self.outcome is not None:
-            return ()
-        self._texts.note(envelope)
-        if self._phase == "refused":
-            return ()
-        match envelope.message:
-            case Heartbeat() as heartbeat if envelope.sender == self._peer.vehicle:
-                return self._on_heartbeat(heartbeat, now)
-            case MissionRequestInt(seq=seq) if self._peer.said(envelope, self._type):
-                return self._on_request(seq, now)
-            case MissionAck() as ack if self._peer.said(envelope, self._type):
-                return self._on_ack(ack, now)
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        message = envelope.message
+        if isinstance(message, Heartbeat) and envelope.sender == self._peer.address:
+            self._booting = message.system_status < MavState.STANDBY
+            ready = self._phase == "booting" and not self._booting
+            return self.start(now) if ready else ()
+        return super()._receive(envelope, now)
+
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
+        match message:
+            case MissionRequestInt() if self._phase != "refused":
+                return self._on_request(message.seq, now)
+            case MissionAck() if self._phase != "refused":
+                return self._on_ack(message, now)
         return ()
 
-    def tick(self, now: float) -> Sequence[Message]:
-        """Send again, wait on, or end."""
-        if self.outcome is not None or now < self._due:
-            return ()
-        if self._phase == "items":
-            return self._tick_items(now)
-        if self._phase in ("booting", "refused") or self._left == 0:
-            return self._give_up(now)
-        self._left -= 1
-        return self._announce(now)
+    def _time_out(self, now: float) -> Sequence[Message]:
+        match self._phase:
+            case "items":
+                return self._time_out_items(now)
+            case "booting" | "refused":
+                return self._give_up(now)
+        return super()._time_out(now)
 
-    def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> Sequence[Message]:
-        self._booting = heartbeat.system_status < State.STANDBY
-        if self._phase == "booting" and not self._booting:
+    def _give_up(self, now: float) -> Sequence[Message]:
+        if self._sent_unasked and self._result is not None:
+            self._most_ahead = 0
             return self.start(now)
+        status: Status = "silent" if self._result is None else "refused"
+        self._end(status, self._result, self._last_sent())
         return ()
 
     def _on_request(self, seq: int, now: float) -> Sequence[Message]:
-        if seq >= len(self._rows):
+        if seq >= len(self._items):
             return ()
         if seq <= self._current:
-            self._question.put_again(now)
+            self._unanswered.send_again(now)
         else:
-            if self._asked_for >= 0:
-                self._pace.answer(self._question, now)
-            self._question = self._pace.ask(now)
-        self._asked_for, self._ahead, self._guessing = seq, 0, False
-        self._phase, self._heard, self._doubt = "items", now, None
-        self._left = self._timeouts.retries
+            if self._last_requested >= 0:
+                self._pace.answer(self._unanswered, now)
+            self._unanswered = self._pace.ask(now)
+        self._last_requested, self._ahead, self._sent_unasked = seq, 0, False
+        self._phase, self._last_progress, self._result = "items", now, None
+        self._retries_done = 0
         item = self._item(seq)
-        if self._complete():
-            self._due = now + self._patience()
-        elif self._repeats():
+        if self._all_sent():
+            self._due = now + self._reminder_wait()
+        elif self._may_repeat():
             self._due = now + self._pace.wait
         else:
             self._due = now + self._timeouts.silence
@@ -143,107 +148,101 @@ class Upload(Exchange):
     def _on_ack(self, ack: MissionAck, now: float) -> Sequence[Message]:
         result = ack.type
         if result == Result.ACCEPTED:
-            # Before the last row was asked for it can only be about something else.
-            if self._complete():
-                self._end("accepted", result, ack.opaque_id)
-        elif result == Result.INVALID_SEQUENCE and self._peer.firmware != "px4":
-            return self._on_out_of_turn(now)
+            # Before the last item was asked for it can only be about something else.
+            if self._all_sent():
+                self._end("accepted", result, self._last_sent(), opaque_id=ack.opaque_id)
+        elif result == Result.INVALID_SEQUENCE and not self._manners.ignores_other_items:
+            return self._on_invalid_sequence(now)
         elif result == Result.ERROR:
-            self._doubt = result
+            self._result = result
             if self._phase == "items":
                 soon = 2 * self._timeouts.item
-                self._due = now + (soon if self._complete() else self._timeouts.response)
+                self._due = now + (soon if self._all_sent() else self._timeouts.response)
         elif result == Result.NO_SPACE and self._booting:
-            self._phase, self._doubt = "booting", result
+            self._phase, self._result = "booting", result
             self._due = now + self._timeouts.boot
         elif result == Result.OPERATION_CANCELLED:
-            self._end("cancelled", result)
+            self._end("cancelled", result, self._last_sent())
         else:
-            self._phase, self._doubt = "refused", result
+            self._phase, self._result = "refused", result
             self._due = now + _REASONS
         return ()
 
-    def _on_out_of_turn(self, now: float) -> Sequence[Message]:
-        if self._complete() and self._left < self._timeouts.retries:
-            return [self._item(len(self._rows) - 1)]
-        if self._question.repeats == 0:
+    def _on_invalid_sequence(self, now: float) -> Sequence[Message]:
+        if self._all_sent() and self._retries_done > 0:
+            return [self._item(len(self._items) - 1)]
+        if self._unanswered.repeats == 0:
             self._pace.answer_again()
             return ()
         if self._ahead == self._room():
             return ()
-        self._pace.answer(self._question, now)
-        self._question = self._pace.ask(now)
+        self._pace.answer(self._unanswered, now)
+        self._unanswered = self._pace.ask(now)
         self._ahead += 1
-        self._heard, self._due = now, now + self._pace.wait
+        self._last_progress, self._due = now, now + self._pace.wait
         return [self._item(self._current)]
 
-    def _tick_items(self, now: float) -> Sequence[Message]:
-        quiet = now - self._heard >= self._timeouts.silence
-        if not self._complete() and self._repeats() and not quiet and self._doubt is None:
-            self._pace.repeat(self._question, now)
-            self._due = now + self._pace.wait
-            return self._again()
-        if not self._complete():
+    def _time_out_items(self, now: float) -> Sequence[Message]:
+        if not self._all_sent():
+            quiet = now - self._last_progress >= self._timeouts.silence
+            if self._may_repeat() and not quiet and self._result is None:
+                self._pace.repeat(self._unanswered, now)
+                self._due = now + self._pace.wait
+                return self._repetition()
             cancel = self._peer.ack(Result.OPERATION_CANCELLED, self._type)
             return [cancel, *self._give_up(now)]
-        reminder = self._reminder()
-        if reminder is not None and self._left > 0 and self._doubt is None:
-            self._left -= 1
-            self._due = now + self._patience()
+        reminder, retries = self._reminder(), self._timeouts.retries
+        if reminder is not None and self._retries_done < retries and self._result is None:
+            self._retries_done += 1
+            self._due = now + self._reminder_wait()
             return [self._item(reminder)]
-        self._end("unknown", self._doubt)
+        self._end("unknown", self._result, self._last_sent())
         return ()
 
-    def _again(self) -> Sequence[Message]:
-        current = self._current
-        if self._peer.firmware == "ardupilot":
-            return [self._item(current)]
-        last = current + min(self._question.repeats, self._room())
-        self._guessing = self._guessing or last > current
-        return [self._item(seq) for seq in range(last, current - 1, -1)]
-
-    def _give_up(self, now: float) -> Sequence[Message]:
-        if self._guessing and self._doubt is not None:
-            self._most_ahead = 0
-            return self.start(now)
-        self._end("silent" if self._doubt is None else "refused", self._doubt)
-        return ()
+    def _repetition(self) -> Sequence[Message]:
+        """Return what is sent when the next request does not come."""
+        last = self._current
+        if self._manners.ignores_other_items:
+            last += min(self._unanswered.repeats, self._room())
+            self._sent_unasked = self._sent_unasked or last > self._current
+        return [self._item(seq) for seq in range(last, self._current - 1, -1)]
 
     @property
     def _current(self) -> int:
-        return self._asked_for + self._ahead
+        """The item that the vehicle waits for, as far as is known: the last one sent in turn."""
+        return self._last_requested + self._ahead
 
-    def _complete(self) -> bool:
-        return len(self._sent) == len(self._rows)
+    def _all_sent(self) -> bool:
+        return len(self._sent) == len(self._items)
 
-    def _repeats(self) -> bool:
-        return self._peer.firmware in _INSISTS and self._asked_for != len(self._rows) - 1
+    def _last_sent(self) -> int | None:
+        return self._current if self._sent else None
+
+    def _may_repeat(self) -> bool:
+        """Tell whether silence of this vehicle tells that something was lost."""
+        is_last = self._last_requested == len(self._items) - 1
+        return math.isfinite(self._manners.request_period) and not is_last
 
     def _room(self) -> int:
-        return max(min(self._most_ahead, len(self._rows) - 2 - self._asked_for), 0)
+        """Return how many items may be sent beyond the one that was asked for."""
+        return max(min(self._most_ahead, len(self._items) - 2 - self._last_requested), 0)
 
-    def _patience(self) -> float:
-        """Return how long to wait for the last answer, before a reminder and after each."""
+    def _reminder(self) -> int | None:
+        """Return the item to send again when the last acknowledgement is missing."""
+        reminder = self._manners.reminder
+        return (
+            None
+            if reminder is None or -reminder > len(self._items)
+            else (len(self._items) + reminder)
+        )
+
+    def _reminder_wait(self) -> float:
+        """Return how long to wait for the last acknowledgement, before and after a reminder, s."""
         if self._reminder() is None:
             return 2 * self._timeouts.response
         first = max(self._timeouts.item, self._pace.wait)
-        return min(first * 2.0 ** (self._timeouts.retries - self._left), self._timeouts.response)
-
-    def _reminder(self) -> int | None:
-        last = len(self._rows) - 1
-        return {"px4": last, "ardupilot": last - 1 if last else None}.get(self._peer.firmware)
-
-    def _announce(self, now: float) -> Sequence[Message]:
-        self._due = now + self._timeouts.response
-        vehicle = self._peer.vehicle
-        return [MissionCount(vehicle.system, vehicle.component, len(self._rows), self._type)]
+        return min(first * 2.0**self._retries_done, self._timeouts.response)
 
     def _item(self, seq: int) -> Message:
         self._sent.add(seq)
-        vehicle = self._peer.vehicle
-        return MissionItemInt(vehicle.system, vehicle.component, seq, self._type, self._rows[seq])
-
-    def _end(self, status: Status, result: int | None = None, opaque_id: int = 0) -> None:
-        said = self._texts.all()
-        last = self._current if self._sent else None
-        self.outcome = Outcome(status, result, last, (), said, opaque_id)
+        return MissionItemInt(self._peer.address, self._type, seq, self._items[seq])

@@ -5,20 +5,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.rows import coordinate_scale, item_of
-from faao_mav.mavlink.transfer.protocol import Firmware, MissionType
+from faao_mav.mavlink.messages import WireItem
+from faao_mav.mavlink.protocol import MissionType
+from faao_mav.mavlink.wire_items import coordinate_scale, home_items, mission_item
 from faao_mav.mission.item import MissionItem
-from faao_mav.plan.autopilots import Kind
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.dialects import storage_known
-from faao_mav.vehicle.storage import as_stored
+from faao_mav.vehicle import VehicleType
 
 DifferenceKind: TypeAlias = Literal["dropped", "wrong"]
 
 _CENTIMETRE = 0.0101
+"""Altitudes that differ by less are equal, m: ArduPilot stores whole centimetres."""
+
 _FLOAT32 = 2e-7
-_ALIASES = {5: 0, 6: 3, 11: 10}
+"""Relative difference of two numbers that single precision does not tell apart."""
+
+_SAME_FRAMES = {5: 0, 6: 3, 11: 10}
+"""Frames with the same meaning: those ending in _INT, and what they are called without."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,28 +48,28 @@ class Difference:
 
 
 def compare(
-    sent: Sequence[Row],
-    found: Sequence[Row],
+    sent: Sequence[WireItem],
+    found: Sequence[WireItem],
     part: MissionType,
-    firmware: Firmware,
-    kind: Kind = "copter",
+    vehicle: VehicleType | None,
 ) -> tuple[Difference, ...]:
-    """Return how the rows `found` on a vehicle differ from those `sent` to it.
+    """Return how the items `found` on a vehicle differ from those `sent` to it.
 
     Not a difference: one step of the integer coordinates, single precision, a centimetre of
     altitude, frames that mean the same (3 and 6), the frame of a command without a place, "not
-    set" read back as 0. ArduPilot's row 0 is its own home: told as dropped where it differs by
+    set" read back as 0. A home item is the vehicle's own: told as dropped where it differs by
     more than a metre or so.
     """
     differences = []
-    home = int(firmware == "ardupilot" and part is MissionType.MISSION)
+    home = home_items(vehicle, part)
     if home and sent and found:
-        differences += _compare_home(item_of(sent[0]), item_of(found[0]))
+        differences += _compare_home(mission_item(sent[0]), mission_item(found[0]))
     if len(sent) != len(found):
-        was, is_ = (max(len(rows) - home, 0) for rows in (sent, found))
+        was, is_ = (max(len(items) - home, 0) for items in (sent, found))
         differences.append(Difference(part, None, "count", was, is_, "wrong"))
-    for index, rows in enumerate(zip(sent[home:], found[home:], strict=False)):
-        differences += _compare_rows(*rows, index, part, firmware, kind)
+    for index, (one, other) in enumerate(zip(sent[home:], found[home:], strict=False)):
+        pair = mission_item(one), mission_item(other)
+        differences += _compare_items(*pair, index, part, vehicle)
     return tuple(differences)
 
 
@@ -81,15 +83,17 @@ def _compare_home(sent: MissionItem, found: MissionItem) -> list[Difference]:
     return [Difference(MissionType.MISSION, None, "home", *places, "dropped")]
 
 
-def _compare_rows(
-    sent_row: Row, found_row: Row, index: int, part: MissionType, firmware: Firmware, kind: Kind
+def _compare_items(
+    sent: MissionItem,
+    found: MissionItem,
+    index: int,
+    part: MissionType,
+    vehicle: VehicleType | None,
 ) -> list[Difference]:
-    sent, found = item_of(sent_row), item_of(found_row)
     stored, unknown = sent, False
-    if firmware != "generic":
-        vehicle = Vehicle(firmware, kind)
-        stored = as_stored(sent, vehicle)
-        unknown = part is MissionType.MISSION and not storage_known(sent.command, vehicle)
+    if vehicle is not None:
+        stored = vehicle.dialect.stored(sent)
+        unknown = part is MissionType.MISSION and not vehicle.dialect.is_known(sent.command)
     differences = []
     for (field, was), is_, kept in zip(
         _fields(sent).items(), _fields(found).values(), _fields(stored).values(), strict=True
@@ -124,7 +128,7 @@ def _same(field: str, one: float, other: float, frame: int) -> bool:
 
 
 def _same_frame(sent: MissionItem, found: int, stored: MissionItem) -> bool:
-    return _ALIASES.get(found, found) in (
-        _ALIASES.get(sent.frame, sent.frame),
-        _ALIASES.get(stored.frame, stored.frame),
+    return _SAME_FRAMES.get(found, found) in (
+        _SAME_FRAMES.get(sent.frame, sent.frame),
+        _SAME_FRAMES.get(stored.frame, stored.frame),
     )

@@ -1,25 +1,31 @@
-"""Missions, fences and rally points as the rows of the mission protocol, and back.
+"""Missions, fences and rally points as the items of the mission protocol, and back.
 
-ArduPilot's row 0 is the home position, PX4 has none. Targets of DO_JUMP count in a `Mission` as
-in mission files, where home is 0 and the first item 1: on PX4 they are one less on the wire.
+A vehicle with a home item (ArduPilot) has its home as item 0, others (PX4) have none. Targets of
+DO_JUMP count in a `Mission` as in mission files, where home is 0 and the first item 1: on PX4 they
+are one less on the wire.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 from faao_mav.errors import InputError
-from faao_mav.mavlink.messages import Row
-from faao_mav.mavlink.transfer.protocol import FIRMWARE_NAMES, Firmware, MissionType
+from faao_mav.mavlink.manners import autopilot_name, manners_of
+from faao_mav.mavlink.messages import WireItem
+from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mission.command import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_POINT, Frame
 from faao_mav.mission.fence import Circle, Fence, Place, Polygon, RallyPoint
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.vehicle.dialects import as_received, as_sent
+from faao_mav.mission.rows import as_received, as_sent
+from faao_mav.vehicle import VehicleType
 
 GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
+"""Frames whose coordinates are latitude and longitude, by their numbers in MAV_FRAME."""
+
 _INT32 = 2**31 - 1
-_FLOAT32 = 2.0**128 - 2.0**104  # the largest single-precision number
+_FLOAT32 = 2.0**128 - 2.0**104
+"""The largest single-precision number."""
 
 
 def coordinate_scale(frame: int) -> float:
@@ -29,8 +35,16 @@ def coordinate_scale(frame: int) -> float:
     return 1.0 if frame == Frame.MISSION else 1e4
 
 
-def rows_of(mission: Mission, mission_type: MissionType, firmware: Firmware) -> tuple[Row, ...]:
-    """Return the rows that `firmware` is sent for one of the lists of `mission`.
+def home_items(vehicle: VehicleType | None, mission_type: MissionType) -> int:
+    """Return how many items before the mission's own a list of `vehicle` has: its home, or none."""
+    has_home = vehicle is not None and vehicle.dialect.home_row
+    return int(has_home and mission_type is MissionType.MISSION)
+
+
+def wire_items(
+    mission: Mission, mission_type: MissionType, vehicle: VehicleType | None
+) -> tuple[WireItem, ...]:
+    """Return what `vehicle` is sent for one of the lists of `mission`.
 
     What is not set (NaN) is 0 for ArduPilot, which refuses NaN and takes 0, 0 for "here". PX4
     would fly to 0, 0. Raises `InputError` for that, and for numbers that the wire does not carry.
@@ -40,42 +54,42 @@ def rows_of(mission: Mission, mission_type: MissionType, firmware: Firmware) -> 
     elif mission_type is MissionType.RALLY:
         items = rally_items(mission.rally)
     else:
-        items = as_sent(mission, home_row=firmware == "ardupilot")
+        items = as_sent(mission, home_row=bool(home_items(vehicle, mission_type)))
     first = 0 if mission_type is MissionType.MISSION else None
     return tuple(
-        row_of(_settled(item, index, firmware), index, current=index == first)
+        wire_item(_without_nan(item, index, vehicle), index, current=index == first)
         for index, item in enumerate(items)
     )
 
 
-def item_of(row: Row) -> MissionItem:
-    """Return `row` as an item."""
-    scale = coordinate_scale(row.frame)
-    params = tuple(map(_finite_or_nan, row.params))
+def mission_item(item: WireItem) -> MissionItem:
+    """Return `item` in degrees, or in the units of its frame."""
+    scale = coordinate_scale(item.frame)
+    params = tuple(map(_finite_or_nan, item.params))
     return MissionItem(
-        row.command,
-        row.frame,
+        item.command,
+        item.frame,
         (params[0], params[1], params[2], params[3]),
-        row.x / scale,
-        row.y / scale,
-        _finite_or_nan(row.z),
-        bool(row.autocontinue),
+        item.x / scale,
+        item.y / scale,
+        _finite_or_nan(item.z),
+        bool(item.autocontinue),
     )
 
 
 def mission_of(
-    rows: Sequence[Row],
-    fence: Sequence[Row],
-    rally: Sequence[Row],
-    firmware: Firmware,
+    lists: Mapping[MissionType, Sequence[WireItem]], vehicle: VehicleType | None
 ) -> Mission:
-    """Return the mission that three downloaded lists make.
+    """Return the mission that the `lists` downloaded from `vehicle` make; one may be missing.
 
     Raises `InputError` for a fence that is none.
     """
-    flown = as_received([item_of(row) for row in rows], home_row=firmware == "ardupilot")
-    points = tuple(RallyPoint(item.x, item.y, item.z) for item in map(item_of, rally))
-    return replace(flown, fence=_fence_of([item_of(row) for row in fence]), rally=points)
+    flown, fence, rally = (
+        [mission_item(item) for item in lists.get(mission_type, ())] for mission_type in MissionType
+    )
+    mission = as_received(flown, home_row=bool(home_items(vehicle, MissionType.MISSION)))
+    points = tuple(RallyPoint(item.x, item.y, item.z) for item in rally)
+    return replace(mission, fence=_fence_of(fence), rally=points)
 
 
 def fence_items(fence: Fence) -> tuple[MissionItem, ...]:
@@ -136,24 +150,23 @@ def _place_item(
     return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), x, y, z)
 
 
-def _settled(item: MissionItem, index: int, firmware: Firmware) -> MissionItem:
+def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:
     values = (*item.params, item.x, item.y, item.z)
     if not any(map(math.isnan, values)):
         return item
-    if firmware == "ardupilot":
+    if manners_of(vehicle).unset_is_zero:
         one, two, three, four, x, y, z = (0.0 if math.isnan(value) else value for value in values)
-        params = (one, two, three, four)
-        return MissionItem(item.command, item.frame, params, x, y, z, item.autocontinue)
+        return replace(item, params=(one, two, three, four), x=x, y=y, z=z)
     if item.frame in GLOBAL_FRAMES and (math.isnan(item.x) or math.isnan(item.y)):
         raise InputError(
-            f"item {index}: latitude or longitude is not set; {FIRMWARE_NAMES[firmware]} would "
+            f"item {index}: latitude or longitude is not set; {autopilot_name(vehicle)} would "
             "fly to 0, 0: give the place"
         )
     return item
 
 
-def row_of(item: MissionItem, index: int, *, current: bool = False) -> Row:
-    """Return `item`, number `index` of its list, as a row.
+def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireItem:
+    """Return `item`, number `index` of its list, as the wire carries it.
 
     Raises `InputError` for numbers that the wire does not carry.
     """
@@ -168,7 +181,7 @@ def row_of(item: MissionItem, index: int, *, current: bool = False) -> Row:
         raise InputError(
             f"item {index}: params {item.params}, z {item.z}; expected single-precision numbers"
         )
-    return Row(
+    return WireItem(
         item.command, item.frame, item.params, x, y, item.z, int(current), int(item.autocontinue)
     )
 

@@ -1,12 +1,13 @@
 """The mock autopilot: a vehicle without sockets or clock."""
 
 from collections.abc import Callable, Mapping, Sequence
-from enum import IntEnum
 from typing import TypeAlias
 
 import numpy as np
 
+from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import (
+    Addressed,
     AutopilotVersion,
     CommandAck,
     CommandLong,
@@ -22,20 +23,22 @@ from faao_mav.mavlink.messages import (
     SetMode,
     Statustext,
 )
-from faao_mav.mavlink.mock.ardupilot import ArduPilotServer
-from faao_mav.mavlink.mock.feasible import infeasible
+from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
 from faao_mav.mavlink.mock.flight import Flight, Posture, telemetry
-from faao_mav.mavlink.mock.lists import Lists
-from faao_mav.mavlink.mock.manners import Manners
-from faao_mav.mavlink.mock.modes import Modes, whole
-from faao_mav.mavlink.mock.parameters import Parameters
-from faao_mav.mavlink.mock.px4 import Px4Server
-from faao_mav.mavlink.rows import mission_of
-from faao_mav.mavlink.transfer.protocol import ARMED, Address, Autopilot, MissionType, State
+from faao_mav.mavlink.mock.parameters import ParameterServer
+from faao_mav.mavlink.protocol import (
+    ARMED,
+    GROUND_STATION,
+    HOME_POSITION,
+    Address,
+    MavCommand,
+    MavSeverity,
+    MavState,
+    MissionType,
+)
+from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.item import Home, Mission
-from faao_mav.plan.autopilots import Autopilot as Family
-from faao_mav.plan.autopilots import Kind
-from faao_mav.vehicle import Track, Vehicle
+from faao_mav.vehicle import Track, vehicle_type
 
 Fly: TypeAlias = Callable[[Mission], Track]
 
@@ -43,45 +46,35 @@ ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 """MAV_RESULT."""
 
 
-class Cmd(IntEnum):
-    """MAV_CMD outside of missions."""
+_AUTOPILOT_VERSION = 148
+"""The number of the message AUTOPILOT_VERSION."""
 
-    SET_MODE = 176
-    SET_CURRENT = 224
-    REBOOT = 246
-    START = 300
-    ARM = 400
-    SET_INTERVAL = 511
-    REQUEST_MESSAGE = 512
-    REQUEST_CAPABILITIES = 520
+_CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
+"""MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
 
-
-_AUTOPILOT_VERSION, _HOME_POSITION = 148, 242
-_MAV_TYPES: dict[Kind, int] = {"copter": 2, "plane": 1}  # quadrotor, fixed wing
-_INFO = 6
 # MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
 _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
 _AT_REST = Posture(np.zeros(3), np.zeros(3), 0)
 
 
-class MockAutopilot:
+class MockAutopilot(Machine[None]):
     """It takes missions as ArduPilot or PX4 does, and flies them along `fly`'s track.
 
     `aircraft` is what its heartbeats say that it is, and whose missions it stores.
     It boots for `boot` seconds, in which it refuses lists. Armed and set to the mission it flies
     what it holds, `speedup` times as fast as predicted, reports its position `rate` times a
     second, and disarms where the flight ends on the ground. Heartbeats are `beat` seconds apart.
-    `parameters` are told beside its defaults; what they do to the flight is up to `fly`.
+    `parameters` are told beside its defaults; what they do to the flight is up to `fly`. `armed`
+    tells whether the motors may turn.
     """
 
-    outcome: None = None
     progress = ("flying", 0, 0)
 
     def __init__(
         self,
-        manners: Manners | None = None,
+        behaviour: Behaviour,
         *,
-        aircraft: Kind = "copter",
+        aircraft: str = "copter",
         address: Address = Address(1, 1),  # noqa: B008
         home: Home = Home(-35.363262, 149.165237, 584.0),  # noqa: B008
         fly: Fly | None = None,
@@ -91,24 +84,21 @@ class MockAutopilot:
         beat: float = 1.0,
         boot: float = 0.0,
     ) -> None:
-        self.manners = manners or Manners()
-        self.address, self.home = address, home
-        autopilot: Family = "ardupilot" if self.manners.kind == "ardupilot" else "px4"
-        self._modes, self._type = Modes(autopilot, aircraft), _MAV_TYPES[aircraft]
-        self.lists = Lists(Vehicle(autopilot, aircraft), home)
-        self.parameters = Parameters(autopilot, parameters)
-        self._server: ArduPilotServer | Px4Server = (
-            ArduPilotServer(self.lists, self.manners, self._is_ready, self._is_flying)
-            if autopilot == "ardupilot"
-            else Px4Server(self.lists, self.manners)
-        )
+        super().__init__()
+        self.behaviour, self.address, self.home = behaviour, address, home
+        self.vehicle = vehicle_type(behaviour.family.key, aircraft)
+        self._mode, self._mission_mode = behaviour.firmware.modes[aircraft]
+        self.lists = StoredLists(self.vehicle, home)
+        known = self.vehicle.defaults() | dict(behaviour.firmware.parameters)
+        self.parameters = ParameterServer(known | dict(parameters or {}))
+        self._firmware = behaviour.firmware(self.lists, behaviour, self._is_ready, self._is_flying)
         self._fly, self._speedup = fly, speedup
         self._period = 1 / rate if rate > 0 else None
         self._beat = beat
         self._boot = boot
         self._booted = self._ready_at = self._now = 0.0
         self._next_beat = self._next_report = 0.0
-        self._armed = False
+        self.armed = False
         self._current = 0
         self._flight: Flight | None = None
 
@@ -120,14 +110,9 @@ class MockAutopilot:
             due.append(self._next_report)
         if self._flight is not None:
             due.append(self._flight.next_event)
-        if self._server.deadline is not None:
-            due.append(self._server.deadline)
+        if self._firmware.deadline is not None:
+            due.append(self._firmware.deadline)
         return min(due)
-
-    @property
-    def armed(self) -> bool:
-        """Whether the motors may turn."""
-        return self._armed
 
     def start(self, now: float) -> Sequence[Message]:
         """Boot."""
@@ -137,18 +122,13 @@ class MockAutopilot:
 
     def reboot(self, now: float) -> None:
         """Begin anew; what is stored stays, what is under way is lost."""
-        self._server.reset()
-        self._armed, self._flight, self._current = False, None, 0
+        self._firmware.reset()
+        self.armed, self._flight, self._current = False, None, 0
         self._booted, self._ready_at = now, now + self._boot
 
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Say nothing: a vehicle does not take leave."""
-        return ()
-
-    def tick(self, now: float) -> Sequence[Message]:
-        """Send what is due."""
+    def _time_out(self, now: float) -> Sequence[Message]:
         self._now = now
-        out: list[Message] = list(self._server.tick(now))
+        out: list[Message] = list(self._firmware.tick(now))
         if self._flight is not None:
             out += self._follow(self._flight, now)
         if now >= self._next_beat:
@@ -159,34 +139,41 @@ class MockAutopilot:
             out += telemetry(self._posture(now), self.home, now - self._booted)
         return out
 
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Answer what is addressed to this vehicle."""
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self._now = now
         sender, message = envelope.sender, envelope.message
-        system = getattr(message, "target_system", None)
-        component = getattr(message, "target_component", 0)
+        if isinstance(message, SetMode):
+            target = Address(message.target_system, 0)
+        elif isinstance(message, Addressed):
+            target = message.target
+        else:
+            return ()
         own = self.address
-        for_me = system in (0, own.system) and component in (0, own.component, 190)
-        if not for_me or sender == own:
+        as_planner = Address(own.system, GROUND_STATION.component)  # PX4 takes it for its own
+        if sender == own or not (own.takes(target) or as_planner.takes(target)):
             return ()
         match message:
             case CommandLong():
                 return self._on_command(sender, message, now)
             case SetMode(custom_mode=mode):
                 result = self._set_mode(mode, now)
-                return [CommandAck(11, result, sender.system, sender.component)]
+                return [CommandAck(sender, 11, result)]  # the number of the message SET_MODE
             case ParamRequestList() | ParamRequestRead() | ParamSet():
                 return self.parameters.on(message)
             case MissionSetCurrent(seq=seq):
                 return self._set_current(seq)
-        if not self._is_ready() and isinstance(self._server, Px4Server):
+        if self._firmware.silent_at_boot and not self._is_ready():
             return ()
-        return self._server.on(envelope, now)
+        return self._firmware.on(envelope, now)
 
     def mission(self) -> Mission:
         """Return what is stored, as a mission."""
-        rows = [self.lists.rows(part) for part in MissionType]
-        return mission_of(rows[0], rows[1], rows[2], self._modes.autopilot)
+        return mission_of({part: self.lists.items(part) for part in MissionType}, self.vehicle)
+
+    @property
+    def _is_mission(self) -> bool:
+        """Whether the mode is to fly the mission."""
+        return self._mode == self._mission_mode
 
     def _is_ready(self) -> bool:
         return self._now >= self._ready_at
@@ -197,35 +184,35 @@ class MockAutopilot:
     def _on_command(self, sender: Address, command: CommandLong, now: float) -> list[Message]:
         result, answers = ACCEPTED, list[Message]()
         match command.command:
-            case Cmd.ARM:
+            case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
-            case Cmd.START:
-                self._modes.set_mission()
+            case MavCommand.START:
+                self._mode = self._mission_mode
                 result = self._begin(now)
-            case Cmd.SET_MODE:
-                result = self._set_mode(self._modes.of_command(command), now)
-            case Cmd.SET_CURRENT:
+            case MavCommand.SET_MODE:
+                result = self._set_mode(self._firmware.requested_mode(command), now)
+            case MavCommand.SET_CURRENT:
                 found = self._set_current(whole(command.param1))
                 result = ACCEPTED if found else DENIED
                 answers += found
-            case Cmd.REQUEST_MESSAGE | Cmd.REQUEST_CAPABILITIES as asked:
-                by_number = asked == Cmd.REQUEST_MESSAGE
+            case MavCommand.REQUEST_MESSAGE | MavCommand.REQUEST_CAPABILITIES as asked:
+                by_number = asked == MavCommand.REQUEST_MESSAGE
                 kind = whole(command.param1) if by_number else _AUTOPILOT_VERSION
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
-            case Cmd.SET_INTERVAL:
+            case MavCommand.SET_INTERVAL:
                 pass
-            case Cmd.REBOOT:
+            case MavCommand.REBOOT:
                 self.reboot(now)
             case _:
                 result = UNSUPPORTED
-        ack = CommandAck(command.command, result, sender.system, sender.component)
+        ack = CommandAck(sender, command.command, result)
         return [ack, *answers]
 
     def _asked_for(self, kind: int) -> list[Message]:
         if kind == _AUTOPILOT_VERSION:
             return [AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
-        if kind == _HOME_POSITION:
+        if kind == HOME_POSITION:
             home = self.home
             place = (round(home.latitude * 1e7), round(home.longitude * 1e7))
             return [HomePosition(*place, round(home.altitude * 1000))]
@@ -233,18 +220,18 @@ class MockAutopilot:
 
     def _arm(self, wanted: bool, now: float) -> int:
         if not wanted:
-            self._armed, self._flight = False, None
+            self.armed, self._flight = False, None
             return ACCEPTED
         if not self._is_ready():
             return REJECTED
-        self._armed = True
-        return self._begin(now) if self._modes.is_mission else ACCEPTED
+        self.armed = True
+        return self._begin(now) if self._is_mission else ACCEPTED
 
     def _set_mode(self, mode: int, now: float) -> int:
-        if self._modes.would_be_mission(mode) and self._problem() is not None:
+        if mode == self._mission_mode and self._problem() is not None:
             return DENIED
-        self._modes.custom_mode = mode
-        if not self._modes.is_mission:
+        self._mode = mode
+        if not self._is_mission:
             self._flight = None
             return ACCEPTED
         return self._begin(now)
@@ -254,13 +241,13 @@ class MockAutopilot:
         mission = self.mission()
         if not mission.items:
             return "no mission"
-        return infeasible(mission) if self._modes.autopilot == "px4" else None
+        return self._firmware.infeasible(mission)
 
     def _begin(self, now: float) -> int:
         """Fly, once armed and told to; not a second time."""
         if self._problem() is not None or self._fly is None:
             return DENIED
-        if self._armed and self._flight is None:
+        if self.armed and self._flight is None:
             mission = self.mission()
             track = self._fly(Mission(mission.items, self.home, mission.fence, mission.rally))
             self._flight = Flight(track, mission.items, now, self._speedup)
@@ -273,34 +260,34 @@ class MockAutopilot:
             self._current = current
             out.append(self._mission_current())
         if now >= flight.end and flight.lands:
-            self._flight, self._armed = None, False
-            out.append(Statustext(_INFO, "Landed, disarming"))
+            self._flight, self.armed = None, False
+            out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
             out.append(self._heartbeat())
         return out
 
     def _first_number(self) -> int:
-        return int(self._modes.autopilot == "ardupilot")
+        return home_items(self.vehicle, MissionType.MISSION)
 
     def _posture(self, now: float) -> Posture:
         return _AT_REST if self._flight is None else self._flight.at(now)
 
     def _set_current(self, seq: int) -> list[Message]:
-        if not 0 <= seq < len(self.lists.rows(MissionType.MISSION)):
+        if not 0 <= seq < len(self.lists.items(MissionType.MISSION)):
             return []
         self._current = seq
         return [self._mission_current()]
 
     def _mission_current(self) -> Message:
-        total = len(self.lists.rows(MissionType.MISSION)) - self._first_number()
+        total = len(self.lists.items(MissionType.MISSION)) - self._first_number()
         # MISSION_STATE: none, not started, active
         state = 1 if total == 0 else 3 if self._flight is not None else 2
         return MissionCurrent(self._current, max(total, 0), state)
 
     def _heartbeat(self) -> Message:
         if not self._is_ready():
-            state = State.CALIBRATING
+            state = MavState.CALIBRATING
         else:
-            state = State.ACTIVE if self._armed else State.STANDBY
-        autopilot = Autopilot.ARDUPILOT if self._modes.autopilot == "ardupilot" else Autopilot.PX4
-        base_mode = self._modes.base_mode | (ARMED if self._armed else 0)
-        return Heartbeat(self._type, autopilot, base_mode, self._modes.custom_mode, state)
+            state = MavState.ACTIVE if self.armed else MavState.STANDBY
+        autopilot = self.vehicle.family.mav_autopilot
+        base_mode = _CUSTOM_MODE | _AUTO * self._is_mission | ARMED * self.armed
+        return Heartbeat(self.vehicle.mav_types[0], autopilot, base_mode, self._mode, state)

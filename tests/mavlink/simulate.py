@@ -9,8 +9,7 @@ from typing import Any
 from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.faults import Channel, Faults
 from faao_mav.mavlink.messages import Envelope, Message
-from faao_mav.mavlink.transfer.protocol import Address
-from faao_mav.mavlink.transfer.transfer import Machine
+from faao_mav.mavlink.protocol import Address
 
 _STEP = 1e-3  # s, least time between two ticks of a machine that stays due
 
@@ -19,7 +18,7 @@ _STEP = 1e-3  # s, least time between two ticks of a machine that stays due
 class Station:
     """A machine on a simulated link, and the address that it speaks from."""
 
-    machine: Machine[Any]
+    machine: Any
     address: Address
 
 

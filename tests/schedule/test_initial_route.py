@@ -1,35 +1,38 @@
-"""The first legs for a trajectory."""
+"""The initial route for a trajectory."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from relay_flights import STEADY, dash, dash_hover_dash, items_of, plan_with
+from relay_flights import STEADY, Trajectory, dash, dash_hover_dash, items_of, plan_with
 
+from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.schedule import assemble, plan_route
-from faao_mav.schedule.hover import find_hovers
-from faao_mav.schedule.outline import Splines
+from faao_mav.plan import Plan
+from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.initial_route import Splines, initial_route
+from faao_mav.schedule.route import Route
+from faao_mav.schedule.waypoints import find_hovers
 from faao_mav.vector import distances_to_segment, lengths
-from faao_mav.vehicle.legs import ArduCopterLegs
+from faao_mav.vehicle import Vehicle
 
 STEP = 0.2
 
 
-def path_error(w, waypoints):
+def path_error(w: Real, waypoints: Real) -> float:
     """The greatest distance of a sample from the polyline through the waypoints."""
     ends = zip(waypoints, [*waypoints[1:], waypoints[-1]], strict=True)
-    return np.min([distances_to_segment(w, a, b) for a, b in ends], axis=0).max()
+    return float(np.min([distances_to_segment(w, a, b) for a, b in ends], axis=0).max())
 
 
-def nominal(route):
+def nominal(route: Route) -> float:
     """How long the route takes without ramps, s."""
-    return route.holds.sum() + (route.leg_lengths / route.speeds).sum()
+    return float(route.waits.sum() + (route.leg_lengths / route.speeds).sum())
 
 
-def check(t, w, plan):
+def check(t: Real, w: Real, plan: Plan) -> Route:
     """What holds of every conversion; returns the route."""
-    route = plan_route(t, w, plan)
+    route = initial_route(t, w, plan)
     positions, speeds, holds = items_of(assemble(route, plan), plan)
     assert positions == pytest.approx(route.positions, abs=1e-3)
     assert path_error(w, positions) <= plan.mission.path_tolerance
@@ -45,11 +48,11 @@ def check(t, w, plan):
 
 
 @st.composite
-def trajectories(draw):
+def trajectories(draw: st.DrawFn) -> Trajectory:
     """Smooth flights within 8 m/s and 1.5 m/s², with stops here and there."""
     n = draw(st.one_of(st.integers(2, 20), st.integers(20, 600)))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    t = STEP * np.arange(n) + draw(st.floats(0, 100))
+    t = STEP * np.arange(float(n)) + draw(st.floats(0, 100))
     pieces = draw(st.integers(1, 8))
     top = rng.uniform(0, 1, pieces) * rng.integers(0, 2, pieces)
     speed = np.interp(t, np.linspace(t[0], t[-1], pieces), 8 * top)
@@ -58,7 +61,8 @@ def trajectories(draw):
     for k in range(1, n):
         change = v[k] - v[k - 1]
         v[k] = v[k - 1] + change * min(1, 1.5 * STEP / max(np.hypot(*change), 1e-12))
-    return t, rng.uniform(-300, 300, 2) + np.cumsum(v, axis=0) * STEP
+    w: Real = rng.uniform(-300, 300, 2) + np.cumsum(v, axis=0) * STEP
+    return t, w
 
 
 @STEADY
@@ -68,7 +72,9 @@ def trajectories(draw):
     st.floats(0.1, 20),
     st.sampled_from([8.0, 7.9999, 5.0]),
 )
-def test_any_flight_keeps_to_its_path(trajectory, autopilot, tolerance, max_speed):
+def test_any_flight_keeps_to_its_path(
+    trajectory: Trajectory, autopilot: str, tolerance: float, max_speed: float
+) -> None:
     plan = plan_with(
         autopilot=autopilot, path_tolerance=tolerance, max_speed=max_speed, max_items=5000
     )
@@ -87,71 +93,73 @@ def test_any_flight_keeps_to_its_path(trajectory, autopilot, tolerance, max_spee
     ),
     st.floats(0.1, 5),
 )
-def test_any_polygon_keeps_to_its_path(points, tolerance):
+def test_any_polygon_keeps_to_its_path(
+    points: list[tuple[float, float, float]], tolerance: float
+) -> None:
     # Not flyable, and so what a converter is most likely to stumble over.
     w = np.array([p[:2] for p in points])
     t = np.cumsum([0.2 + p[2] for p in points])
     check(t, w, plan_with(path_tolerance=tolerance))
 
 
-def test_dash_hover_dash():
+def test_dash_hover_dash() -> None:
     t, w = dash_hover_dash(hover=40.0)
     route = check(t, w, plan_with())
-    assert route.holds.sum() == pytest.approx(40, abs=1)
-    assert np.count_nonzero(route.holds) == 1
-    assert route.positions[np.argmax(route.holds)] == pytest.approx([150.0, 150.0], abs=0.05)
+    assert route.waits.sum() == pytest.approx(40, abs=1)
+    assert np.count_nonzero(route.waits) == 1
+    assert route.positions[np.argmax(route.waits)] == pytest.approx([150.0, 150.0], abs=0.05)
     assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1)
     assert route.distance == pytest.approx(500, abs=1)
     assert route.positions == pytest.approx(np.array([w[0], [150.0, 150.0], w[-1]]), abs=0.05)
 
 
-def test_hovers_at_both_ends_are_holds():
+def test_hovers_at_both_ends_are_holds() -> None:
     t = np.arange(0, 100, STEP)
     w = np.outer(dash(0, 200, 8, 1.5, np.maximum(t - 20.3, 0)), [1.0, 0.0])
     route = check(t, w, plan_with())
     flight = 200 / 8 + 8 / 1.5
-    assert route.holds[0] == pytest.approx(20.3, abs=1)
-    assert route.holds[-1] == pytest.approx(t[-1] - 20.3 - flight, abs=1)
-    assert route.holds[1:-1].sum() == 0
+    assert route.waits[0] == pytest.approx(20.3, abs=1)
+    assert route.waits[-1] == pytest.approx(t[-1] - 20.3 - flight, abs=1)
+    assert route.waits[1:-1].sum() == 0
     assert nominal(route) == pytest.approx(t[-1], abs=1)
 
 
-def test_what_holds_lose_to_rounding_is_carried_on():
+def test_what_holds_lose_to_rounding_is_carried_on() -> None:
     # Six hovers of 5.45 s each: 5 s every time would be 2.7 s early in the end.
     lasting = 60 / 5 + 5 / 1.5
     period = lasting + 5.45
     t = np.arange(0, 6 * period, 0.05)
     s = sum(dash(0, 60, 5, 1.5, np.maximum(t - k * period, 0)) for k in range(6))
     route = check(t, np.outer(s, [0.0, 1.0]), plan_with())
-    holds = route.holds[route.holds > 0]
+    holds = route.waits[route.waits > 0]
     assert len(holds) == 6
     assert set(holds) == {5.0, 6.0}
     assert nominal(route) == pytest.approx(t[-1], abs=1)
 
 
-def test_a_creep_is_a_leg_and_no_hover():
+def test_a_creep_is_a_leg_and_no_hover() -> None:
     t = np.arange(0, 60, STEP)
     route = check(t, np.outer(0.25 * t, [0.0, 1.0]), plan_with())
     assert len(route.positions) == 2
     assert route.speeds == pytest.approx([0.25])
-    assert route.holds.sum() == 0
+    assert route.waits.sum() == 0
 
 
-def test_a_crawl_below_any_speed_keeps_its_time():
+def test_a_crawl_below_any_speed_keeps_its_time() -> None:
     t = np.arange(0, 200, STEP)
     w = np.outer(0.05 * t, [0.0, 1.0])
     route = check(t, w, plan_with())
     assert nominal(route) == pytest.approx(t[-1], abs=1)
 
 
-def test_a_turn_back_on_the_same_line_is_seen():
+def test_a_turn_back_on_the_same_line_is_seen() -> None:
     t = np.arange(0, 60, STEP)
     w = np.outer(dash(0, 150, 8, 1.5, t) - dash(0, 150, 8, 1.5, np.maximum(t - 30, 0)), [1.0, 1.0])
     route = check(t, w, plan_with())
     assert route.positions[:, 0].max() == pytest.approx(150, abs=2)
 
 
-def test_a_circle_has_legs_of_one_length():
+def test_a_circle_has_legs_of_one_length() -> None:
     t = np.linspace(0, 2 * np.pi * 30 / 6, 300)
     w = 30 * np.stack([np.cos(t / 5), np.sin(t / 5)], axis=1)
     route = check(t, w, plan_with(path_tolerance=1.0))
@@ -160,24 +168,24 @@ def test_a_circle_has_legs_of_one_length():
     assert nominal(route) == pytest.approx(t[-1], abs=1)
 
 
-def test_a_flight_that_stays_is_one_waypoint():
+def test_a_flight_that_stays_is_one_waypoint() -> None:
     t = np.arange(0, 60, STEP)
     route = check(t, np.full((len(t), 2), 12.5), plan_with())
     assert route.positions.shape == (1, 2)
-    assert route.holds == pytest.approx([60])
+    assert route.waits == pytest.approx([60])
     assert route.distance == 0
     assert nominal(route) == pytest.approx(60)
 
 
-def test_a_small_loop_within_the_tolerance_is_a_hold():
+def test_a_small_loop_within_the_tolerance_is_a_hold() -> None:
     t = np.linspace(0, 2 * np.pi, 100)
     w = 0.8 * np.stack([np.cos(t), np.sin(t)], axis=1)
     route = check(t, w, plan_with())
     assert len(route.positions) == 1
-    assert route.holds == pytest.approx([6])
+    assert route.waits == pytest.approx([6])
 
 
-def test_two_ends_within_one_hover():
+def test_two_ends_within_one_hover() -> None:
     t = np.arange(0, 60, STEP)
     route = check(t, np.outer(t / 60, [0.5, 0.0]), plan_with())
     assert len(route.positions) == 2
@@ -186,15 +194,15 @@ def test_two_ends_within_one_hover():
 
 @pytest.mark.parametrize("w", [[[0, 0], [0, 0]], [[0, 0], [0.5, 0]], [[0, 0], [50, 0]]])
 @pytest.mark.parametrize("lasting", [0.2, 20.0])
-def test_two_samples(w, lasting):
+def test_two_samples(w: list[list[float]], lasting: float) -> None:
     check(np.array([0.0, lasting]), np.array(w, dtype=float), plan_with())
 
 
-def test_a_speed_is_rounded_down_at_the_limit():
+def test_a_speed_is_rounded_down_at_the_limit() -> None:
     t = np.arange(0, 20, STEP)
-    route = plan_route(t, np.outer(7.9999 * t, [1.0, 0.0]), plan_with(max_speed=7.9999))
+    route = initial_route(t, np.outer(7.9999 * t, [1.0, 0.0]), plan_with(max_speed=7.9999))
     assert route.speeds == pytest.approx([7.999], abs=1e-12)
-    route = plan_route(t, np.outer(t, [1.0, 0.0]), plan_with(max_speed=0.0004))
+    route = initial_route(t, np.outer(t, [1.0, 0.0]), plan_with(max_speed=0.0004))
     assert route.speeds == pytest.approx([0.0004])
 
 
@@ -207,14 +215,16 @@ def test_a_speed_is_rounded_down_at_the_limit():
         ([0.0, 0.0], [[0.0, 0.0], [1.0, 0.0]], "increase"),
     ],
 )
-def test_what_is_no_trajectory_is_refused(t, w, message):
+def test_what_is_no_trajectory_is_refused(
+    t: list[float], w: list[list[float]], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
-        plan_route(t, w, plan_with())
+        initial_route(t, w, plan_with())
 
 
-def test_hovers_stay_in_their_radius():
+def test_hovers_stay_in_their_radius() -> None:
     rng = np.random.default_rng(1)
-    t = STEP * np.arange(2000)
+    t = STEP * np.arange(2000.0)
     w = np.cumsum(rng.normal(0, 0.004, (2000, 2)), axis=0)
     hovers = find_hovers(t, w, 0.5)
     assert hovers
@@ -223,7 +233,7 @@ def test_hovers_stay_in_their_radius():
         assert t[hover.last] - t[hover.first] >= 3
 
 
-def bent_at_45_degrees():
+def bent_at_45_degrees() -> Trajectory:
     """300 m east, a bend of 50 m radius, 300 m north-east; at 6 m/s throughout."""
     s = np.arange(0.0, 640.0, 1.0)
     turn = np.clip((s - 300) / 50, 0, np.pi / 4)
@@ -232,9 +242,9 @@ def bent_at_45_degrees():
     return s / 6, np.stack([x, y], axis=-1)
 
 
-def test_splines_everywhere_are_closer_in_bends():
+def test_splines_everywhere_are_closer_in_bends() -> None:
     t, w = bent_at_45_degrees()
-    route = plan_route(t, w, plan_with(), splines=Splines(15.0, 40.0))
+    route = initial_route(t, w, plan_with(), splines=Splines(15.0, 40.0))
     assert route.splines.tolist() == [False] + [True] * (len(route.positions) - 1)
     middle = (route.positions[1:, 0] + route.positions[:-1, 0]) / 2
     in_bend = (middle > 300) & (middle < 336)
@@ -244,9 +254,9 @@ def test_splines_everywhere_are_closer_in_bends():
     assert path_error(w, route.positions) < 1
 
 
-def test_splines_only_where_legs_are_too_short():
+def test_splines_only_where_legs_are_too_short() -> None:
     t, w = bent_at_45_degrees()
-    route = plan_route(t, w, plan_with(), splines=Splines(15.0, 40.0, ArduCopterLegs()))
+    route = initial_route(t, w, plan_with(), splines=Splines(15.0, 40.0, Vehicle().legs))
     assert route.splines.any()
     assert not route.splines.all()
     straight = ~route.splines[1:]
@@ -258,10 +268,12 @@ def test_splines_only_where_legs_are_too_short():
 
 @given(trajectories(), st.floats(5, 60), st.floats(0, 100), st.booleans())
 @STEADY
-def test_any_flight_can_have_splines(trajectory, spacing, braking, everywhere):
+def test_any_flight_can_have_splines(
+    trajectory: Trajectory, spacing: float, braking: float, everywhere: bool
+) -> None:
     t, w = trajectory
-    straight = None if everywhere else ArduCopterLegs()
-    route = plan_route(t, w, plan_with(), splines=Splines(spacing, braking, straight))
+    straight = None if everywhere else Vehicle().legs
+    route = initial_route(t, w, plan_with(), splines=Splines(spacing, braking, straight))
     assert len(route.splines) == len(route.positions)
     assert not route.splines[0]
     assert route.positions[0] == pytest.approx(w[0])

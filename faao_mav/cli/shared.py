@@ -1,0 +1,75 @@
+"""What the commands share: options, exit statuses, messages."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
+
+import typer
+
+from faao_mav.errors import FaaoError, InputError
+
+
+def option(value: str, text: str, *names: str, **limits: Any) -> Any:
+    """Return an option: what its value is called in the help, and what the option does."""
+    return typer.Option(*names, metavar=value, help=text, **limits)
+
+
+def flag(name: str, text: str) -> Any:
+    """Return an option without a value: its name, and what it does."""
+    return typer.Option(name, help=text)
+
+
+VEHICLE = "The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD."
+"""The help of an option for a vehicle's connection."""
+
+Number: TypeAlias = float | None
+File: TypeAlias = Path | None
+System: TypeAlias = Annotated[
+    int | None, option("N", "The vehicle's system number.", min=1, max=255)
+]
+AllowArmed: TypeAlias = Annotated[
+    bool, flag("--allow-armed", "Replace the mission of an armed vehicle too.")
+]
+Component: TypeAlias = Annotated[
+    int | None, option("N", "The autopilot's component number.", min=1, max=255)
+]
+Log: TypeAlias = Annotated[File, option("F.tlog", "Write a log of the exchange.")]
+Wait: TypeAlias = Annotated[float, option("S", "How long to wait for the vehicle, s.", min=0.1)]
+SigningKey: TypeAlias = Annotated[
+    File, option("F", "File with the key for signed packets: 32 bytes, or in hex.")
+]
+Whose: TypeAlias = Annotated[
+    str | None, option("NAME", "Whose mission it is: ardupilot or px4.", "--autopilot")
+]
+Aircraft: TypeAlias = Annotated[
+    str | None, option("NAME", "What flies it: copter or plane.", "--type")
+]
+AsJson: TypeAlias = Annotated[bool, flag("--json", "Print one JSON object instead of the text.")]
+
+
+@contextmanager
+def exit_status() -> Iterator[None]:
+    """Turn the errors of a command's work into a message and an exit status.
+
+    2: `InputError`, unusable arguments or input; 1: any other `FaaoError`, the answer is no.
+    """
+    try:
+        yield
+    except FaaoError as error:
+        note(str(error))
+        raise typer.Exit(2 if isinstance(error, InputError) else 1) from None
+
+
+def check_known(autopilot: str | None, kind: str | None) -> None:
+    """Raise `InputError` for --autopilot or --type of which no vehicle is known."""
+    from faao_mav.plan.autopilots import autopilots, types
+
+    for name, value, known in (("autopilot", autopilot, autopilots()), ("type", kind, types())):
+        if value is not None and value not in known:
+            raise InputError(f"--{name} {value}: expected {' or '.join(known)}")
+
+
+def note(message: str) -> None:
+    """Say something that the result does not say, on standard error."""
+    typer.echo(f"faao-mission: {message}", err=True)

@@ -1,0 +1,193 @@
+"""How ArduPilot takes and gives lists."""
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from faao_mav.mavlink.messages import (
+    Envelope,
+    ListMessage,
+    Message,
+    MissionAck,
+    MissionClearAll,
+    MissionCount,
+    MissionItemInt,
+    MissionRequestInt,
+    MissionRequestList,
+    MissionWritePartialList,
+    Statustext,
+    WireItem,
+)
+from faao_mav.mavlink.mock.firmware import MockFirmware
+from faao_mav.mavlink.protocol import ALL_TYPES, Address, MavSeverity, MissionType, Result
+from faao_mav.vehicle.ardupilot.family import ARDUPILOT
+
+
+@dataclass(slots=True)
+class _Receiving:
+    """An upload under way; `fence` collects what takes effect only as a whole."""
+
+    partner: Address
+    next_sequence: int
+    last_sequence: int
+    last_item_time: float
+    last_request_time: float
+    fence: list[WireItem]
+
+
+class ArduPilotFirmware(MockFirmware):
+    """ArduPilot: each list has an upload of its own, and one partner at a time.
+
+    A mission is changed item by item: an upload that stops half-way leaves new and old items mixed.
+    """
+
+    family = ARDUPILOT
+    mission_limit = 655  # as in its simulator
+    modes = MappingProxyType({"copter": (0, 3), "plane": (2, 10)})  # COPTER_MODE, PLANE_MODE
+    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
+    misplaced = Result.UNSUPPORTED
+    thin_polygon = Result.INVALID_PARAM1
+    nonsense = Result.INVALID
+
+    @property
+    def deadline(self) -> float | None:
+        """When the next request or the end of patience is due."""
+        return min(map(self._due, self._uploads.values()), default=None)
+
+    def reset(self) -> None:
+        """Forget what is under way, as a reboot does."""
+        self._uploads: dict[MissionType, _Receiving] = {}
+
+    def on(self, envelope: Envelope, now: float) -> list[Message]:
+        """Answer a message of the mission protocol."""
+        sender, message = envelope.sender, envelope.message
+        if not isinstance(message, ListMessage):
+            return []
+        mission_type = message.mission_type
+        if mission_type == ALL_TYPES and isinstance(message, MissionClearAll):
+            return self._on_clear(sender, mission_type, tuple(MissionType))
+        if mission_type not in tuple(MissionType):
+            known = isinstance(message, MissionAck)
+            return [] if known else [MissionAck(sender, mission_type, Result.UNSUPPORTED)]
+        part = MissionType(mission_type)
+        match message:
+            case MissionCount(count=count):
+                return self._on_count(sender, part, count, now)
+            case MissionItemInt(seq=seq, item=item):
+                return self._on_item(sender, part, seq, item, now)
+            case MissionRequestList():
+                return self._on_list(sender, part)
+            case MissionRequestInt():
+                return self._on_request(sender, part, message)
+            case MissionClearAll():
+                return self._on_clear(sender, mission_type, (part,))
+            case MissionWritePartialList(start_index=first, end_index=last):
+                return self._on_partial(sender, part, first, last, now)
+        return []
+
+    def tick(self, now: float) -> list[Message]:
+        """Ask again, or give up."""
+        out: list[Message] = []
+        for part, upload in list(self._uploads.items()):
+            if now >= upload.last_item_time + self._manners.upload_patience:
+                del self._uploads[part]
+                out.append(Statustext(MavSeverity.WARNING, "Mission upload timeout"))
+                out.append(MissionAck(upload.partner, part, Result.OPERATION_CANCELLED))
+            elif now >= upload.last_request_time + self._manners.request_period:
+                out.append(self._ask(part, upload, now))
+        return out
+
+    def _due(self, upload: _Receiving) -> float:
+        return min(
+            upload.last_item_time + self._manners.upload_patience,
+            upload.last_request_time + self._manners.request_period,
+        )
+
+    def _on_count(
+        self, sender: Address, part: MissionType, count: int, now: float
+    ) -> list[Message]:
+        upload = self._uploads.get(part)
+        if upload is not None and upload.partner != sender:
+            return [MissionAck(sender, part, Result.DENIED)]
+        result, limit = self.check_count(part, count), self.size_limit(part)
+        if result != Result.ACCEPTED:
+            text = Statustext(MavSeverity.WARNING, f"Only {limit} items are supported")
+            return [MissionAck(sender, part, result), *([text] if count > limit else [])]
+        if count == 0:
+            self._lists.clear(part)
+            self._uploads.pop(part, None)
+            return [MissionAck(sender, part, Result.ACCEPTED)]
+        if part is not MissionType.FENCE:
+            self._lists.truncate(part, count)
+        return self._begin(sender, part, 0, count - 1, now)
+
+    def _on_partial(
+        self, sender: Address, part: MissionType, first: int, last: int, now: float
+    ) -> list[Message]:
+        count = len(self._lists.items(part))
+        if not 0 <= first <= last <= count:
+            return [MissionAck(sender, part, Result.ERROR)]
+        return self._begin(sender, part, first, last, now)
+
+    def _begin(
+        self, sender: Address, part: MissionType, first: int, last: int, now: float
+    ) -> list[Message]:
+        upload = _Receiving(sender, first, last, now, now, [])
+        self._uploads[part] = upload
+        return [self._ask(part, upload, now)]
+
+    def _ask(self, part: MissionType, upload: _Receiving, now: float) -> Message:
+        upload.last_request_time = now
+        return MissionRequestInt(upload.partner, part, upload.next_sequence, self._legacy)
+
+    def _on_item(
+        self, sender: Address, part: MissionType, seq: int, item: WireItem, now: float
+    ) -> list[Message]:
+        upload = self._uploads.get(part)
+        if upload is None:
+            return [MissionAck(sender, part, Result.ERROR)]
+        if seq != upload.next_sequence:
+            return [MissionAck(sender, part, Result.INVALID_SEQUENCE)]
+        if sender != upload.partner:
+            return [MissionAck(sender, part, Result.DENIED)]
+        result = self.check_item(part, seq, item)
+        if result != Result.ACCEPTED:
+            del self._uploads[part]
+            return [MissionAck(sender, part, result)]
+        if part is MissionType.FENCE:
+            upload.fence.append(self._lists.kept(part, seq, item))
+        else:
+            self._lists.put(part, seq, item)
+        upload.last_item_time, upload.next_sequence = now, seq + 1
+        if seq < upload.last_sequence:
+            return [self._ask(part, upload, now)]
+        if part is MissionType.FENCE:
+            self._lists.replace(part, upload.fence)
+        del self._uploads[part]
+        return [MissionAck(sender, part, Result.ACCEPTED)]
+
+    def _on_list(self, sender: Address, part: MissionType) -> list[Message]:
+        if part in self._uploads:
+            return [MissionAck(sender, part, Result.DENIED)]
+        count = len(self._lists.items(part))
+        return [MissionCount(sender, part, count)]
+
+    def _on_request(
+        self, sender: Address, part: MissionType, request: MissionRequestInt
+    ) -> list[Message]:
+        items = self._lists.items(part)
+        if part in self._uploads and not request.legacy:
+            return [MissionAck(sender, part, Result.DENIED)]
+        if request.seq >= len(items):
+            wrong = Result.ERROR if part is MissionType.MISSION else Result.INVALID_SEQUENCE
+            return [MissionAck(sender, part, wrong)]
+        return [MissionItemInt(sender, part, request.seq, items[request.seq], request.legacy)]
+
+    def _on_clear(
+        self, sender: Address, mission_type: int, parts: tuple[MissionType, ...]
+    ) -> list[Message]:
+        flown = MissionType.MISSION in parts and self._flying()
+        if flown or any(part in self._uploads for part in parts):
+            return [MissionAck(sender, mission_type, Result.ERROR)]
+        for part in parts:
+            self._lists.clear(part)
+        return [MissionAck(sender, mission_type, Result.ACCEPTED)]

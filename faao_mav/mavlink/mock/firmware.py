@@ -1,0 +1,212 @@
+"""What the firmwares of mock autopilots have in common: what they store, what they refuse."""
+
+import math
+import struct
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+from faao_mav.mavlink.manners import manners_of
+from faao_mav.mavlink.messages import CommandLong, Envelope, Message, WireItem
+from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.wire_items import home_items, mission_item, wire_item
+from faao_mav.mission.command import POLYGON, RALLY_POINT, Frame
+from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.vehicle import AutopilotFamily, VehicleType
+from faao_mav.vehicle.dialect import FENCE_ROWS, ROWS_BESIDE
+
+COUNT = -1
+"""In `Behaviour.refusals`: instead of an item, the announcement of the list."""
+
+_FIELDS = range(Result.INVALID_PARAM1, Result.INVALID_PARAM7 + 1)
+"""What is wrong if param1 to param4, x, y or z is."""
+
+
+class StoredLists:
+    """What is stored: items as the vehicle gives them back."""
+
+    def __init__(self, vehicle: VehicleType, home: Home) -> None:
+        self.vehicle, self.home = vehicle, home
+        self._items = {
+            part: [self._home_item()] * home_items(vehicle, part) for part in MissionType
+        }
+
+    def items(self, part: MissionType) -> tuple[WireItem, ...]:
+        """Return what a download gives."""
+        return tuple(self._items[part])
+
+    def put(self, part: MissionType, seq: int, item: WireItem) -> None:
+        """Store `item` in place of the one at `seq`, or behind the last one."""
+        self._items[part][seq : seq + 1] = [self.kept(part, seq, item)]
+
+    def kept(self, part: MissionType, seq: int, item: WireItem) -> WireItem:
+        """Return what becomes of `item`; a home item is the vehicle's own, whatever is sent."""
+        if seq < home_items(self.vehicle, part):
+            return self._home_item()
+        return wire_item(self.vehicle.dialect.stored(mission_item(item)), seq)
+
+    def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
+        """Store all of `items`, which are as `kept` gives them, in place of the list."""
+        self._items[part] = list(items)
+
+    def truncate(self, part: MissionType, count: int) -> None:
+        """Forget what is beyond `count`."""
+        del self._items[part][count:]
+
+    def clear(self, part: MissionType) -> None:
+        """Forget all but home."""
+        self.truncate(part, home_items(self.vehicle, part))
+
+    def number(self, part: MissionType) -> int:
+        """Return a number that tells this list from others: a checksum; 0 when empty."""
+        packed = b"".join(
+            struct.pack("<HB5f2i", item.command, item.frame, *item.params, item.z, item.x, item.y)
+            for item in self._items[part]
+        )
+        return zlib.crc32(packed)
+
+    def _home_item(self) -> WireItem:
+        home = self.home
+        place = (round(home.latitude * 1e7), round(home.longitude * 1e7), home.altitude)
+        return WireItem(16, 0, (0.0, 0.0, 0.0, 0.0), *place)
+
+
+@dataclass(frozen=True, slots=True)
+class Behaviour:
+    """How a mock autopilot takes lists.
+
+    `refusals` are results to answer an item (or `COUNT`) with, whatever it says. `legacy_first`: it
+    asks with MISSION_REQUEST; PX4 until it is sent MISSION_ITEM_INT. `complete_only`: PX4
+    acknowledges a repeated last item only if it has all items (older ones acknowledge a repeated
+    item of an upload that they gave up).
+    """
+
+    firmware: "type[MockFirmware]"
+    refusals: Mapping[tuple[int, int], Result] = field(default_factory=dict)
+    legacy_first: bool = False
+    complete_only: bool = True
+
+    @property
+    def family(self) -> AutopilotFamily:
+        """The autopilot that is mocked."""
+        return self.firmware.family
+
+
+class MockFirmware(ABC):
+    """The part of a mock autopilot that differs from one autopilot to the next.
+
+    `ready` tells whether booting is over, `flying` whether the mission is being flown. What
+    derives from it answers the messages of the mission protocol, and says:
+
+    Attributes:
+        family: the autopilot that is mocked.
+        mission_limit: how many items of a mission it holds, home included.
+        modes: its custom modes at rest and on a mission, by the type of vehicle.
+        parameters: what ground stations look for beside the parameters that the package knows.
+        misplaced: the answer to an item of a fence, or a rally point, in a mission.
+        thin_polygon: the answer to a fence polygon of fewer than three vertices.
+        nonsense: the answer to commands 0 and 1.
+        silent_at_boot: it answers nothing about lists before it is ready.
+    """
+
+    family: ClassVar[AutopilotFamily]
+    mission_limit: ClassVar[int]
+    modes: ClassVar[Mapping[str, tuple[int, int]]]
+    parameters: ClassVar[Mapping[str, float]] = {}
+    misplaced: ClassVar[Result]
+    thin_polygon: ClassVar[Result]
+    nonsense: ClassVar[Result]
+    silent_at_boot: ClassVar[bool] = False
+
+    def __init__(
+        self,
+        lists: StoredLists,
+        behaviour: Behaviour,
+        ready: Callable[[], bool],
+        flying: Callable[[], bool],
+    ) -> None:
+        self._lists, self._behaviour = lists, behaviour
+        self._manners = manners_of(lists.vehicle)
+        self._ready, self._flying = ready, flying
+        self._legacy = behaviour.legacy_first
+        self.reset()
+
+    @property
+    @abstractmethod
+    def deadline(self) -> float | None:
+        """When the next request or the end of patience is due."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Forget what is under way, as a reboot does."""
+
+    @abstractmethod
+    def on(self, envelope: Envelope, now: float) -> list[Message]:
+        """Answer a message of the mission protocol."""
+
+    @abstractmethod
+    def tick(self, now: float) -> list[Message]:
+        """Ask again, or give up."""
+
+    def requested_mode(self, command: CommandLong) -> int:
+        """Return the custom mode that DO_SET_MODE asks for."""
+        return max(whole(command.param2), 0)
+
+    def infeasible(self, mission: Mission) -> str | None:  # noqa: ARG002
+        """Return why `mission` is not flown though it was taken, None if it is."""
+        return None
+
+    def check_count(self, part: MissionType, count: int) -> Result:
+        """Return what it answers to the announcement of `count` items."""
+        if (refusal := self._behaviour.refusals.get((part, COUNT))) is not None:
+            return refusal
+        fits = self._ready() and count <= self.size_limit(part)
+        return Result.ACCEPTED if fits else Result.NO_SPACE
+
+    def size_limit(self, part: MissionType) -> int:
+        """Return how many items of that list it holds."""
+        dialect = self._lists.vehicle.dialect
+        return (self.mission_limit, dialect.fence_rows, dialect.rally_rows)[part]
+
+    def check_item(self, part: MissionType, seq: int, item: WireItem) -> Result:
+        """Return what it answers to `item`, number `seq` of that list."""
+        if (refusal := self._behaviour.refusals.get((part, seq))) is not None:
+            return refusal
+        if part is MissionType.MISSION:
+            if item.command in ROWS_BESIDE:
+                return self.misplaced
+            if item.command in (0, 1):
+                return self.nonsense
+            return _check_mission_item(mission_item(item), self._lists.vehicle)
+        if item.command not in (FENCE_ROWS if part is MissionType.FENCE else {RALLY_POINT}):
+            return Result.UNSUPPORTED
+        if item.command in POLYGON.values() and item.params[0] < 3:
+            return self.thin_polygon
+        if item.command == RALLY_POINT and math.isnan(item.z):
+            return Result.INVALID_PARAM7
+        if abs(item.x) > 900_000_000:
+            return Result.INVALID_PARAM5_X
+        return Result.INVALID_PARAM6_Y if abs(item.y) > 1_800_000_000 else Result.ACCEPTED
+
+
+def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> Result:
+    """Return what is wrong with `item`: the first field that `vehicle` does not take.
+
+    Fields are tried in the order of the message, those behind the one tried set to 0.
+    """
+    refusal = vehicle.dialect.refusal
+    if item.frame != Frame.MISSION and refusal(MissionItem(16, item.frame)) is not None:
+        return Result.UNSUPPORTED_FRAME
+    values = (*item.params, item.x, item.y, item.z)
+    for tried in range(len(values) + 1):
+        one, two, three, four, x, y, z = (*values[:tried], *[0.0] * (len(values) - tried))
+        if refusal(replace(item, params=(one, two, three, four), x=x, y=y, z=z)) is not None:
+            return Result.UNSUPPORTED if tried == 0 else Result(_FIELDS[tried - 1])
+    return Result.ACCEPTED
+
+
+def whole(param: float) -> int:
+    """Return a command's parameter as a number of something, -1 if it cannot be one."""
+    return int(param) if 0 <= param < 2**32 else -1

@@ -1,0 +1,110 @@
+"""The numbers of the mission protocol.
+
+Source: MAVLink developer guide, "Mission Protocol", and the MAVLink common set.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class MissionType(IntEnum):
+    """MAV_MISSION_TYPE: which of a vehicle's three lists is meant; `part` in names."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+
+    @property
+    def title(self) -> str:
+        """What people call it."""
+        return ("mission", "fence", "rally points")[self]
+
+
+ALL_TYPES = 255
+"""MAV_MISSION_TYPE_ALL: valid in MISSION_CLEAR_ALL only."""
+
+
+class Result(IntEnum):
+    """MAV_MISSION_RESULT: how a transfer went."""
+
+    ACCEPTED = 0
+    ERROR = 1
+    UNSUPPORTED_FRAME = 2
+    UNSUPPORTED = 3
+    NO_SPACE = 4
+    INVALID = 5
+    INVALID_PARAM1 = 6
+    INVALID_PARAM2 = 7
+    INVALID_PARAM3 = 8
+    INVALID_PARAM4 = 9
+    INVALID_PARAM5_X = 10
+    INVALID_PARAM6_Y = 11
+    INVALID_PARAM7 = 12
+    INVALID_SEQUENCE = 13
+    DENIED = 14
+    OPERATION_CANCELLED = 15
+
+
+class MavSeverity(IntEnum):
+    """MAV_SEVERITY of status texts."""
+
+    CRITICAL = 2
+    WARNING = 4
+    INFO = 6
+
+
+class MavCommand(IntEnum):
+    """MAV_CMD outside of missions."""
+
+    SET_MODE = 176
+    SET_CURRENT = 224
+    REBOOT = 246
+    START = 300
+    ARM = 400
+    SET_INTERVAL = 511
+    REQUEST_MESSAGE = 512
+    REQUEST_CAPABILITIES = 520
+
+
+HOME_POSITION = 242
+"""The number of the message HOME_POSITION."""
+
+GROUND_STATION_TYPE = 6
+"""MAV_TYPE_GCS."""
+
+NO_AUTOPILOT = 8
+"""MAV_AUTOPILOT_INVALID: what ground stations and other components say that they are."""
+
+
+class MavState(IntEnum):
+    """MAV_STATE: below `STANDBY` a vehicle does not take missions yet."""
+
+    UNINIT = 0
+    BOOT = 1
+    CALIBRATING = 2
+    STANDBY = 3
+    ACTIVE = 4
+    CRITICAL = 5
+
+
+ARMED = 128
+"""MAV_MODE_FLAG_SAFETY_ARMED, in a heartbeat's base_mode."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Address:
+    """Who speaks on a link: system and component, 0 to 255; 0 addresses everyone."""
+
+    system: int
+    component: int
+
+    def takes(self, target: "Address") -> bool:
+        """Tell whether a message to `target` is for this address."""
+        return target.system in (0, self.system) and target.component in (0, self.component)
+
+
+NOBODY = Address(0, 0)
+"""No sender has this address."""
+
+GROUND_STATION = Address(255, 190)
+"""MAV_COMP_ID_MISSIONPLANNER of the system that ground stations use by custom."""

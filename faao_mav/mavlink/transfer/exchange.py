@@ -1,0 +1,158 @@
+"""What the transfers of one list have in common, and the simplest of them: clearing it."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from faao_mav.mavlink.machine import AskingMachine, Progress
+from faao_mav.mavlink.manners import Manners, manners_of
+from faao_mav.mavlink.messages import (
+    Envelope,
+    ListMessage,
+    Message,
+    MissionAck,
+    MissionClearAll,
+    Statustext,
+    WireItem,
+)
+from faao_mav.mavlink.protocol import Address, MissionType, Result
+from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.vehicle import VehicleType
+
+Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "cancelled"]
+
+_TEXTS = 5
+"""The number of status texts that are kept, the last ones; chosen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """Both ends of a transfer, and what flies at the other: None if its autopilot is not known."""
+
+    own: Address
+    address: Address
+    vehicle: VehicleType | None
+
+    @property
+    def manners(self) -> Manners:
+        """How the other end behaves in transfers."""
+        return manners_of(self.vehicle)
+
+    def ack(self, result: Result, mission_type: MissionType) -> MissionAck:
+        """Return the acknowledgement to send to the vehicle."""
+        return MissionAck(self.address, mission_type, result)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a transfer ended.
+
+    `status`: "accepted"; "unknown": everything was sent, but the last answer is missing or
+    ambiguous; "refused" with the `result`; "silent": nothing came any more; "cancelled" by us, or
+    by the vehicle with the `result`. `last_requested` is the number of the item last asked for,
+    `items` what was downloaded, `said` the vehicle's status texts, `opaque_id` its number for the
+    list, 0 for none.
+    """
+
+    status: Status
+    result: int | None = None
+    last_requested: int | None = None
+    items: tuple[WireItem, ...] = ()
+    said: tuple[str, ...] = ()
+    opaque_id: int = 0
+
+
+class Exchange(AskingMachine[Outcome]):
+    """The transfer of one list: it opens with a question and ends with an `Outcome`.
+
+    What derives from it gives `_question`, which opens the transfer, and `_take`, which answers the
+    vehicle's messages about the list.
+    """
+
+    def __init__(
+        self,
+        peer: Peer,
+        mission_type: MissionType = MissionType.MISSION,
+        timeouts: Timeouts | None = None,
+    ) -> None:
+        self._timeouts = timeouts or Timeouts()
+        super().__init__(self._timeouts.response, self._timeouts.retries)
+        self._peer, self._type = peer, mission_type
+        self._texts: list[str] = []
+        self._result: int | None = None
+        """What the vehicle said last, if it was no."""
+
+    @abstractmethod
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
+        """Answer what the vehicle says to us about the list."""
+
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        message = envelope.message
+        if envelope.sender != self._peer.address:
+            return ()
+        if isinstance(message, Statustext):
+            self._texts = [*self._texts[1 - _TEXTS :], message.text.strip()]
+        elif isinstance(message, ListMessage) and message.mission_type == self._type:
+            return self._take(message, now) if self._peer.own.takes(message.target) else ()
+        return ()
+
+    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
+        self._end("silent" if self._result is None else "refused", self._result)
+        return ()
+
+    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
+        """Give up and tell the vehicle."""
+        if self.outcome is not None:
+            return ()
+        self._end("cancelled")
+        return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
+
+    def _end(
+        self,
+        status: Status,
+        result: int | None = None,
+        last_requested: int | None = None,
+        items: tuple[WireItem, ...] = (),
+        opaque_id: int = 0,
+    ) -> None:
+        said = tuple(dict.fromkeys(self._texts))
+        self.outcome = Outcome(status, result, last_requested, items, said, opaque_id)
+
+
+class Clear(Exchange):
+    """A machine that clears a list; asking twice does no harm, so it asks until answered.
+
+    An ERROR is the end only if it is repeated: PX4 says nothing while busy, ArduPilot ERROR.
+
+    >>> vehicle = Address(1, 1)
+    >>> clearing = Clear(Peer(Address(255, 190), vehicle, None), MissionType.RALLY)
+    >>> clearing.start(now=0.0)
+    [MissionClearAll(target=Address(system=1, component=1), mission_type=<MissionType.RALLY: 2>)]
+    >>> clearing.deadline  # when the question is put again, s
+    1.5
+    >>> accepted = MissionAck(Address(255, 190), MissionType.RALLY, Result.ACCEPTED)
+    >>> clearing.on(Envelope(vehicle, accepted), now=0.1)
+    ()
+    >>> clearing.outcome.status
+    'accepted'
+    """
+
+    @property
+    def progress(self) -> Progress:
+        """Not counted."""
+        return f"clearing {self._type.title}", 0, 0
+
+    def _question(self) -> Message:
+        return MissionClearAll(self._peer.address, self._type)
+
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:  # noqa: ARG002
+        if not isinstance(message, MissionAck):
+            return ()
+        if message.type == Result.ACCEPTED:
+            self._end("accepted", message.type)
+        elif message.type == Result.ERROR and self._result is None:
+            self._result = message.type
+        else:
+            self._end("refused", message.type)
+        return ()

@@ -1,0 +1,182 @@
+"""A result, a validation and its findings in words: the lines of the terminal and of the page."""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TypeAlias
+
+from faao_mav.validate.check import Check
+from faao_mav.validate.finding import Finding, Level
+from faao_mav.workflow import Result
+
+Line: TypeAlias = tuple[str, str]
+"""A label and a text; a line without a label goes on where the one before it ended."""
+
+_LABEL_WIDTH = 13
+"""Characters that a label takes on the terminal."""
+
+_MAX_RUNS_SHOWN = 8
+"""Runs of item numbers that are named in one line; chosen: about a line of a terminal."""
+
+
+def summary(result: Result, written: Sequence[Path] = ()) -> str:
+    """Return the text that the main job prints: `result`, and the files that were `written`."""
+    lines = [*result_lines(result), *_checked(result)]
+    lines += [("written", str(path)) for path in written]
+    if not written:
+        lines.append(("written", "nothing: give --out MISSION.waypoints"))
+    name = result.solution.plan.name
+    text = [f"{label:<{_LABEL_WIDTH}}{text}" for label, text in lines]
+    return "\n".join([*([name] if name else []), *text])
+
+
+def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
+    """Yield what the optimiser found and how its mission will fly.
+
+    With `timed` it says how long that took, which no two runs have in common.
+    """
+    solution, rates = result.solution, result.solution.rates
+    information, limit, bound = result.information, result.saturation, result.bound
+    most = f" of at most {limit.ceiling:g}" if limit else ""
+    yield (
+        "rate",
+        f"{rates.R_avg:.4f} bit/s/Hz{most} "
+        f"(base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f})",
+    )
+    start = f"{solution.history[0]:.4f} on the straight start"
+    if information is not None:
+        start += f"; mutual information {information.average:.3f} +- {information.error:.1g}"
+    yield "", start
+    if fresh := result.fresh:
+        yield "", f"{fresh.average:.4f} +- {fresh.error:.1g} on fading that was not planned on"
+    if bound is not None:
+        short = 100 * (1 - rates.R_avg / bound.value) if bound.value else 0.0
+        yield (
+            "bound",
+            f"within {short:.2g} % of the best that any route can do: at most "
+            f"{bound.value:.4f} bit/s/Hz{'' if bound.exact else ' (numerical)'}",
+        )
+    if limit is not None and limit.saturated:
+        yield (
+            "saturated",
+            "the alphabet is used up and the route hardly matters: "
+            f"{limit.spare_db:.1f} dB less power at both stations would do",
+        )
+    if len(solution.starts) > 1:
+        ranked = sorted(solution.starts.items(), key=lambda start: start[1])
+        (worst, low), (best, high) = ranked[0], ranked[-1]
+        yield "starts", f"{len(ranked)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
+    state = "converged" if solution.converged else "NOT CONVERGED"
+    seconds = f", {result.seconds_optimize:.1f} s" if timed else ""
+    steps = _count(solution.iterations, "iteration")
+    yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
+    yield from _flown(result)
+
+
+def _flown(result: Result) -> Iterator[Line]:
+    conversion, flown, rates = result.conversion, result.prediction, result.solution.rates
+    if result.no_mission is not None:
+        yield "mission", f"none: {result.no_mission}"
+    if conversion is None or flown is None:
+        return
+    distance = conversion.schedule.route.distance
+    items = _count(len(conversion.mission.items), "item")
+    yield "mission", f"{items}; relay route of {distance:.0f} m"
+    share = 100 * flown.rates.R_avg / rates.R_avg if rates.R_avg else 100.0
+    yield (
+        "predicted",
+        f"{flown.rates.R_avg:.4f} bit/s/Hz, {share:.2f} % of the plan, in "
+        f"{flown.duration:.1f} s (planned: {result.solution.plan.flight.duration:g} s)",
+    )
+    yield "", _apart(flown.rms_position_error, flown.max_position_error, flown.max_path_error)
+    if doubt := conversion.vehicle.type.caveat:
+        yield "", doubt
+
+
+def check_lines(check: Check) -> Iterator[Line]:
+    """Yield what the predicted flight of a mission is, by itself and beside its plan."""
+    if check.track is None:
+        yield "flight not predicted", check.unpredicted
+    else:
+        doubt = check.vehicle.type.caveat
+        lasting = f"{check.track.t[-1]:.0f} s"
+        yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
+    if link := check.link:
+        yield (
+            "predicted link",
+            f"{link.predicted_rate:.4f} bit/s/Hz, {100 * link.share:.2f} % of the plan's "
+            f"{link.planned_rate:.4f}",
+        )
+        yield "", _apart(link.rms_position_error, link.max_position_error, link.path_error)
+
+
+def _apart(rms: float, most: float, path: float) -> str:
+    """Say how far, m, the predicted flight is from the plan."""
+    at_equal_times = f"{rms:.1f} m rms from the plan at equal times, {most:.1f} m at most"
+    return f"{at_equal_times}; {path:.1f} m from its path"
+
+
+def _checked(result: Result) -> Iterator[Line]:
+    """Yield what validation found, notes counted and the rest told, and the parameters to load."""
+    if result.conversion is None:
+        return
+    findings = result.findings
+    told = [finding for finding in findings if finding.level is not Level.NOTE]
+    levels = (Level.ERROR, Level.WARNING) if told else ()
+    counts = [count_of(findings, level) for level in levels] or ["no errors or warnings"]
+    yield "checked", ", ".join([*counts, count_of(findings, Level.NOTE)])
+    for group in by_rule(told):
+        yield "", line_of(group)
+    if parameters := result.conversion.parameters:
+        wanted = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
+        yield "parameters", f"the mission is timed for {wanted}: load them first"
+
+
+def count_of(findings: Sequence[Finding], level: Level) -> str:
+    """Return how many of `findings` are of `level`, as in "2 errors"."""
+    return _count(sum(finding.level is level for finding in findings), level)
+
+
+def by_rule(findings: Sequence[Finding]) -> Iterator[list[Finding]]:
+    """Yield the findings with those of one rule together, in the order of the first of each."""
+    order = {finding.rule: n for n, finding in reversed(list(enumerate(findings)))}
+    for _, group in groupby(sorted(findings, key=lambda f: order[f.rule]), lambda f: f.rule):
+        yield list(group)
+
+
+def line_of(group: Sequence[Finding]) -> str:
+    """Return the findings of one rule in a line: level, items, what is the case, the rule."""
+    return f"{group[0].level}: {said_of(group)}"
+
+
+def said_of(group: Sequence[Finding]) -> str:
+    """Return the line of `line_of` without the level."""
+    numbers = items_of(group)
+    plural = "" if numbers.isdigit() else "s"
+    where = f"item{plural} {numbers}: " if numbers else ""
+    return f"{where}{message_of(group)} [{group[0].rule}]"
+
+
+def message_of(group: Sequence[Finding]) -> str:
+    """Return the message of the first of `group`, and how many more there are."""
+    more = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
+    return group[0].message + more
+
+
+def items_of(group: Sequence[Finding]) -> str:
+    """Return the items' numbers, runs as `4-9`; nothing where it is about no item."""
+    numbers = sorted({finding.item for finding in group if finding.item is not None})
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    shown = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
+    if len(shown) > _MAX_RUNS_SHOWN:
+        shown = [*shown[:_MAX_RUNS_SHOWN], "..."]
+    return ", ".join(shown)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -1,0 +1,152 @@
+"""From a trajectory to the mission whose predicted flight keeps it, in space and time."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from faao_mav.errors import InputError
+from faao_mav.mission.item import Mission
+from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.copter_scheduler import CopterScheduler
+from faao_mav.schedule.initial_route import Splines, initial_route
+from faao_mav.schedule.plane_scheduler import PlaneScheduler
+from faao_mav.schedule.route import Route
+from faao_mav.schedule.schedule import Schedule
+from faao_mav.schedule.scheduler import Scheduler
+from faao_mav.schedule.waypoints import SLOWEST
+from faao_mav.vehicle import Vehicle, copter_model, vehicle_of
+from faao_mav.vehicle.recommend import candidates
+
+if TYPE_CHECKING:
+    from faao_mav.optimizer.solution import Solution
+    from faao_mav.plan import Plan
+
+# Chosen; what a change costs is not measured.
+_SPLINE_SPACING = 10.0  # the least distance of spline waypoints, m
+_SPLINE_TIMES = (2.0, 3.0)  # least times between spline waypoints to try, s
+_BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the acceleration
+_PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
+_GOOD_COST = 1.5  # the `Schedule.cost`, m, from which nothing better is looked for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conversion:
+    """A mission, with all that has to be known to fly it.
+
+    `parameters` are those that the autopilot has to be given before the flight, by its own names
+    and in its own units: the mission is timed for them, and late without. There are none if the
+    plan keeps the vehicle's own. `vehicle` has them already. `schedule` holds the predicted flight.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> conversion = convert(optimize(read_plan("missions/copter_relay.yaml")))
+    >>> conversion.mission.items[0].command.name, conversion.parameters["WPNAV_SPEED"]
+    ('NAV_TAKEOFF', 800)
+    >>> conversion.schedule.deviation.rms < 1.5  # metres
+    True
+    """
+
+    mission: Mission
+    schedule: Schedule
+    vehicle: Vehicle
+    parameters: Mapping[str, float]
+
+
+def check_vehicle(plan: "Plan") -> None:
+    """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
+
+    That is one with useless parameters, or a plane that does not fly the plan's least or greatest
+    speed.
+    """
+    vehicle = vehicle_of(plan)
+    vehicle.legs  # noqa: B018
+    vehicle.flight_model()
+    if vehicle.type.hovers:
+        return
+    least, most = vehicle.value("min_speed"), vehicle.value("max_speed")
+    names = f"{vehicle.name_of('min_speed')}; {vehicle.name_of('max_speed')}"
+    for key in ("min_speed", "max_speed"):
+        speed = getattr(plan.vehicle, key)
+        if not least <= speed <= most:
+            raise InputError(
+                f"{plan.source}: vehicle.{key}: {speed:g} m/s; the plane flies {least:g} to "
+                f"{most:g} m/s ({names}; vehicle.parameters may say otherwise)"
+            )
+
+
+def convert(solution: "Solution") -> Conversion:
+    """Return the mission for `solution`, with the parameters that make it fly best.
+
+    The sets of parameters that are recommended for the vehicle are compared by the error of the
+    first schedule, and refined in that order until one is good. If none is, a vehicle that flies
+    splines may do so with the liveliest: everywhere, or where legs are too short for their speed.
+
+    Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
+    """
+    plan, t, w = solution.plan, solution.t, solution.w
+    given, sets = vehicle_of(plan), candidates(plan)
+    schedulers = [
+        _scheduler(solution, replace(given, parameters={**given.parameters, **parameters}))
+        for parameters in sets
+    ]
+    straight = initial_route(t, w, plan, share=1.0 if given.type.hovers else _PLANE_SHARE)
+    found = _refined((straight, scheduler) for scheduler in schedulers)
+    best = min(found, key=_cost)
+    if _cost(best) > _GOOD_COST and given.type.dialect.splines:
+        liveliest = schedulers[-1]
+        bent = [initial_route(t, w, plan, splines=splines) for splines in _splines(liveliest)]
+        new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
+        found = _refined((route, liveliest) for route in new.values())
+        best = min([best, *found], key=_cost)
+    schedule, scheduler = best
+    return Conversion(
+        mission=assemble(schedule.route, plan),
+        schedule=schedule,
+        vehicle=scheduler.vehicle,
+        parameters=sets[schedulers.index(scheduler)],
+    )
+
+
+def _scheduler(solution: "Solution", vehicle: Vehicle) -> Scheduler:
+    """Return what schedules the flights of `vehicle`, which may have recommended parameters."""
+    plan, limits = solution.plan, solution.plan.vehicle
+    if vehicle.type.hovers:
+        scheduler: type[Scheduler] = CopterScheduler
+        least, most = SLOWEST, vehicle.type.fastest
+    else:
+        scheduler = PlaneScheduler
+        least = max(limits.min_speed, vehicle.value("min_speed"))
+        most = vehicle.value("max_speed")
+    return scheduler(
+        t=solution.t,
+        w=solution.w,
+        vehicle=vehicle,
+        model=copter_model(vehicle, plan.origin.latitude),
+        min_speed=least,
+        max_speed=min(limits.max_speed, most),
+        tolerance=plan.mission.path_tolerance,
+    )
+
+
+def _refined(trials: Iterable[tuple[Route, Scheduler]]) -> list[tuple[Schedule, Scheduler]]:
+    """Return the schedules of the trials refined, the most promising first, up to a good one."""
+    firsts = [(scheduler.first(route), scheduler) for route, scheduler in trials]
+    refined: list[tuple[Schedule, Scheduler]] = []
+    for first, scheduler in sorted(firsts, key=lambda each: each[0].error):
+        refined.append((scheduler.refined(first), scheduler))
+        if _cost(refined[-1]) <= _GOOD_COST:
+            break
+    return refined
+
+
+def _cost(scheduled: tuple[Schedule, Scheduler]) -> float:
+    return scheduled[0].cost
+
+
+def _splines(scheduler: Scheduler) -> Iterator[Splines]:
+    """Yield what may be splines on a flight at the greatest speed: all legs, or some."""
+    vehicle, speed = scheduler.vehicle, scheduler.max_speed
+    braking = _BRAKING * speed**2 / vehicle.value("acceleration")
+    for seconds in _SPLINE_TIMES:
+        spacing = max(_SPLINE_SPACING, seconds * speed)
+        yield Splines(spacing, braking)
+        yield Splines(spacing, braking, vehicle.legs)

@@ -1,0 +1,128 @@
+"""Missions for multicopters: as few legs as it takes to keep the plan's time and path.
+
+The initial route's speeds and waits are fitted (`timing`); legs on which the predicted flight is
+still too far from the plan at equal times are split there, and all is fitted anew. In the end
+legs whose speeds hardly differ share one, and values are rounded to what is sent.
+
+Constants that name no source are chosen; what a change costs is not measured.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from faao_mav.arrays import Flags, Integers
+from faao_mav.schedule.route import Route
+from faao_mav.schedule.schedule import Schedule
+from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
+from faao_mav.vector import lengths
+
+# The shortest wait at the first waypoint, s. After a hold of 1 s ArduCopter is still drifting and
+# leaves 0.4 to 0.75 s late, measured in its simulator.
+_FIRST_WAIT = 6.0
+
+_LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
+_MOST_WAYPOINTS = 24  # the most that splitting legs leads to; the path itself may take more
+_OVERSPEED = 1.1  # the greatest speed over the plan's, where the aircraft falls behind
+_ROUNDS = 5  # the most rounds of splitting legs, and of moving waypoints
+_WORTHWHILE = 0.98  # the largest ratio of the costs after and before a change that is kept
+_SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
+_MOVE_SHARE = 0.8  # of its offset from the plan by which a waypoint is moved the other way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CopterScheduler(Scheduler):
+    """As `Scheduler`, for an aircraft that waits at hovers and is quick to change its speed.
+
+    Where it would not keep up, speeds are up to a tenth above `max_speed`.
+    """
+
+    def _first(self, route: Route) -> Schedule:
+        """Return `route` with the speeds and waits that fit best."""
+        waits = route.waits.copy()
+        waits[0] = max(waits[0], _FIRST_WAIT)
+        if route.last == len(waits) - 1:  # it ends at rest
+            waits[-1] = max(waits[-1], _LAST_WAIT)
+        return self.fitted(replace(route, waits=waits), self.max_speed)
+
+    def refined(self, first: Schedule) -> Schedule:
+        """Return `first` with more legs where it is off, and values as they are sent."""
+        best, top_speed = first, self.max_speed
+        if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
+            top_speed *= _OVERSPEED
+            best = self.fitted(best.route, top_speed)
+        for changes in (self._splits, self._moves):
+            for _ in range(_ROUNDS):
+                tried = (self.fitted(route, top_speed) for route in changes(best))
+                good = (each for each in tried if each.cost <= _WORTHWHILE * best.cost)
+                better = next(good, None)
+                if better is None:
+                    break
+                best = better
+        return self.rounded(self.shared(best, top_speed), top_speed)
+
+    def _splits(self, schedule: Schedule) -> Iterator[Route]:
+        """Yield the route with all legs split that are off by too much, with half, with one.
+
+        A leg may become too short for its speed: then fewer splits can be better than all.
+        """
+        route, times = schedule.route, self._split_times(schedule)
+        for count in dict.fromkeys((len(times), len(times) // 2, 1)):
+            if 0 < count <= len(times):
+                chosen = np.array(sorted(times[:count]))
+                at = np.searchsorted(route.arrivals, chosen)
+                positions = np.column_stack([np.interp(chosen, self.t, x) for x in self.w.T])
+                yield route.insert(at, positions, chosen, route.speeds[at - 1])
+
+    def _split_times(self, schedule: Schedule) -> list[float]:
+        """Return the plan's times, s, at which legs that are off by too much are best split.
+
+        The leg that is off the most comes first.
+        """
+        route = schedule.route
+        off = lengths(schedule.positions(self.t - self.t[0]) - self.w)
+        splits = []
+        for k in range(route.first, route.last):
+            if route.splines[k + 1]:
+                continue
+            inside = np.flatnonzero(
+                (self.t > route.departures[k]) & (self.t < route.arrivals[k + 1])
+            )
+            usable = inside[self._long_enough(route, k, inside)]
+            if len(usable) and off[inside].max() > ALLOWED_ERROR:
+                at = usable[np.argmax(off[usable])]
+                splits.append((float(off[inside].max()), float(self.t[at])))
+        splits.sort(reverse=True)
+        most = max(0, _MOST_WAYPOINTS - len(route.positions))
+        return [time for _, time in splits[:most]]
+
+    def _long_enough(self, route: Route, k: int, inside: Integers) -> Flags:
+        """Tell for each sample `inside` leg k whether both parts are long enough for their speed.
+
+        On a part much shorter than its ramps the aircraft is slower than planned at the split.
+        """
+        planned_speed = lengths(self.w[inside + 1] - self.w[inside - 1])
+        planned_speed /= self.t[inside + 1] - self.t[inside - 1]
+        legs, result = self.vehicle.legs, np.ones(len(inside), dtype=bool)
+        parts = (
+            (route.positions[k], self.t[inside] - route.departures[k]),
+            (route.positions[k + 1], route.arrivals[k + 1] - self.t[inside]),
+        )
+        for end, duration in parts:
+            length = lengths(self.w[inside] - end)
+            speed = np.maximum(length / duration, _SPEED_SHARE * planned_speed)
+            result &= length >= np.maximum(legs.shortest_leg(speed), legs.least)
+        return result
+
+    def _moves(self, schedule: Schedule) -> Iterator[Route]:
+        """Yield the route with waypoints moved, if the path is too far off or has splines.
+
+        ArduPilot's aircraft swings wide in splines, for it is not told what turning takes; PX4's
+        cuts corners with wide acceptance radii.
+        """
+        route = schedule.route
+        if schedule.deviation.path > self.tolerance or route.splines.any():
+            movable = (route.splines | (route.radii > 0)) & (route.waits == 0)
+            points = np.arange(route.first + 1, route.last)
+            yield self.moved(schedule, points[movable[points]], _MOVE_SHARE)

@@ -1,0 +1,209 @@
+"""Where waypoints go on a trajectory: at hovers, at the ends of long legs, along splines.
+
+Constants that name no source are chosen; what a change costs is not measured.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Flags, Real
+from faao_mav.vector import distances_to_segment, lengths
+
+SLOWEST = 0.1  # the least speed that is commanded for a leg, m/s; a slower trajectory hovers
+
+# Shares of the path tolerance that together never exceed it: how far a sample may be from its leg,
+# a hover's radius (its samples are within two radii of its waypoint), and how far apart two hovers
+# may be that become one.
+LEG_SHARE, _HOVER_SHARE, _MERGE_SHARE = 0.9, 0.45, 0.05
+
+_WIDEST_HOVER = 1.0  # the largest radius of a hover, m, however large the path tolerance
+_SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
+_SPEED_WINDOW = 1.0  # s, over which a speed is averaged: it hides a trajectory's chatter
+_SAME_POINT = 1e-3  # the distance, m, within which both ends of a trajectory are one waypoint
+_BISECTIONS = 8  # halvings of the tolerance that evens out legs: it is found to 1/256
+_BEND_SAMPLING = 1.0  # the distance of the points, m, at which a path's bends are measured
+_SPLINE_TURN = 0.3  # the largest turn between spline waypoints, rad, where their spacing allows
+_SPARSEST = 2.0  # the largest distance of spline waypoints as a multiple of their spacing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waypoint:
+    """A waypoint at `position` (2,), m: the plan is there from sample `first` to sample `last`."""
+
+    first: int
+    last: int
+    position: Real
+
+
+def find_hovers(t: Real, w: Real, radius: float) -> list[Waypoint]:
+    """Return the hovers of the trajectory `t` (n,) s, `w` (n, 2) m, in order.
+
+    A hover lasts 3 s at least, in which the aircraft is slower than `SLOWEST` throughout and stays
+    in a box with a half diagonal of at most `radius` (m). Its position is the median, so no sample
+    of a hover is farther than 2 `radius` from it. A creep through several boxes makes several
+    hovers, with 3 s between them to get on.
+
+    >>> t = np.arange(0.0, 20.0)
+    >>> w = np.column_stack([np.clip(t - 10, 0, None), 0 * t])
+    >>> [(hover.first, hover.last) for hover in find_hovers(t, w, 0.5)]
+    [(0, 9)]
+    """
+    hovers = []
+    for begin, end in _runs(_speeds(t, w) < SLOWEST):
+        first = begin
+        while first < end:
+            last = _last_within(w[first : end + 1], radius) + first
+            if t[last] - t[first] >= _SHORTEST_HOVER:
+                hovers.append(Waypoint(first, last, np.median(w[first : last + 1], axis=0)))
+                first = int(np.searchsorted(t, t[last] + _SHORTEST_HOVER))
+            else:
+                first += 1
+    return hovers
+
+
+def hovers_and_ends(t: Real, w: Real, tolerance: float) -> list[Waypoint]:
+    """Return the waypoints between which a trajectory moves: w_I, the hovers, w_F.
+
+    `t` (n,) s, `w` (n, 2) m; `tolerance` is the path tolerance, m. A hover at an end takes the
+    end's exact position. Neighbours in one place with nothing of note between them are one.
+    """
+    end = len(t) - 1
+    closed = math.dist(w[0], w[end]) <= _SAME_POINT
+    hovers = find_hovers(t, w, min(_WIDEST_HOVER, _HOVER_SHARE * tolerance))
+    if hovers and hovers[0].first == 0:
+        last = hovers[0].last
+        if last == end and not closed:
+            last -= 1  # two ends in one hover: leave a leg between them
+        hovers[0] = Waypoint(0, last, w[0])
+    else:
+        hovers.insert(0, Waypoint(0, 0, w[0]))
+    if hovers[-1].last == end:
+        hovers[-1] = Waypoint(hovers[-1].first, end, w[end])
+    else:
+        hovers.append(Waypoint(end, end, w[end]))
+
+    merged = [hovers[0]]
+    for hover in hovers[1:]:
+        before = merged[-1]
+        ends = hover.last == end
+        near = _SAME_POINT if before.first == 0 and ends else _MERGE_SHARE * tolerance
+        position = hover.position if ends else before.position
+        samples = w[before.first : hover.last + 1]
+        if (
+            math.dist(before.position, hover.position) <= near
+            and lengths(samples - position).max() <= tolerance
+        ):
+            merged[-1] = Waypoint(before.first, hover.last, position)
+        else:
+            merged.append(hover)
+    return merged
+
+
+def simplify(w: Real, tolerance: float) -> list[int]:
+    """Return the indices between the first and the last sample that become waypoints.
+
+    Each leg goes as far as the samples it passes over stay within `tolerance` (m) of it. With the
+    number of legs that this takes, the least tolerance is sought that takes no more: legs in a
+    bend are then of one length, where taking each as long as possible would leave a short last
+    one, on which an autopilot crawls.
+
+    `w` (n, 2) m, n >= 2, are the stretch with both its ends; every sample is within `tolerance`
+    of the polyline through the ends and the result.
+
+    >>> angle = np.linspace(0, np.pi / 2, 91)
+    >>> simplify(100 * np.column_stack([np.cos(angle), np.sin(angle)]), 1.0)
+    [23, 46, 69]
+    """
+    best = _longest_legs(w, tolerance)
+    low, high = 0.0, tolerance
+    for _ in range(_BISECTIONS if best else 0):
+        middle = (low + high) / 2
+        points = _longest_legs(w, middle)
+        if len(points) <= len(best):
+            best, high = points, middle
+        else:
+            low = middle
+    return best
+
+
+def along_spline(path: Real, spacing: float, end_spacing: float) -> list[int]:
+    """Return the indices between first and last sample that become spline waypoints.
+
+    They are `spacing` m apart in bends of `path` (n, 2), m, and up to twice as far on straight
+    parts. The last one is at least `end_spacing` m before the end, if there is one then.
+    """
+    way = np.concatenate([[0.0], np.cumsum(lengths(np.diff(path, axis=0)))])
+    end = float(way[-1]) - max(0.0, end_spacing - spacing)
+    if end <= 2 * _BEND_SAMPLING:
+        return []
+    fine = np.linspace(0.0, end, math.ceil(end / _BEND_SAMPLING) + 1)
+    x, y = (np.interp(fine, way, axis) for axis in path.T)
+    heading = np.unwrap(np.arctan2(*(np.gradient(_smooth(axis, spacing / 4)) for axis in (y, x))))
+    bend = np.abs(np.gradient(heading)) / _BEND_SAMPLING
+    per_metre = np.clip(bend / _SPLINE_TURN, 1 / (_SPARSEST * spacing), 1 / spacing)
+    count = np.cumsum(_smooth(per_metre, spacing)) * _BEND_SAMPLING
+    parts = max(1, round(float(count[-1])))
+    places = np.interp(np.linspace(count[0], count[-1], parts + 1)[1:-1], count, fine)
+    return [int(k) for k in np.unique(np.searchsorted(way, places)) if 0 < k < len(path) - 1]
+
+
+def _speeds(t: Real, w: Real) -> Real:
+    """Return the magnitude of the mean velocity over a window about each sample, (n,), m/s."""
+    before = np.maximum(t - _SPEED_WINDOW / 2, t[0])
+    after = np.minimum(t + _SPEED_WINDOW / 2, t[-1])
+    moved = [np.interp(after, t, x) - np.interp(before, t, x) for x in w.T]
+    means: Real = np.stack(moved, axis=-1) / (after - before)[:, None]
+    return lengths(means)
+
+
+def _runs(mask: Flags) -> Iterator[tuple[int, int]]:
+    """Yield first and last index of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    for begin, end in edges.reshape(-1, 2):
+        yield int(begin), int(end) - 1
+
+
+def _last_within(w: Real, radius: float) -> int:
+    """Return the last index up to which the bounding box's half diagonal is within `radius`."""
+    extent = np.maximum.accumulate(w, axis=0) - np.minimum.accumulate(w, axis=0)
+    outside = lengths(extent) / 2 > radius
+    return int(np.argmax(outside)) - 1 if outside.any() else len(w) - 1
+
+
+def _longest_legs(w: Real, tolerance: float) -> list[int]:
+    """Return the indices at which legs end if each is as long as `tolerance` (m) allows."""
+    ends: list[int] = []
+    first, last = 0, len(w) - 1
+    while True:
+        step = 1
+        while first + step < last and _fits(w, first, min(first + 2 * step, last), tolerance):
+            step = min(2 * step, last - first)
+        if first + step >= last:
+            return ends
+        low, high = step, min(2 * step, last - first)
+        while high - low > 1:
+            middle = (low + high) // 2
+            if _fits(w, first, first + middle, tolerance):
+                low = middle
+            else:
+                high = middle
+        first += low
+        ends.append(first)
+
+
+def _fits(w: Real, first: int, last: int, tolerance: float) -> bool:
+    """Tell whether the samples between two stay close to the leg from one to the other."""
+    passed = w[first + 1 : last]
+    return bool(
+        len(passed) == 0 or distances_to_segment(passed, w[first], w[last]).max() <= tolerance
+    )
+
+
+def _smooth(values: Real, reach: float) -> Real:
+    """Return the means of `values`, one for each metre, over `reach` m to both sides."""
+    half = min(round(reach / _BEND_SAMPLING), (len(values) - 1) // 2)
+    padded = np.pad(values, half, mode="edge")
+    return np.convolve(padded, np.full(2 * half + 1, 1 / (2 * half + 1)), mode="valid")

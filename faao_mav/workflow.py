@@ -1,0 +1,296 @@
+"""The whole way from a plan to a mission: optimise, convert, predict, check, price, write.
+
+The command line, the reports, the studies and Python users all call `plan_mission`.
+"""
+
+import time
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from faao_mav.errors import FaaoError, InputError
+from faao_mav.files import check_writable, write_together
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.formats import check_suffix, render_mission
+from faao_mav.optimizer.pricing import (
+    FreshRates,
+    MutualInformation,
+    Saturation,
+    fresh_rates,
+    price,
+    saturation,
+)
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.search.bound import Bound
+from faao_mav.optimizer.solution import Observer, Progress, Solution
+from faao_mav.plan import Plan, parse_plan
+from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
+from faao_mav.schedule.prediction import Prediction, predict_delivery
+from faao_mav.validate import Finding, Level, Limits
+from faao_mav.validate.check import Check, check
+from faao_mav.vehicle.parameter_file import parameter_path, render_parameters
+from faao_mav.vehicle.predict import predict
+from faao_mav.vehicle.recommend import candidates
+
+DRAWING_START = datetime(2000, 1, 1, tzinfo=UTC)
+"""When the flight in a drawing (.kml) begins: a plan says how long it takes, not when it is."""
+
+_DRAWING_STEP = 1.0
+"""Seconds between the samples of a drawn flight; chosen: a drawing needs no more."""
+
+_HEADER = "for "
+"""How the comment begins that a file of parameters written by this program has in its first line,
+before the name of the mission."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """What a plan led to.
+
+    `solution` is the optimised flight. `conversion` is its mission with the autopilot parameters
+    that the mission is timed for, `prediction` what the predicted flight of that mission delivers,
+    `check` what validation says of it. Where no mission can be made these three are None and
+    `no_mission` says why.
+
+    `information` is the mutual information along the solution, bit/s/Hz; `fresh` the rates on
+    fading that was not planned on, None unless the plan averages over fading; `saturation` says
+    whether the alphabet limits the rate, `bound` what no route can exceed, if that was asked for.
+    `seconds_optimize` is the time of the optimiser, `seconds_total` that of everything, in seconds.
+    """
+
+    solution: Solution
+    information: MutualInformation | None = None
+    fresh: FreshRates | None = None
+    saturation: Saturation | None = None
+    bound: Bound | None = None
+    conversion: Conversion | None = None
+    prediction: Prediction | None = None
+    check: Check | None = None
+    no_mission: FaaoError | None = None
+    seconds_optimize: float = 0.0
+    seconds_total: float = 0.0
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What validation found in the mission; nothing where there is no mission."""
+        return self.check.findings if self.check is not None else ()
+
+    @property
+    def flyable(self) -> bool:
+        """Whether there is a mission, and validation found no error in it."""
+        errors = any(finding.level is Level.ERROR for finding in self.findings)
+        return self.conversion is not None and not errors
+
+    def write(self, path: str | Path) -> tuple[Path, ...]:
+        """Write the mission to the file `path` and its parameters to the file beside it.
+
+        Both are written or neither; the paths of both are returned. The ending of `path` tells
+        the mission's format: see `faao_mav.mission.formats`. A mission that needs no parameters
+        has no second file. Raises the error that stood in the way of a mission, if there is none,
+        and `InputError` where a file cannot be written.
+        """
+        if self.conversion is None:
+            raise self.no_mission or InputError("there is no mission: the plan was only optimised")
+        mission, *beside = mission_files(path, self.solution.plan)
+        contents: dict[str | Path, bytes] = {
+            file: render_parameters(
+                self.conversion.parameters,
+                self.conversion.vehicle.autopilot,
+                header=f"{_HEADER}{mission.name}",
+            ).encode(errors="replace")  # the name of a mission may be no Unicode
+            for file in beside
+        }
+        drawn = mission.suffix.lower() == ".kml"
+        contents[mission] = (
+            draw_mission(self.solution, self.conversion)
+            if drawn
+            else render_mission(self.conversion.mission, mission, self.conversion.vehicle)
+        ).encode()
+        write_together(contents)
+        return mission, *beside
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON object of `--json`: bit/s/Hz, seconds, metres, dB.
+
+        A part that is not there is null.
+        """
+        solution, rates, conversion = self.solution, self.solution.rates, self.conversion
+        information, fresh, flown = self.information, self.fresh, self.prediction
+        return {
+            "name": solution.plan.name,
+            "average_rate": rates.R_avg,
+            "rate_bs_uav": rates.R_U,
+            "rate_uav_user": rates.R_G,
+            "mutual_information": information.average if information else None,
+            "mutual_information_bs_uav": information.bs_uav if information else None,
+            "mutual_information_uav_user": information.uav_user if information else None,
+            "mutual_information_error": information.error if information else None,
+            "fresh_rate": fresh.average if fresh else None,
+            "fresh_rate_error": fresh.error if fresh else None,
+            "upper_bound": self.bound.value if self.bound else None,
+            "upper_bound_exact": self.bound.exact if self.bound else None,
+            "starts": dict(solution.starts),
+            "iterations": solution.iterations,
+            "converged": solution.converged,
+            "ending": solution.ending,
+            "history": solution.history.tolist(),
+            "residuals": solution.residuals(),
+            "seconds": {"optimize": self.seconds_optimize, "total": self.seconds_total},
+            "saturated": self.saturation.saturated if self.saturation else None,
+            "spare_db": self.saturation.spare_db if self.saturation else None,
+            "no_mission": str(self.no_mission) if self.no_mission else None,
+            "mission": {
+                "items": len(conversion.mission.items),
+                "duration": flown.duration,
+                "distance": conversion.schedule.route.distance,
+                "parameters": dict(conversion.parameters),
+            }
+            if conversion and flown
+            else None,
+            "predicted": {
+                "average_rate": flown.rates.R_avg,
+                "rate_bs_uav": flown.rates.R_U,
+                "rate_uav_user": flown.rates.R_G,
+                "average_rate_by_position": flown.by_position.R_avg,
+                "duration": flown.duration,
+                "max_path_error": flown.max_path_error,
+                "max_position_error": flown.max_position_error,
+                "rms_position_error": flown.rms_position_error,
+                "calibrated": not conversion.vehicle.type.caveat,
+            }
+            if conversion and flown
+            else None,
+            "validation": [asdict(finding) for finding in self.findings],
+        }
+
+
+def optimize_plan(plan: Plan, *, observe: Observer | None = None) -> Result:
+    """Return the solution of `plan` with its mutual information: all that a study's row needs.
+
+    `observe` is told the progress. Raises what `optimize` raises.
+    """
+    from faao_mav.optimizer.optimize import optimize
+
+    started = time.perf_counter()
+    solution = optimize(plan, observe=observe)
+    seconds = time.perf_counter() - started
+    return Result(solution, price(solution), seconds_optimize=seconds)
+
+
+def plan_mission(
+    plan: Plan,
+    *,
+    method: str | None = None,
+    bound: bool = False,
+    observe: Observer | None = None,
+) -> Result:
+    """Optimise the flight of `plan` and make the mission that flies it.
+
+    `method`, where given, replaces `optimizer.method`; with `bound` what no route can exceed is
+    computed too; `observe` is told the progress. A flight that no mission can be made of is a
+    result without a mission: see `Result.no_mission`. Raises `PlanError` when the plan asks for
+    more than the method can handle, `InfeasibleError` when no flight satisfies it.
+
+    With `plan` a `Plan`, as `read_plan` returns it:
+
+    >>> result = plan_mission(plan)
+    >>> result.flyable
+    True
+    >>> result.prediction.rates.R_avg > 0.9 * result.solution.rates.R_avg
+    True
+    >>> sorted(result.conversion.parameters)[:2]
+    ['WPNAV_ACCEL', 'WPNAV_JERK']
+    """
+    started = time.perf_counter()
+    if method is not None:
+        plan = parse_plan(plan.text, plan.source, method=method)
+    result = optimize_plan(plan, observe=observe)
+    solution = result.solution
+    if observe is not None:
+        observe(Progress(1, 1, "the mission's timing", solution.rates.R_avg))
+    result = _with_mission(result)
+    ceiling = None
+    if bound:
+        from faao_mav.optimizer.search.bound import upper_bound
+
+        ceiling = upper_bound(build_problem(plan), solution.rates.R_avg)
+    return replace(
+        result,
+        fresh=fresh_rates(solution),
+        saturation=saturation(solution),
+        bound=ceiling,
+        seconds_total=time.perf_counter() - started,
+    )
+
+
+def _with_mission(result: Result) -> Result:
+    """Return `result` with its mission, or with why there is none."""
+    solution = result.solution
+    try:
+        check_vehicle(solution.plan)
+        conversion = convert(solution)
+    except FaaoError as error:
+        return replace(result, no_mission=error)
+    judged = check(
+        conversion.mission,
+        conversion.vehicle,
+        limits=Limits(max_speed=solution.plan.vehicle.max_speed),
+        solution=solution,
+        lead=conversion.schedule.route.lead,
+    )
+    prediction = predict_delivery(solution, conversion)
+    return replace(result, conversion=conversion, prediction=prediction, check=judged)
+
+
+def mission_files(path: str | Path, plan: Plan) -> tuple[Path, ...]:
+    """Return the files that `Result.write` writes for `plan`: the mission, and its parameters.
+
+    Raises `InputError` for one that cannot be written, and for parameters there that no run has
+    written: they are the vehicle's own, perhaps. To be asked before the work.
+    """
+    mission = Path(path)
+    check_suffix(mission)
+    check_writable(mission)
+    if not any(candidates(plan)):
+        return (mission,)
+    beside = parameter_path(mission, plan.vehicle.autopilot)
+    check_writable(beside)
+    if beside.exists():
+        with beside.open("rb") as file:
+            beginning = file.read(len(_HEADER) + 2)
+        if beginning != f"# {_HEADER}".encode():
+            raise InputError(
+                f"{beside}: the mission's parameters are to go there, but it is not of an earlier "
+                "run; rename it, or give the mission another name"
+            )
+    return mission, beside
+
+
+def draw_mission(solution: Solution, conversion: Conversion) -> str:
+    """Return the KML document of a mission: its route, the stations, and its predicted flight.
+
+    The flight begins at `DRAWING_START`.
+    """
+    from faao_mav.mission.formats.kml import Station, TimedTrack, write_kml
+
+    plan = solution.plan
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    ground = plan.origin.elevation
+    stations = []
+    for name, place in (
+        ("base station", plan.radio.base_station.position),
+        ("ground user", plan.radio.ground_user.position),
+    ):
+        latitude, longitude = frame.to_geodetic(place)
+        stations.append(Station(name, float(latitude), float(longitude), ground))
+    track = predict(conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP)
+    latitudes, longitudes = frame.to_geodetic(track.position[:, :2])
+    heights = track.position[:, 2] + ground
+    spots = list(zip(latitudes.tolist(), longitudes.tolist(), heights.tolist(), strict=True))
+    return write_kml(
+        conversion.mission,
+        name=plan.name or "relay flight",
+        stations=stations,
+        track=TimedTrack(DRAWING_START, track.t.tolist(), spots),
+    )

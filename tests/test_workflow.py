@@ -1,0 +1,152 @@
+"""From a plan to a result, and what it writes."""
+
+import doctest
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from conftest import MISSIONS, SMALL, MakePlan, edited, free_port
+
+import faao_mav.study.sweep
+import faao_mav.validate.check
+import faao_mav.workflow
+from faao_mav import (
+    Vehicle,
+    check,
+    parse_plan,
+    plan_mission,
+    read_mission,
+    read_parameters,
+    read_plan,
+    upload,
+)
+from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mavlink.mock.serve import running
+from faao_mav.workflow import Result, mission_files, optimize_plan
+
+QUICK = {"radio.fading": "none", "optimizer.starts": ["straight"]}
+
+
+@pytest.fixture(scope="module")
+def result(small_plan: MakePlan) -> Result:
+    return plan_mission(small_plan(QUICK))
+
+
+@pytest.fixture(scope="module")
+def too_many_items(small_plan: MakePlan) -> Result:
+    return plan_mission(small_plan(QUICK | {"mission.max_items": 4}))
+
+
+def test_the_readmes_python_does_what_it_says(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "missions").symlink_to(MISSIONS)
+    monkeypatch.chdir(tmp_path)
+    found = re.search(r"```python\n(.*?)```", (MISSIONS.parent / "README.md").read_text(), re.S)
+    assert found is not None
+    if "plan_mission" not in found[1]:
+        pytest.skip("README does not show it yet")
+    exec(found[1], {})
+    rates, *files = capsys.readouterr().out.splitlines()
+    planned, predicted = map(float, rates.split())
+    assert predicted == pytest.approx(planned, rel=0.01)
+    assert files == ["mission.waypoints", "mission.param"]
+    assert all(Path(name).exists() for name in files)
+
+
+def test_a_mission_comes_with_the_parameters_that_it_is_timed_for(
+    result: Result, tmp_path: Path
+) -> None:
+    assert result.conversion is not None
+    mission, beside = result.write(tmp_path / "m.waypoints")
+    assert (mission.name, beside.name) == ("m.waypoints", "m.param")
+    assert read_mission(mission).items == result.conversion.mission.items
+    assert read_parameters(beside) == result.conversion.parameters
+    assert result.write(mission) == (mission, beside)  # its own may be replaced
+    assert mission_files(mission, result.solution.plan) == (mission, beside)
+
+
+def test_what_is_written_is_in_time_and_goes_to_the_vehicle_whole(tmp_path: Path) -> None:
+    lively = {"vehicle.max_speed": 8, "flight.end": [120, 0], "flight.duration": 40}
+    result = plan_mission(parse_plan(edited(SMALL, QUICK | lively)))
+    out, beside = result.write(tmp_path / "m.plan")
+    mission, loaded = read_mission(out), Vehicle(parameters=read_parameters(beside))
+    checked = check(mission, loaded, solution=result.solution)
+    assert [finding.rule for finding in checked.findings if finding.level != "note"] == []
+    without = check(mission, Vehicle(), solution=result.solution)
+    assert "link-late" in {finding.rule for finding in without.findings}
+    port = free_port()
+    mock = MockAutopilot(behaviour_of("ardupilot"), beat=0.1)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        assert upload(mission, f"udpout:127.0.0.1:{port}").verified
+
+
+def test_the_vehicles_own_parameters_are_not_replaced(result: Result, tmp_path: Path) -> None:
+    (tmp_path / "m.param").write_text("WPNAV_SPEED,700\n")
+    with pytest.raises(InputError, match="not of an earlier run"):
+        result.write(tmp_path / "m.waypoints")
+    assert [path.name for path in tmp_path.iterdir()] == ["m.param"]
+
+
+def test_a_vehicle_that_keeps_its_parameters_gets_a_mission_alone(
+    small_plan: MakePlan, tmp_path: Path
+) -> None:
+    kept = plan_mission(small_plan(QUICK | {"mission.parameters": "keep"}))
+    assert kept.write(tmp_path / "m.plan") == (tmp_path / "m.plan",)
+
+
+@pytest.mark.parametrize("name", ["m.gpx", "absent/m.plan"])
+def test_a_mission_that_cannot_be_written_leaves_nothing(
+    result: Result, tmp_path: Path, name: str
+) -> None:
+    with pytest.raises((MissionFileError, InputError)):
+        result.write(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flight_without_a_mission_is_a_result(too_many_items: Result, tmp_path: Path) -> None:
+    assert too_many_items.solution.rates.R_avg > 0
+    assert (too_many_items.conversion, too_many_items.prediction) == (None, None)
+    assert not too_many_items.flyable
+    assert "mission.max_items" in str(too_many_items.no_mission)
+    with pytest.raises(InfeasibleError, match=r"mission\.max_items"):
+        too_many_items.write(tmp_path / "m.plan")
+    with pytest.raises(FaaoError, match="only optimised"):
+        optimize_plan(too_many_items.solution.plan).write(tmp_path / "m.plan")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_row_of_a_study_needs_no_mission(result: Result) -> None:
+    alone = optimize_plan(result.solution.plan)
+    assert alone.solution.rates == result.solution.rates
+    assert alone.information == result.information
+    assert (alone.conversion, alone.check, alone.findings) == (None, None, ())
+    assert alone.as_dict().keys() == result.as_dict().keys()
+
+
+def test_another_method_is_in_the_plan_of_the_result(paper_plan: MakePlan) -> None:
+    result = plan_mission(paper_plan(), method="direct")
+    assert result.solution.plan.optimizer.method == "direct"
+    assert parse_plan(result.solution.plan.text).optimizer.method == "direct"
+
+
+def test_flyable_is_without_errors(result: Result) -> None:
+    paper = plan_mission(read_plan(MISSIONS / "paper_fig3.yaml"))
+    assert paper.conversion is not None
+    assert not paper.flyable
+    slow = {"vehicle.max_speed": 8, "vehicle.max_acceleration": 1.5, "flight.duration": 16}
+    gentle = plan_mission(parse_plan(edited(SMALL, QUICK | slow)))
+    assert gentle.flyable
+
+
+@pytest.mark.parametrize(
+    "module", [faao_mav.workflow, faao_mav.validate.check, faao_mav.study.sweep]
+)
+def test_the_examples_run(module: ModuleType, small_plan: MakePlan) -> None:
+    slow = {"vehicle.max_speed": 8, "vehicle.max_acceleration": 1.5, "flight.duration": 16}
+    plan = small_plan(QUICK | slow)
+    done = doctest.testmod(module, extraglobs={"plan": plan})
+    assert done.attempted
+    assert not done.failed
