@@ -40,6 +40,13 @@ class Forces:
     a: Real | float = 0.0
     own: Real | float = 0.0
 
+    @classmethod
+    def total(cls, forces: "Sequence[Forces]") -> "Forces":
+        """Return the sum of `forces` on w, v and a."""
+        if len(forces) == 1:
+            return forces[0]
+        return cls(*(added(getattr(each, part) for each in forces) for part in "wva"))
+
     def less(self, other: "Forces") -> "Forces":
         """Return the forces on v and a without those of `other`."""
         return Forces(v=self.v - other.v, a=self.a - other.a)

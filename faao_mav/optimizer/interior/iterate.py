@@ -69,7 +69,7 @@ class Iterate:
         """Return s^T z per inequality, after `share` of the `direction`, (flights, 1)."""
         steps = (None,) * len(self.states) if direction is None else direction.steps
         gaps = [state.gap(share, step) for state, step in zip(self.states, steps, strict=True)]
-        return np.asarray(sum(gaps) / sum(state.count() for state in self.states))
+        return np.asarray(reduce(np.add, gaps) / sum(state.count() for state in self.states))
 
     def centred(self, mu: Real, barrier_share: float) -> "Iterate":
         """Return the same flights with multipliers that go with mu (flights, 1)."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.optimizer.interior.constraint import Constraint, ScaledFlight, added
+from faao_mav.optimizer.interior.constraint import Constraint, Forces, ScaledFlight
 from faao_mav.optimizer.interior.iterate import Direction, Iterate, best_floor, merged, only
 from faao_mav.optimizer.interior.newton import Newton
 from faao_mav.optimizer.interior.rewards import ScaledRewards
@@ -203,11 +203,10 @@ class Search:
         n = matrix.slots
         forces = [state.forces() for state in at.states]
         on_w = matrix.pull(at.y) - np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.gradient)
-        of_constraints = added(force.w for force in forces)
-        if isinstance(of_constraints, np.ndarray):
-            on_w -= of_constraints * matrix.moves_w
-        on_v = self.flight.forces_asked(at.y, np.asarray(added(force.a for force in forces)))
-        on_v -= added(force.v for force in forces) * matrix.moves_v
+        total = Forces.total(forces)
+        if isinstance(total.w, np.ndarray):
+            on_w -= total.w * matrix.moves_w
+        on_v = self.flight.forces_asked(at.y, np.asarray(total.a)) - total.v * matrix.moves_v
         slope = np.maximum(_largest(on_w), _largest(on_v))
         size, gap = _sum(np.abs(at.y)), (at.weights * (at.total - at.floor)).sum(axis=0)
         broken = _largest(matrix.dynamics(at.w, at.v))
@@ -288,8 +287,10 @@ class Search:
         finite = np.isfinite(total.sum(axis=0) + _sum(gradient) + _sum(hessian))
         weights = at.weights + share * direction.weights
         missing = (weights * (at.total + share * direction.total - total)).sum(axis=0)
-        missing -= share**2 * newton.bend(direction) / 2
-        allowed = _MISFIT * share * np.maximum(newton.decrease(direction), 0) + self.rewards.noise
+        bend = newton.bend(direction)
+        missing -= share**2 * bend / 2
+        decrease = np.maximum(newton.decrease(direction, bend), 0)
+        allowed = _MISFIT * share * decrease + self.rewards.noise
         taken: Flags = asked & finite & (missing <= allowed)
         if not taken.any():
             return taken
