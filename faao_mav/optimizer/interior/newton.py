@@ -71,11 +71,12 @@ class Newton:
         """Factor the system, with the negative part of H cut where `cut` (flights, 1)."""
         matrix, (links, flights) = flight.matrix, at.total.shape[:2]
         n = matrix.slots
+        stiffness = [state.stiffness() for state in at.states]
         curvature = -np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.hessian)
+        curvature += added(each.curvature for each in stiffness)
         if cut.any():
             curvature = np.where(cut, _positive_part(curvature), curvature)
         curvature[::2] += proximal
-        stiffness = [state.stiffness() for state in at.states]
         compliance = np.empty((3, flights, n))  # the last slot has none
         compliance[..., :-1] = _compliance(stiffness)
         compliance[..., :-1] /= flight.gain**2
@@ -107,7 +108,7 @@ class Newton:
         move = direction.move
         size = sum(np.einsum("cbn,cbn->b", x, x) for x in (move.w, move.v))
         falls = self.decrease(direction, self.bend(direction)) > _MIN_CURVATURE * size[:, None]
-        return np.asarray((np.linalg.eigvalsh(both)[:, :1] > 0) & falls)
+        return np.asarray((np.linalg.eigvalsh(both) > 0).all(axis=1, keepdims=True) & falls)
 
     def predictor(self) -> Direction:
         """Return the direction for mu = 0 without a correction."""
@@ -136,7 +137,7 @@ class Newton:
         # G dw - dt + (F - t) weights+ / weights = mu c / weights, and the weights sum to one
         system = np.ones((flights, links + 1, links + 1))
         system[:, :links, :links] = self.border
-        system[:, :links, links], system[:, links, links] = -1, 0
+        system[:, :links, links], system[:, links, links] = -1, links == 0
         right = np.ones((flights, links + 1, 1))
         gained = np.einsum("cjbn,bnc->bj", at.gradient, alone[..., W])
         right[:, :links, 0] = (mu * self.barrier_share / at.weights)[..., 0].T - gained
