@@ -39,6 +39,24 @@ class Relayed:
         return float(self.forwarded.mean())
 
 
+@dataclass(frozen=True, slots=True)
+class RelayQueue:
+    """How a relay forwards: sharing one band between both hops if `half`; its buffer, bit/Hz.
+
+    In slots of `time_step` seconds the buffer is that of `buffer / time_step` bits per slot.
+    """
+
+    half: bool = False
+    buffer: float = math.inf
+
+    def rate(self, I_U: Real, I_G: Real, time_step: float) -> float:
+        """Return the largest delivered rate at the rates `I_U`, `I_G` (n,), bit/s/Hz."""
+        room = self.buffer / time_step
+        if self.half:
+            return forward_by_shares(I_U, I_G, best_shares(I_U, I_G, room), room).rate
+        return forward_greedily(I_U, I_G, room).rate
+
+
 def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:
     """Return what a full-duplex relay delivers that sends what it holds as fast as it can.
 
