@@ -138,7 +138,9 @@ class Budget(Constraint):
 
     normal: tuple[float, float]
     most: float
-    unknowns: ClassVar[int] = 2
+    @property
+    def unknowns(self) -> int:
+        return 2
 
     def entries(self, slots: int, first: int) -> Sequence[Entry]:
         begins, ends = np.eye(slots)[[0, -1]]

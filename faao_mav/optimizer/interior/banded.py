@@ -88,6 +88,7 @@ class FlightMatrix:
         self.moves_w, self.moves_v = np.ones((2, slots))
         self.moves_w[[0, -1]] = 0
         self.moves_v[[0, -1]] = [not is_fixed for is_fixed in fixed]
+        self._moves = [self.moves_w] * 2 + [self.moves_v] * 2 + [np.ones(slots)] * (4 + more)
         has_next = np.arange(slots) < slots - 1
         self._free = np.stack([self.moves_w, self.moves_v, has_next])[:, None, None] > 0
         self._template = self._constants(constant)
@@ -175,15 +176,10 @@ class FlightMatrix:
         """Add the values of `entry` and of its mirror image, but for fixed unknowns, to `cells`."""
         below, count = self._below(entry), entry.values.shape[-1]
         later = slice(entry.ahead, entry.ahead + count)
-        values = entry.values * self._moves(entry.row)[later] * self._moves(entry.column)[:count]
+        values = entry.values * self._moves[entry.row][later] * self._moves[entry.column][:count]
         cells[..., :count, entry.column, self._diagonal + below] += values
         if below:
             cells[..., later, entry.row, self._diagonal - below] += values
-
-    def _moves(self, unknown: int) -> Real:
-        """Return 0 for the slots in which the `unknown` is fixed and 1 elsewhere, (n,)."""
-        moves = {0: self.moves_w, 1: self.moves_w, 2: self.moves_v, 3: self.moves_v}
-        return moves.get(unknown, np.ones(self.slots))
 
     def _below(self, entry: Entry) -> int:
         """Return by how many rows `entry` is below the diagonal."""

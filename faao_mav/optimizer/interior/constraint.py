@@ -19,7 +19,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -40,6 +40,13 @@ class Forces:
     a: Real | float = 0.0
     own: Real | float = 0.0
 
+    @classmethod
+    def total(cls, forces: "Sequence[Forces]") -> "Forces":
+        """Return the sum of `forces` on w, v and a."""
+        if len(forces) == 1:
+            return forces[0]
+        return cls(*(added(getattr(each, part) for each in forces) for part in "wva"))
+
     def less(self, other: "Forces") -> "Forces":
         """Return the forces on v and a without those of `other`."""
         return Forces(v=self.v - other.v, a=self.a - other.a)
@@ -50,7 +57,8 @@ class Stiffness:
     """The symmetric 2x2 blocks of K on w, v (3, flights, n) and a (3, flights, n - 1), 0 if none.
 
     `compliance` is the inverse of `a`, for a constraint that knows it better than by inversion.
-    `entries` are those of the constraint's own unknowns.
+    `entries` are those of the constraint's own unknowns. `curvature` (3, flights, n) is that of
+    its functions of w, weighted by their multipliers, which is cut where it has the wrong sign.
     """
 
     w: Real | float = 0.0
@@ -58,6 +66,7 @@ class Stiffness:
     a: Real | float = 0.0
     compliance: Real | None = None
     entries: Sequence[Entry] = ()
+    curvature: Real | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +79,7 @@ class Move:
 
 
 class State(Protocol):
-    """A constraint at an iterate: a frozen dataclass of arrays (..., flights, slots).
+    """A constraint at an iterate: a frozen dataclass, derived from this, of (..., flights, slots).
 
     Sums and extremes over a flight are (flights, 1). `target`, and the changes `step` that
     `solved` returns, are the state's own records; no one else looks into them.
@@ -122,6 +131,21 @@ class State(Protocol):
     def centred(self, mu: Real) -> "State":
         """Return the same slacks with the multipliers z = mu s^-1."""
 
+    def missing(self, share: Real, step: Any, then: Any) -> Real | float:  # noqa: ARG002
+        """Return by how much its functions fall short of the model after `share` of `step`.
+
+        Weighted by the new multipliers; `then` is the state there. 0 where they are linear.
+        """
+        return 0.0
+
+    def reward(self) -> Real | float:
+        """Return what the constraint's own unknowns add to the objective, (flights, 1)."""
+        return 0.0
+
+    def steepness(self) -> Real | float:
+        """Return the largest gradient of its functions of w, weighted as in `missing`."""
+        return 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Start:
@@ -141,8 +165,10 @@ class Start:
 class Constraint(ABC):
     """A limit on flights, apart from any iterate."""
 
-    unknowns: ClassVar[int] = 0
-    """How many unknowns per slot it brings into the Newton system."""
+    @property
+    def unknowns(self) -> int:
+        """How many unknowns per slot it brings into the Newton system."""
+        return 0
 
     def entries(self, slots: int, first: int) -> Sequence[Entry]:  # noqa: ARG002
         """Return what never changes of the rows of its own unknowns, which count from `first`."""
@@ -218,6 +244,17 @@ def quadratic(packed: Real, x: Real) -> Real:
     east, north = x
     each = xx * east * east + 2 * xy * east * north + yy * north * north
     return np.asarray(each.sum(axis=-1, keepdims=True))
+
+
+def summed(values: Real) -> Real:
+    """Return the sum over everything but the flights, (flights, 1)."""
+    return np.asarray(values.reshape(-1, *values.shape[-2:]).sum(axis=(0, 2))[:, None])
+
+
+def largest(values: Real) -> Real:
+    """Return the largest modulus over everything but the flights, (flights, 1)."""
+    each = np.abs(values).max(axis=-1, keepdims=True)
+    return np.asarray(each.max(axis=0) if each.ndim == 3 else each)
 
 
 def added(parts: Iterable[Real | float]) -> Real | float:

@@ -28,17 +28,20 @@ from faao_mav.optimizer.interior.constraint import (
     Move,
     ScaledFlight,
     Start,
+    State,
     Stiffness,
+    largest,
+    summed,
 )
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 
 @dataclass(frozen=True)
-class Slacks:
-    """Scalar slacks s > 0 and multipliers z of inequalities, one per slot, with their margins.
+class Slacks(State):
+    """Scalar slacks s > 0 and multipliers z of inequalities, some per slot, with their margins.
 
     `on` is one where the inequality holds and zero where there is none, s, z, margin alike
-    (flights, n). A step is (ds, dz), a target what z + z / s ds has to be, (flights, n).
+    (..., flights, n). A step is (ds, dz), a target what z + z / s ds has to be, shaped as s.
     """
 
     on: Real
@@ -48,21 +51,21 @@ class Slacks:
 
     def count(self) -> Real:
         """Return in how many slots the inequality holds, (flights, 1)."""
-        return np.asarray(self.on.sum(axis=-1, keepdims=True))
+        return summed(self.on)
 
     def gap(self, share: Real | float = 0.0, step: Any = None) -> Real:
         """Return the sum of s z after `share` of `step`, (flights, 1)."""
         ds, dz = (0.0, 0.0) if step is None else step[:2]
         both = (self.s + share * ds * self.on) * (self.z + share * dz)
-        return np.asarray(both.sum(axis=-1, keepdims=True))
+        return summed(both)
 
     def size(self) -> Real:
         """Return the sum of the multipliers, (flights, 1)."""
-        return np.asarray(self.z.sum(axis=-1, keepdims=True))
+        return summed(self.z)
 
     def violation(self) -> Real:
         """Return the largest margin, (flights, 1)."""
-        return np.asarray(self.margin.max(axis=-1, keepdims=True))
+        return largest(self.margin)
 
     def target(self, mu: Real, ahead: tuple[Real, Real], share: Real) -> Real:
         """Return (mu - ds dz) / s at `share` of the step `ahead`."""
@@ -76,14 +79,15 @@ class Slacks:
     def curvature(self, step: tuple[Real, Real]) -> Real:
         """Return the sum of z / s ds^2, the margins left out, (flights, 1)."""
         ds = step[0] + self.margin
-        return np.asarray((self.z / self.s * ds * ds).sum(axis=-1, keepdims=True))
+        return summed(self.z / self.s * ds * ds)
 
     def reach(self, step: tuple[Real, Real]) -> Real:
         """Return the share of `step` at which a slack or a multiplier vanishes, (flights, 1)."""
         falls = np.maximum(
             -step[0] * self.on / self.s, -step[1] * self.on / np.maximum(self.z, TINY)
         )
-        return np.asarray(1 / np.maximum(falls.max(axis=-1, keepdims=True), TINY))
+        falls = falls.reshape(-1, *falls.shape[-2:]).max(axis=(0, 2))[:, None]
+        return np.asarray(1 / np.maximum(falls, TINY))
 
 
 @dataclass(frozen=True)

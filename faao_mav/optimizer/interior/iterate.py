@@ -29,6 +29,8 @@ def best_floor(total: Real, weight: Real) -> Real:
     >>> float(best_floor(np.array([[[3.0]]]), np.array([[0.5]]))[0, 0])
     2.5
     """
+    if not len(total):
+        return np.zeros_like(weight)
     ordered = np.sort(total, axis=0)
     if len(total) == 1:
         return np.asarray(ordered[0] - weight)
@@ -65,11 +67,17 @@ class Iterate:
     gradient: Real
     hessian: Real
 
+    def value(self) -> Real:
+        """Return the objective: min_j F_j, or what constraints with a reward of their own say."""
+        if len(self.total):
+            return np.asarray(self.total.min(axis=0))
+        return np.asarray(reduce(np.add, [state.reward() for state in self.states]))
+
     def mean_gap(self, share: Real | float = 0.0, direction: "Direction | None" = None) -> Real:
         """Return s^T z per inequality, after `share` of the `direction`, (flights, 1)."""
         steps = (None,) * len(self.states) if direction is None else direction.steps
         gaps = [state.gap(share, step) for state, step in zip(self.states, steps, strict=True)]
-        return np.asarray(sum(gaps) / sum(state.count() for state in self.states))
+        return np.asarray(reduce(np.add, gaps) / sum(state.count() for state in self.states))
 
     def centred(self, mu: Real, barrier_share: float) -> "Iterate":
         """Return the same flights with multipliers that go with mu (flights, 1)."""
@@ -97,7 +105,7 @@ class Direction:
 
     def reach(self, at: Iterate) -> Real:
         """Return the share at which a slack, a multiplier or a weight vanishes, (flights, 1)."""
-        falls = (-self.weights / at.weights).max(axis=0)
+        falls = (-self.weights / at.weights).max(axis=0, initial=0)
         shares = [state.reach(step) for state, step in zip(at.states, self.steps, strict=True)]
         return np.asarray(reduce(np.minimum, shares, 1 / np.maximum(falls, TINY)))
 

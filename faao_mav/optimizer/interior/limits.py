@@ -19,6 +19,7 @@ from faao_mav.optimizer.interior.constraint import (
     Move,
     ScaledFlight,
     Start,
+    State,
     Stiffness,
     quadratic,
 )
@@ -48,7 +49,7 @@ class FlightLimits(Constraint):
 
 
 @dataclass(frozen=True)
-class LimitsState:
+class LimitsState(State):
     """Slacks and multipliers `pair` (3, 2, flights, m) of the m = 2 n - 1 cones; margin = s_0 - 1.
 
     A target is (3, flights, m), a step (ds, dz) has the shape of `pair`.

@@ -9,9 +9,11 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.interior.limits import FlightLimits
 from faao_mav.optimizer.interior.min_speed import MinSpeedConstraint
+from faao_mav.optimizer.interior.queue import Queue, QueueRewards
 from faao_mav.optimizer.interior.rewards import ScaledRewards, Stage
 from faao_mav.optimizer.interior.search import COLD_START, Search, StartStrategy
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.radio.relay import RelayQueue
 
 _ALLOWED = 1e-9
 """The violation of a limit, relative to it, that a flight may have: rounding of 1,000s of slots."""
@@ -42,6 +44,7 @@ def maximize(
     tolerance: float = 1e-6,
     max_iterations: int = 100,
     strategy: StartStrategy = COLD_START,
+    relay: RelayQueue | None = None,
 ) -> LocalOptimum:
     """Return a local optimum that is never worse than the feasible `start`.
 
@@ -49,7 +52,8 @@ def maximize(
     saturation, or none was found, the optimum is the start itself. `stage` is called once for the
     start, once per trial step and once for the result.
 
-    >>> from faao_mav.optimizer.interior.rewards import StageValues
+    >>> from faao_mav.optimizer.interior.queue import Queue, QueueRewards
+from faao_mav.optimizer.interior.rewards import StageValues
     >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
     >>> def near(w):  # the reward falls with the squared distance from (50, 40), as 1 / km^2
     ...     away = (w - np.array([50.0, 40.0]).reshape(2, *[1] * (w.ndim - 1)))[:, None]
@@ -69,6 +73,7 @@ def maximize(
         tolerance=tolerance,
         max_iterations=max_iterations,
         strategy=strategy,
+        relay=relay,
     )
     return optimum
 
@@ -82,12 +87,17 @@ def maximize_all(
     tolerance: float = 1e-6,
     max_iterations: int = 100,
     strategy: StartStrategy = COLD_START,
+    relay: RelayQueue | None = None,
 ) -> list[LocalOptimum]:
     """Return what `maximize` finds from each of the `starts`; the searches run side by side."""
     w, v = (np.stack(each, axis=1) for each in zip(*((s.w.T, s.v.T) for s in starts), strict=True))
-    rewards = ScaledRewards(stage, w)
-    first = rewards.first[..., 0]
     kept = (*constraints_of(kin), *constraints)
+    if relay is None:
+        rewards = ScaledRewards(stage, w)
+    else:
+        rewards = QueueRewards(stage, w)
+        kept = (*kept, Queue(rewards, relay.half, relay.buffer / kin.time_step))
+    first = objectives(rewards.base, kin, relay)
     search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy)
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
         results = search.run(max_iterations)
@@ -95,20 +105,28 @@ def maximize_all(
         feasible(kin, start, results[k].v.T * kin.max_speed, kept) if k in results else start
         for k, start in enumerate(starts)
     ]
-    means = stage(np.stack([flight.w.T for flight in flights], axis=1)).value.mean(axis=-1)
+    reached = objectives(stage(np.stack([f.w.T for f in flights], axis=1)).value, kin, relay)
     optima = []
     for k, start in enumerate(starts):
-        least = float(first[:, k].min())
+        least, value = float(first[k]), float(reached[k])
         if k not in results:
-            lowest = first[:, k] == least
+            means = rewards.first[:, k, 0]
+            lowest = means == means.min()
             optima.append(LocalOptimum(start, least, lowest / lowest.sum(), 0, 0.0, True))
             continue
-        end, value = results[k], float(means[:, k].min())
+        end = results[k]
         flight, value = (flights[k], value) if value >= least else (start, least)
         optima.append(
             LocalOptimum(flight, value, end.weights, end.iterations, end.residual, end.converged)
         )
     return optima
+
+
+def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
+    """Return min_j F_j, or what `relay` delivers of both rates `values` (J, flights, n)."""
+    if relay is None:
+        return np.asarray(values.mean(axis=-1).min(axis=0))
+    return np.array([relay.rate(*each, kin.time_step) for each in values.swapaxes(0, 1)])
 
 
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:

@@ -13,6 +13,7 @@ share of the barrier that keeps t below the F_j, and K, ds, s of every constrain
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -70,11 +71,12 @@ class Newton:
         """Factor the system, with the negative part of H cut where `cut` (flights, 1)."""
         matrix, (links, flights) = flight.matrix, at.total.shape[:2]
         n = matrix.slots
+        stiffness = [state.stiffness() for state in at.states]
         curvature = -np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.hessian)
+        curvature += added(each.curvature for each in stiffness)
         if cut.any():
             curvature = np.where(cut, _positive_part(curvature), curvature)
         curvature[::2] += proximal
-        stiffness = [state.stiffness() for state in at.states]
         compliance = np.empty((3, flights, n))  # the last slot has none
         compliance[..., :-1] = _compliance(stiffness)
         compliance[..., :-1] /= flight.gain**2
@@ -105,8 +107,8 @@ class Newton:
         both = np.where(np.isfinite(both).all(axis=(1, 2), keepdims=True), both, 0.0)
         move = direction.move
         size = sum(np.einsum("cbn,cbn->b", x, x) for x in (move.w, move.v))
-        falls = self.decrease(direction) > _MIN_CURVATURE * size[:, None]
-        return np.asarray((np.linalg.eigvalsh(both)[:, :1] > 0) & falls)
+        falls = self.decrease(direction, self.bend(direction)) > _MIN_CURVATURE * size[:, None]
+        return np.asarray((np.linalg.eigvalsh(both) > 0).all(axis=1, keepdims=True) & falls)
 
     def predictor(self) -> Direction:
         """Return the direction for mu = 0 without a correction."""
@@ -135,7 +137,7 @@ class Newton:
         # G dw - dt + (F - t) weights+ / weights = mu c / weights, and the weights sum to one
         system = np.ones((flights, links + 1, links + 1))
         system[:, :links, :links] = self.border
-        system[:, :links, links], system[:, links, links] = -1, 0
+        system[:, :links, links], system[:, links, links] = -1, links == 0
         right = np.ones((flights, links + 1, 1))
         gained = np.einsum("cjbn,bnc->bj", at.gradient, alone[..., W])
         right[:, :links, 0] = (mu * self.barrier_share / at.weights)[..., 0].T - gained
@@ -166,24 +168,23 @@ class Newton:
         """Return dw^T H dw, (flights, 1)."""
         return quadratic(self.curvature, direction.move.w)
 
-    def decrease(self, direction: Direction) -> Real:
-        """Return the curvature of the whole model along `direction`, (flights, 1)."""
+    def decrease(self, direction: Direction, bend: Real) -> Real:
+        """Return the curvature of the whole model along a `direction` of this `bend`, (flights, 1)."""
         at = self.at
         kink = at.weights / (at.total - at.floor) * (direction.total - direction.floor) ** 2
         of_constraints = [
             state.curvature(step) for state, step in zip(at.states, direction.steps, strict=True)
         ]
-        return np.asarray(self.bend(direction) + sum(of_constraints) + kink.sum(axis=0))
+        return np.asarray(reduce(np.add, of_constraints, bend) + kink.sum(axis=0))
 
 
 def _load(right: Real, flight: ScaledFlight, compliance: Real, pushes: list[Forces]) -> None:
     """Enter what the forces `pushes` of the constraints make of the right-hand side."""
-    matrix = flight.matrix
-    on_w, on_v, on_a = (added(getattr(push, part) for push in pushes) for part in "wva")
-    if isinstance(on_w, np.ndarray):
-        right[..., W] = (on_w * matrix.moves_w).transpose(1, 2, 0)
-    right[..., V] = (on_v * matrix.moves_v).transpose(1, 2, 0)
-    x, y = flight.gains * on_a
+    matrix, total = flight.matrix, Forces.total(pushes)
+    if isinstance(total.w, np.ndarray):
+        right[..., W] = (total.w * matrix.moves_w).transpose(1, 2, 0)
+    right[..., V] = (total.v * matrix.moves_v).transpose(1, 2, 0)
+    x, y = flight.gains * total.a
     xx, xy, yy = compliance[..., :-1]
     right[:, :-1, Q.start] = xx * x + xy * y
     right[:, :-1, Q.start + 1] = xy * x + yy * y

@@ -14,11 +14,18 @@ centred anew (`_centre`).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.optimizer.interior.constraint import Constraint, ScaledFlight, added
+from faao_mav.optimizer.interior.constraint import (
+    Constraint,
+    Forces,
+    ScaledFlight,
+    largest,
+    summed,
+)
 from faao_mav.optimizer.interior.iterate import Direction, Iterate, best_floor, merged, only
 from faao_mav.optimizer.interior.newton import Newton
 from faao_mav.optimizer.interior.rewards import ScaledRewards
@@ -203,27 +210,27 @@ class Search:
         n = matrix.slots
         forces = [state.forces() for state in at.states]
         on_w = matrix.pull(at.y) - np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.gradient)
-        of_constraints = added(force.w for force in forces)
-        if isinstance(of_constraints, np.ndarray):
-            on_w -= of_constraints * matrix.moves_w
-        on_v = self.flight.forces_asked(at.y, np.asarray(added(force.a for force in forces)))
-        on_v -= added(force.v for force in forces) * matrix.moves_v
-        slope = np.maximum(_largest(on_w), _largest(on_v))
-        size, gap = _sum(np.abs(at.y)), (at.weights * (at.total - at.floor)).sum(axis=0)
-        broken = _largest(matrix.dynamics(at.w, at.v))
+        total = Forces.total(forces)
+        if isinstance(total.w, np.ndarray):
+            on_w -= total.w * matrix.moves_w
+        on_v = self.flight.forces_asked(at.y, np.asarray(total.a)) - total.v * matrix.moves_v
+        slope = np.maximum(largest(on_w), largest(on_v))
+        size, gap = summed(np.abs(at.y)), (at.weights * (at.total - at.floor)).sum(axis=0)
+        broken = largest(matrix.dynamics(at.w, at.v))
         for state, force in zip(at.states, forces, strict=True):
             size, gap = size + state.size(), gap + state.gap()
             broken = np.maximum(broken, state.violation())
             if isinstance(force.own, np.ndarray):
                 slope = np.maximum(slope, np.abs(force.own).max(axis=(1, 2))[:, None])
         slope /= np.maximum(1, size / (80 * n))
-        least = at.total.min(axis=0)
+        least = at.value()
         better = (broken < self.tolerance / 10) & (least > control.best)
         control.best = np.where(better, least, control.best)
         control.best_v = np.where(better, at.v, control.best_v)
         # where the rewards are steeper than at the start, their unit is larger
-        steepest = np.abs(at.gradient).max(axis=(0, -1))[..., None]
-        control.steepness = np.maximum(1, (steepest * at.weights).sum(axis=0))
+        steepest = (np.abs(at.gradient).max(axis=(0, -1))[..., None] * at.weights).sum(axis=0)
+        steepest = reduce(np.maximum, [state.steepness() for state in at.states], steepest)
+        control.steepness = np.maximum(1, steepest)
         slope, gap = slope / control.steepness, gap / control.steepness
         return slope, np.maximum(np.maximum(slope, broken), gap / n)
 
@@ -285,11 +292,19 @@ class Search:
         at, control = newton.at, self.control
         w, v = at.w + share * direction.move.w, at.v + share * direction.move.v
         total, gradient, hessian = self.rewards(w)
-        finite = np.isfinite(total.sum(axis=0) + _sum(gradient) + _sum(hessian))
+        finite = np.isfinite(total.sum(axis=0) + summed(gradient) + summed(hessian))
         weights = at.weights + share * direction.weights
         missing = (weights * (at.total + share * direction.total - total)).sum(axis=0)
-        missing -= share**2 * newton.bend(direction) / 2
-        allowed = _MISFIT * share * np.maximum(newton.decrease(direction), 0) + self.rewards.noise
+        states = tuple(
+            state.moved(w, v, share, step)
+            for state, step in zip(at.states, direction.steps, strict=True)
+        )
+        for state, step, then in zip(at.states, direction.steps, states, strict=True):
+            missing += state.missing(share, step, then)
+        bend = newton.bend(direction)
+        missing -= share**2 * bend / 2
+        decrease = np.maximum(newton.decrease(direction, bend), 0)
+        allowed = _MISFIT * share * decrease + self.rewards.noise
         taken: Flags = asked & finite & (missing <= allowed)
         if not taken.any():
             return taken
@@ -297,10 +312,7 @@ class Search:
             w=w,
             v=v,
             y=at.y + np.where(control.iterations == 1, 1.0, share) * direction.y,
-            states=tuple(
-                state.moved(w, v, share, step)
-                for state, step in zip(at.states, direction.steps, strict=True)
-            ),
+            states=states,
             weights=weights / weights.sum(axis=0),
             total=total,
             floor=best_floor(total, self.barrier_share * control.mu),
@@ -321,14 +333,3 @@ class Search:
             np.where(chosen, 0, count) for count in (control.attempts, control.short)
         )
         control.centrings = control.centrings + chosen
-
-
-def _sum(values: Real) -> Real:
-    """Return the sum over everything but the flights, (flights, 1)."""
-    return np.asarray(values.reshape(-1, *values.shape[-2:]).sum(axis=(0, 2))[:, None])
-
-
-def _largest(values: Real) -> Real:
-    """Return the largest modulus over everything but the flights, (flights, 1)."""
-    each = np.abs(values).max(axis=-1, keepdims=True)
-    return np.asarray(each.max(axis=0) if each.ndim == 3 else each)

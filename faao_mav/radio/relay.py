@@ -1,0 +1,136 @@
+"""What a relay delivers: it cannot forward what it has not received.
+
+Per slot n the relay receives r_n and forwards f_n, and q_n waits in its queue, all in bits per
+slot and hertz of bandwidth:
+
+    q_0 = 0,    q_{n+1} = q_n + r_n - f_n,    0 <= f_n <= q_n,    0 <= r_n,    q_n <= buffer
+
+so that what comes in during slot n leaves from slot n + 1 on. A relay on two bands (full duplex)
+has r_n <= I_U,n and f_n <= I_G,n of (7), (8); one that shares a band between both hops (half
+duplex) has r_n / I_U,n + f_n / I_G,n <= 1. The delivered rate is the mean of f_n, bit/s/Hz.
+
+Source: information causality of Zeng, Zhang and Lim, "Throughput Maximization for UAV-Enabled
+Mobile Relaying Systems", IEEE Transactions on Communications, 2016.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Relayed:
+    """What came in, what left and what waited: `received`, `forwarded`, `queue`, each (n,) bits.
+
+    `queue` is q_n at the beginning of the slot.
+    """
+
+    received: Real
+    forwarded: Real
+    queue: Real
+
+    @property
+    def rate(self) -> float:
+        """The delivered rate R_del, the mean of f_n, bit/s/Hz."""
+        return float(self.forwarded.mean())
+
+
+@dataclass(frozen=True, slots=True)
+class RelayQueue:
+    """How a relay forwards: sharing one band between both hops if `half`; its buffer, bit/Hz.
+
+    In slots of `time_step` seconds the buffer is that of `buffer / time_step` bits per slot.
+    """
+
+    half: bool = False
+    buffer: float = math.inf
+
+    def rate(self, I_U: Real, I_G: Real, time_step: float) -> float:
+        """Return the largest delivered rate at the rates `I_U`, `I_G` (n,), bit/s/Hz."""
+        room = self.buffer / time_step
+        if self.half:
+            return forward_by_shares(I_U, I_G, best_shares(I_U, I_G, room), room).rate
+        return forward_greedily(I_U, I_G, room).rate
+
+
+def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:
+    """Return what a full-duplex relay delivers that sends what it holds as fast as it can.
+
+    f_n = min(q_n, I_G,n) and r_n = min(I_U,n, buffer - q_n + f_n) for rates `I_U`, `I_G` (n,),
+    bits, and a `buffer` of that many bits per hertz. No other forwarding along the same route
+    delivers more: a bit that can leave now and waits only takes room. Raises `InputError` for
+    rates of different shapes, negative or not finite ones, or a buffer not above 0.
+
+    >>> relayed = forward_greedily(np.array([2.0, 1.0, 0.0]), np.array([5.0, 1.0, 1.5]))
+    >>> relayed.queue.tolist(), relayed.forwarded.tolist()
+    ([0.0, 2.0, 2.0], [0.0, 1.0, 1.5])
+    """
+    _check(I_U, I_G, buffer)
+    received, forwarded, queue = np.empty((3, len(I_U)))
+    waiting = 0.0
+    for n, (arriving, leaving) in enumerate(zip(I_U.tolist(), I_G.tolist(), strict=True)):
+        queue[n] = waiting
+        forwarded[n] = min(waiting, leaving)
+        received[n] = min(arriving, buffer - waiting + forwarded[n])
+        waiting += received[n] - forwarded[n]
+    return Relayed(received, forwarded, queue)
+
+
+def forward_by_shares(I_U: Real, I_G: Real, shares: Real, buffer: float = math.inf) -> Relayed:
+    """Return what a half-duplex relay delivers that receives in the `shares` (n,) of each slot.
+
+    The rates are `shares` I_U and (1 - `shares`) I_G; within them it forwards what it holds: see
+    `forward_greedily`. Raises `InputError` for shares outside 0 to 1.
+    """
+    if shares.shape != I_U.shape or not ((shares >= 0) & (shares <= 1)).all():
+        raise InputError(f"shares {shares.shape}: expected one of 0 to 1 for each of {len(I_U)}")
+    return forward_greedily(shares * I_U, (1 - shares) * I_G, buffer)
+
+
+def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
+    """Return the shares (n,) of the slots to receive in with which a route delivers most.
+
+    The linear program of the module's half duplex in r, f and q, by HiGHS. Raises `InputError`
+    as `forward_greedily` does.
+
+    >>> rates = np.array([2.0, 2.0, 2.0, 2.0])
+    >>> forward_by_shares(rates, rates, best_shares(rates, rates)).rate
+    1.0
+    """
+    from scipy import sparse
+    from scipy.optimize import linprog
+
+    _check(I_U, I_G, buffer)
+    n = len(I_U)
+    one, none = sparse.eye_array(n, format="csr"), sparse.csr_array((n, n))
+    before = sparse.eye_array(n, k=-1, format="csr")
+    # unknowns: the shares x of receiving and y of sending, and q; r = x I_U, f = y I_G
+    arriving, leaving = (sparse.diags_array(rates, format="csr") for rates in (I_U, I_G))
+    shared = sparse.hstack([one, one, none])
+    held = sparse.hstack([none, leaving, -one])
+    queue = sparse.hstack([-(before @ arriving), before @ leaving, one - before])
+    found = linprog(
+        np.concatenate([np.zeros(n), -I_G, np.zeros(n)]),
+        A_ub=sparse.vstack([shared, held]),
+        b_ub=np.concatenate([np.ones(n), np.zeros(n)]),
+        A_eq=queue,
+        b_eq=np.zeros(n),
+        bounds=[(0, 1)] * (2 * n) + [(0, buffer)] * n,
+        method="highs",
+    )
+    if found.x is None:
+        raise InputError(f"no shares of {n} slots: {found.message}")
+    return np.clip(1 - found.x[n : 2 * n], 0.0, 1.0)
+
+
+def _check(I_U: Real, I_G: Real, buffer: float) -> None:
+    if I_U.ndim != 1 or I_U.shape != I_G.shape or not len(I_U):
+        raise InputError(f"rates {I_U.shape} and {I_G.shape}; expected one per slot of each hop")
+    if not (np.isfinite(I_U).all() and np.isfinite(I_G).all() and min(I_U.min(), I_G.min()) >= 0):
+        raise InputError("rates of a relay: expected finite bits of at least 0")
+    if not buffer > 0:
+        raise InputError(f"buffer {buffer}; expected bits per hertz above 0")

@@ -1,0 +1,117 @@
+"""The relay's queue, against linear programs that know nothing of it."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.optimize import linprog
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.radio.relay import best_shares, forward_by_shares, forward_greedily
+
+BITS = st.integers(0, 64).map(lambda k: k / 16)
+BUFFERS = st.sampled_from([0.5, 1.0, 3.0, math.inf])
+
+
+@st.composite
+def routes(draw: st.DrawFn) -> tuple[Real, Real]:
+    """Both hops' rates along a flight of up to 12 slots."""
+    n = draw(st.integers(1, 12))
+    I_U, I_G = (draw(arrays(float, n, elements=BITS)) for _ in range(2))
+    return I_U, I_G
+
+
+def most(I_U: Real, I_G: Real, buffer: float, *, half: bool) -> float:
+    """The greatest delivered rate by the constraints as they are written, slot by slot."""
+    n = len(I_U)
+    cost = np.concatenate([np.zeros(n), -np.ones(n)]) / n
+    rows, bounds = [], []
+    for k in range(n + 1):
+        came = np.concatenate([np.arange(n) < k, np.zeros(n)])
+        left_before = np.concatenate([np.zeros(n), np.arange(n) < k])
+        if k < n:  # f_k <= q_k
+            this = np.eye(2 * n)[n + k]
+            rows.append(this - came + left_before)
+            bounds.append(0.0)
+        if math.isfinite(buffer) and k < n:
+            rows.append(came - left_before)
+            bounds.append(buffer)
+    if half:
+        for k in range(n):
+            if I_U[k] > 0 and I_G[k] > 0:
+                rows.append(np.eye(2 * n)[k] / I_U[k] + np.eye(2 * n)[n + k] / I_G[k])
+                bounds.append(1.0)
+    limits = [(0.0, float(x)) for x in np.concatenate([I_U, I_G])]
+    return -float(linprog(cost, A_ub=np.array(rows), b_ub=bounds, bounds=limits).fun)
+
+
+@given(routes(), BUFFERS)
+def test_greedy_forwarding_is_the_best_in_full_duplex(
+    route: tuple[Real, Real], buffer: float
+) -> None:
+    relayed = forward_greedily(*route, buffer)
+    if math.isfinite(buffer):  # q after the last slot has no limit in the program: nothing to gain
+        assert relayed.queue.max() <= buffer + 1e-12
+    assert relayed.rate == pytest.approx(most(*route, buffer, half=False), abs=1e-9)
+
+
+@given(routes(), BUFFERS)
+def test_best_shares_are_those_of_the_program(route: tuple[Real, Real], buffer: float) -> None:
+    shares = best_shares(*route, buffer)
+    relayed = forward_by_shares(*route, shares, buffer)
+    assert relayed.rate == pytest.approx(most(*route, buffer, half=True), abs=1e-7)
+
+
+@given(routes(), BUFFERS)
+def test_what_is_delivered_has_come_in_before(route: tuple[Real, Real], buffer: float) -> None:
+    I_U, I_G = route
+    relayed = forward_greedily(I_U, I_G, buffer)
+    assert (relayed.received >= 0).all()
+    assert (relayed.received <= I_U).all()
+    assert (relayed.forwarded >= 0).all()
+    assert (relayed.forwarded <= np.minimum(I_G, relayed.queue)).all()
+    assert relayed.queue[0] == 0
+    assert np.diff(relayed.queue) == pytest.approx((relayed.received - relayed.forwarded)[:-1])
+    assert relayed.rate <= min(I_U.mean(), I_G.mean()) + 1e-12
+
+
+@given(routes())
+def test_more_room_never_delivers_less_and_half_duplex_never_more(route: tuple[Real, Real]) -> None:
+    by_buffer = [forward_greedily(*route, buffer).rate for buffer in (0.5, 1.0, 3.0, math.inf)]
+    assert by_buffer == sorted(by_buffer)
+    shared = forward_by_shares(*route, best_shares(*route))
+    assert shared.rate <= by_buffer[-1] + 1e-9
+
+
+@given(routes())
+def test_time_reversed_with_the_hops_swapped_delivers_as_much(route: tuple[Real, Real]) -> None:
+    I_U, I_G = route
+    back = forward_greedily(I_G[::-1].copy(), I_U[::-1].copy())
+    assert back.rate == pytest.approx(forward_greedily(I_U, I_G).rate)
+
+
+@pytest.mark.parametrize(
+    ("I_U", "I_G", "buffer"),
+    [
+        (np.ones(3), np.ones(2), 1.0),
+        (np.ones(0), np.ones(0), 1.0),
+        (-np.ones(2), np.ones(2), 1.0),
+        (np.array([math.nan]), np.ones(1), 1.0),
+        (np.ones(2), np.ones(2), 0.0),
+        (np.ones(2), np.ones(2), math.nan),
+    ],
+)
+def test_what_no_relay_has_is_refused(I_U: Real, I_G: Real, buffer: float) -> None:
+    with pytest.raises(InputError, match=r"expected"):
+        forward_greedily(I_U, I_G, buffer)
+    with pytest.raises(InputError, match=r"expected"):
+        best_shares(I_U, I_G, buffer)
+
+
+def test_shares_are_shares() -> None:
+    with pytest.raises(InputError, match=r"0 to 1"):
+        forward_by_shares(np.ones(2), np.ones(2), np.array([0.5, 1.5]))
