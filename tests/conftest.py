@@ -35,8 +35,9 @@ radio:
   base_station: {position: [0, 0], power_dbm: 10}
   relay: {power_dbm: 10, noise_dbm: -80}
   ground_user: {position: [60, 60], noise_dbm: -80}
+  causal: false
 """
-"""Twenty slots in the active region: solved in a second."""
+"""Twenty slots in the active region, for R_avg of the paper: solved in a second."""
 
 MakePlan = Callable[..., Plan]
 

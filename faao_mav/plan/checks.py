@@ -23,6 +23,7 @@ def problems(plan: Plan) -> Iterator[str]:
     yield from _not_yet(plan)
     yield from _vehicle(plan)
     yield from _speeds(plan)
+    yield from _relay(plan)
     yield from _steps(plan.flight)
     yield from _distance(plan)
     yield from _study(plan)
@@ -30,8 +31,6 @@ def problems(plan: Plan) -> Iterator[str]:
 
 def _not_yet(plan: Plan) -> Iterator[str]:
     """Values that the keys accept and the program cannot make anything of."""
-    if plan.radio.causal:
-        yield "radio.causal: true does not work yet; leave it false"
     if plan.fence is not None:
         yield "fence: does not work yet; leave it out"
 
@@ -71,6 +70,19 @@ def _speeds(plan: Plan) -> Iterator[str]:
             yield f"{told}max_speed allows {most:g} m/s"
         if speed < least:
             yield f"{told}min_speed asks for at least {least:g} m/s: give free or a velocity"
+
+
+def _relay(plan: Plan) -> Iterator[str]:
+    if plan.radio.relay.buffer_mbytes is not None and plan.radio.bandwidth_mhz is None:
+        yield (
+            f"radio.relay.buffer_mbytes: {plan.radio.relay.buffer_mbytes:g}: how long it takes to "
+            "fill depends on the bandwidth; give radio.bandwidth_mhz too"
+        )
+    if plan.optimizer.method == "algorithm1" and plan.radio.causal:
+        yield (
+            "radio.causal: true: algorithm1 (optimizer.method) maximises R_avg, whatever of it is "
+            "delivered; give radio.causal: false, or method direct"
+        )
 
 
 def _steps(flight: Flight) -> Iterator[str]:

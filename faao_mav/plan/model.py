@@ -36,6 +36,7 @@ Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
 Fading: TypeAlias = Literal["ergodic", "realization", "none"]
 ChannelKnowledge: TypeAlias = Literal["statistical", "instantaneous"]
+Duplex: TypeAlias = Literal["full", "half"]
 Method: TypeAlias = Literal["direct", "algorithm1"]
 PrecoderScheme: TypeAlias = Literal["faao", "mmse", "mrt", "zf", "waterfilling"]
 Inputs: TypeAlias = Literal["alphabet", "gaussian"]
@@ -45,7 +46,7 @@ MissionParameters: TypeAlias = Literal["recommend", "keep"]
 StudyScheme: TypeAlias = Literal[
     "faao", "algorithm1", "mmse", "mrt", "zf", "waterfilling", "gaussian"
 ]
-StudyFigure: TypeAlias = Literal["rate", "trajectories"]
+StudyFigure: TypeAlias = Literal["delivered", "rate", "trajectories"]
 
 _HOVER = (0.0, 0.0)
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
@@ -174,6 +175,17 @@ class Relay(_Section):
     antennas: Annotated[Antennas, key("Antennas N_u.")] = 2
     power: Annotated[Power, key("Transmit power W_U.", "dBm", name="power_dbm")] = _POWER
     noise: Annotated[Noise, key("Noise power sigma_U^2.", "dBm", name="noise_dbm")] = _NOISE
+    buffer_mbytes: Annotated[
+        Number | None,
+        key(
+            "What the relay can hold, 10^6 bytes, for which radio.bandwidth_mhz is needed; "
+            "unlimited without.",
+            "10^6 bytes",
+            "10^6 bytes, above 0 and at most 1e+09",
+            gt=0,
+            le=1e9,
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,8 +231,26 @@ class Radio(_Section):
         Whole, key("Seed of the draws.", accepted="a whole number from 0", ge=0, lt=2**63)
     ] = 0
     causal: Annotated[
-        Flag, key("Whether the relay forwards only what it has received; the paper: false.")
-    ] = False
+        Flag,
+        key(
+            "true: plan for what is delivered by a relay that forwards only what it has received; "
+            "false: for R_avg, as in the paper."
+        ),
+    ] = True
+    duplex: Annotated[
+        Duplex,
+        key("full: two bands, one for each hop; half: both hops share the time of each slot."),
+    ] = "full"
+    bandwidth_mhz: Annotated[
+        Number | None,
+        key(
+            "Bandwidth of a hop: rates are told in Mbit/s too, and flights in megabytes.",
+            "MHz",
+            "MHz, above 0 and at most 100000",
+            gt=0,
+            le=1e5,
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -333,7 +363,9 @@ class Study(_Section):
         "faao",
     )
     seeds: Annotated[Whole, key("Draws of the fading, from radio.seed on.", ge=1, le=10_000)] = 1
-    figure: Annotated[StudyFigure, key("What the figure shows.")] = "rate"
+    figure: Annotated[
+        StudyFigure, key("What the figure shows: the delivered rate, R_avg, or the routes.")
+    ] = "delivered"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -364,3 +396,13 @@ class Plan(PlanFile):
     def origin(self) -> Origin:
         """The point of local [0, 0]."""
         return self.site.origin
+
+    def megabits(self, rate: float) -> float | None:
+        """Return `rate`, bit/s/Hz, in Mbit/s; None without `radio.bandwidth_mhz`."""
+        bandwidth = self.radio.bandwidth_mhz
+        return None if bandwidth is None else rate * bandwidth
+
+    def megabytes(self, rate: float) -> float | None:
+        """Return what `rate`, bit/s/Hz, carries in the duration T, 10^6 bytes, as `megabits`."""
+        megabits = self.megabits(rate)
+        return None if megabits is None else megabits * self.flight.duration / 8
