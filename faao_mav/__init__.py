@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from faao_mav.mission import MissionItem as MissionItem
     from faao_mav.mission.formats import read_mission as read_mission
     from faao_mav.mission.formats import render_mission as render_mission
+    from faao_mav.mission.formats.parameter_file import read_parameters as read_parameters
+    from faao_mav.mission.formats.parameter_file import render_parameters as render_parameters
     from faao_mav.optimizer.optimize import optimize as optimize
     from faao_mav.optimizer.pricing import price as price
     from faao_mav.optimizer.pricing import saturation as saturation
@@ -35,8 +37,6 @@ if TYPE_CHECKING:
     from faao_mav.validate.check import check as check
     from faao_mav.vehicle import Track as Track
     from faao_mav.vehicle import Vehicle as Vehicle
-    from faao_mav.vehicle.parameter_file import read_parameters as read_parameters
-    from faao_mav.vehicle.parameter_file import render_parameters as render_parameters
     from faao_mav.vehicle.predict import predict as predict
     from faao_mav.workflow import Result as Result
     from faao_mav.workflow import plan_mission as plan_mission
@@ -54,7 +54,7 @@ _HOMES = {
     "validate": "Finding Limits LinkCheck",
     "validate.check": "Check check",
     "vehicle": "Track Vehicle",
-    "vehicle.parameter_file": "read_parameters render_parameters",
+    "mission.formats.parameter_file": "read_parameters render_parameters",
     "vehicle.predict": "predict",
     "workflow": "Result plan_mission",
 }

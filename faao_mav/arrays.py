@@ -1,4 +1,4 @@
-"""Names for the array types that signatures use."""
+"""Names for the array types that signatures use; shapes stand in the docstrings."""
 
 from typing import TypeAlias
 
@@ -9,3 +9,4 @@ Real: TypeAlias = NDArray[np.float64]
 Complex: TypeAlias = NDArray[np.complex128]
 Integers: TypeAlias = NDArray[np.int_]
 Flags: TypeAlias = NDArray[np.bool_]
+RealOrComplex: TypeAlias = Real | Complex

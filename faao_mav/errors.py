@@ -1,4 +1,7 @@
-"""The exceptions that faao-mav raises on purpose."""
+"""The exceptions that faao-mav raises on purpose, and values as their messages show them."""
+
+_MAX_SHOWN = 60
+"""Characters of a value that a message shows; chosen: a message stays within two lines."""
 
 
 class FaaoError(Exception):
@@ -31,3 +34,17 @@ class SolverError(FaaoError):
 
 class LinkError(FaaoError):
     """A vehicle cannot be reached, or did not do what was asked."""
+
+
+def quote(value: object) -> str:
+    """Return `value` as a message shows it, in one line, cut short.
+
+    >>> quote("slow"), quote(None), quote(True), quote([1, 2.5]), quote({})
+    ("'slow'", 'null', 'true', '[1, 2.5]', 'nothing')
+    """
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict | list) and not value:
+        return "nothing"
+    text = "null" if value is None else repr(value)
+    return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "..."

@@ -9,16 +9,22 @@ from pathlib import Path
 
 from faao_mav.errors import InputError
 
-_SHOWN = 40  # characters of a name in that of its temporary file: no name gets too long by it
+_SHOWN = 40
+"""Characters of a file's name that its temporary file's name repeats: file systems allow 255."""
+
+_NO_FILE = "is a device or a pipe; give the name of a file"
 
 
 def read_text(path: str | Path, most: int, what: str, error: type[InputError]) -> str:
     """Return the UTF-8 text in the file `path`.
 
-    Raises `error` if it cannot be opened, is larger than `most` bytes (`what` says what was
-    expected instead) or is not UTF-8.
+    Raises `error` if it cannot be opened, is no regular file (a pipe may never end), is larger
+    than `most` bytes (`what` says what was expected instead) or is not UTF-8.
     """
     try:
+        kind = Path(path).stat().st_mode
+        if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
+            raise error(f"{path}: {_NO_FILE}")
         with Path(path).open("rb") as file:
             content = file.read(most + 1)
     except (OSError, ValueError) as failure:  # ValueError: a NUL in the name
@@ -48,7 +54,7 @@ def check_writable(path: str | Path) -> None:
     if stat.S_ISDIR(kind):
         raise InputError(f"{path}: is a directory; give the name of a file")
     if not stat.S_ISREG(kind):  # a file would take the place of the device
-        raise InputError(f"{path}: is a device or a pipe; give the name of a file")
+        raise InputError(f"{path}: {_NO_FILE}")
     if not target.parent.is_dir():
         raise InputError(f"{path}: there is no directory {Path(path).parent}")
     if not os.access(target.parent, os.W_OK):

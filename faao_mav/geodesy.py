@@ -21,10 +21,18 @@ class LocalFrame:
 
     Distance and azimuth from the origin are exact (geodesic); elsewhere lengths across the
     line of sight are off by about (r / 6371 km)² / 6: 1e-6 at 16 km. Computed by PROJ
-    (projection `aeqd`, Snyder 1987, section 25).
+    (projection `aeqd`, Snyder 1987, section 25), which takes what is within 1 mm of the origin
+    for the origin.
 
     `latitude` and `longitude` are the origin, degrees. Raises `InputError` for an origin that
     is not finite or has a latitude beyond ±90.
+
+    >>> frame = LocalFrame(-35.363262, 149.165237)
+    >>> latitude, longitude = frame.to_geodetic([0.0, 350.0])
+    >>> print(f"{latitude:.6f} {longitude:.6f}")
+    -35.360107 149.165237
+    >>> frame.to_local(latitude, longitude).round(6)
+    array([  0., 350.])
     """
 
     latitude: float

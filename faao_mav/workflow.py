@@ -13,6 +13,7 @@ from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_together
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.formats import check_suffix, render_mission
+from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.optimizer.pricing import (
     FreshRates,
     MutualInformation,
@@ -29,7 +30,7 @@ from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
-from faao_mav.vehicle.parameter_file import parameter_path, render_parameters
+from faao_mav.vehicle.files import parameter_path, plan_target
 from faao_mav.vehicle.predict import predict
 from faao_mav.vehicle.recommend import candidates
 
@@ -96,7 +97,7 @@ class Result:
         contents: dict[str | Path, bytes] = {
             file: render_parameters(
                 self.conversion.parameters,
-                self.conversion.vehicle.autopilot,
+                self.conversion.vehicle.type.family.parameter_style,
                 header=f"{_HEADER}{mission.name}",
             ).encode(errors="replace")  # the name of a mission may be no Unicode
             for file in beside
@@ -105,7 +106,9 @@ class Result:
         contents[mission] = (
             draw_mission(self.solution, self.conversion)
             if drawn
-            else render_mission(self.conversion.mission, mission, self.conversion.vehicle)
+            else render_mission(
+                self.conversion.mission, mission, plan_target(self.conversion.vehicle)
+            )
         ).encode()
         write_together(contents)
         return mission, *beside

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import HealthCheck, settings
 
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 settings.register_profile(
     "deterministic",
@@ -43,14 +43,14 @@ MakePlan = Callable[..., Plan]
 
 def edited(text: str, changes: dict[str, Any]) -> str:
     """Return the YAML `text` with the values at the dotted keys of `changes` replaced."""
-    data = yaml.safe_load(text)
+    data = load_yaml(text, "test")
     for path, value in changes.items():
         *parents, last = path.split(".")
         section = data
         for key in parents:
             section = section.setdefault(key, {})
         section[last] = value
-    return yaml.safe_dump(data)
+    return dump_yaml(data)
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:

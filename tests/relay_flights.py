@@ -19,8 +19,8 @@ from faao_mav.plan import (
     Origin,
     Plan,
     Radio,
-    Relay,
-    Vehicle,
+    Site,
+    VehicleOptions,
 )
 from faao_mav.schedule import Conversion, convert
 from faao_mav.schedule.assemble import assemble
@@ -46,20 +46,34 @@ def plan_with(
 ) -> Plan:
     """Return a plan; the radio and the flight's ends play no part in a mission."""
     return Plan(
-        origin=Origin(*origin),
-        vehicle=Vehicle(
-            max_speed, 1.5, autopilot=autopilot, parameters=parameters if parameters else {}
+        site=Site(Origin(*origin)),
+        vehicle=VehicleOptions(
+            max_speed=max_speed,
+            max_acceleration=1.5,
+            autopilot=autopilot,
+            parameters=parameters if parameters else {},
         ),
-        flight=Flight((0.0, 350.0), (350.0, 0.0), 100.0, 120.0, 0.2, None, None, True),
+        flight=Flight(
+            start=(0.0, 350.0),
+            end=(350.0, 0.0),
+            altitude=100.0,
+            duration=120.0,
+            start_velocity=None,
+            end_velocity=None,
+        ),
         radio=Radio(
-            BaseStation((0.0, 0.0), 2, 0.1),
-            Relay(2, 0.1, 1e-11),
-            GroundUser((300.0, 300.0), 2, 1e-11),
-            *("bpsk", 1e-5, 3.0, "ula", "none", 1, "statistical", 0, False),
+            base_station=BaseStation(position=(0.0, 0.0)),
+            ground_user=GroundUser(position=(300.0, 300.0)),
+            fading="none",
+            fading_samples=1,
         ),
-        optimizer=Optimizer("direct", "faao", "alphabet", ("straight",), 1e-4, 50),
+        optimizer=Optimizer(starts=("straight",)),
         mission=MissionOptions(
-            takeoff, on_finish, path_tolerance, max_items, "recommend" if recommend else "keep"
+            takeoff=takeoff,
+            on_finish=on_finish,
+            path_tolerance=path_tolerance,
+            max_items=max_items,
+            parameters="recommend" if recommend else "keep",
         ),
     )
 

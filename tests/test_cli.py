@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from conftest import SMALL, edited
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,7 +16,8 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.mission.formats import read_mission, read_mission_file
-from faao_mav.vehicle.parameter_file import read_parameters
+from faao_mav.mission.formats.parameter_file import read_parameters
+from faao_mav.plan.yaml_text import load_yaml
 
 
 def run(*arguments: object) -> Any:
@@ -61,7 +61,7 @@ def test_the_mission_as_a_plan_of_qgroundcontrol_is_the_same(plan: Path, tmp_pat
     for name in ("m.waypoints", "m.plan", "m.kml"):
         assert run(plan, "--out", tmp_path / name, "--quiet").output == ""
     read = read_mission_file(tmp_path / "m.plan")
-    assert (read.autopilot, read.kind) == ("px4", "copter")
+    assert (read.firmware, read.vehicle_type) == (12, 2)
     assert read.mission == read_mission(tmp_path / "m.waypoints")
     assert "<LineString>" in (tmp_path / "m.kml").read_text()
 
@@ -249,7 +249,7 @@ VALUES = st.one_of(
 def mutations(draw: st.DrawFn) -> dict[str, Any]:
     paths = [
         f"{section}.{key}"
-        for section, keys in yaml.safe_load(TINY).items()
+        for section, keys in load_yaml(TINY, "test").items()
         for key in [*keys, "extra"]
     ]
     paths += ["radio.relay.power_dbm", "radio.relay.antennas", "radio.modulation", "radio.fading",

@@ -36,7 +36,7 @@ def test_there_and_back_is_the_same(tmp_path: Path) -> None:
     assert run(first, "--out", plan, "--autopilot", "ardupilot").stderr == ""
     assert run(plan, "--out", last).stderr == ""
     assert read_mission(last) == read_mission(plan) == read_mission(first)
-    assert read_mission_file(plan).autopilot == "ardupilot"
+    assert read_mission_file(plan).firmware == 3
 
 
 def test_whom_a_plan_is_for(tmp_path: Path) -> None:
@@ -46,10 +46,10 @@ def test_whom_a_plan_is_for(tmp_path: Path) -> None:
         f"faao-mission: {out}: no autopilot is known: the plan is for a generic one\n"
     )
     assert run(MISSIONS / "px4.plan", "--out", out).stderr == ""
-    assert read_mission_file(out).autopilot == "px4"
+    assert read_mission_file(out).firmware == 12
     result = run(MISSIONS / "px4.plan", "--out", out, "--autopilot", "ardupilot")
     assert "not set (NaN) becomes 0: item 1 param4, item 3 param4" in result.stderr
-    assert read_mission_file(out).autopilot == "ardupilot"
+    assert read_mission_file(out).firmware == 3
 
 
 def test_json_is_one_object(tmp_path: Path) -> None:
@@ -60,10 +60,21 @@ def test_json_is_one_object(tmp_path: Path) -> None:
     assert [f"faao-mission: {out}: {line}" for line in data["lost"]] == result.stderr.splitlines()
 
 
+@pytest.mark.parametrize("command", ["convert", "validate"])
+def test_what_is_odd_about_a_file_is_told_once(command: str, tmp_path: Path) -> None:
+    arguments = ["--out", str(tmp_path / "m.waypoints")] if command == "convert" else []
+    source = str(MISSIONS / "gap.waypoints")
+    result = CliRunner().invoke(app, [command, source, *arguments])
+    assert result.stderr.splitlines() == [
+        f"faao-mission: {source}: line 4, field index: '3': indexes do not count up; rows are "
+        "taken in the file's order, in which targets of DO_JUMP count too"
+    ]
+
+
 @pytest.mark.parametrize(
     ("source", "target", "part"),
     [
-        ("gap.waypoints", "m.plan", "field index: '3'; expected 2"),
+        ("two_current.waypoints", "m.plan", "field current: '1'; expected 0"),
         ("plain.waypoints", "m.gpx", "'.gpx'; expected a name that ends in .waypoints"),
         ("plain.waypoints", "absent/m.plan", "there is no directory"),
         ("absent.waypoints", "m.plan", "cannot be read: No such file"),

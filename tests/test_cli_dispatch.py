@@ -91,4 +91,4 @@ def test_help_loads_nothing_that_costs() -> None:
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout
     assert "faao_mav.cli.convert" in loaded
-    assert not {"numpy", "scipy", "pymavlink", "yaml", "pydantic"} & set(loaded.split())
+    assert not {"numpy", "scipy", "pymavlink", "ruamel", "pydantic"} & set(loaded.split())

@@ -18,9 +18,9 @@ from faao_mav.mavlink.protocol import Address, Result
 from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
+from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.plan.autopilots import autopilots, types
-from faao_mav.vehicle.parameter_file import read_parameters
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 GENTLE = edited(

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from faao_mav.errors import InputError
-from faao_mav.files import check_apart, check_writable, write_together, write_whole
+from faao_mav.errors import InputError, PlanError
+from faao_mav.files import check_apart, check_writable, read_text, write_together, write_whole
 
 
 def test_content_arrives_and_replaces(tmp_path: Path) -> None:
@@ -58,6 +58,13 @@ def test_names_that_are_no_place_for_a_file(tmp_path: Path) -> None:
     for path in (tmp_path / "pipe", Path("/dev/null")):
         with pytest.raises(InputError, match="is a device or a pipe"):
             check_writable(path)
+
+
+def test_what_is_no_file_is_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")  # opening it would wait for a writer
+    for path in (tmp_path / "pipe", Path("/dev/null")):
+        with pytest.raises(PlanError, match="is a device or a pipe; give the name of a file"):
+            read_text(path, 1000, "a plan", PlanError)
 
 
 def test_the_longest_name_that_there_is(tmp_path: Path) -> None:

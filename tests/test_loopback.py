@@ -18,11 +18,12 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted, running
 from faao_mav.mission.formats import read_mission
+from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.mission.item import Home, Mission
 from faao_mav.optimizer.solution import load_solution
 from faao_mav.validate.comparison import compare_with_plan
 from faao_mav.vehicle import Track, Vehicle
-from faao_mav.vehicle.parameter_file import parameter_path, read_parameters
+from faao_mav.vehicle.files import parameter_path
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 SPEEDUP, RATE = 40.0, 80.0

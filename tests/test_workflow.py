@@ -1,7 +1,6 @@
 """From a plan to a result, and what it writes."""
 
 import doctest
-import re
 from pathlib import Path
 from types import ModuleType
 
@@ -37,23 +36,6 @@ def result(small_plan: MakePlan) -> Result:
 @pytest.fixture(scope="module")
 def too_many_items(small_plan: MakePlan) -> Result:
     return plan_mission(small_plan(QUICK | {"mission.max_items": 4}))
-
-
-def test_the_readmes_python_does_what_it_says(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "missions").symlink_to(MISSIONS)
-    monkeypatch.chdir(tmp_path)
-    found = re.search(r"```python\n(.*?)```", (MISSIONS.parent / "README.md").read_text(), re.S)
-    assert found is not None
-    if "plan_mission" not in found[1]:
-        pytest.skip("README does not show it yet")
-    exec(found[1], {})
-    rates, *files = capsys.readouterr().out.splitlines()
-    planned, predicted = map(float, rates.split())
-    assert predicted == pytest.approx(planned, rel=0.01)
-    assert files == ["mission.waypoints", "mission.param"]
-    assert all(Path(name).exists() for name in files)
 
 
 def test_a_mission_comes_with_the_parameters_that_it_is_timed_for(

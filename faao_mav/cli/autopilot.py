@@ -64,8 +64,8 @@ def autopilot(
     from faao_mav.mavlink.mock.serve import predicted, serve
     from faao_mav.mavlink.protocol import Address
     from faao_mav.mavlink.transport import open_transport
+    from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.vehicle import Vehicle
-    from faao_mav.vehicle.parameter_file import read_parameters
 
     values = {} if parameters is None else read_parameters(parameters)
     check_known(None, aircraft)

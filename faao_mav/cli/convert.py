@@ -33,6 +33,7 @@ def convert(
         render_mission,
     )
     from faao_mav.vehicle import Vehicle
+    from faao_mav.vehicle.files import kind_in, plan_target, vehicle_in
 
     check_known(autopilot, None)
     check_readable(mission_file)
@@ -40,12 +41,12 @@ def convert(
     check_writable(out)
     check_apart({"--out": out}, {"MISSION": mission_file})
     read = read_mission_file(mission_file)
-    whose = autopilot or read.autopilot
-    vehicle = Vehicle(whose, read.kind or "copter") if whose else None
-    lost = losses_in(read.mission, out, vehicle)
-    write_whole(out, render_mission(read.mission, out, vehicle).encode())
-    for line in lost:
-        note(f"{out}: {line}")
+    vehicle = Vehicle(autopilot, kind_in(read) or "copter") if autopilot else vehicle_in(read)
+    target = plan_target(vehicle)
+    lost = losses_in(read.mission, out, target)
+    write_whole(out, render_mission(read.mission, out, target).encode())
+    for line in (*read.warnings, *(f"{out}: {line}" for line in lost)):
+        note(line)
     items = len(read.mission.items)
     if as_json:
         typer.echo(json.dumps({"items": items, "lost": lost, "written": str(out)}))

@@ -58,7 +58,7 @@ def study(
     if jobs == 0:
         raise InputError("--jobs 0: give a number of processes, or -1 for one a core")
     plan = read_plan(plan_file)
-    asked = plan.study or Study({}, ("faao",), 1, "rate")
+    asked = plan.study or Study()
     options = [parse_vary(text) for text in vary or []]
     if power is not None:
         options.append((POWER, parse_values(power, "--power")))

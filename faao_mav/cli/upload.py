@@ -17,6 +17,7 @@ from faao_mav.cli.shared import (
     System,
     Wait,
     exit_status,
+    note,
     option,
 )
 
@@ -45,12 +46,14 @@ def upload(
     """
     from faao_mav.cli.progress import transfer_progress
     from faao_mav.mavlink.client import upload as run
-    from faao_mav.mission.formats import read_mission
+    from faao_mav.mission.formats import read_mission_file
 
-    mission = read_mission(mission_file)
+    file = read_mission_file(mission_file)
+    for line in file.warnings:
+        note(line)
     with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
         report = run(
-            mission,
+            file.mission,
             to,
             system=system,
             component=component,

@@ -17,6 +17,7 @@ from faao_mav.cli.shared import (
     check_known,
     exit_status,
     flag,
+    note,
     option,
 )
 from faao_mav.errors import InputError
@@ -156,6 +157,8 @@ def _judge(
     plan = solution.plan if solution is not None else None
     limits = Limits(*given, max_speed=plan.vehicle.max_speed if plan is not None else None)
     file = read_mission_file(mission_file)
+    for line in file.warnings:
+        note(line)
     vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
     if vehicle.type.flight_model is not None:
         vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement

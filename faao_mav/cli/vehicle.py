@@ -4,9 +4,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
+from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.plan.autopilots import Autopilot, Kind, autopilots
 from faao_mav.vehicle import Vehicle, family, vehicle_of
-from faao_mav.vehicle.parameter_file import autopilot_of, parameter_path, read_parameters
+from faao_mav.vehicle.files import autopilot_of, parameter_path, vehicle_in
 
 if TYPE_CHECKING:
     from faao_mav.mission.formats import MissionFile
@@ -56,8 +57,9 @@ def _told(
     """Return what plan, mission and parameters say of the vehicle, and which of them it was."""
     if plan is not None:
         return vehicle_of(plan), "as the plan says"
-    if file.autopilot is not None:
-        return Vehicle(file.autopilot, file.kind or "copter"), "as the file says"
+    named = vehicle_in(file)
+    if named is not None:
+        return named, "as the file says"
     if given is not None:
         theirs = autopilot_of(given)
     else:

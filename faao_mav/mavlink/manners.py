@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from faao_mav.mavlink.protocol import Result
 from faao_mav.vehicle import AutopilotFamily, VehicleType
-from faao_mav.vehicle.ardupilot.family import ARDUPILOT
+from faao_mav.vehicle.ardupilot import ARDUPILOT
 from faao_mav.vehicle.px4 import PX4
 
 _GENERAL = {

@@ -15,9 +15,8 @@ from faao_mav.mavlink.manners import autopilot_name, manners_of
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mission.command import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_POINT, Frame
-from faao_mav.mission.fence import Circle, Fence, Place, Polygon, RallyPoint
-from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.mission.rows import as_received, as_sent
+from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon, RallyPoint
+from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
 from faao_mav.vehicle import VehicleType
 
 GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
@@ -119,7 +118,7 @@ def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
 
 def _fence_of(items: Sequence[MissionItem]) -> Fence:
     polygons, circles, breach_return = [], [], None
-    vertices: list[Place] = []
+    vertices: list[LatLon] = []
     for number, item in enumerate(items):
         if item.command in POLYGON.values():
             vertices.append((item.x, item.y))

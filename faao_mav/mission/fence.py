@@ -6,8 +6,20 @@ from typing import TypeAlias
 
 from faao_mav.errors import InputError
 
-Place: TypeAlias = tuple[float, float]
-"""WGS84 latitude and longitude, degrees."""
+LatLon: TypeAlias = tuple[float, float]
+"""Latitude and longitude, WGS84 degrees."""
+
+
+def check_place(place: LatLon, what: str, altitude: float = 0.0) -> None:
+    """Raise `InputError`, which names `what`, for coordinates that are no place on Earth."""
+    latitude, longitude = place
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
+        raise InputError(
+            f"{what}: {latitude}, {longitude}; expected a latitude within 90 degrees and a "
+            "longitude within 180"
+        )
+    if not math.isfinite(altitude):
+        raise InputError(f"{what}: altitude {altitude}; expected finite metres")
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,12 +29,12 @@ class Circle:
     Raises `InputError` for a center that is no place on Earth or a radius that is not above 0.
     """
 
-    center: Place
+    center: LatLon
     radius: float
     inclusion: bool
 
     def __post_init__(self) -> None:
-        _check(self.center, "fence circle")
+        check_place(self.center, "fence circle")
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise InputError(f"fence circle: radius {self.radius}; expected metres above 0")
 
@@ -34,14 +46,14 @@ class Polygon:
     Raises `InputError` for fewer vertices or one that is no place on Earth.
     """
 
-    vertices: tuple[Place, ...]
+    vertices: tuple[LatLon, ...]
     inclusion: bool
 
     def __post_init__(self) -> None:
         if len(self.vertices) < 3:
             raise InputError(f"fence polygon: {len(self.vertices)} vertices; expected at least 3")
         for vertex in self.vertices:
-            _check(vertex, "fence polygon")
+            check_place(vertex, "fence polygon")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,16 +68,18 @@ class RallyPoint:
     altitude: float
 
     def __post_init__(self) -> None:
-        _check((self.latitude, self.longitude), "rally point")
-        if not math.isfinite(self.altitude):
-            raise InputError(f"rally point: altitude {self.altitude}; expected finite metres")
+        check_place((self.latitude, self.longitude), "rally point", self.altitude)
 
 
 @dataclass(frozen=True, slots=True)
 class Fence:
     """Where the aircraft may be: inside every inclusion, outside every exclusion.
 
-    `breach_return` is where ArduPilot flies after a breach, or None.
+    `breach_return` is where ArduPilot flies after a breach, or None. A fence without areas is
+    false.
+
+    >>> bool(Fence(circles=(Circle((47.4, 8.5), 300.0, inclusion=True),))), bool(Fence())
+    (True, False)
     """
 
     polygons: tuple[Polygon, ...] = ()
@@ -74,12 +88,3 @@ class Fence:
 
     def __bool__(self) -> bool:
         return bool(self.polygons or self.circles)
-
-
-def _check(place: Place, what: str) -> None:
-    latitude, longitude = place
-    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
-        raise InputError(
-            f"{what}: {latitude}, {longitude}; expected a latitude within 90 degrees and a "
-            "longitude within 180"
-        )

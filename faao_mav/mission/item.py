@@ -1,13 +1,16 @@
-"""A mission as data: items, home, fence, rally points."""
+"""A mission as data: items, home, fence, rally points; and as the rows that go over the wire."""
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from faao_mav.errors import InputError
-from faao_mav.mission.fence import Fence, RallyPoint
+from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.fence import Fence, RallyPoint, check_place
 
 Params: TypeAlias = tuple[float, float, float, float]
+"""param1 to param4 of an item."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,13 +25,7 @@ class Home:
     altitude: float
 
     def __post_init__(self) -> None:
-        if not (
-            abs(self.latitude) <= 90 and abs(self.longitude) <= 180 and math.isfinite(self.altitude)
-        ):
-            raise InputError(
-                f"home {self.latitude}, {self.longitude}, {self.altitude}: expected a latitude "
-                "within 90 degrees, a longitude within 180 and a finite altitude"
-            )
+        check_place((self.latitude, self.longitude), "home", self.altitude)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,3 +74,47 @@ class Mission:
     home: Home | None = None
     fence: Fence = field(default_factory=Fence)
     rally: tuple[RallyPoint, ...] = ()
+
+
+def home_item(home: Home | None) -> MissionItem:
+    """Return the row 0 that stands for `home`; zeros for none."""
+    known = home or Home(0.0, 0.0, 0.0)
+    return MissionItem(
+        Command.NAV_WAYPOINT, Frame.GLOBAL, x=known.latitude, y=known.longitude, z=known.altitude
+    )
+
+
+def as_sent(mission: Mission, *, home_row: bool) -> tuple[MissionItem, ...]:
+    """Return the items to send, the first as number 0.
+
+    With a home row (ArduPilot) row 0 is the home, zeros if there is none: the vehicle puts its
+    own there. Without one (PX4) the targets of DO_JUMP, which count items from 1, count from 0.
+
+    >>> takeoff = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, z=30.0)
+    >>> again = MissionItem(Command.DO_JUMP, Frame.MISSION, (1.0, 2.0, 0.0, 0.0))
+    >>> [row.command.name for row in as_sent(Mission((takeoff, again)), home_row=True)]
+    ['NAV_WAYPOINT', 'NAV_TAKEOFF', 'DO_JUMP']
+    >>> as_sent(Mission((takeoff, again)), home_row=False)[1].params[0]
+    0.0
+    """
+    if not home_row:
+        return tuple(jump_moved(item, -1) for item in mission.items)
+    return (home_item(mission.home), *mission.items)
+
+
+def as_received(rows: Sequence[MissionItem], *, home_row: bool) -> Mission:
+    """Return the mission that was read back as `rows`: the reverse of `as_sent`."""
+    if not home_row:
+        return Mission(tuple(jump_moved(item, 1) for item in rows))
+    if not rows:
+        return Mission(())
+    first = rows[0]
+    home = None if first.x == first.y == first.z == 0 else Home(first.x, first.y, first.z)
+    return Mission(tuple(rows[1:]), home)
+
+
+def jump_moved(item: MissionItem, by: int) -> MissionItem:
+    """Return `item` with the target of a DO_JUMP moved by so many rows; any other as it is."""
+    if item.command != Command.DO_JUMP:
+        return item
+    return replace(item, params=(item.params[0] + by, *item.params[1:]))

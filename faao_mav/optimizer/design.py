@@ -1,7 +1,7 @@
-"""What is designed for: how precoders follow a channel, and which rate counts.
+"""The design of a plan: how precoders follow a channel, and which rate the route is optimised for.
 
-The paper's question in four lines: precoders made for the alphabet or by a classical scheme, and
-inputs taken for what they are or for Gaussian.
+The paper compares four: precoders that are optimal for the alphabet or of a classical scheme
+(`optimizer.precoder`), with the rate of the alphabet or of Gaussian inputs (`optimizer.inputs`).
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.optimizer.problem import Link
 from faao_mav.plan import Plan
 from faao_mav.radio.best_precoder import best_mean_precoders, best_precoders
@@ -17,15 +17,22 @@ from faao_mav.radio.precoder import SCHEMES
 from faao_mav.radio.rate import cutoff_rate
 
 Draws: TypeAlias = Complex
-"""Channels of (1) or (2), (..., N_r, N_t); with unknown fading the first axis runs over draws."""
+"""Channels of (1) or (2), (..., N_r, N_t); the first axis is that of the draws if `averaged`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """The scheme of `optimizer.precoder` and the inputs of `optimizer.inputs`.
+    """How precoders follow a channel, and which rate counts.
 
-    `averaged`: H has a leading axis of draws. `blind`: one precoder then serves all draws
-    (statistical CSI); otherwise each draw has its own.
+    Attributes:
+        scheme: `optimizer.precoder`, faao or a name of `radio.precoder.SCHEMES`.
+        gaussian: the rate that counts is that of Gaussian inputs.
+        averaged: the fading is averaged over; H has a leading axis of draws.
+        blind: one precoder serves all draws (statistical CSI); otherwise each draw has its own.
+
+    >>> from faao_mav import read_plan
+    >>> design(read_plan("missions/paper.yaml"))
+    Design(scheme='faao', gaussian=False, averaged=False, blind=False)
     """
 
     scheme: str
@@ -35,30 +42,27 @@ class Design:
 
     @property
     def optimal(self) -> bool:
-        """Whether precoders maximise the cutoff rate that is counted."""
+        """Whether precoders maximise the cutoff rate, and that rate counts."""
         return self.scheme == "faao" and not self.gaussian
 
     def precoders(self, link: Link, H: Draws, start: Complex | None = None) -> Complex:
-        """Return precoders (..., N_t, N_t) for the channels `H`.
+        """Return precoders (..., N_t, N_t) of power W for the channels `H`.
 
-        The optimal ones search from `start` where given. A scheme without knowledge of the draw
-        is made for the mean channel.
+        The search for optimal ones begins at `start` (..., N_t, N_t) where given. A classical
+        scheme that does not know the draw is that of the mean channel.
         """
         power, noise = link.power, link.noise
         if self.optimal:
             if self.blind:
-                found = best_mean_precoders(
-                    np.moveaxis(H, 0, -3), power, link.modulation, noise, start=start
-                )
-            else:
-                found = best_precoders(H, power, link.modulation, noise, start=start)
-            return found.P
+                draws = np.moveaxis(H, 0, -3)
+                return best_mean_precoders(draws, power, link.modulation, noise, start=start).P
+            return best_precoders(H, power, link.modulation, noise, start=start).P
         known = H.mean(axis=0) if self.blind else H
         scheme = "waterfilling" if self.scheme == "faao" else self.scheme
         return SCHEMES[scheme](known, power, noise)
 
     def rate(self, link: Link, H: Draws, P: Complex) -> Real:
-        """Return the rate that the route is optimised for, bits (n,): the mean over draws."""
+        """Return the rate that the route is optimised for, bits (n,), its mean where `averaged`."""
         if self.gaussian:
             rate = gaussian_rate(H, P, link.noise)
         else:
@@ -67,7 +71,7 @@ class Design:
 
 
 def design(plan: Plan) -> Design:
-    """Return what `plan` asks for."""
+    """Return the design that `plan` asks for."""
     averaged = plan.radio.fading == "ergodic"
     return Design(
         scheme=plan.optimizer.precoder,
@@ -77,8 +81,14 @@ def design(plan: Plan) -> Design:
     )
 
 
-def gaussian_rate(H: Complex, P: Complex, noise: float) -> Real:
-    """Return log2 det(I + H P P^H H^H / sigma²) (...), what Gaussian inputs would carry, bits."""
+def gaussian_rate(H: RealOrComplex, P: RealOrComplex, noise: float) -> Real:
+    """Return the rate of Gaussian inputs, log2 det(I + H P P^H H^H / sigma²), bits (...).
+
+    `H` is (..., N_r, N_t), `P` (..., N_t, N_t) in sqrt(W), `noise` sigma² in W.
+
+    >>> float(gaussian_rate(np.eye(1), np.eye(1), 1.0))
+    1.0
+    """
     A = H @ P / np.sqrt(noise)
-    gram = np.eye(A.shape[-1]) + np.conj(np.swapaxes(A, -1, -2)) @ A
+    gram = np.eye(A.shape[-1]) + A.conj().mT @ A
     return np.asarray(np.linalg.slogdet(gram)[1] / np.log(2.0))

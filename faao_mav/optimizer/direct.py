@@ -19,13 +19,13 @@ from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximiz
 from faao_mav.optimizer.interior.search import COLD_START, WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
-from faao_mav.optimizer.rates.place import PlaceRate, place
 from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
-from faao_mav.optimizer.search.coarse import improved
-from faao_mav.optimizer.search.routes import starts
+from faao_mav.optimizer.search.multistart import improve_starts
+from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
 _EXACT_ITERATIONS = 12
@@ -59,7 +59,9 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
     tell(1, "the starts", 0.0)
-    rough = improved(kin, field, routes, tolerance=_ROUGH, max_iterations=options.max_iterations)
+    rough = improve_starts(
+        kin, field, routes, tolerance=_ROUGH, max_iterations=options.max_iterations
+    )
     flights = [*routes.values(), *rough.flights.values()]
     means = field.value(np.stack([flight.w.T for flight in flights], axis=1)).mean(axis=-1)
     values = means.min(axis=0)
@@ -79,10 +81,10 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             strategy=COLD_START if cold else WARM_START,
         )
 
-    optima = optimized([rough.flights[name] for name in rough.hopeful])
+    optima = optimized([rough.flights[name] for name in rough.promising])
     by_start = dict(zip(routes, reported[len(routes) :], strict=True))
     if not scheme.gaussian:
-        by_start |= {name: end.value for name, end in zip(rough.hopeful, optima, strict=True)}
+        by_start |= {name: end.value for name, end in zip(rough.promising, optima, strict=True)}
     if values.max() > max(optimum.value for optimum in optima):
         optima += optimized([flights[int(values.argmax())]])
     best = max(optima, key=lambda optimum: optimum.value)
@@ -157,16 +159,16 @@ def _solution(
     return replace(solution, history=np.array([*exact, reached]))
 
 
-def _precoders(link: Link, rate: PlaceRate, scheme: Design, w: Real, H: Complex) -> Complex:
+def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex) -> Complex:
     """Return the precoders at positions w (n, 2), searched from the best that `rate` knows."""
-    where = place(link, w.T)
+    where = link_coordinates(link, w.T)
     at = where.gain_log, where.cosine
     if isinstance(rate, CurveRate) and scheme.optimal:
-        return scheme.precoders(link, H, start=rate.start(*at))
+        return scheme.precoders(link, H, start=rate.initial_precoders(*at))
     afresh = scheme.precoders(link, H)
     if not isinstance(rate, BestRate | ModeRate) or rate.exact:
         return afresh
-    carried = scheme.precoders(link, H, start=rate.start(*at))
+    carried = scheme.precoders(link, H, start=rate.initial_precoders(*at))
     better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
     return np.asarray(np.where(better[:, None, None], carried, afresh))
 

@@ -13,9 +13,7 @@ def optimize(plan: Plan, *, observe: Observer | None = None) -> Solution:
     """
     problem = build_problem(plan)
     if plan.optimizer.method == "algorithm1":
-        from faao_mav.optimizer.algorithm1.algorithm1 import (
-            algorithm1,  # with CVXPY, half a second to import
-        )
+        from faao_mav.optimizer.algorithm1 import algorithm1  # CVXPY takes half a second
 
         return algorithm1(problem, observe=observe)
     from faao_mav.optimizer.direct import direct

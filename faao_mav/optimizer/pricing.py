@@ -1,4 +1,13 @@
-"""What a solution is worth beyond its objective: mutual information, and power to spare."""
+"""Figures of a solution beyond its objective R_avg.
+
+`price` has its mutual information, `fresh_rates` its rates on new draws of the fading, `saturation`
+the power that it could do without.
+
+>>> from faao_mav import optimize, price, read_plan, saturation
+>>> solution = optimize(read_plan("missions/paper.yaml"))
+>>> round(saturation(solution).spare_db, 1), round(price(solution).average, 4)  # dB, bit/s/Hz
+(19.7, 2.0)
+"""
 
 from dataclasses import dataclass, replace
 
@@ -13,22 +22,24 @@ from faao_mav.radio.mutual_information import mean_mutual_information
 from faao_mav.radio.rate import cutoff_rate
 
 SATURATED = 0.999
-"""Share of N log2(rho) from which a link counts as saturated."""
+"""Share of N log2(rho) from which a link counts as saturated. Chosen."""
 
-_MOST_PAIRS, _PART_PAIRS, _PARTS = 1000, 150, 6
-_COARSER = 6.0  # the noise of a part may err more: its slots and draws do
-_FRESH_DRAWS = 64
-_FRESH_SEARCHES = 128
+# Chosen: with these, where slots and draws are sampled, the stated error is some 5e-3 bit/s/Hz.
+_MOST_PAIRS = 1000  # pairs of slot and draw up to which all are averaged
+_PART_PAIRS, _PARTS = 150, 6  # pairs per sample and samples beyond
+_COARSER = 6.0  # tolerance of the noise average of a sample, in that of the result
+_FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
+_FRESH_SEARCHES = 128  # slots with a new draw, and a search, where precoders know the draw
 
-_MAX_SPARE_DB = 300.0
-_BISECTIONS = 60
+_MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
+_BISECTIONS = 60  # bisections of the spare power: 300 dB / 2^60 is rounding
 
 
 @dataclass(frozen=True, slots=True)
 class MutualInformation:
-    """(9), (10) with the mutual information (5), (6) in place of its bound, bit/s/Hz.
+    """The rates (10) with the mutual information (5), (6) in place of the cutoff rate, bit/s/Hz.
 
-    `error` is the larger error of the two means, one standard error where it was drawn.
+    `error` is the larger of the errors of the two means, a standard error where noise was sampled.
     """
 
     bs_uav: float
@@ -37,16 +48,16 @@ class MutualInformation:
 
     @property
     def average(self) -> float:
-        """The smaller of both, as in (9)."""
+        """The smaller of the two rates, as in (9), bit/s/Hz."""
         return min(self.bs_uav, self.uav_user)
 
 
 def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
-    """Return the mutual information along `solution` with an error of at most `tolerance`.
+    """Return the mutual information of both links along `solution`, bit/s/Hz.
 
-    Where fading is averaged over, slots and draws are sampled, and the error, which is stated, is
-    what the sample leaves: some 5e-3. Noise is drawn from the plan's seed, so that the same plan
-    gives the same value.
+    The error is at most `tolerance`. Where fading is averaged over, slots and draws are sampled,
+    and the error is that of the sample, some 5e-3. The noise is drawn with the plan's seed: the
+    same plan gives the same value.
     """
     problem, rng = build_problem(solution.plan), np.random.default_rng(solution.plan.radio.seed)
     (bs_uav, first), (uav_user, second) = (
@@ -64,10 +75,10 @@ def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
 def _mean_information(
     link: Link, H: Complex, P: Complex, rng: np.random.Generator, tolerance: float
 ) -> tuple[float, float]:
-    """Mean of (5) or (6) over slots, and over draws where there are any, with its error.
+    """Return the mean of (5) or (6) over slots, and draws where there are any, and its error, bits.
 
-    Of many pairs of slot and draw a sample is enough, taken evenly along their cutoff rates, with
-    which the mutual information goes hand in hand. It is taken in parts, whose spread is the error.
+    Many pairs of slot and draw are sampled evenly in the order of their cutoff rates, which nearly
+    is the order of their mutual information. The spread of several samples is the error.
     """
     wide = np.broadcast_to(P, (*H.shape[:-2], *P.shape[-2:]))
     H, P = H.reshape(-1, *H.shape[-2:]), wide.reshape(-1, *P.shape[-2:])
@@ -92,7 +103,7 @@ def _mean_information(
 
 @dataclass(frozen=True, slots=True)
 class FreshRates:
-    """R_U and R_G of (10) on fading that was not planned on, with standard errors, bit/s/Hz."""
+    """R_U and R_G of (10) on draws that the plan does not know, and standard errors, bit/s/Hz."""
 
     bs_uav: float
     uav_user: float
@@ -101,38 +112,38 @@ class FreshRates:
 
     @property
     def average(self) -> float:
-        """The smaller of both, as in (9)."""
+        """The smaller of the two rates, as in (9), bit/s/Hz."""
         return min(self.bs_uav, self.uav_user)
 
     @property
     def error(self) -> float:
-        """The standard error of the smaller of both."""
+        """The standard error of the smaller of the two rates, bit/s/Hz."""
         return self.bs_uav_error if self.bs_uav <= self.uav_user else self.uav_user_error
 
 
 def fresh_rates(solution: Solution) -> FreshRates | None:
-    """Return what `solution` carries on new draws of the fading; None unless it was averaged over.
+    """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
-    Every slot has draws of its own. Precoders that know the draw are made anew for each, on a
-    regular sample of the slots.
+    Every slot has draws of its own. Precoders that know the draw are searched for each of them, on
+    every so many slots.
     """
-    problem, wanted = build_problem(solution.plan), design(solution.plan)
-    if not wanted.averaged:
+    problem, how = build_problem(solution.plan), design(solution.plan)
+    if not how.averaged:
         return None
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
     slots = len(solution.w)
-    step = 1 if wanted.blind else -(-slots // _FRESH_SEARCHES)
+    step = 1 if how.blind else -(-slots // _FRESH_SEARCHES)
     chosen = np.arange(step // 2, slots, step)
-    w, draws = solution.w[chosen], _FRESH_DRAWS if wanted.blind else 1
+    w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
     found = []
     for link, P in zip(problem.links, (solution.P_B, solution.P_U), strict=True):
         nlos = rayleigh(rng, draws * len(w), link.receive, link.transmit)
         fresh = replace(link, nlos=nlos.reshape(draws, len(w), link.receive, link.transmit))
         H = link.channel(w, fresh.small_scale(w))
-        known = P[chosen] if wanted.blind else wanted.precoders(link, H)
+        known = P[chosen] if how.blind else how.precoders(link, H)
         rates = cutoff_rate(H, known, link.classes, link.noise)
-        # The slots' own means differ: within a slot it is the draws that err. One draw per slot
-        # leaves only the spread over all, an upper estimate.
+        # The error is that of the draws within each slot, not the spread from slot to slot. With
+        # one draw per slot only the spread over all slots is known, an upper estimate.
         spread = rates.var(axis=0, ddof=1).mean() if draws > 1 else rates.var(ddof=1)
         found.append((float(rates.mean()), float(np.sqrt(spread / rates.size))))
     (bs_uav, first), (uav_user, second) = found
@@ -141,10 +152,11 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
 
 @dataclass(frozen=True, slots=True)
 class Saturation:
-    """Whether the alphabet, not the link, limits the rate.
+    """Whether the alphabet, not the power, limits the rate.
 
-    `ceiling` is the least N log2(rho) of both links, bit/s/Hz; `spare_db` by how many dB both
-    powers could fall before R_avg leaves `SATURATED` of it, 0 for a plan that is not saturated.
+    `ceiling` is the smaller N log2(rho) of the two links, bit/s/Hz. `spare_db` is by how many dB
+    both powers could fall before R_avg is below `SATURATED` times the ceiling; 0 for a plan that is
+    not saturated.
     """
 
     ceiling: float
@@ -152,12 +164,12 @@ class Saturation:
 
     @property
     def saturated(self) -> bool:
-        """Whether power could be saved: the route hardly matters."""
+        """Whether less power would do; the route then hardly matters."""
         return self.spare_db > 0
 
 
 def saturation(solution: Solution) -> Saturation:
-    """Return how far `solution` is into saturation, with its own route and precoders."""
+    """Return how far into saturation `solution` is, with its own route and precoders."""
     ceiling = min(link.classes.bits for link in build_problem(solution.plan).links)
 
     def enough(db: float) -> bool:

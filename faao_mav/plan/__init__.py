@@ -1,5 +1,10 @@
-"""The plan: `plan.yaml` read, checked and turned into SI units."""
+"""The plan: `plan.yaml` read, checked and turned into SI units.
 
+`model` declares the keys and what they mean, `reader` reads them, `keys.reference` lists them.
+"""
+
+from faao_mav.plan.fields import Vector
+from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.plan.model import (
     BaseStation,
     Flight,
@@ -10,8 +15,8 @@ from faao_mav.plan.model import (
     Plan,
     Radio,
     Relay,
-    Vector,
-    Vehicle,
+    Site,
+    VehicleOptions,
 )
 from faao_mav.plan.reader import parse_plan, read_plan
 
@@ -23,10 +28,13 @@ __all__ = [
     "Optimizer",
     "Origin",
     "Plan",
+    "PlanKey",
     "Radio",
     "Relay",
+    "Site",
     "Vector",
-    "Vehicle",
+    "VehicleOptions",
     "parse_plan",
     "read_plan",
+    "reference",
 ]

@@ -1,19 +1,116 @@
-"""The dotted keys of a plan, as a study varies them."""
+"""The keys of `plan.yaml`: what each means and accepts, and which of them a study varies."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from typing import Any, Literal, get_args, get_origin
 
-from faao_mav.plan.messages import paths
-from faao_mav.plan.schema import PlanSection
+from pydantic.fields import FieldInfo
+
+from faao_mav.plan.fields import Written, listed
+from faao_mav.plan.model import PlanFile
 
 POWER = "power_dbm"
-"""The powers of the base station and of the relay together."""
+"""The key of a study that stands for the powers of the base station and of the relay."""
 
 ALIASES = {POWER: ("radio.base_station.power_dbm", "radio.relay.power_dbm")}
 """Keys of a study that stand for several of the plan."""
 
 _FREE = "vehicle.parameters."  # any name below it
 _NOT_VARIED = ("study", "name")
+_UNIT_WORDS = {"m": "metres", "s": "seconds"}
+
+
+@dataclass(frozen=True, slots=True)
+class PlanKey:
+    """One key of a plan.
+
+    `path` has dots between the keys, `default` is what the file would say (empty: nothing, or the
+    key is `required`), `accepted` completes "give ...", and `inside` are the keys of a section.
+    """
+
+    path: str
+    description: str
+    unit: str
+    default: str
+    required: bool
+    accepted: str
+    inside: tuple[str, ...] = ()
+
+
+def reference() -> Mapping[str, PlanKey]:
+    """Return every key of a plan by its path, sections before what is in them.
+
+    >>> key = reference()["radio.relay.power_dbm"]
+    >>> key.description, key.unit, key.default, key.accepted
+    ('Transmit power W_U.', 'dBm', '20', 'a power from -200 to 100 dBm')
+    >>> reference()["mission.max_items"].accepted
+    'a whole number, 2 to 65535'
+    """
+    return {key.path: key for key in _below(PlanFile, "")}
+
+
+def _below(section: type, prefix: str) -> Iterator[PlanKey]:
+    for field in fields(section):
+        info = FieldInfo.from_annotation(field.type)  # type: ignore[arg-type]
+        written = next((m for m in info.metadata if isinstance(m, Written)), Written(""))
+        in_file = written.accepted if isinstance(written.accepted, str) else written.accepted()
+        inner = list(_sections(info.annotation))
+        inside = tuple(key.path for one in inner for key in _below(one, "") if "." not in key.path)
+        extra: Any = info.json_schema_extra or {"unit": "", "accepted": ""}
+        required = field.default is MISSING and field.default_factory is MISSING
+        default = field.default if field.default_factory is MISSING else field.default_factory()
+        path = prefix + (info.alias or field.name)
+        yield PlanKey(
+            path,
+            info.description or inner[0].__doc__.partition("\n")[0],
+            extra["unit"],
+            "" if required or inside else _as_yaml(written.convert(default)),
+            required,
+            extra["accepted"] or in_file or _accepted(info, extra["unit"], inside),
+            inside,
+        )
+        for one in inner:
+            yield from _below(one, f"{path}.")
+
+
+def _sections(annotation: Any) -> Iterator[Any]:
+    """Yield the sections that a field of this type holds."""
+    if isinstance(annotation, type) and is_dataclass(annotation):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _sections(part)
+
+
+def _as_yaml(value: object) -> str:
+    """Return a default as a plan's file would have it; nothing for None."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_as_yaml, value))}]"
+    if isinstance(value, int | float):
+        return f"{value:g}".replace("e+0", "e")
+    if isinstance(value, Mapping):
+        return "{}"
+    return "" if value is None else str(value) or '""'
+
+
+def _accepted(info: FieldInfo, unit: str, inside: tuple[str, ...]) -> str:
+    """Return in words what type and limits of a key accept."""
+    kind: Any = info.annotation
+    if inside:
+        return f"a mapping with {', '.join(inside)}"
+    if get_origin(kind) is Literal:
+        return listed(get_args(kind))
+    if get_origin(kind) is tuple:
+        return f"a list of {listed(get_args(get_args(kind)[0]), 'and')}"
+    if kind is bool:
+        return "true or false"
+    number = "a whole number" if kind is int else "a number"
+    of = f" of {_UNIT_WORDS.get(unit, unit)}" if unit else ""
+    limits = {n: getattr(m, n) for m in info.metadata for n in ("gt", "ge", "le") if hasattr(m, n)}
+    low = f" above {limits['gt']:g}, at most" if "gt" in limits else f", {limits['ge']:g} to"
+    return f"{number}{of}{low} {limits['le']:g}"
 
 
 def varied_twice(keys: Iterable[str]) -> str:
@@ -28,13 +125,18 @@ def varied_twice(keys: Iterable[str]) -> str:
 
 
 def unknown_key(key: str) -> str:
-    """Return why `key` cannot be varied and what is near it; nothing for a key that can."""
-    every = [path for path in paths(PlanSection) if path.split(".")[0] not in _NOT_VARIED]
-    sections = {path.rsplit(".", 1)[0] for path in every if "." in path}
-    known = [*ALIASES, *(path for path in every if path not in sections)]
+    """Return why `key` cannot be varied and what is near it; nothing for a key that can.
+
+    >>> unknown_key("radio.relay.power_dbm")
+    ''
+    >>> unknown_key("radio.modulaton")
+    'unknown key; did you mean radio.modulation?'
+    """
+    every = [k for k in reference().values() if k.path.split(".")[0] not in _NOT_VARIED]
+    known = [*ALIASES, *(k.path for k in every if not k.inside)]
     if key in known or (key.startswith(_FREE) and key != _FREE):
         return ""
-    if key in sections:
+    if any(k.path == key for k in every):
         inside = [path for path in known if path.startswith(f"{key}.")]
         return f"a section cannot be varied; give one of {', '.join(inside)}"
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)

@@ -1,17 +1,36 @@
 """A mission plan: what is flown, where, and over which radio link.
 
-`Plan` is what the rest of the program sees: validated, SI and linear units, frozen. The file
-`plan.yaml` with its decibels and degrees is described in `schema`.
+`Plan` is what the rest of the program sees: validated, SI and linear units, frozen. The same
+declarations say what `plan.yaml` may hold: each field is a key, with what it means, its unit and
+its limits. `fields` says how, `keys.reference` lists them all.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from faao_mav.plan.autopilots import Autopilot, Kind
+from pydantic import AfterValidator, ConfigDict, Discriminator, Tag, ValidationInfo
 
-Vector: TypeAlias = tuple[float, float]
-"""East and north components, metres or m/s."""
+from faao_mav.plan.fields import (
+    MAX_LOCAL_DISTANCE,
+    Antennas,
+    AutopilotName,
+    Flag,
+    Gain,
+    Noise,
+    Number,
+    Position,
+    Power,
+    Text,
+    TypeName,
+    Velocity,
+    Whole,
+    check_degrees,
+    key,
+    linear,
+    told,
+    watts,
+)
 
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
@@ -28,146 +47,320 @@ StudyScheme: TypeAlias = Literal[
 ]
 StudyFigure: TypeAlias = Literal["rate", "trajectories"]
 
-
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """The point of local (0, 0): WGS84 degrees, metres above mean sea level."""
-
-    latitude: float
-    longitude: float
-    elevation: float
+_HOVER = (0.0, 0.0)
+_POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
 
 
-@dataclass(frozen=True, slots=True)
-class Vehicle:
-    """The aircraft and its limits: v_max and v_min in m/s, a_max in m/s²."""
+class _Section:
+    """A mapping of known keys."""
 
-    max_speed: float
-    max_acceleration: float
-    min_speed: float = 0.0
-    autopilot: Autopilot = "ardupilot"
-    type: Kind = "copter"
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    __slots__ = ()
+    __pydantic_config__ = ConfigDict(extra="forbid")
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
-    """The flight: w_I, w_F (m, east-north), H (m), T and delta_t (s), end velocities (m/s).
+class Origin(_Section):
+    """The point of local [0, 0], WGS84."""
 
-    A velocity of None is free. `slots` is N + 2 = T / delta_t.
+    latitude: Annotated[Number, key("Latitude.", "degrees", "degrees, -90 to 90, south negative")]
+    longitude: Annotated[
+        Number, key("Longitude.", "degrees", "degrees, -180 to 180, west negative")
+    ]
+    elevation: Annotated[Number, key("Height above mean sea level.", "m", ge=-500, le=9000)] = 0.0
+
+
+def _keep(origin: Origin, info: ValidationInfo) -> Origin:
+    """Check the origin, and keep it for the positions in degrees, which are read after it."""
+    try:
+        check_degrees(origin.latitude, origin.longitude)
+    except ValueError as error:
+        raise told(str(error)) from None
+    context: Any = info.context
+    context["origin"] = (origin.latitude, origin.longitude)
+    return origin
+
+
+@dataclass(frozen=True, slots=True)
+class Site(_Section):
+    """Where the plan is flown."""
+
+    origin: Annotated[Origin, AfterValidator(_keep)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleOptions(_Section):
+    """The aircraft and its limits."""
+
+    autopilot: Annotated[AutopilotName, key("The autopilot that the mission is for.")] = "ardupilot"
+    type: Annotated[TypeName, key("The kind of aircraft; a plane with ArduPilot.")] = "copter"
+    max_speed: Annotated[Number, key("Largest speed v_max.", "m/s", gt=0, le=1000)]
+    max_acceleration: Annotated[Number, key("Largest acceleration a_max.", "m/s^2", gt=0, le=1000)]
+    min_speed: Annotated[
+        Number,
+        key(
+            "Least speed v_min: above 0 both ends are free or velocities.",
+            "m/s",
+            "a speed from 0 m/s, below max_speed",
+            ge=0,
+            le=1000,
+        ),
+    ] = 0.0
+    parameters: Annotated[
+        Mapping[str, Number],
+        key(
+            "Parameters of the autopilot, in its own units, that the flight is predicted with.",
+            accepted="autopilot parameters as NAME: number",
+        ),
+    ] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flight(_Section):
+    """The flight that is optimised.
+
+    A velocity of None is free.
     """
 
-    start: Vector
-    end: Vector
-    altitude: float
-    duration: float
-    time_step: float
-    start_velocity: Vector | None
-    end_velocity: Vector | None
-    bound_first_acceleration: bool
+    start: Annotated[Position, key("Where the flight starts, w_I.", "m")]
+    end: Annotated[Position, key("Where the flight ends, w_F.", "m")]
+    altitude: Annotated[
+        Number,
+        key(
+            "Height H above the origin.",
+            "m",
+            "a height above the origin in metres, above 0 (at 0 the path gain rho_0 d^-2 has no "
+            "bound), at most 20000",
+            gt=0,
+            le=20_000,
+        ),
+    ]
+    duration: Annotated[
+        Number,
+        key(
+            "Duration T, a whole number of time steps; w_F is reached one step before its end.",
+            "s",
+            gt=0,
+            le=1e7,
+        ),
+    ]
+    time_step: Annotated[Number, key("Length delta_t of a time slot.", "s", gt=0, le=1e6)] = 0.2
+    start_velocity: Annotated[Velocity, key("Velocity at the start; the paper: free.", "m/s")] = (
+        _HOVER
+    )
+    end_velocity: Annotated[Velocity, key("Velocity at the end; the paper: free.", "m/s")] = _HOVER
+    bound_first_acceleration: Annotated[
+        Flag, key("Whether a_max bounds a(0) too, which the paper leaves unbounded.")
+    ] = True
 
     @property
     def slots(self) -> int:
-        """Number of time slots N + 2."""
+        """Number of time slots, N + 2 = T / delta_t."""
         return round(self.duration / self.time_step)
 
 
-@dataclass(frozen=True, slots=True)
-class BaseStation:
-    """The base station: p_B (m), N_t, W_B (W)."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseStation(_Section):
+    """The base station."""
 
-    position: Vector
-    antennas: int
-    power: float
-
-
-@dataclass(frozen=True, slots=True)
-class Relay:
-    """The radio aboard: N_u, W_U (W), sigma_U² (W)."""
-
-    antennas: int
-    power: float
-    noise: float
+    position: Annotated[Position, key("Place p_B.", "m")]
+    antennas: Annotated[Antennas, key("Antennas N_t.")] = 2
+    power: Annotated[Power, key("Transmit power W_B.", "dBm", name="power_dbm")] = _POWER
 
 
-@dataclass(frozen=True, slots=True)
-class GroundUser:
-    """The ground user: p_U (m), N_r, sigma_G² (W)."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relay(_Section):
+    """The radio aboard."""
 
-    position: Vector
-    antennas: int
-    noise: float
+    antennas: Annotated[Antennas, key("Antennas N_u.")] = 2
+    power: Annotated[Power, key("Transmit power W_U.", "dBm", name="power_dbm")] = _POWER
+    noise: Annotated[Noise, key("Noise power sigma_U^2.", "dBm", name="noise_dbm")] = _NOISE
 
 
-@dataclass(frozen=True, slots=True)
-class Radio:
-    """Both links: rho_0 = `reference_gain` and K = `rician_factor` are linear."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundUser(_Section):
+    """The ground user."""
+
+    position: Annotated[Position, key("Place p_U.", "m")]
+    antennas: Annotated[Antennas, key("Antennas N_r.")] = 2
+    noise: Annotated[Noise, key("Noise power sigma_G^2.", "dBm", name="noise_dbm")] = _NOISE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Radio(_Section):
+    """Both links."""
 
     base_station: BaseStation
-    relay: Relay
+    relay: Relay = field(default_factory=Relay)
     ground_user: GroundUser
-    modulation: Modulation
-    reference_gain: float
-    rician_factor: float
-    line_of_sight: LineOfSight
-    fading: Fading
-    fading_samples: int
-    csi: ChannelKnowledge
-    seed: int
-    causal: bool
+    modulation: Annotated[Modulation, key("The alphabet of both hops.")] = "bpsk"
+    reference_gain: Annotated[
+        Gain, key("Power gain rho_0 at 1 m.", "dB", name="reference_gain_db")
+    ] = _GAIN
+    rician_factor: Annotated[Number, key("Rician factor K, linear.", ge=0, le=1e6)] = 3.0
+    line_of_sight: Annotated[
+        LineOfSight,
+        key("ula: half-wavelength arrays along east, follows the aircraft; all_ones: ones."),
+    ] = "ula"
+    fading: Annotated[
+        Fading,
+        key(
+            "ergodic: the mean over fading; realization: one known draw per slot, as in the paper; "
+            "none: the line of sight alone."
+        ),
+    ] = "ergodic"
+    fading_samples: Annotated[
+        Whole, key("Draws that the mean over fading is taken over.", ge=1, le=10_000)
+    ] = 32
+    csi: Annotated[
+        ChannelKnowledge,
+        key("Ergodic fading: one precoder per slot (statistical) or per draw (instantaneous)."),
+    ] = "statistical"
+    seed: Annotated[
+        Whole, key("Seed of the draws.", accepted="a whole number from 0", ge=0, lt=2**63)
+    ] = 0
+    causal: Annotated[
+        Flag, key("Whether the relay forwards only what it has received; the paper: false.")
+    ] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Optimizer(_Section):
+    """How the plan is optimised."""
+
+    method: Annotated[Method, key("The direct method, or the paper's Algorithm 1.")] = "direct"
+    precoder: Annotated[PrecoderScheme, key("The precoders that the route is for.")] = "faao"
+    inputs: Annotated[
+        Inputs, key("Inputs that the design is for; what is reported is the alphabet's rate.")
+    ] = "alphabet"
+    starts: Annotated[
+        tuple[Start, ...], key("Routes that the direct method starts from.", min_length=1)
+    ] = ("straight", "bs", "user", "bs-user", "user-bs")
+    tolerance: Annotated[
+        Number,
+        key(
+            "Algorithm 1: change of R_avg at which it ends; direct: largest residual.",
+            "bit/s/Hz",
+            gt=0,
+            le=10,
+        ),
+    ] = 1e-4
+    max_iterations: Annotated[
+        Whole,
+        key(
+            "Iterations of Algorithm 1; Newton steps per start of the direct method.",
+            ge=1,
+            le=10_000,
+        ),
+    ] = 50
 
 
 @dataclass(frozen=True, slots=True)
-class Optimizer:
-    """How the plan is optimised; `tolerance` is tol on R_avg, bit/s/Hz.
+class CircleZone(_Section):
+    """A circular exclusion zone of the fence."""
 
-    `inputs` are those that route and precoders are made for; what is reported is always the rate
-    of the alphabet. `starts` are the routes that the direct method starts from.
-    """
-
-    method: Method
-    precoder: PrecoderScheme
-    inputs: Inputs
-    starts: tuple[Start, ...]
-    tolerance: float
-    max_iterations: int
+    center: Annotated[Position, key("Centre of the circle.", "m")]
+    radius: Annotated[Number, key("Radius of the circle.", "m", gt=0, le=MAX_LOCAL_DISTANCE)]
 
 
 @dataclass(frozen=True, slots=True)
-class MissionOptions:
-    """How the trajectory becomes a mission; `path_tolerance` in metres."""
+class PolygonZone(_Section):
+    """A polygonal exclusion zone of the fence."""
 
-    takeoff: bool
-    on_finish: OnFinish
-    path_tolerance: float
-    max_items: int
-    parameters: MissionParameters
+    polygon: Annotated[
+        tuple[Position, ...], key("Corners.", "m", "three corners or more", min_length=3)
+    ]
 
 
-@dataclass(frozen=True, slots=True)
-class Study:
-    """What `faao-mission study` makes of a plan: values by dotted key, schemes, seeds, a figure.
+def _zone(value: object) -> str:
+    return "<polygon>" if isinstance(value, dict) and "polygon" in value else "<circle>"
 
-    The main job takes no notice of it.
-    """
 
-    vary: Mapping[str, tuple[object, ...]]
-    schemes: tuple[StudyScheme, ...]
-    seeds: int
-    figure: StudyFigure
+Zone: TypeAlias = Annotated[
+    Annotated[CircleZone, Tag("<circle>")] | Annotated[PolygonZone, Tag("<polygon>")],
+    Discriminator(_zone),
+]
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
-    """A validated plan; `text` is the YAML that it was read from, `source` the name of its file."""
+class FenceOptions(_Section):
+    """Where the aircraft may be; does not work yet."""
 
-    origin: Origin
-    vehicle: Vehicle
+    inclusion: Annotated[
+        tuple[Position, ...] | None,
+        key("Corners of the area to stay in.", "m", "three corners or more", min_length=3),
+    ] = None
+    exclusion: Annotated[
+        tuple[Zone, ...],
+        key("Zones to stay out of.", accepted="a list of {center, radius} and {polygon}"),
+    ] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionOptions(_Section):
+    """How the trajectory becomes a mission."""
+
+    takeoff: Annotated[Flag, key("Whether the mission begins with a take-off.")] = True
+    on_finish: Annotated[OnFinish, key("What the aircraft does at the end.")] = "rtl"
+    path_tolerance: Annotated[
+        Number, key("Largest distance of the predicted flight from the path.", "m", ge=0.1, le=1000)
+    ] = 2.0
+    max_items: Annotated[
+        Whole, key("Most items of the mission, the home row included.", ge=2, le=65_535)
+    ] = 600
+    parameters: Annotated[
+        MissionParameters,
+        key(
+            "recommend: time the mission for limits that suit it, and write them beside it; "
+            "keep: fit it to the vehicle's."
+        ),
+    ] = "recommend"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Study(_Section):
+    """What `faao-mission study` varies; the main job takes no notice of it."""
+
+    vary: Annotated[
+        Mapping[
+            str, Annotated[tuple[Any, ...], key("", accepted="a list of values", min_length=1)]
+        ],
+        key(
+            "Values by dotted key; power_dbm stands for both powers.",
+            accepted="lists of values by dotted key",
+        ),
+    ] = field(default_factory=dict)
+    schemes: Annotated[tuple[StudyScheme, ...], key("Designs to compare.", min_length=1)] = (
+        "faao",
+    )
+    seeds: Annotated[Whole, key("Draws of the fading, from radio.seed on.", ge=1, le=10_000)] = 1
+    figure: Annotated[StudyFigure, key("What the figure shows.")] = "rate"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanFile(_Section):
+    """What the file of a plan holds."""
+
+    name: Annotated[
+        Text, key("Name, for the summary.", "", "text of at most 200 characters", max_length=200)
+    ] = ""
+    site: Site
+    vehicle: VehicleOptions
     flight: Flight
     radio: Radio
-    optimizer: Optimizer
-    mission: MissionOptions
+    optimizer: Optimizer = field(default_factory=Optimizer)
+    fence: FenceOptions | None = None
+    mission: MissionOptions = field(default_factory=MissionOptions)
     study: Study | None = None
-    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan(PlanFile):
+    """A validated plan; `text` is the YAML that it was read from, `source` the name of its file."""
+
     text: str = ""
     source: str = "plan"
+
+    @property
+    def origin(self) -> Origin:
+        """The point of local [0, 0]."""
+        return self.site.origin

@@ -1,49 +1,34 @@
-"""YAML text to plain Python data, without the surprises of YAML 1.1.
+"""YAML text to plain Python data and back, by the core schema of YAML 1.2.
 
-PyYAML's own resolver reads `1e-4` as text, `2:30` as 150, `010` as 8 and `no` as false, and
-keeps the last of two equal keys. A plan that drives an aircraft is read by the core schema of
-YAML 1.2 instead, and a key that stands twice is an error.
+`1e-4` is a number, `010` is ten, `no` and `2:30` are words, and a key that stands twice is an
+error. What plans have no use for is refused before it is built: anchors' aliases, tags, nesting.
 """
 
+import io
 import re
+from collections.abc import Mapping
 from typing import Any
 
-import yaml
+from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
+from ruamel.yaml.constructor import SafeConstructor
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import AliasEvent
+from ruamel.yaml.nodes import MappingNode, Node
+from ruamel.yaml.resolver import VersionedResolver
 
 from faao_mav.errors import PlanError
 
 MAX_CHARACTERS = 1_000_000
+"""Characters of the longest plan that is read; chosen: a plan of every key has 3,000."""
+
 _MAX_DEPTH = 20
+"""Levels of nesting that are read; chosen: a plan has at most six."""
 
+_MAX_WIDTH = 4096
+"""Characters of a line at which long values are folded when written; chosen."""
 
-class _Loader(yaml.SafeLoader):
-    def construct_unique_mapping(self, node: yaml.MappingNode) -> dict[Any, Any]:
-        seen = set()
-        for key_node, _ in node.value:
-            if not isinstance(key_node, yaml.ScalarNode) or not key_node.tag.endswith(":str"):
-                shown = f", not {key_node.value}" if isinstance(key_node.value, str) else ""
-                raise yaml.MarkedYAMLError(
-                    problem=f"a key has to be a word{shown}", problem_mark=key_node.start_mark
-                )
-            if key_node.value in seen:
-                raise yaml.MarkedYAMLError(
-                    problem=f"the key '{key_node.value}' stands twice",
-                    problem_mark=key_node.start_mark,
-                )
-            seen.add(key_node.value)
-        return self.construct_mapping(node, deep=True)
-
-    def construct_decimal(self, node: yaml.ScalarNode) -> int:
-        try:
-            return int(node.value)
-        except ValueError:  # beyond the digits that Python converts
-            raise yaml.MarkedYAMLError(
-                problem="a whole number of thousands of digits", problem_mark=node.start_mark
-            ) from None
-
-
-_Loader.yaml_implicit_resolvers = {}
-for _tag, _pattern, _first in (
+_CORE_SCHEMA = (
     ("null", r"~|null|Null|NULL|", "~nN\0"),
     ("bool", r"true|True|TRUE|false|False|FALSE", "tTfF"),
     ("int", r"[-+]?[0-9]+", "-+0123456789"),
@@ -53,38 +38,95 @@ for _tag, _pattern, _first in (
         r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
         "-+.0123456789",
     ),
-):
-    _Loader.add_implicit_resolver(
-        f"tag:yaml.org,2002:{_tag}",
-        re.compile(rf"^(?:{_pattern})$"),
-        [c if c != "\0" else "" for c in _first],
-    )
-_Loader.add_constructor("tag:yaml.org,2002:map", _Loader.construct_unique_mapping)
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_decimal)
+)
+"""Type, pattern and first characters (NUL: none) of the words that are no text, without 0x, 0o."""
 
 
-def _check_structure(text: str, source: str) -> None:
-    """Refuse what is read recursively or by reference before it is built."""
-    depth, problem = 0, ""
-    for event in yaml.parse(text, Loader=_Loader):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-        if isinstance(event, yaml.AliasEvent):
+def _by_first_character() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
+    found: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
+    for name, pattern, first in _CORE_SCHEMA:
+        for character in first:
+            entry = (f"tag:yaml.org,2002:{name}", re.compile(rf"^(?:{pattern})$"))
+            found.setdefault(character.strip("\0"), []).append(entry)
+    return found
+
+
+class _Refused(MarkedYAMLError):
+    """Sound YAML that is not used in plans."""
+
+
+class _CoreResolver(VersionedResolver):
+    """The types of `_CORE_SCHEMA`, whatever version a `%YAML` directive asks for."""
+
+    processing_version = (1, 2)
+    versioned_resolver = _by_first_character()
+
+
+class _PlainComposer(Composer):
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.parser.peek_event()
+        problem = ""
+        if isinstance(event, AliasEvent):
             problem = "aliases (*name) are not used in plans"
-        elif depth > _MAX_DEPTH:
+        elif event.ctag is not None:
+            problem = f"tags ({event.ctag}) are not used in plans"
+        elif self.depth > _MAX_DEPTH:
             problem = f"nested more than {_MAX_DEPTH} deep"
         if problem:
-            line = event.start_mark.line + 1 if event.start_mark else "?"
-            raise PlanError(f"{source}: line {line}: {problem}")
+            raise _Refused(problem=problem, problem_mark=event.start_mark)
+        self.anchors.clear()  # one that is named twice is no matter where none is used
+        return super().compose_node(parent, index)
 
 
-def load_yaml(text: str, source: str) -> dict[Any, Any]:
+class _UniqueKeys(SafeConstructor):
+    def check_mapping_key(
+        self, node: MappingNode, key_node: Node, mapping: Any, key: Any, value: Any
+    ) -> bool:
+        del node, value
+        problem = ""
+        if not isinstance(key, str):
+            shown = f", not {key_node.value}" if isinstance(key_node.value, str) else ""
+            problem = f"a key has to be a word{shown}"
+        elif key in mapping:
+            problem = f"the key '{key}' stands twice"
+        if problem:
+            raise MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+        return True
+
+
+def _yaml() -> Any:
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.Resolver, yaml.Composer, yaml.Constructor = _CoreResolver, _PlainComposer, _UniqueKeys
+    return yaml
+
+
+def dump_yaml(data: Mapping[str, Any]) -> str:
+    """Return `data` as YAML text that `load_yaml` reads back, keys in their order.
+
+    >>> print(dump_yaml({"name": "2:30", "flight": {"start": [0, 1.5]}}), end="")
+    name: 2:30
+    flight:
+      start:
+      - 0
+      - 1.5
+    """
+    yaml = _yaml()
+    yaml.default_flow_style = yaml.allow_unicode = False
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.width = _MAX_WIDTH
+    text = io.StringIO()
+    yaml.dump(data, text)
+    return text.getvalue()
+
+
+def load_yaml(text: str, source: str) -> dict[str, Any]:
     """Return the mapping that `text` holds.
 
     `source` names the file in messages. Raises `PlanError` with the line for anything that is
     not one YAML mapping.
+
+    >>> load_yaml("{tolerance: 1e-4, antennas: 010, name: no}", "plan.yaml")
+    {'tolerance': 0.0001, 'antennas': 10, 'name': 'no'}
     """
     if text.startswith("QGC WPL") or (text.lstrip()[:1] == "{" and '"fileType"' in text):
         raise PlanError(f"{source}: a mission, not a plan; faao-mission validate takes missions")
@@ -93,16 +135,18 @@ def load_yaml(text: str, source: str) -> dict[Any, Any]:
             f"{source}: {len(text):,} characters; a plan has at most {MAX_CHARACTERS:,}"
         )
     try:
-        _check_structure(text, source)
-        data = yaml.load(text, Loader=_Loader)
-    except yaml.MarkedYAMLError as error:
+        data = _yaml().load(text)
+    except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        what = "" if isinstance(error, _Refused) else "not valid YAML: "
         advice = "; indent with spaces" if r"'\t'" in (error.problem or "") else ""
-        raise PlanError(f"{source}: {where}not valid YAML: {error.problem}{advice}") from None
-    except (yaml.YAMLError, ValueError) as error:
+        raise PlanError(f"{source}: {where}{what}{error.problem}{advice}") from None
+    except YAMLError as error:
         problem = " ".join(str(error).split())
         raise PlanError(f"{source}: not valid YAML: {problem}") from None
+    except ValueError:  # beyond the digits that Python converts
+        raise PlanError(f"{source}: a whole number of thousands of digits") from None
     if not isinstance(data, dict):
         found = "nothing" if data is None else type(data).__name__
         raise PlanError(

@@ -1,10 +1,15 @@
-"""The radio link of the relay.
+"""The radio link of the relay, from bits to rates: (1) to (8) of the paper.
 
 - ``constellation``: the alphabets, and the differences between their vectors merged into classes;
 - ``channel``: path gain, line of sight, fading, (1) and (2);
 - ``rate``: the cutoff rate, (7) and (8);
-- ``mutual_information``: the rate itself, (5) and (6);
-- ``precoder``: the classical linear precoders and the optimum for BPSK on two antennas.
+- ``mutual_information``: the mutual information, (5) and (6): ``real_channel`` reduces the link,
+  ``noise_average`` averages over the noise;
+- ``precoder``: the classical linear precoders and the optimum for BPSK on two antennas;
+- ``best_precoder``: the precoders of highest cutoff rate, one per channel or one for many draws;
+  ``precoder_search`` finds them, ``precoder_objective`` has the derivatives.
 
 Everything is in linear SI units and vectorised over time slots, which lead every array's axes.
+Another alphabet is an entry of ``constellation._GRIDS``, another linear precoder a function in
+``precoder`` and an entry of ``SCHEMES``; ``plan/`` then accepts its name in plan.yaml.
 """

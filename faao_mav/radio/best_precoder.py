@@ -1,8 +1,9 @@
 """Precoders that maximise the cutoff rate, (7) or (8), subject to tr(P^H P) <= W.
 
-The limit is always active, and P_B(n) and P_U(n) of (14) separate: every slot is a problem of its
-own. With H = U S V^H and P = V Q the rate depends on S Q alone, so that the search knows singular
-values only; one P for many draws of a channel has no such reduction.
+The power limit is always active, and P_B(n) and P_U(n) of (14) separate: every slot of every link
+is a problem of its own. With H = U S V^H and P = V Q the rate depends on S Q alone, so that the
+best rate is a function of the singular values S. One P for many draws of a channel has no such
+reduction.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses, difference_classes
 from faao_mav.radio.precoder import (
@@ -22,21 +23,21 @@ from faao_mav.radio.precoder import (
     waterfilling,
     zf,
 )
-from faao_mav.radio.precoder_objective import ClassSum, value
 from faao_mav.radio.precoder_search import search
 from faao_mav.radio.rate import cutoff_rate
 
-# Numbers held at once while the derivatives are assembled, 20 starts at a time: 32 MB.
-_CHUNK = 4_000_000
+_CHUNK = 4_000_000  # numbers held at once while the derivatives are assembled: 32 MB. Chosen
+_STARTS = 20  # points from which each search starts, about, to reckon its memory with
 
 
 @dataclass(frozen=True, eq=False)
 class BestPrecoders:
-    """Precoders and, on demand, what they reach.
+    """Precoders of highest cutoff rate and, when asked for, that rate.
 
     Attributes:
         P: (..., N_t, N_t), tr(P^H P) = W.
-        exact: a closed form was used and the optimum is global; else the best of the starts.
+        exact: whether P is the global optimum, by a closed form; otherwise P is the best of the
+            local optima that the search reached.
         draws: (..., S, N_r, N_t), the channels that each P serves.
         classes: the differences of the alphabet.
         noise: σ², W.
@@ -54,28 +55,20 @@ class BestPrecoders:
         each = cutoff_rate(self.draws, self.P[..., None, :, :], self.classes, self.noise)
         return np.asarray(np.mean(each, axis=-1))
 
-    @cached_property
-    def log_sum(self) -> Real:
-        """(...) s with N log2(rho) - R_0 = log2(1 + e^s), see ``log_nonzero_sum``.
 
-        It still tells precoders apart where R_0 equals N log2(rho) to the last digit.
-        """
-        S, receive, N = self.draws.shape[-3:]
-        flat, P = self.draws.reshape(-1, S, receive, N), self.P.reshape(-1, 1, N, N)
-        sums, found = ClassSum(self.classes), np.empty(len(flat))
-        step = max(1, _CHUNK // (S * N * max(N, receive)))
-        for first in range(0, len(flat), step):
-            part = slice(first, first + step)
-            HP = flat[part] @ P[part] / (2.0 * np.sqrt(self.noise))
-            gram = np.conj(np.swapaxes(HP, -1, -2)) @ HP
-            F = value(sums, gram, np.broadcast_to(np.eye(N), (len(HP), N, N)))
-            # δ = ln(1 + e^s), where s is ln δ to the last digit once δ is that small.
-            with np.errstate(divide="ignore"):
-                found[part] = np.where(F < -36.0, F, np.log(np.expm1(np.exp(F))))
-        return found.reshape(self.P.shape[:-2])
+def has_closed_form(modulation: str, antennas: int) -> bool:
+    """Return whether the best precoder for one channel has a closed form.
+
+    >>> has_closed_form("bpsk", 2), has_closed_form("qpsk", 2), has_closed_form("64qam", 1)
+    (True, False, True)
+    """
+    return antennas == 1 or (antennas == 2 and modulation == "bpsk")
 
 
-def _checked(H: Complex, axes: int, power: float, noise: float, start: Complex | None) -> Complex:
+def _checked(
+    H: RealOrComplex, axes: int, power: float, noise: float, start: RealOrComplex | None
+) -> Complex:
+    """Return H (..., N_r, N_t) as complex numbers; the errors are those of ``best_precoders``."""
     _check_positive("transmit power", power)
     _check_positive("noise power", noise)
     H = np.asarray(H, dtype=np.complex128)
@@ -87,64 +80,36 @@ def _checked(H: Complex, axes: int, power: float, noise: float, start: Complex |
     return H
 
 
-def _best(
-    H: Complex,
-    power: float,
-    modulation: str,
-    noise: float,
-    start: Complex | None,
-    tolerance: float,
-) -> BestPrecoders:
-    """``best_mean_precoders`` with its arguments checked."""
-    shape, (S, receive, N) = H.shape[:-3], H.shape[-3:]
-    flat = H.reshape(-1, S, receive, N)
-    classes = difference_classes(modulation, N)
-    exact = N == 1 or (S == 1 and N == 2 and modulation == "bpsk")
-    P = np.ones((len(flat), N, N), dtype=np.complex128)
-    if exact and N == 2:
-        P = bpsk_two_antennas(flat[:, 0], power)
-    elif not exact:
-        A = flat * (np.sqrt(power) / (2.0 * np.sqrt(noise)))
-        given = None if start is None else np.asarray(start).reshape(-1, N, N)
-        mean = np.mean(flat, axis=1)
-        step = max(1, _CHUNK // (S * 2 * N**4 * (20 if start is None else 1)))
-        for first in range(0, len(flat), step):
-            part = slice(first, first + step)
-            known = None if given is not None else _known(mean[part], power, noise)
-            begin = None if given is None else given[part]
-            P[part], _ = search(A[part], classes, tolerance, begin, known)
-    P = _with_power(P, power)
-    return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)
-
-
 def _known(H: Complex, power: float, noise: float) -> Complex:
+    """Return the identity and the classical schemes, (5, b, N_t, N_t), for H (b, N_r, N_t)."""
     identity = np.broadcast_to(np.eye(H.shape[-1]), (*H.shape[:-2], H.shape[-1], H.shape[-1]))
     schemes = (mrt(H, power), zf(H, power), mmse(H, power, noise), waterfilling(H, power, noise))
     return np.stack([identity, *schemes])
 
 
 def best_precoders(
-    H: Complex,
+    H: RealOrComplex,
     power: float,
     modulation: str,
     noise: float,
     *,
-    start: Complex | None = None,
+    start: RealOrComplex | None = None,
     tolerance: float = 1e-6,
 ) -> BestPrecoders:
     """Return the precoders of highest cutoff rate, max R_0(H, P) of (7) or (8) per slot.
 
-    BPSK on two antennas and any alphabet on one have a closed form. Elsewhere Newton's method runs
-    from several starts; the result is never below the classical schemes of ``precoder``.
+    BPSK on two antennas and any alphabet on one have a closed form. For the others Newton's method
+    runs from several starts; the rate is never below that of the classical schemes in ``precoder``.
 
     Args:
         H: (..., N_r, N_t) channels, one problem each.
         power: W, W.
         modulation: the alphabet, one of ``MODULATIONS``.
         noise: σ², W.
-        start: (..., N_t, N_t), precoders of similar channels, of any power. The search then begins
-            there only: far quicker, and not worse than the start scaled to W.
-        tolerance: how far from a stationary point to stop, as a relative change of the power.
+        start: (..., N_t, N_t), precoders of similar channels, of any power. The search then starts
+            there only, which is far quicker, and its result is not worse than the start scaled to
+            W.
+        tolerance: largest gain of a further step, as the relative change of W with the same gain.
 
     Returns:
         The precoders, their rates and whether they are known to be optimal.
@@ -157,23 +122,23 @@ def best_precoders(
     >>> float(best_precoders(H, 2.0, "qpsk", 1.0).rate.round(4))
     2.2761
     """
-    H = _checked(H, 2, power, noise, start)
-    return _best(H[..., None, :, :], power, modulation, noise, start, tolerance)
+    H = _checked(H, 2, power, noise, start)[..., None, :, :]
+    return best_mean_precoders(H, power, modulation, noise, start=start, tolerance=tolerance)
 
 
 def best_mean_precoders(
-    H_draws: Complex,
+    H_draws: RealOrComplex,
     power: float,
     modulation: str,
     noise: float,
     *,
-    start: Complex | None = None,
+    start: RealOrComplex | None = None,
     tolerance: float = 1e-6,
 ) -> BestPrecoders:
     """Return one precoder per group of draws, max over P of mean_s R_0(H_s, P), (7) or (8).
 
-    It is what to send when the statistics of the fading are known and the fading is not. The mean
-    is that of the rates; ``log_sum`` belongs to the mean rate.
+    This is the best precoder for a transmitter that knows the statistics of the fading and not the
+    draw (statistical CSI).
 
     Args:
         H_draws: (..., S, N_r, N_t), S draws of each channel.
@@ -194,4 +159,22 @@ def best_mean_precoders(
     (2, 2)
     """
     H = _checked(H_draws, 3, power, noise, start)
-    return _best(H, power, modulation, noise, start, tolerance)
+    shape, (S, receive, N) = H.shape[:-3], H.shape[-3:]
+    flat = H.reshape(-1, S, receive, N)
+    classes = difference_classes(modulation, N)
+    exact = N == 1 or (S == 1 and has_closed_form(modulation, N))
+    P = np.ones((len(flat), N, N), dtype=np.complex128)
+    if exact and N == 2:
+        P = bpsk_two_antennas(flat[:, 0], power)
+    elif not exact:
+        A = flat * (np.sqrt(power) / (2.0 * np.sqrt(noise)))
+        given = None if start is None else np.reshape(start, (-1, N, N)).astype(np.complex128)
+        mean = np.mean(flat, axis=1)
+        step = max(1, _CHUNK // (S * 2 * N**4 * (_STARTS if start is None else 1)))
+        for first in range(0, len(flat), step):
+            part = slice(first, first + step)
+            known = None if given is not None else _known(mean[part], power, noise)
+            begin = None if given is None else given[part]
+            P[part] = search(A[part], classes, tolerance, begin, known)
+    P = _with_power(P, power)
+    return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)

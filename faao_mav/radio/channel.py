@@ -1,8 +1,11 @@
-"""The channel of each hop, (1) and (2): path gain, line of sight, fading."""
+"""The channel of each hop: H = √(rho_0 d^-2) (√(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS), (1), (2).
+
+The functions of this module are its factors: path gain, line of sight, scattering, and their sum.
+"""
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 
 
@@ -25,19 +28,6 @@ def path_gain(w: Real, p: Real, altitude: float, rho_0: float) -> Real:
     return np.asarray(rho_0 / (np.sum(away**2, axis=-1) + altitude**2))[()]
 
 
-def displacement(w: Real, p: Real, altitude: float) -> Real:
-    """Return the vector from a ground station to the UAV, (..., 3) m east, north, up.
-
-    It points along the wave on the BS-UAV link; on the UAV-GU link the wave goes the other way,
-    along its negative.
-
-    >>> displacement(np.array([30.0, 0.0]), np.array([10.0, 5.0]), 40.0)
-    array([20., -5., 40.])
-    """
-    away = np.asarray(w, dtype=np.float64) - np.asarray(p, dtype=np.float64)
-    return np.concatenate([away, np.full((*away.shape[:-1], 1), float(altitude))], axis=-1)
-
-
 def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
     """Return H^LoS of uniform linear arrays half a wavelength apart, both lying along east.
 
@@ -46,8 +36,8 @@ def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
     along the wave. The phase common to all entries, 2π d/λ, changes no rate and is left out.
 
     Args:
-        path: (..., 3) vector from transmitter to receiver in any unit, far longer than the arrays:
-            ``displacement`` for BS to UAV, its negative for UAV to GU.
+        path: (..., 3) vector east, north, up from transmitter to receiver, in any unit and far
+            longer than the arrays: [w - p_B, H] for BS to UAV, [p_U - w, -H] for UAV to GU.
         receive: number of receiving antennas.
         transmit: number of transmitting antennas.
 
@@ -72,7 +62,7 @@ def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
 
 
 def line_of_sight_all_ones(receive: int, transmit: int) -> Complex:
-    """Return an H^LoS of ones, (receive, transmit): every pair of elements in phase.
+    """Return the H^LoS of ones, (receive, transmit), as the paper has it: all elements in phase.
 
     >>> line_of_sight_all_ones(1, 2).real
     array([[1., 1.]])
@@ -81,7 +71,13 @@ def line_of_sight_all_ones(receive: int, transmit: int) -> Complex:
 
 
 def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) -> Complex:
-    """Draw H^NLoS for each slot: independent CN(0, 1) entries, (slots, receive, transmit).
+    """Return draws of H^NLoS with independent CN(0, 1) entries, (slots, receive, transmit).
+
+    Args:
+        rng: source of the draws.
+        slots: number of draws.
+        receive: number of receiving antennas.
+        transmit: number of transmitting antennas.
 
     >>> rayleigh(np.random.default_rng(1), 3, 2, 4).shape
     (3, 2, 4)
@@ -92,38 +88,45 @@ def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) 
 
 
 def balanced_rayleigh(rng: np.random.Generator, draws: int, receive: int, transmit: int) -> Complex:
-    """Draw a few H^NLoS that stand for all of them, (draws, receive, transmit).
+    """Return a few draws of H^NLoS that represent CN(0, 1), (draws, receive, transmit).
 
-    Every draw comes with its turns by j, -1 and -j, and all are scaled to unit mean power: mean
-    and mean square are exact, where a few independent draws would have some of their own. (Fewer
-    than four draws are only scaled.)
+    Every draw comes with its rotations by j, -1 and -j, and all are scaled to unit mean power: the
+    sample mean 0 and the sample mean square 1 are exact. Fewer than four draws are only scaled.
+
+    Args:
+        rng: source of the draws.
+        draws: number of draws.
+        receive: number of receiving antennas.
+        transmit: number of transmitting antennas.
 
     >>> G = balanced_rayleigh(np.random.default_rng(1), 8, 2, 2)
     >>> bool(np.abs(G.mean(axis=0)).max() < 1e-15), float(np.mean(np.abs(G) ** 2).round(12))
     (True, 1.0)
     """
-    turns = 4 if draws >= 4 else 1
-    base = rayleigh(rng, -(-draws // turns), receive, transmit)
-    drawn = np.concatenate([base * 1j**k for k in range(turns)])[:draws]
+    rotations = 4 if draws >= 4 else 1
+    base = rayleigh(rng, -(-draws // rotations), receive, transmit)
+    drawn = np.concatenate([base * 1j**k for k in range(rotations)])[:draws]
     return np.asarray(drawn / np.sqrt(np.mean(np.abs(drawn) ** 2)))
 
 
-def rician(los: Complex, nlos: Complex, K: float) -> Complex:
-    """Combine √(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS, the bracket of (1) and (2).
+def rician(los: RealOrComplex, nlos: RealOrComplex, K: float) -> Complex:
+    """Return √(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS, the bracket of (1) and (2).
 
     Args:
         los: (..., N_r, N_t) line-of-sight part.
         nlos: (..., N_r, N_t) scattered part; the leading axes broadcast.
         K: Rician factor, linear, at least 0; infinity gives the line of sight alone.
 
+    Returns:
+        (..., N_r, N_t) fading of unit mean power per entry.
+
     Raises:
         InputError: K is negative or not a number.
 
-    >>> float(rician(np.ones((1, 1)), np.zeros((1, 1)), 3.0)[0, 0]) ** 2
-    0.7499999999999999
+    >>> rician(np.ones((1, 1)), np.zeros((1, 1)), 3.0).round(6)
+    array([[0.866025]])
     """
     if not K >= 0.0:
         raise InputError(f"the Rician factor K must be at least 0, got {K}")
     scattered = 1.0 / (1.0 + K)
-    combined: Complex = np.sqrt(1.0 - scattered) * los + np.sqrt(scattered) * nlos
-    return combined
+    return np.asarray(np.sqrt(1.0 - scattered) * los + np.sqrt(scattered) * nlos)

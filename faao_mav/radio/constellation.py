@@ -14,10 +14,9 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InputError
 
-MODULATIONS: tuple[str, ...] = ("bpsk", "qpsk", "8psk", "16qam", "64qam")
-
-# 8-PSK alone has irrational coordinates; far below their spacing, far above rounding.
 _DECIMALS = 9
+"""Decimals by which differences are compared: only 8-PSK has irrational coordinates, whose spacing
+is far above 1e-9 and whose rounding errors are far below."""
 
 
 def _square_qam(side: int) -> Complex:
@@ -37,6 +36,9 @@ _GRIDS: dict[str, Callable[[], Complex]] = {
     "16qam": lambda: _square_qam(4),
     "64qam": lambda: _square_qam(8),
 }
+
+MODULATIONS: tuple[str, ...] = tuple(_GRIDS)
+"""The names of the alphabets, from the smallest to the largest."""
 
 
 @lru_cache

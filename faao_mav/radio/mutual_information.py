@@ -11,26 +11,25 @@ them, and z ~ N(0, I) there. Then:
 """
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Flags, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import difference_classes, difference_vector_count
-from faao_mav.radio.noise_average import by_lattice, by_quadrature, real_channel, real_inputs
+from faao_mav.radio.noise_average import by_lattice, by_quadrature
 from faao_mav.radio.rate import cutoff_rate
-
-Method: TypeAlias = Literal["quadrature", "monte carlo"]
+from faao_mav.radio.real_channel import real_channel, real_inputs
 
 _LN2 = float(np.log(2.0))
-_CLASSES = 1 << 20  # difference vectors for which the cutoff rate is worth asking
-_NEGLIGIBLE = 1e-6  # standard deviations of the noise: adds below 1e-12 bit
-_WEAK = 1e-3  # total SNR below which two terms of the series are right to six digits
-_ROUGH = 0.1  # bits that a slot among many may err: spreads of rougher ones say little
-_RARE = 0.5  # gap of the cutoff rate, bits, below which errors are rare
-_GRID_POINTS = 64  # input vectors up to which averaging each over a grid is the cheaper way
+
+# Chosen, unless another reason is given.
+_MOST_DIFFERENCES = 1 << 20  # difference vectors up to which the cutoff rate proves the ceiling
+_NEGLIGIBLE = 1e-6  # amplitude of a dimension, noise deviations, that adds less than 1e-12 bit
+_WEAK = 1e-3  # total SNR below which two terms of the series in the SNR are right to six digits
+_ROUGH = 0.1  # largest standard error of one slot among many, bits
+_RARE = 0.5  # gap of the cutoff rate to its ceiling, bits, below which errors count as rare
+_GRID_INPUTS = 64  # input vectors up to which a grid for each is quicker than lattices
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,27 +37,20 @@ class Estimate:
     """Numerically averaged rates and how far to trust them.
 
     Attributes:
-        value: (...) bit/s/Hz.
-        error: (...) bit/s/Hz: one standard error where lattice rules were used, independent from
-            slot to slot; the last change, or a bound, where the value is deterministic.
-        method: "monte carlo" as soon as one slot needed lattice rules, "quadrature" otherwise.
+        value: (n,) bit/s/Hz.
+        error: (n,) bit/s/Hz: one standard error where ``random``, independent from slot to slot;
+            elsewhere the last change of the quadrature, or a bound.
+        random: (n,) whether random lattice rules were used.
     """
 
     value: Real
     error: Real
-    method: Method
-
-
-@dataclass(frozen=True, eq=False)
-class _PerSlot:
-    value: Real  # (n,)
-    error: Real  # (n,)
-    random: NDArray[np.bool_]  # (n,) whether the error is a standard error
+    random: Flags
 
 
 def _estimate(
-    H: Complex,
-    P: Complex,
+    H: RealOrComplex,
+    P: RealOrComplex,
     modulation: str,
     noise: float,
     rng: np.random.Generator,
@@ -66,9 +58,8 @@ def _estimate(
     tolerance: float,
     random_tolerance: float,
     pooled: bool = False,
-    method: Method | None = None,
-) -> _PerSlot:
-    """Every slot's rate by the cheapest way that applies, or all by the way that is named."""
+) -> Estimate:
+    """Return every slot's rate by the cheapest way that applies."""
     if not noise > 0.0:
         raise InputError(f"the noise power must be above 0, got {noise}")
     if not tolerance > 0.0:
@@ -78,59 +69,50 @@ def _estimate(
     singular, maps = real_channel(H, P, noise, real=modulation == "bpsk")
     n = len(singular)
     value, error, random = np.empty(n), np.empty(n), np.zeros(n, dtype=np.bool_)
-    open_ = np.ones(n, dtype=np.bool_)
 
     gap = np.full(n, np.inf)
-    if difference_vector_count(modulation, antennas) <= _CLASSES:
+    if difference_vector_count(modulation, antennas) <= _MOST_DIFFERENCES:
         classes = difference_classes(modulation, antennas)
         gap = np.broadcast_to(inputs.bits - cutoff_rate(H, P, classes, noise), n)
 
-    if method is None:
-        power = inputs.variance * singular**2
-        total = power.sum(axis=1)
-        weak = total < _WEAK
-        series = 0.5 * total - 0.25 * np.sum(power**2, axis=1)
-        value[weak], error[weak] = series[weak] / _LN2, total[weak] ** 3 / _LN2
-        open_ &= ~weak
-        sure = open_ & (gap <= 0.01 * tolerance)
-        value[sure], error[sure] = inputs.bits, gap[sure]
-        open_ &= ~sure
+    power = inputs.variance * singular**2
+    total = power.sum(axis=1)
+    weak = total < _WEAK
+    series = 0.5 * total - 0.25 * np.sum(power**2, axis=1)
+    value[weak], error[weak] = series[weak] / _LN2, total[weak] ** 3 / _LN2
+    saturated = ~weak & (gap <= 0.01 * tolerance)
+    value[saturated], error[saturated] = inputs.bits, gap[saturated]
+    remaining = ~weak & ~saturated
 
     floor = _NEGLIGIBLE * np.minimum(1.0, singular[:, :1])
     dimensions = np.maximum(1, np.sum(singular > floor, axis=1))
-    for d in np.unique(dimensions[open_]):
-        slots = np.flatnonzero(open_ & (dimensions == d))
+    for d in np.unique(dimensions[remaining]):
+        slots = np.flatnonzero(remaining & (dimensions == d))
         reduced = np.ascontiguousarray(maps[slots, :, :d])
-        few = d <= 2 and len(inputs.points) <= _GRID_POINTS
-        if method == "quadrature" or (method is None and few):
+        if d <= 2 and len(inputs.points) <= _GRID_INPUTS:
             value[slots], error[slots] = by_quadrature(reduced, inputs, tolerance)
-        else:
-            rare = gap[slots] < _RARE
-            for kind in (False, True):
-                chosen = slots[rare == kind]
-                if len(chosen):
-                    value[chosen], error[chosen] = by_lattice(
-                        reduced[rare == kind],
-                        inputs,
-                        random_tolerance,
-                        rng,
-                        rare=kind,
-                        pooled=pooled,
-                    )
-            random[slots] = True
-    return _PerSlot(value, error, random)
+            continue
+        random[slots] = True
+        rare_errors = gap[slots] < _RARE
+        for rare in (False, True):
+            chosen = rare_errors == rare
+            if chosen.any():
+                value[slots[chosen]], error[slots[chosen]] = by_lattice(
+                    reduced[chosen], inputs, random_tolerance, rng, rare=rare, pooled=pooled
+                )
+    return Estimate(value, error, random)
 
 
 def mutual_information(
-    H: Complex,
-    P: Complex,
+    H: RealOrComplex,
+    P: RealOrComplex,
     modulation: str,
     noise: float,
     *,
     rng: np.random.Generator,
     tolerance: float = 1e-3,
 ) -> Estimate:
-    """Return the mutual information of a link in every slot, (5) or (6).
+    """Return the mutual information of a link in every slot, (5) or (6), bit/s/Hz.
 
     I = N log2(rho) - rho^-N Σ_m E log2 Σ_k exp(-(||H P u_mk + n||² - ||n||²) / σ²) with noise
     n ~ CN(0, σ² I).
@@ -145,7 +127,7 @@ def mutual_information(
             million points): ``error`` says what was reached.
 
     Returns:
-        Values and errors (n,).
+        Values, errors and whether the errors are random, (n,) each.
 
     Raises:
         InputError: unknown modulation, more than 65,536 input vectors, or a noise power or
@@ -153,17 +135,15 @@ def mutual_information(
 
     >>> one = np.ones((1, 1, 1))
     >>> estimate = mutual_information(one, one, "bpsk", 1.0, rng=np.random.default_rng(1))
-    >>> estimate.value.round(4), estimate.method
-    (array([0.7215]), 'quadrature')
+    >>> estimate.value.round(4), estimate.random
+    (array([0.7215]), array([False]))
     """
-    slots = _estimate(H, P, modulation, noise, rng, tolerance=tolerance, random_tolerance=tolerance)
-    method: Method = "monte carlo" if np.any(slots.random) else "quadrature"
-    return Estimate(slots.value, slots.error, method)
+    return _estimate(H, P, modulation, noise, rng, tolerance=tolerance, random_tolerance=tolerance)
 
 
 def mean_mutual_information(
-    H: Complex,
-    P: Complex,
+    H: RealOrComplex,
+    P: RealOrComplex,
     modulation: str,
     noise: float,
     *,

@@ -5,9 +5,9 @@ D_k = u_k^H Z u_k = Σ_a φ_ka z_a, z the N² real coordinates of Z. The classes
 therefore enter only through the mean and the covariance of φ under the weights
 ∝ multiplicity e^-D; what remains is algebra on matrices as small as Q.
 
-What is minimised is F = ln mean_s δ_s, δ_s = N ln(rho) - R_0(G_s) [nats] over the draws s of a
-channel. One draw or many, it has a slope at any SNR, even where R_0 equals N log2(rho) to the last
-digit.
+The objective, which is minimised, is F = ln mean_s δ_s with δ_s = N ln(rho) - R_0(G_s) [nats] and s
+the draws of a channel. Unlike R_0, F has a non-zero gradient at any SNR, even where R_0 equals
+N log2(rho) to the last digit.
 """
 
 from collections.abc import Iterator
@@ -19,22 +19,21 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.radio.constellation import DifferenceClasses
 
-# Exponents held at once, and classes taken together: blocks that stay in the cache.
-_BLOCK = 1 << 17
-_CLASSES = 2048
+_BLOCK, _CLASSES = 1 << 17, 2048
+"""Exponents held at once, 1 MB, and classes taken together: they stay in the cache. Chosen."""
 
-# Below this ln δ and its derivatives are those of s, δ = ln(1 + e^s), to the last digit.
 _SATURATED = -36.0
+"""s below which ln δ, δ = ln(1 + e^s), equals s to the last digit: e^s / 2 < 1.2e-16."""
 
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """F at a batch of points, with its derivatives by the real coordinates [Re Q, Im Q].
+    """F at b points, with its derivatives by the m = 2 q N real coordinates [Re Q, Im Q].
 
     Attributes:
         value: (b,) F.
-        gradient: (b, m), m = 2 q N.
-        hessian: (b, m, m).
+        gradient: (b, m) ∂F.
+        hessian: (b, m, m) ∂²F.
     """
 
     value: Real
@@ -43,20 +42,31 @@ class Objective:
 
 
 def to_real(Q: Complex) -> Real:
-    """Return [Re Q, Im Q], (..., q, N) complex to (..., 2 q N) real."""
+    """Return [Re Q, Im Q], (..., q, N) complex to (..., 2 q N) real.
+
+    >>> to_real(np.array([[1.0 + 2.0j, 3.0]])).tolist()
+    [1.0, 3.0, 2.0, 0.0]
+    """
     flat = Q.reshape(*Q.shape[:-2], Q.shape[-2] * Q.shape[-1])
     return np.concatenate([flat.real, flat.imag], axis=-1)
 
 
 def to_complex(x: Real, antennas: int) -> Complex:
-    """Return Q from [Re Q, Im Q], (..., 2 q N) real to (..., q, N) complex."""
+    """Return Q from [Re Q, Im Q], (..., 2 q N) real to (..., q, N) complex.
+
+    >>> to_complex(np.array([1.0, 3.0, 2.0, 0.0]), 2).tolist()
+    [[(1+2j), (3+0j)]]
+    """
     half = x.shape[-1] // 2
     Q: Complex = x[..., :half] + 1j * x[..., half:]
     return Q.reshape(*x.shape[:-1], half // antennas, antennas)
 
 
 def _basis(antennas: int) -> Complex:
-    """Hermitian B_a with z_a = tr(B_a Z): the diagonal, then Re and Im of what is above it."""
+    """Return the N² Hermitian B_a with z_a = tr(B_a Z), (N², N, N).
+
+    The coordinates z are the diagonal of Z, then Re and Im of the entries above it.
+    """
     B = np.zeros((antennas**2, antennas, antennas), dtype=np.complex128)
     B[np.arange(antennas), np.arange(antennas), np.arange(antennas)] = 1.0
     for a, (i, j) in enumerate(combinations(range(antennas), 2)):
@@ -67,7 +77,7 @@ def _basis(antennas: int) -> Complex:
 
 
 def _features(u: Complex) -> Real:
-    """φ with Σ_a φ_a B_a = u u^H, (k, N²)."""
+    """Return φ (k, N²) with Σ_a φ_a B_a = u u^H for u (k, N)."""
     columns = [np.abs(u[:, i]) ** 2 for i in range(u.shape[1])]
     for i, j in combinations(range(u.shape[1]), 2):
         product = 2.0 * u[:, i] * u[:, j].conj()
@@ -76,7 +86,7 @@ def _features(u: Complex) -> Real:
 
 
 def _coordinates(Z: Complex) -> Real:
-    """z, (..., N, N) to (..., N²)."""
+    """Return the real coordinates z of Z, (..., N, N) to (..., N²)."""
     antennas = Z.shape[-1]
     columns = [Z[..., i, i].real for i in range(antennas)]
     for i, j in combinations(range(antennas), 2):
@@ -85,7 +95,16 @@ def _coordinates(Z: Complex) -> Real:
 
 
 class ClassSum:
-    """ln Σ_k multiplicity_k e^(-φ_k z) / rho^N with its moments, in bounded memory."""
+    """The function s(z) = ln Σ_k multiplicity_k e^(-φ_k z) / rho^N, in bounded memory.
+
+    The sum is over the non-zero difference classes, as in (7) and (8): R_0 = N log2(rho) -
+    log2(1 + e^s).
+
+    >>> from faao_mav.radio.constellation import difference_classes
+    >>> sums = ClassSum(difference_classes("bpsk", 1))
+    >>> sums.value(np.array([[2.0]]))  # one class, u = 2, of two pairs: ln(2 e^(-4 z) / 2)
+    array([-8.])
+    """
 
     def __init__(self, classes: DifferenceClasses) -> None:
         self.antennas = classes.vectors.shape[1]
@@ -104,7 +123,7 @@ class ClassSum:
             yield np.ascontiguousarray(phi.T), np.concatenate(terms, axis=1) * weights
 
     def _sums(self, z: Real, derivatives: bool) -> tuple[Real, Real]:
-        """Σ_k weight_k e^(least - D_k) [1, φ, φ φ] and the least exponent, streamed over blocks."""
+        """Return Σ_k weight_k e^(least - D_k) [1, φ, φ φ] and least, the smallest D_k."""
         step = max(1, _BLOCK // min(_CLASSES, len(self._phi)))
         least = np.full(len(z), np.inf)
         width = 1 + derivatives * (z.shape[1] + len(self._rows))
@@ -121,12 +140,12 @@ class ClassSum:
         return sums, least
 
     def value(self, z: Real) -> Real:
-        """Return the logarithm, (b, N²) to (b,)."""
+        """Return s, (b,), at z (b, N²)."""
         sums, least = self._sums(z, False)
         return np.asarray(np.log(sums[:, 0]) - least)
 
     def moments(self, z: Real) -> tuple[Real, Real, Real]:
-        """Return the logarithm, (b,), and the mean, (b, N²), and covariance, (b, N², N²), of φ."""
+        """Return s (b,), and the mean (b, N²) and the covariance (b, N², N²) of φ, at z (b, N²)."""
         sums, least = self._sums(z, True)
         width = z.shape[1]
         mean = sums[:, 1 : 1 + width] / sums[:, :1]
@@ -154,27 +173,38 @@ def _log_mean(y: Real) -> Real:
 
 
 def _quadratic(G: Complex, Q: Complex) -> tuple[Complex, Real]:
-    """G Q, (b, S, q, N), and the coordinates of Q^H G Q, (b, S, N²): one product for all draws."""
+    """Return G Q, (b, S, q, N), and the coordinates z of Q^H G Q, (b, S, N²)."""
     b, S, q, N = *G.shape[:3], Q.shape[2]
     GQ = (G.reshape(b, S * q, q) @ Q).reshape(b, S, q, N)
-    Z = np.conj(np.swapaxes(Q, 1, 2)) @ GQ.transpose(0, 2, 1, 3).reshape(b, q, S * N)
+    Z = Q.conj().mT @ GQ.transpose(0, 2, 1, 3).reshape(b, q, S * N)
     return GQ, _coordinates(Z.reshape(b, N, S, N).transpose(0, 2, 1, 3))
 
 
 def value(sums: ClassSum, G: Complex, Q: Complex) -> Real:
-    """Return F, (b,), of G (b, S, q, q) and Q (b, q, N)."""
+    """Return F = ln mean_s δ_s, (b,), of G (b, S, q, q) and Q (b, q, N).
+
+    >>> from faao_mav.radio.constellation import difference_classes
+    >>> sums = ClassSum(difference_classes("bpsk", 1))
+    >>> value(sums, np.array([[[[2.0 + 0j]]]]), np.array([[[1.0 + 0j]]])).round(6)
+    array([-8.000168])
+    """
     _, z = _quadratic(G, Q)
     s = sums.value(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
     return _log_mean(_log_deficit(s)[0])
 
 
 def evaluate(sums: ClassSum, G: Complex, Q: Complex) -> Objective:
-    """Return F and its first and second derivatives.
+    """Return F and its first and second derivatives by the real coordinates of Q.
 
     Args:
         sums: the classes of the alphabet.
         G: (b, S, q, q) Hermitian, H^H H / (4 σ²) of each draw.
         Q: (b, q, N) precoders.
+
+    >>> from faao_mav.radio.constellation import difference_classes
+    >>> sums = ClassSum(difference_classes("bpsk", 1))
+    >>> evaluate(sums, np.array([[[[2.0 + 0j]]]]), np.array([[[1.0 + 0j]]])).gradient.round(3)
+    array([[-15.997,  -0.   ]])
     """
     b, S, q = G.shape[:3]
     m = 2 * q * sums.antennas
@@ -205,7 +235,7 @@ def evaluate(sums: ClassSum, G: Complex, Q: Complex) -> Objective:
     hessian = np.swapaxes(stacked, 1, 2) @ (inner @ slopes).reshape(b, S * width, m)
     hessian -= gradient[:, :, None] * gradient[:, None, :]
 
-    # The curvature of z: the quadratic form tr(G E M E^H), M = Σ_a mean_a B_a, as a real matrix.
+    # The second derivative of z: the quadratic form tr(G E M E^H), M = Σ_a mean_a B_a, in reals.
     M = np.tensordot(shared, sums.basis, axes=1)
     K = 2.0 * np.einsum("bsij,bskl->biljk", G, M, optimize=True).reshape(b, m // 2, m // 2)
     half = m // 2

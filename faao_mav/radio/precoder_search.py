@@ -1,81 +1,96 @@
-"""The search for a precoder: where it starts, and at which power it is done.
+"""The search for the precoder of highest mean cutoff rate, over many channels at once.
 
-P = V Q with V the directions that the channel, or the draws of one, respond to: what of P lies
-outside them is power wasted. The problem is not concave. Newton's method runs from a few starts
-that between them cover what an optimum may look like (streams on separate modes, streams spread
-over the modes, all streams superposed on the strongest mode), and the best is kept.
+P = V Q with V the directions that the channel, or its draws, respond to: whatever P sends outside
+them is lost power. The problem is not concave in Q. Newton's method on the sphere ||Q||_F = 1 runs
+from a few starts that cover the known kinds of optimum (streams on separate modes, streams spread
+over the modes, all streams superposed on the strongest mode), and the best result is kept.
+
+The constants below were chosen; unless one says so, what a change costs is not measured.
 """
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.radio.constellation import DifferenceClasses
-from faao_mav.radio.precoder_newton import minimise
-from faao_mav.radio.precoder_objective import ClassSum, value
+from faao_mav.radio.precoder_objective import (
+    ClassSum,
+    Objective,
+    evaluate,
+    to_complex,
+    to_real,
+    value,
+)
 
-# Below a gain G of this size the rate is proportional to the power and the best P stays the same.
 _FAINT = 1e-4
+"""Trace of the gain matrix G below which the rate is proportional to the power: the best P is then
+the same at any lower power, and is searched at this one."""
 
-# Where ln δ is below -_SATURATED no rate can tell; the search, whose steps get smaller as the SNR
-# grows, is done at a lower power and followed upwards by factors, as far as -_DEEPEST: there P is
-# within a fraction of a per cent (in power) of maximising the least distance, its limit.
-_SATURATED, _DEEPEST, _FACTOR = 40.0, 1000.0, 4.0
+_SATURATED, _DEEPEST, _POWER_STEP = 40.0, 1000.0, 4.0
+"""-ln δ beyond which no rate can tell precoders apart, -ln δ up to which the optimum is followed,
+and the factor of the power from one search to the next in between. The region in which Newton's
+method converges shrinks as the SNR grows, so the search is done at the power where -ln δ is the
+first, and its result is followed upwards. At the second, P is within a fraction of a per cent (in
+power) of the precoder of largest least distance, its limit."""
 
-# r of the superposition [1, r, r², ...]: moduli, in bands, and angles in degrees.
-_RATIOS = np.array([[1.0, 0.85], [0.7, 0.6], [0.5, 0.4], [0.25, 0.125]])
-_ANGLES = np.array([0.0, 11.25, 22.5, 45.0, 67.5, 90.0])
+_RATIO_BANDS = np.array([[1.0, 0.85], [0.7, 0.6], [0.5, 0.4], [0.25, 0.125]])
+_RATIO_ANGLES = np.array([0.0, 11.25, 22.5, 45.0, 67.5, 90.0])
+"""Moduli (in bands, of each of which the best is kept) and angles in degrees of the ratio r in the
+superposition [1, r, r², ...] of all streams on one mode."""
 
-# Generic starts: more for draws of a channel, whose optima have less structure, and for a few
-# channels, which have hardly any neighbours to learn from.
-_GENERIC, _GENERIC_MORE, _FEW = 4, 8, 12
+_RANDOM_STARTS, _MORE_RANDOM_STARTS, _FEW_CHANNELS = 4, 8, 12
+"""Random starts per channel; the larger number for draws of a channel, whose optima have less
+structure, and for fewer than so many channels, which have few neighbours to take over from."""
 
-# Which others a slot looks at, in the order of gains, and what it lets them fall short by in ln δ.
 _NEIGHBOURS = (-9, -5, -3, -2, -1, 1, 2, 3, 5, 9)
 _MARGIN = 0.03
+"""The channels, counted in the order of gains, whose optima a channel tries as well, and the share
+of ln δ by which such an optimum may be worse before it is improved."""
 
-# The tolerance, in relative power, for telling starts apart and for where no rate can tell.
-_COARSE = 1e-4
+_COARSE = 1e-4  # tolerance, as a relative power, that tells starts apart, and in saturation
+_STEPS = 60  # Newton steps at most
+_MOST_DAMPED = 1e7  # damping, in the largest curvature, beyond which a refusal is due to rounding
+_LONGEST = 0.7  # longest step, radians on the sphere ||Q||_F = 1
 
 
-def _starts(gains: Real, antennas: int, generic: int) -> Complex:
-    """Points to start from in the basis of the modes, (starts, b, q, N).
+def _starts(gains: Real, antennas: int, random: int) -> Complex:
+    """Return points to start from in the basis of the modes, (starts, b, q, N).
 
     Args:
         gains: (b, q) singular values, largest first.
         antennas: N.
-        generic: how many points of no structure to add, always the same.
+        random: how many random points to add, the same for every call.
     """
     b, q = gains.shape
     stream = np.arange(antennas)
     separate = np.eye(q, antennas, dtype=np.complex128)
     spread = np.exp(2j * np.pi * np.outer(np.arange(q), stream) / antennas)
-    turned = spread * np.exp(0.25j * np.pi * stream)
+    rotated = spread * np.exp(0.25j * np.pi * stream)
     floor = np.maximum(gains, 0.03 * gains[:, :1])
     equalised = (gains[:, :1] / np.where(floor > 0.0, floor, 1.0))[:, :, None]
-    structured = (separate, spread, turned, equalised * separate, equalised * turned)
+    structured = (separate, spread, rotated, equalised * separate, equalised * rotated)
     starts = np.stack([_unit(np.broadcast_to(M, (b, q, antennas))) for M in structured])
     # Symmetric points are stationary without being optima: none is hit exactly.
-    parts = np.random.default_rng(7).standard_normal((2, 1 + generic, 1, q, antennas))
+    parts = np.random.default_rng(7).standard_normal((2, 1 + random, 1, q, antennas))
     points = _unit(parts[0] + 1j * parts[1])
-    others = np.broadcast_to(points[1:], (generic, b, q, antennas))
+    others = np.broadcast_to(points[1:], (random, b, q, antennas))
     return np.concatenate([starts + 0.05 * points[0], others])
 
 
 def _superposed(rows: int, antennas: int) -> Complex:
-    """All streams on the strongest mode, [1, r, r², ...]: (bands of |r|, points, q, N).
+    """Return all streams on the strongest mode, [1, r, r², ...]: (bands of |r|, points, q, N).
 
     QPSK with |r| = 1/2 makes 16-QAM of two streams, BPSK with r = j makes QPSK.
     """
-    r = _RATIOS[:, :, None] * np.exp(1j * np.deg2rad(_ANGLES))
+    r = _RATIO_BANDS[:, :, None] * np.exp(1j * np.deg2rad(_RATIO_ANGLES))
     Q = np.zeros((len(r), r[0].size, rows, antennas), dtype=np.complex128)
     Q[:, :, 0] = r.reshape(len(r), -1)[..., None] ** np.arange(antennas)
-    # Not exactly: where no other mode takes part at all, none would ever be tried.
+    # Without a small share of the other modes their gradient is zero and none is ever tried.
     Q[:, :, 1:] = 0.03
     return _unit(Q)
 
 
 def _unit(Q: Complex) -> Complex:
-    """Scale each matrix to ||Q||_F = 1; zero matrices become a scaled identity."""
+    """Return each matrix scaled to ||Q||_F = 1; zero matrices become a scaled identity."""
     norm = np.linalg.norm(Q, axis=(-2, -1), keepdims=True)
     filled = np.where(norm > 0.0, Q, np.eye(*Q.shape[-2:]))
     return np.asarray(filled / np.linalg.norm(filled, axis=(-2, -1), keepdims=True))
@@ -85,14 +100,14 @@ def _scaled(G: Complex, factor: Real) -> Complex:
     return np.asarray(G * factor[:, None, None, None])
 
 
-def _raise(G: Complex) -> Real:
-    """The factor by which the power of a hopeless link may be raised without moving its optimum."""
+def _raised(G: Complex) -> Real:
+    """Return the factor of the power, at least 1, up to which a faint link keeps its optimum."""
     largest = np.max(np.trace(G, axis1=-2, axis2=-1).real, axis=1)
     return np.maximum(1.0, _FAINT / np.where(largest > 0.0, largest, 1.0))
 
 
 def _best_superposed(sums: ClassSum, G: Complex) -> Complex:
-    """The best point of each band of ``_superposed`` for each channel, (bands, b, q, N)."""
+    """Return the best point of each band of ``_superposed`` for each channel, (bands, b, q, N)."""
     Q = _superposed(G.shape[-1], sums.antennas)
     bands, points = Q.shape[:2]
     flat = Q.reshape(-1, *Q.shape[2:])
@@ -101,74 +116,65 @@ def _best_superposed(sums: ClassSum, G: Complex) -> Complex:
     return np.asarray(Q[np.arange(bands)[:, None], best])
 
 
-def _from_starts(
-    sums: ClassSum, G: Complex, starts: Complex, tolerance: float
-) -> tuple[Complex, int]:
-    """The best point reached from the starts, (K, b, q, N), and the evaluations it took."""
+def _from_starts(sums: ClassSum, G: Complex, starts: Complex, tolerance: float) -> Complex:
+    """Return the best point (b, q, N) that is reached from the starts (K, b, q, N)."""
     K, b = starts.shape[:2]
     each = np.tile(np.arange(b), K)
     F = value(sums, G[each], _unit(starts.reshape(K * b, *starts.shape[2:])))
     depth = -np.min(F.reshape(K, b), axis=0)
-    factor = _raise(G) * np.minimum(1.0, _SATURATED / np.maximum(depth, _SATURATED))
+    factor = _raised(G) * np.minimum(1.0, _SATURATED / np.maximum(depth, _SATURATED))
     starts = np.concatenate([starts, _best_superposed(sums, _scaled(G, factor))])
     K = len(starts)
     owner = np.tile(np.arange(b), K)
     flat = starts.reshape(K * b, *starts.shape[2:])
-    Q, F, evaluations = minimise(sums, _scaled(G, factor)[owner], flat, _COARSE)
+    Q, F = minimise(sums, _scaled(G, factor)[owner], flat, _COARSE)
     winner = np.argmin(F.reshape(K, b), axis=0)
     Q = Q.reshape(starts.shape)[winner, np.arange(b)]
-    Q, F, more = minimise(sums, _scaled(G, factor), Q, tolerance)
-    evaluations += more
+    Q, F = minimise(sums, _scaled(G, factor), Q, tolerance)
 
     target = np.minimum(1.0, factor * _DEEPEST / np.maximum(-F, 1.0))
     while np.any(rising := factor < target):
-        factor[rising] = np.minimum(target, _FACTOR * factor)[rising]
-        Q[rising], _, more = minimise(
+        factor[rising] = np.minimum(target, _POWER_STEP * factor)[rising]
+        Q[rising], _ = minimise(
             sums, _scaled(G[rising], factor[rising]), Q[rising], max(tolerance, _COARSE)
         )
-        evaluations += more
-    return Q, evaluations
+    return Q
 
 
-def _improved(
-    sums: ClassSum, G: Complex, Q: Complex, tolerance: float
-) -> tuple[Complex, Real, int]:
-    """Q carried on to an optimum nearby and its F, never above that of Q; the evaluations."""
+def _improved(sums: ClassSum, G: Complex, Q: Complex, tolerance: float) -> tuple[Complex, Real]:
+    """Return the local optimum that Newton's method reaches from Q, and its F; never worse."""
     before = value(sums, G, Q)
-    factor = _raise(G) * np.minimum(1.0, _DEEPEST / np.maximum(-before, _DEEPEST))
+    factor = _raised(G) * np.minimum(1.0, _DEEPEST / np.maximum(-before, _DEEPEST))
     fine = np.where(before < -_SATURATED, max(tolerance, _COARSE), tolerance)
-    better, F, evaluations = minimise(sums, _scaled(G, factor), Q, fine)
+    better, F = minimise(sums, _scaled(G, factor), Q, fine)
     other = factor != 1.0
     F[other] = value(sums, G[other], better[other])
     kept = before < F
     better[kept], F[kept] = Q[kept], before[kept]
-    return better, F, evaluations
+    return better, F
 
 
-def _exchanged(
-    sums: ClassSum, G: Complex, gain: Real, Q: Complex, tolerance: float
-) -> tuple[Complex, int]:
-    """Let each channel try what was found for those of the most similar gain, (b,).
+def _exchanged(sums: ClassSum, G: Complex, gain: Real, Q: Complex, tolerance: float) -> Complex:
+    """Return Q (b, q, N) after each channel has tried the optima of those of similar gain (b,).
 
-    In the basis of the modes equal singular values have equal optima, so that every neighbour adds
-    a start; what one missed its neighbour may have found.
+    In the basis of the modes, channels of equal singular values have equal optima, so that the
+    optimum of every neighbour is a further start.
     """
-    b, evaluations, everyone = len(Q), 0, np.arange(len(Q))
+    b, everyone = len(Q), np.arange(len(Q))
     order = np.argsort(gain, kind="stable")
-    place = np.argsort(order, kind="stable")
-    near = np.stack([order[np.clip(place + k, 0, b - 1)] for k in _NEIGHBOURS])
+    rank = np.argsort(order, kind="stable")
+    near = np.stack([order[np.clip(rank + k, 0, b - 1)] for k in _NEIGHBOURS])
     for _ in range(2):
         F = value(sums, G, Q)
         offered = np.stack([value(sums, G, Q[other]) for other in near])
         best = np.argmin(offered, axis=0)
-        # Not yet made for this slot, a better kind of optimum may look a little worse.
+        # An optimum of a better kind may be a little worse here until it is improved for this slot.
         tried = offered[best, everyone] < F + _MARGIN * np.maximum(1.0, -F)
         moved = Q[near[best, everyone][tried]]
-        moved, reached, more = _improved(sums, G[tried], moved, tolerance)
-        evaluations += more
+        moved, reached = _improved(sums, G[tried], moved, tolerance)
         better = reached < F[tried]
         Q[np.flatnonzero(tried)[better]] = moved[better]
-    return Q, evaluations
+    return Q
 
 
 def search(
@@ -177,39 +183,122 @@ def search(
     tolerance: float,
     start: Complex | None,
     known: Complex | None = None,
-) -> tuple[Complex, int]:
-    """Maximise the mean rate over draws by Newton's method.
+) -> Complex:
+    """Return P (b, N_t, N_t), of any power, that maximises the mean cutoff rate over the draws.
 
     Args:
         A: (b, S, N_r, N_t), H √W / (2 σ).
         classes: the differences of the alphabet.
-        tolerance: relative power.
+        tolerance: relative power at which to stop, see ``minimise``.
         start: (b, N_t, N_t), the only start if given.
-        known: (k, b, N_t, N_t), none of which shall be better than the result.
+        known: (k, b, N_t, N_t), further precoders; the result is not worse than any of them.
 
-    Returns:
-        P, (b, N_t, N_t), of any power, and how often F was evaluated, summed over the channels.
+    >>> from faao_mav.radio.constellation import difference_classes
+    >>> H = np.diag([1.0, 2.0])[None, None] + 0j
+    >>> P = search(H, difference_classes("bpsk", 2), 1e-9, None)
+    >>> (np.linalg.norm(P, axis=2) / np.linalg.norm(P)).round(4)
+    array([[0., 1.]])
     """
     b, S, receive, N = A.shape
     _, s, Vh = np.linalg.svd(A.reshape(b, S * receive, N), full_matrices=False)
-    V = np.conj(np.swapaxes(Vh, -1, -2))
+    V = Vh.conj().mT
     modes = A @ V[:, None]
-    G = np.conj(np.swapaxes(modes, -1, -2)) @ modes
+    G = modes.conj().mT @ modes
     sums = ClassSum(classes)
     if start is not None:
-        Q, _, evaluations = _improved(sums, G, _unit(Vh @ start), tolerance)
-        return np.where(s[:, :1, None] > 0.0, V @ Q, start), evaluations
-    starts = _starts(s, N, _GENERIC_MORE if S > 1 or b < _FEW else _GENERIC)
-    Q, evaluations = _from_starts(sums, G, starts, tolerance)
+        Q, _ = _improved(sums, G, _unit(Vh @ start), tolerance)
+        return np.where(s[:, :1, None] > 0.0, V @ Q, start)
+    starts = _starts(s, N, _MORE_RANDOM_STARTS if S > 1 or b < _FEW_CHANNELS else _RANDOM_STARTS)
+    Q = _from_starts(sums, G, starts, tolerance)
     if S == 1 and b > 1:
-        Q, more = _exchanged(sums, G, s[:, 0], Q, tolerance)
-        evaluations += more
+        Q = _exchanged(sums, G, s[:, 0], Q, tolerance)
     F = value(sums, G, Q)
     for P in () if known is None else known:
-        # What of P lies outside the modes is power wasted; it must not be counted as used.
+        # The part of P outside the modes is lost power: without it the rest may be scaled up.
         other = _unit(Vh @ P)
         better = value(sums, G, other) < F - 1e-12 * np.abs(F)
         if np.any(better):
-            Q[better], F[better], more = _improved(sums, G[better], other[better], tolerance)
-            evaluations += more
-    return np.where(s[:, :1, None] > 0.0, V @ Q, np.eye(N)), evaluations
+            Q[better], F[better] = _improved(sums, G[better], other[better], tolerance)
+    return np.where(s[:, :1, None] > 0.0, V @ Q, np.eye(N))
+
+
+def _step(x: Real, at: Objective, damping: Real) -> tuple[Real, Real, Real]:
+    """Return the Newton step along the sphere, the predicted fall of F, and -dF / d ln(power)."""
+    radial = np.sum(x * at.gradient, axis=1)
+    gradient = at.gradient - radial[:, None] * x
+    # Projected on the tangent plane; along x, where the gradient is zero, any curvature will do.
+    across = (at.hessian @ x[:, :, None])[:, :, 0]
+    along = np.sum(x * across, axis=1)
+    hessian = at.hessian - across[:, :, None] * x[:, None, :] - x[:, :, None] * across[:, None, :]
+    hessian += along[:, None, None] * (x[:, :, None] * x[:, None, :])
+    diagonal = np.arange(x.shape[1])
+    hessian[:, diagonal, diagonal] -= radial[:, None]
+    curvature, directions = np.linalg.eigh(hessian)
+    component = (gradient[:, None] @ directions)[:, 0]
+    largest = np.max(np.abs(curvature), axis=1, keepdims=True)
+    # |h| in place of h makes every step descend; free phases, of curvature 0, are left unchanged.
+    divisor = np.abs(curvature) + (damping[:, None] + 1e-9) * largest
+    move = -component / np.where(divisor > 0.0, divisor, 1.0)
+    move /= np.maximum(1.0, np.linalg.norm(move, axis=1, keepdims=True) / _LONGEST)
+    predicted = -np.sum(move * (component + 0.5 * curvature * move), axis=1)
+    return (directions @ move[:, :, None])[:, :, 0], predicted, -0.5 * radial
+
+
+def minimise(
+    sums: ClassSum, G: Complex, Q: Complex, tolerance: float | Real
+) -> tuple[Complex, Real]:
+    """Minimise F over ||Q||_F = 1 by damped Newton steps from each of the given points.
+
+    A point is done once the fall of F that the next step predicts is below that of raising the
+    transmit power by the share ``tolerance``: a measure that means the same at any SNR.
+
+    Args:
+        sums: the classes of the alphabet.
+        G: (b, S, q, q) Hermitian, H^H H / (4 σ²) of each draw.
+        Q: (b, q, N), ||Q||_F = 1.
+        tolerance: relative power, (b,) or one for all.
+
+    Returns:
+        Q (b, q, N) and F (b,), never above the F of the start.
+
+    >>> from faao_mav.radio.constellation import difference_classes
+    >>> G = np.diag([1.0, 4.0])[None, None] + 0j
+    >>> Q, F = minimise(ClassSum(difference_classes("bpsk", 1)), G, np.ones((1, 2, 1)) + 0j, 1e-9)
+    >>> np.abs(Q[0]).round(3).ravel().tolist()
+    [0.0, 1.0]
+    """
+    x = to_real(Q)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    at = evaluate(sums, G, to_complex(x, sums.antennas))
+    F, best = at.value.copy(), x.copy()
+    index, damping = np.arange(len(x)), np.zeros(len(x))
+    tolerance = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), len(x))
+    for _ in range(_STEPS):
+        step, predicted, slope = _step(x, at, damping)
+        going = (predicted > tolerance[index] * slope) & (damping < _MOST_DAMPED)
+        if not going.all():
+            index, x, damping = index[going], x[going], damping[going]
+            step, predicted, G = step[going], predicted[going], G[going]
+            at = Objective(at.value[going], at.gradient[going], at.hessian[going])
+        if not len(index):
+            break
+        trial = x + step
+        trial /= np.linalg.norm(trial, axis=1, keepdims=True)
+        new = evaluate(sums, G, to_complex(trial, sums.antennas))
+        gained = at.value - new.value
+        better = gained > 1e-3 * predicted
+        x[better] = trial[better]
+        for old, fresh in (
+            (at.value, new.value),
+            (at.gradient, new.gradient),
+            (at.hessian, new.hessian),
+        ):
+            old[better] = fresh[better]
+        F[index], best[index] = at.value, x
+        damping = np.where(
+            better,
+            np.where(gained > 0.5 * predicted, 0.1 * damping, damping),
+            np.maximum(4.0 * damping, 0.03),
+        )
+        damping[damping < 1e-3] = 0.0
+    return to_complex(best, sums.antennas), F

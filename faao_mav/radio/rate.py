@@ -2,28 +2,27 @@
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses
 
-# Complex numbers held at once: 32 MB.
-_CHUNK = 2_000_000
+_CHUNK = 2_000_000  # complex numbers held at once: 32 MB. Chosen
 
 
-def _received(H: Complex, P: Complex, noise: float) -> Complex:
-    """H P / (2 σ), so that exponents are plain squared norms; (..., N_r, N_t)."""
+def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:
+    """Return H P / (2 σ), (..., N_r, N_t): the exponents are squared norms of it times u."""
     if not noise > 0.0:
         raise InputError(f"the noise power must be above 0, got {noise}")
     return np.asarray(np.asarray(H) @ np.asarray(P) / (2.0 * np.sqrt(noise)), dtype=np.complex128)
 
 
-def _squared_norms(A: Complex, u: Complex) -> Real:
+def _squared_norms(A: Complex, u: RealOrComplex) -> Real:
     received = A @ u.T
     norms: Real = np.sum(received.real**2 + received.imag**2, axis=-2)
     return norms
 
 
-def exponents(H: Complex, P: Complex, u: Complex, noise: float) -> Real:
+def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float) -> Real:
     """Return the exponents D = ||H P u||² / (4 σ²) of (7) and (8).
 
     Args:
@@ -44,7 +43,9 @@ def exponents(H: Complex, P: Complex, u: Complex, noise: float) -> Real:
     return _squared_norms(_received(H, P, noise), u)
 
 
-def cutoff_rate(H: Complex, P: Complex, classes: DifferenceClasses, noise: float) -> Real:
+def cutoff_rate(
+    H: RealOrComplex, P: RealOrComplex, classes: DifferenceClasses, noise: float
+) -> Real:
     """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz.
 
     R_0 = 2 N log2(rho) - log2 Σ_m Σ_k exp(-||H P u_mk||² / (4 σ²)), the double sum taken over the
@@ -81,25 +82,3 @@ def cutoff_rate(H: Complex, P: Complex, classes: DifferenceClasses, noise: float
         value[low] = -np.log1p(np.expm1(-D[low]) @ classes.weight) / np.log(2.0)
         rate[part] = value
     return np.clip(rate, 0.0, classes.bits).reshape(shape)[()]
-
-
-def log_nonzero_sum(D: Real, classes: DifferenceClasses) -> Real:
-    """Return ln of what keeps the cutoff rate below its ceiling, Σ multiplicity e^-D / rho^N.
-
-    N log2(rho) - R_0 = log2(1 + e^s) with s the value returned. It is finite at any SNR, even
-    where the sum itself underflows and R_0 no longer tells two precoders apart.
-
-    Args:
-        D: (..., k) exponents of the classes, from ``exponents``.
-        classes: the differences of the alphabet.
-
-    Returns:
-        (...) natural logarithms.
-
-    >>> from faao_mav.radio.constellation import difference_classes
-    >>> float(log_nonzero_sum(np.array([1e4]), difference_classes("bpsk", 1)))
-    -10000.0
-    """
-    nearest = np.min(D, axis=-1)
-    total = np.exp(nearest[..., None] - D) @ (classes.multiplicity / classes.symbols)
-    return np.asarray(np.log(total) - nearest)[()]

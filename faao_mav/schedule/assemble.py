@@ -12,14 +12,11 @@ from faao_mav.vehicle import vehicle_of
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
 
-_DECIMALS = 9
-"""Decimals of a latitude or longitude in degrees: 0.1 mm."""
+_DECIMALS = 9  # of a latitude or longitude in degrees: 0.1 mm
+_PITCH = 15.0  # the least pitch of a plane's climb after take-off, degrees; chosen
 
+# Types of DO_CHANGE_SPEED. ArduPlane takes the second for the least ground speed.
 _AIRSPEED, _GROUND_SPEED = 0.0, 1.0
-"""Types of DO_CHANGE_SPEED. ArduPlane takes the second for the least ground speed."""
-
-_PITCH = 15.0
-"""The least pitch of a plane's climb after take-off, degrees; chosen."""
 
 
 def assemble(route: Route, plan: "Plan") -> Mission:

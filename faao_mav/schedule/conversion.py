@@ -14,7 +14,7 @@ from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
 from faao_mav.schedule.waypoints import SLOWEST
-from faao_mav.vehicle import Vehicle, copter_model, vehicle_of
+from faao_mav.vehicle import Vehicle, vehicle_of
 from faao_mav.vehicle.recommend import candidates
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _scheduler(solution: "Solution", vehicle: Vehicle) -> Scheduler:
         t=solution.t,
         w=solution.w,
         vehicle=vehicle,
-        model=copter_model(vehicle, plan.origin.latitude),
+        model=vehicle.flight_model(plan.origin.latitude),
         min_speed=least,
         max_speed=min(limits.max_speed, most),
         tolerance=plan.mission.path_tolerance,

@@ -17,6 +17,7 @@ from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
 from faao_mav.vector import lengths
+from faao_mav.vehicle.vehicle_type import OVERSPEED
 
 # The shortest wait at the first waypoint, s. After a hold of 1 s ArduCopter is still drifting and
 # leaves 0.4 to 0.75 s late, measured in its simulator.
@@ -24,7 +25,6 @@ _FIRST_WAIT = 6.0
 
 _LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
 _MOST_WAYPOINTS = 24  # the most that splitting legs leads to; the path itself may take more
-_OVERSPEED = 1.1  # the greatest speed over the plan's, where the aircraft falls behind
 _ROUNDS = 5  # the most rounds of splitting legs, and of moving waypoints
 _WORTHWHILE = 0.98  # the largest ratio of the costs after and before a change that is kept
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
@@ -50,7 +50,7 @@ class CopterScheduler(Scheduler):
         """Return `first` with more legs where it is off, and values as they are sent."""
         best, top_speed = first, self.max_speed
         if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
-            top_speed *= _OVERSPEED
+            top_speed *= OVERSPEED
             best = self.fitted(best.route, top_speed)
         for changes in (self._splits, self._moves):
             for _ in range(_ROUNDS):

@@ -28,8 +28,7 @@ from faao_mav.vehicle import LegLimits
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
 
-_MOVING = 0.5
-"""The least speed at an end of a plan, m/s, that takes a run-in; chosen: below it is a hover."""
+_MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +90,19 @@ def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: floa
     """
     if len(route.positions) < 2:
         return route
-    before, after = _end_velocities(t, w)
-    route = _with_leg_outside(route, before, legs, max_speed, first=True)
-    return _with_leg_outside(route, after, legs, max_speed, first=False)
+    for end, velocity in zip((0, -1), _end_velocities(t, w), strict=True):
+        speed = float(lengths(velocity))
+        if speed <= _MOVING or route.departures[end] > route.arrivals[end]:
+            continue
+        flown, outward = min(speed, max_speed), 1.0 if end else -1.0
+        length = legs.run_in * float(legs.shortest_leg(np.array([flown]))[0])
+        route = route.insert(
+            np.array([len(route.positions) if end else 0]),
+            (route.positions[end] + outward * (velocity / speed * length))[None],
+            np.array([route.arrivals[end] + outward * length / flown]),
+            np.array([speed]),
+        )
+    return route
 
 
 def set_out(t: Real, w: Real, plan: "Plan") -> float:
@@ -196,24 +205,3 @@ def _end_velocities(t: Real, w: Real) -> tuple[Real, Real]:
     first = np.gradient(w[:3], t[:3], axis=0, edge_order=2)[0]
     last = np.gradient(w[-3:], t[-3:], axis=0, edge_order=2)[-1]
     return first, last
-
-
-def _with_leg_outside(
-    route: Route, velocity: Real, legs: LegLimits, max_speed: float, *, first: bool
-) -> Route:
-    """Return `route` with a leg before its `first` waypoint, or after its last.
-
-    The leg is as long as it takes to reach the plan's `velocity` (2,), m/s, at most `max_speed`.
-    """
-    end, speed = 0 if first else -1, float(lengths(velocity))
-    if speed <= _MOVING or route.departures[end] > route.arrivals[end]:
-        return route
-    flown = min(speed, max_speed)
-    length = legs.run_in * float(legs.shortest_leg(np.array([flown]))[0])
-    outward = -1.0 if first else 1.0
-    return route.insert(
-        np.array([0 if first else len(route.positions)]),
-        (route.positions[end] + outward * (velocity / speed * length))[None],
-        np.array([route.arrivals[end] + outward * length / flown]),
-        np.array([speed]),
-    )

@@ -9,8 +9,7 @@ from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.vector import lengths
 from faao_mav.vehicle import FlightPath
 
-_SPEED_DIGITS = 3
-"""Decimals of a commanded speed in m/s: with two, a flight of 300 s ended 0.25 s off."""
+_SPEED_DIGITS = 3  # decimals of a commanded speed in m/s: with two, 300 s of flight end 0.25 s off
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Clock, Schedule
 from faao_mav.schedule.timing import SHORTEST_HOLD, fit
 from faao_mav.vector import lengths
-from faao_mav.vehicle import CopterModel, FlightPath, Vehicle
+from faao_mav.vehicle import FlightModel, FlightPath, Vehicle
 
 # The position error at equal times, m, that is left as it is. Repeats of one flight in ArduCopter's
 # simulator differ by up to 0.4 m rms.
@@ -42,7 +42,7 @@ class Scheduler(ABC):
     t: Real
     w: Real
     vehicle: Vehicle
-    model: CopterModel
+    model: FlightModel
     min_speed: float
     max_speed: float
     tolerance: float

@@ -16,7 +16,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.schedule.schedule import LATE_WEIGHT, Clock
-from faao_mav.vehicle import CopterModel, FlightPath
+from faao_mav.vehicle import FlightModel, FlightPath
 
 MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the plan, s
 SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
@@ -42,7 +42,7 @@ _SPEED_PULL = 0.05
 
 
 def fit(
-    model: CopterModel,
+    model: FlightModel,
     path: FlightPath,
     clock: Clock,
     *,

@@ -115,7 +115,7 @@ def simplify(w: Real, tolerance: float) -> list[int]:
 
     >>> angle = np.linspace(0, np.pi / 2, 91)
     >>> simplify(100 * np.column_stack([np.cos(angle), np.sin(angle)]), 1.0)
-    [23, 46, 69]
+    [15, 30, 45, 60, 75]
     """
     best = _longest_legs(w, tolerance)
     low, high = 0.0, tolerance

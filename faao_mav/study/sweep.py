@@ -10,12 +10,10 @@ from decimal import Decimal, InvalidOperation
 from importlib.metadata import version
 from typing import Any, TypeAlias, get_args
 
-import yaml
-
 from faao_mav.errors import InputError, PlanError
 from faao_mav.plan.keys import ALIASES, unknown_key, varied_twice
 from faao_mav.plan.model import StudyScheme
-from faao_mav.plan.yaml_text import load_yaml
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 Value: TypeAlias = Any
 """The value of a varied key, as YAML reads it: a number, a word, a list."""
@@ -159,7 +157,7 @@ def make_cases(
             seeded = {"radio.seed": seed} if isinstance(first, int) else {}
             # what is varied goes before what the scheme would have
             changed = _changed(data, chosen | changes | seeded)
-            plan = yaml.safe_dump(changed, sort_keys=False)
+            plan = dump_yaml(changed)
             made.append(StudyCase(pairs, scheme, seed, plan, source))
     return tuple(made)
 

@@ -1,14 +1,23 @@
 """Whether an autopilot takes a mission, an aircraft can fly it, and it delivers the link."""
 
 from faao_mav.mission.item import Mission
-from faao_mav.validate.case import Case
+from faao_mav.validate import (
+    ardupilot,
+    extent,
+    fences,
+    items,
+    link,
+    px4_checks,
+    px4_flight,
+    shape,
+    speeds,
+    upload,
+)
+from faao_mav.validate.context import Limits, ValidationContext
 from faao_mav.validate.finding import Finding, Level
-from faao_mav.validate.limits import Limits
 from faao_mav.validate.link import LinkCheck, Stretch
-from faao_mav.validate.registry import RULES
 from faao_mav.validate.rule import Rule
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track, Vehicle
 
 __all__ = [
     "RULES",
@@ -18,8 +27,19 @@ __all__ = [
     "LinkCheck",
     "Rule",
     "Stretch",
+    "ValidationContext",
     "validate",
 ]
+
+RULES: tuple[Rule, ...] = tuple(
+    rule
+    for module in (
+        *(items, upload, ardupilot, px4_checks, px4_flight),
+        *(speeds, shape, extent, fences, link),
+    )
+    for rule in module.RULES
+)
+"""All rules, in the order in which findings about one item are given."""
 
 _ORDER = {Level.ERROR: 0, Level.WARNING: 1, Level.NOTE: 2}
 
@@ -36,11 +56,15 @@ def validate(
 
     `track` is the predicted flight: with it speeds, heights, duration and fence are judged along
     the flight as well as along the straights between the items. `limits` are what the flight must
-    stay within. `link` says what of a plan's rate the flight delivers. Any mission can be judged,
-    however odd; nothing is raised.
+    stay within. `link` says what of a plan's rate the flight delivers. Parameters of the vehicle
+    that are no use count as not given. Any mission can be judged, however odd; nothing is raised.
+
+    >>> from faao_mav.mission.item import Mission
+    >>> [finding.rule for finding in validate(Mission(()), Vehicle())]
+    ['empty']
     """
-    case = Case(mission, vehicle, track, limits or Limits(), link)
+    context = ValidationContext(mission, vehicle, track, limits or Limits(), link)
     found = [
-        finding for rule in RULES if rule.applies_to(vehicle) for finding in rule.findings(case)
+        finding for rule in RULES if rule.applies_to(vehicle) for finding in rule.findings(context)
     ]
     return tuple(sorted(found, key=lambda f: (_ORDER[f.level], -1 if f.item is None else f.item)))

@@ -5,18 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from faao_mav.mission.command import ABOVE_HOME, Command
-from faao_mav.validate import parameters
-from faao_mav.validate.case import HOME, Case, Leg, number
-from faao_mav.validate.finding import Level
+from faao_mav.validate.context import HOME, Straight, ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
 
 RULES = Rules()
 
 FAR = 10_000.0
-"""Farther than this, m, from home or from item to item is hardly meant."""
+"""The distance from home or from item to item, m, that is hardly meant. Chosen."""
 
 COMMON_CEILING = 120.0
-"""What many countries allow without a permission, m above ground."""
+"""The height, m above ground, that many countries allow without a permission."""
 
 _GIVEN = "the limit that was given"
 _LANDINGS = (Command.NAV_LAND, Command.NAV_VTOL_LAND)
@@ -24,16 +22,15 @@ _HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_
 _DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
 
-@RULES.add(
+@RULES.warning(
     "below-home",
-    Level.WARNING,
     "an item at home's height or below",
     "PX4: Waypoint below home; ArduPilot says nothing and flies there",
 )
-def _below_home(case: Case) -> Iterator[Issue]:
-    home = case.mission.home
-    for place in case.places:
-        item = case.items[place.index]
+def _below_home(context: ValidationContext) -> Iterator[Issue]:
+    home = context.mission.home
+    for place in context.places:
+        item = context.items[place.index]
         if not place.up <= 0 or item.command in _LANDINGS:
             continue
         how = f"{-place.up:g} m below home" if place.up < 0 else "at home's height"
@@ -48,40 +45,39 @@ def _below_home(case: Case) -> Iterator[Issue]:
         )
 
 
-@RULES.add("above-ceiling", Level.ERROR, "higher than the ceiling that was set", _GIVEN)
-def _above_ceiling(case: Case) -> Iterator[Issue]:
-    ceiling = case.limits.max_altitude
+@RULES.error("above-ceiling", "higher than the ceiling that was set", _GIVEN)
+def _above_ceiling(context: ValidationContext) -> Iterator[Issue]:
+    ceiling = context.limits.max_altitude
     if ceiling is None:
         return
-    high = [place for place in case.places if place.up > ceiling]
+    high = [place for place in context.places if place.up > ceiling]
     for place in high:
         yield Issue(
             place.index,
             f"{place.up:g} m above home; the ceiling is {ceiling:g} m",
             f"lower the item to {ceiling:g} m or less, or raise --max-altitude",
         )
-    if case.track is not None and len(case.track.t) and not high:
-        up = case.track.position[:, 2]
+    if context.track is not None and len(context.track.t) and not high:
+        up = context.track.position[:, 2]
         top = int(np.argmax(up))
         # The aircraft is allowed to wobble.
         if up[top] > ceiling + 1.0:
             yield Issue(
-                int(case.track.item[top]),
+                int(context.track.item[top]),
                 f"the predicted flight gets {up[top]:.1f} m above home; the ceiling is "
                 f"{ceiling:g} m",
                 "plan lower, or raise --max-altitude",
             )
 
 
-@RULES.add(
+@RULES.note(
     "above-120-m",
-    Level.NOTE,
     f"higher than {COMMON_CEILING:g} m above home, what many countries allow",
     "EU 2019/947 (open category), FAA part 107 (400 ft)",
 )
-def _above_common(case: Case) -> Iterator[Issue]:
-    high = [place for place in case.places if place.up > COMMON_CEILING]
-    if high and case.limits.max_altitude is None:
+def _above_common(context: ValidationContext) -> Iterator[Issue]:
+    high = [place for place in context.places if place.up > COMMON_CEILING]
+    if high and context.limits.max_altitude is None:
         top = max(high, key=lambda place: place.up)
         yield Issue(
             top.index,
@@ -90,57 +86,55 @@ def _above_common(case: Case) -> Iterator[Issue]:
         )
 
 
-@RULES.add(
+@RULES.warning(
     "return-above-ceiling",
-    Level.WARNING,
     "on a return to launch the aircraft climbs above the ceiling that was set",
     "RTL_ALT, RTL_ALTITUDE (ArduPilot), RTL_RETURN_ALT (PX4)",
 )
-def _return_above(case: Case) -> Iterator[Issue]:
-    ceiling = case.limits.max_altitude
-    altitude = parameters.return_altitude(case.vehicle)
-    height = altitude.of(case.vehicle)
+def _return_above(context: ValidationContext) -> Iterator[Issue]:
+    ceiling = context.limits.max_altitude
+    vehicle = context.vehicle
+    height, name = vehicle.value("return_height"), vehicle.name_of("return_height")
+    newest = vehicle.type.parameters["return_height"].newest_name
     if ceiling is not None and height > ceiling:
         yield Issue(
             None,
             f"a return to launch, also after a failure, goes up to {height:g} m "
-            f"({altitude.name(case.vehicle)}); the ceiling is {ceiling:g} m",
-            f"set {altitude.names[0][0]} to {ceiling:g} m or less",
+            f"({name}); the ceiling is {ceiling:g} m",
+            f"set {newest} to {ceiling:g} m or less",
         )
 
 
-@RULES.add("beyond-distance", Level.ERROR, "farther from home than was set", _GIVEN)
-def _beyond(case: Case) -> Iterator[Issue]:
-    limit = case.limits.max_distance
-    if limit is None or case.home is None:
+@RULES.error("beyond-distance", "farther from home than was set", _GIVEN)
+def _beyond(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.limits.max_distance
+    if limit is None or context.home is None:
         return
-    far = [place for place in case.places if place.from_origin > limit]
+    far = [place for place in context.places if place.from_origin > limit]
     for place in far:
         yield Issue(
             place.index,
             f"{place.from_origin:.0f} m from home; the limit is {limit:g} m",
             "move the item nearer, or raise --max-distance",
         )
-    positions = case.track_positions
-    if positions is not None and case.track is not None and len(positions) and not far:
+    positions = context.track_positions
+    if positions is not None and context.track is not None and len(positions) and not far:
         distance = np.hypot(positions[:, 0], positions[:, 1])
         worst = int(np.argmax(distance))
         if distance[worst] > limit + 1.0:
             yield Issue(
-                int(case.track.item[worst]),
+                int(context.track.item[worst]),
                 f"the predicted flight gets {distance[worst]:.0f} m from home; the limit is "
                 f"{limit:g} m",
                 "plan nearer to home, or raise --max-distance",
             )
 
 
-@RULES.add(
-    "far-from-home", Level.WARNING, f"farther than {FAR / 1000:g} km from home", "common sense"
-)
-def _far(case: Case) -> Iterator[Issue]:
-    if case.home is None or case.limits.max_distance is not None:
+@RULES.warning("far-from-home", f"farther than {FAR / 1000:g} km from home", "common sense")
+def _far(context: ValidationContext) -> Iterator[Issue]:
+    if context.home is None or context.limits.max_distance is not None:
         return
-    for place in case.places:
+    for place in context.places:
         distance = place.from_origin
         if distance > FAR:
             yield Issue(
@@ -150,9 +144,9 @@ def _far(case: Case) -> Iterator[Issue]:
             )
 
 
-@RULES.add("long-leg", Level.WARNING, f"a leg of more than {FAR / 1000:g} km", "common sense")
-def _long(case: Case) -> Iterator[Issue]:
-    for leg in case.legs:
+@RULES.warning("long-leg", f"a leg of more than {FAR / 1000:g} km", "common sense")
+def _long(context: ValidationContext) -> Iterator[Issue]:
+    for leg in context.legs:
         if leg.length > FAR and leg.start.index != HOME and leg.end.index != HOME:
             yield Issue(
                 leg.index,
@@ -162,17 +156,15 @@ def _long(case: Case) -> Iterator[Issue]:
             )
 
 
-@RULES.add(
-    "too-long", Level.ERROR, "the flight takes longer than was set", f"{_GIVEN}; predicted flight"
-)
-def _too_long(case: Case) -> Iterator[Issue]:
-    limit = case.limits.max_duration
+@RULES.error("too-long", "the flight takes longer than was set", f"{_GIVEN}; predicted flight")
+def _too_long(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.limits.max_duration
     if limit is None:
         return
-    if case.track is not None and len(case.track.t):
-        duration, how = float(case.track.t[-1]), "is predicted to take"
+    if context.track is not None and len(context.track.t):
+        duration, how = float(context.track.t[-1]), "is predicted to take"
     else:
-        duration, how = least_duration(case), "takes at least"
+        duration, how = least_duration(context), "takes at least"
     if duration > limit:
         yield Issue(
             None,
@@ -181,17 +173,17 @@ def _too_long(case: Case) -> Iterator[Issue]:
         )
 
 
-def least_duration(case: Case) -> float:
+def least_duration(context: ValidationContext) -> float:
     """Return what the legs at the commanded speeds and the holds take, s, without any ramps.
 
     A DO_JUMP is not followed.
     """
-    climb = parameters.climb_speed(case.vehicle).of(case.vehicle)
-    flying = sum(_leg_duration(leg, climb) for leg in case.legs if not leg.jump)
-    waiting = sum(item.params[0] for _, item in case.each(*_DELAYS) if item.params[0] > 0)
+    climb = context.vehicle.value("climb_speed")
+    flying = sum(_leg_duration(leg, climb) for leg in context.legs if not leg.jump)
+    waiting = sum(item.params[0] for _, item in context.each(*_DELAYS) if item.params[0] > 0)
     return flying + waiting
 
 
-def _leg_duration(leg: Leg, climb: float) -> float:
+def _leg_duration(leg: Straight, climb: float) -> float:
     up = leg.rise / climb if leg.rise > 0 and climb > 0 else 0.0
     return max(leg.length / leg.speed if leg.speed > 0 else 0.0, up)

@@ -1,5 +1,7 @@
-"""The fence of a case: what of the mission and of the predicted flight leaves it."""
+"""The fence in the plane: its areas, and what of mission and flight leaves it."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -9,15 +11,88 @@ from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
-from faao_mav.validate import parameters
-from faao_mav.validate.area import Area, areas_of, free_area, lines
+from faao_mav.mission.fence import Fence
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from faao_mav.validate.case import Case
+    from faao_mav.validate.context import ValidationContext
 
-_UNION_OPTION = 2  # bit of FENCE_OPTIONS
+_SEGMENTS = 64
+"""Straights to a quarter of a circle: 0.075 mm of error a metre of radius."""
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """One part of a fence, metres of a local frame; `name` is what people may call it.
+
+    Circles become polygons, inside the circle for inclusions and outside for exclusions, so that
+    what is found to stay within the fence does so. `crosses_itself`: its outline does; what counts
+    as inside is then what an odd number of outlines encloses, as the autopilots count.
+    """
+
+    name: str
+    inclusion: bool
+    shape: "BaseGeometry"
+    crosses_itself: bool = False
+
+
+def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
+    """Return the parts of `fence` in `frame`: polygons, then circles."""
+    import shapely
+
+    areas = []
+    for n, polygon in enumerate(fence.polygons, start=1):
+        outline = shapely.Polygon(frame.to_local(*np.transpose(polygon.vertices)))
+        kind = "inclusion" if polygon.inclusion else "exclusion"
+        shape = _polygonal(shapely.make_valid(outline))
+        areas.append(
+            Area(f"{kind} polygon {n}", polygon.inclusion, shape, not shapely.is_valid(outline))
+        )
+    for n, circle in enumerate(fence.circles, start=1):
+        kind = "inclusion" if circle.inclusion else "exclusion"
+        radius = circle.radius
+        if not circle.inclusion:
+            radius /= math.cos(math.pi / (4 * _SEGMENTS))
+        center = shapely.Point(frame.to_local(*circle.center))
+        shape = center.buffer(radius, quad_segs=_SEGMENTS)
+        areas.append(Area(f"{kind} circle {n}", circle.inclusion, shape))
+    return tuple(areas)
+
+
+def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | None":
+    """Return where the aircraft may be by the inclusions of `areas`, None if there are none.
+
+    Inside one of them with `any_inclusion`, else inside all.
+    """
+    import shapely
+
+    shapes = [area.shape for area in areas if area.inclusion]
+    if not shapes:
+        return None
+    joined = shapely.union_all(shapes) if any_inclusion else shapely.intersection_all(shapes)
+    return _polygonal(joined)
+
+
+def lines(starts: Real, ends: Real) -> NDArray[np.object_]:
+    """Return the straights from `starts` to `ends`, each (n, 2), as an array of n geometries."""
+    import shapely
+
+    paths: NDArray[np.object_] = np.asarray(
+        shapely.linestrings(np.stack([starts, ends], axis=1)), dtype=object
+    )
+    still = (starts == ends).all(axis=1)
+    paths[still] = shapely.points(starts[still])
+    return paths
+
+
+def _polygonal(shape: "BaseGeometry") -> "BaseGeometry":
+    """Return the part of `shape` that has an area."""
+    import shapely
+
+    parts = shapely.get_parts(shapely.get_parts(shape))
+    flat = [part for part in parts if part.geom_type == "Polygon"]
+    return shapely.union_all(flat) if flat else shapely.Polygon()
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +112,13 @@ class Broken:
 
 @dataclass(frozen=True)
 class FenceMap:
-    """The fence of a case in the plane.
+    """The fence of a context in the plane.
 
     `free` is where the inclusions let the aircraft be, None if there are none. `any_inclusion`:
     one inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else all have to hold.
     """
 
-    case: "Case"
+    context: "ValidationContext"
     frame: LocalFrame
     areas: tuple[Area, ...]
     free: "BaseGeometry | None"
@@ -51,8 +126,8 @@ class FenceMap:
 
     @cached_property
     def legs(self) -> NDArray[np.object_]:
-        """The legs of the case, in order, as geometries."""
-        legs = self.case.legs
+        """The legs of the context, in order, as geometries."""
+        legs = self.context.legs
         starts = np.array([[leg.start.east, leg.start.north] for leg in legs]).reshape(-1, 2)
         ends = np.array([[leg.end.east, leg.end.north] for leg in legs]).reshape(-1, 2)
         return lines(starts, ends)
@@ -60,7 +135,7 @@ class FenceMap:
     @cached_property
     def flight(self) -> NDArray[np.object_]:
         """The predicted flight from sample to sample, as geometries; none without a track."""
-        positions = self.case.track_positions
+        positions = self.context.track_positions
         if positions is None or len(positions) < 2:
             return np.empty(0, dtype=object)
         return lines(positions[:-1, :2], positions[1:, :2])
@@ -68,7 +143,7 @@ class FenceMap:
     @cached_property
     def flight_items(self) -> NDArray[np.int_]:
         """The index of the item of each part of `flight`."""
-        track = self.case.track
+        track = self.context.track
         return track.item[1:] if track is not None and len(self.flight) else np.empty(0, dtype=int)
 
     @cached_property
@@ -107,7 +182,7 @@ class FenceMap:
         if not len(self.legs) or self.broken_legs.any.any() or self.broken_flight.any.any():
             return None
         margins = self._margins(np.concatenate([self.legs, self.flight]))
-        items = [*(leg.index for leg in self.case.legs), *self.flight_items.tolist()]
+        items = [*(leg.index for leg in self.context.legs), *self.flight_items.tolist()]
         nearest = int(np.argmin(margins))
         return float(margins[nearest]), items[nearest]
 
@@ -123,20 +198,18 @@ class FenceMap:
         return margin
 
 
-def fence_map(case: "Case") -> FenceMap | None:
-    """Return the fence of `case` in the plane, None without a fence."""
-    fence = case.mission.fence
+def fence_map(context: "ValidationContext") -> FenceMap | None:
+    """Return the fence of `context` in the plane, None without a fence."""
+    fence = context.mission.fence
     if not fence:
         return None
     import shapely
 
     first = fence.polygons[0].vertices[0] if fence.polygons else fence.circles[0].center
-    frame = case.frame or LocalFrame(*first)
+    frame = context.frame or LocalFrame(*first)
     areas = areas_of(fence, frame)
-    any_inclusion = case.vehicle.autopilot == "px4" or bool(
-        int(parameters.FENCE_OPTIONS.of(case.vehicle)) & _UNION_OPTION
-    )
+    any_inclusion = context.vehicle.type.fence_needs_one_inclusion(context.vehicle)
     free = free_area(areas, any_inclusion=any_inclusion)
     shapely.prepare([area.shape for area in areas])
     shapely.prepare(free)
-    return FenceMap(case, frame, areas, free, any_inclusion)
+    return FenceMap(context, frame, areas, free, any_inclusion)

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from faao_mav.validate.area import Area
-from faao_mav.validate.case import HOME, Case, number
-from faao_mav.validate.finding import Level
+from faao_mav.validate.context import HOME, ValidationContext, number
+from faao_mav.validate.fence_map import Area
 from faao_mav.validate.rule import Issue, Rules
 
 RULES = Rules()
 
 LEAST_MARGIN = 2.0
-"""Nearer to the fence than this, m, the aircraft's own position error counts."""
+"""The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
+what a change costs is not measured."""
 
 _GEOMETRY = "plane geometry about home; ArduPilot AC_Fence, PX4 Geofence"
 
@@ -24,9 +24,9 @@ def _what(part: Area | None) -> str:
     return f"{'outside' if part.inclusion else 'inside'} {part.name}"
 
 
-@RULES.add("fence-crosses-itself", Level.ERROR, "a fence polygon crosses itself", _GEOMETRY)
-def _crosses(case: Case) -> Iterator[Issue]:
-    for area in case.fence.areas if case.fence else ():
+@RULES.error("fence-crosses-itself", "a fence polygon crosses itself", _GEOMETRY)
+def _crosses(context: ValidationContext) -> Iterator[Issue]:
+    for area in context.fence.areas if context.fence else ():
         if area.crosses_itself:
             yield Issue(
                 None,
@@ -35,49 +35,51 @@ def _crosses(case: Case) -> Iterator[Issue]:
             )
 
 
-@RULES.add("fence-home", Level.ERROR, "home lies outside the fence", _GEOMETRY)
-def _home(case: Case) -> Iterator[Issue]:
-    if case.home is not None:
-        yield from _points(case, [("home", (0.0, 0.0))], "move home or the fence")
+@RULES.error("fence-home", "home lies outside the fence", _GEOMETRY)
+def _home(context: ValidationContext) -> Iterator[Issue]:
+    if context.home is not None:
+        yield from _points(context, [("home", (0.0, 0.0))], "move home or the fence")
 
 
-@RULES.add("fence-rally", Level.ERROR, "a rally point lies outside the fence", _GEOMETRY)
-def _rally(case: Case) -> Iterator[Issue]:
-    if case.fence is not None:
+@RULES.error("fence-rally", "a rally point lies outside the fence", _GEOMETRY)
+def _rally(context: ValidationContext) -> Iterator[Issue]:
+    if context.fence is not None:
         points = [
-            (f"rally point {n}", case.fence.frame.to_local(point.latitude, point.longitude))
-            for n, point in enumerate(case.mission.rally, start=1)
+            (f"rally point {n}", context.fence.frame.to_local(point.latitude, point.longitude))
+            for n, point in enumerate(context.mission.rally, start=1)
         ]
-        yield from _points(case, points, "move the rally point or the fence")
+        yield from _points(context, points, "move the rally point or the fence")
 
 
-@RULES.add("fence-return", Level.ERROR, "the breach return point lies outside the fence", _GEOMETRY)
-def _return(case: Case) -> Iterator[Issue]:
-    point = case.mission.fence.breach_return
-    if case.fence is not None and point is not None:
-        local = case.fence.frame.to_local(point.latitude, point.longitude)
-        yield from _points(case, [("the breach return point", local)], "move it inside")
+@RULES.error("fence-return", "the breach return point lies outside the fence", _GEOMETRY)
+def _return(context: ValidationContext) -> Iterator[Issue]:
+    point = context.mission.fence.breach_return
+    if context.fence is not None and point is not None:
+        local = context.fence.frame.to_local(point.latitude, point.longitude)
+        yield from _points(context, [("the breach return point", local)], "move it inside")
 
 
-def _points(case: Case, points: list[tuple[str, Any]], action: str) -> Iterator[Issue]:
-    if case.fence is None or not points:
+def _points(
+    context: ValidationContext, points: list[tuple[str, Any]], action: str
+) -> Iterator[Issue]:
+    if context.fence is None or not points:
         return
     import shapely
 
-    broken = case.fence.broken(shapely.points([place for _, place in points]))
+    broken = context.fence.broken(shapely.points([place for _, place in points]))
     for k in np.flatnonzero(broken.any).tolist():
         yield Issue(None, f"{points[k][0]} is {' and '.join(map(_what, broken.parts(k)))}", action)
 
 
-@RULES.add("fence-leg", Level.ERROR, "a leg leaves the fence", _GEOMETRY)
-def _legs(case: Case) -> Iterator[Issue]:
-    fence = case.fence
-    if fence is None or not case.legs:
+@RULES.error("fence-leg", "a leg leaves the fence", _GEOMETRY)
+def _legs(context: ValidationContext) -> Iterator[Issue]:
+    fence = context.fence
+    if fence is None or not context.legs:
         return
     import shapely
 
     for k in np.flatnonzero(fence.broken_legs.any).tolist():
-        leg = case.legs[k]
+        leg = context.legs[k]
         start = "home" if leg.start.index == HOME else f"item {number(leg.start.index)}"
         parts = []
         for part in fence.broken_legs.parts(k):
@@ -93,14 +95,14 @@ def _legs(case: Case) -> Iterator[Issue]:
         )
 
 
-@RULES.add("fence-flight", Level.ERROR, "the predicted flight leaves the fence", _GEOMETRY)
-def _flight(case: Case) -> Iterator[Issue]:
-    fence, track = case.fence, case.track
+@RULES.error("fence-flight", "the predicted flight leaves the fence", _GEOMETRY)
+def _flight(context: ValidationContext) -> Iterator[Issue]:
+    fence, track = context.fence, context.track
     if fence is None or track is None or not len(fence.flight):
         return
     told = set()
-    if case.legs:
-        told = {case.legs[k].index for k in np.flatnonzero(fence.broken_legs.any)}
+    if context.legs:
+        told = {context.legs[k].index for k in np.flatnonzero(fence.broken_legs.any)}
     broken = fence.broken_flight
     for index in sorted(set(fence.flight_items[broken.any].tolist()) - told):
         first = int(np.flatnonzero(broken.any & (fence.flight_items == index))[0])
@@ -112,9 +114,9 @@ def _flight(case: Case) -> Iterator[Issue]:
         )
 
 
-@RULES.add("fence-close", Level.WARNING, f"less than {LEAST_MARGIN:g} m from the fence", _GEOMETRY)
-def _close(case: Case) -> Iterator[Issue]:
-    nearest = case.fence.nearest if case.fence else None
+@RULES.warning("fence-close", f"less than {LEAST_MARGIN:g} m from the fence", _GEOMETRY)
+def _close(context: ValidationContext) -> Iterator[Issue]:
+    nearest = context.fence.nearest if context.fence else None
     if nearest is not None and nearest[0] < LEAST_MARGIN:
         yield Issue(
             nearest[1],
@@ -124,9 +126,9 @@ def _close(case: Case) -> Iterator[Issue]:
         )
 
 
-@RULES.add("fence-margin", Level.NOTE, "how near the mission comes to the fence", _GEOMETRY)
-def _margin(case: Case) -> Iterator[Issue]:
-    nearest = case.fence.nearest if case.fence else None
+@RULES.note("fence-margin", "how near the mission comes to the fence", _GEOMETRY)
+def _margin(context: ValidationContext) -> Iterator[Issue]:
+    nearest = context.fence.nearest if context.fence else None
     if nearest is not None and nearest[0] >= LEAST_MARGIN:
         yield Issue(
             nearest[1],

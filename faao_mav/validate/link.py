@@ -4,28 +4,30 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from faao_mav.validate.finding import Level
 from faao_mav.validate.rule import Issue, Rules
 
 if TYPE_CHECKING:
-    from faao_mav.validate.case import Case
+    from faao_mav.validate.context import ValidationContext
 
 RULES = Rules()
 
 LEAST_SHARE = 0.95
-"""Of the planned rate; below it the mission does not do its job."""
+"""The share of the planned rate below which the mission does not do its job. Chosen."""
 
 GOOD_SHARE = 0.995
-"""Of the planned rate; below it something can be won back."""
+"""The share of the planned rate below which something can be won back. Chosen."""
 
 LATE, LATE_SHARE = 3.0, 0.05
-"""Seconds, and share of the planned duration: both exceeded, the plan is not kept."""
+"""By how many seconds, and by which share of the planned duration, a flight ends late that does not
+keep its plan: both are exceeded. Chosen."""
 
 PATH_ALLOWANCE = 0.2
-"""Metres beyond the plan's path_tolerance: predictions are no better."""
+"""How far beyond the plan's path_tolerance the predicted path may lie, m: predictions are no
+better."""
 
 ALTITUDE_ERROR = 2.0
-"""Metres; from 100 m up that is a tenth of a decibel."""
+"""The error of the altitude that is reported, m: from 100 m up it changes the rate by a tenth of a
+decibel."""
 
 _SOURCE = "the plan, and the rate along the predicted flight"
 
@@ -70,26 +72,24 @@ class LinkCheck:
         return self.predicted_rate / self.planned_rate if self.planned_rate > 0 else 1.0
 
 
-@RULES.add(
+@RULES.error(
     "link-rate-lost",
-    Level.ERROR,
     f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of the planned rate",
     _SOURCE,
 )
-def _lost(case: "Case") -> Iterator[Issue]:
-    if case.link is not None and case.link.share < LEAST_SHARE:
-        yield _rate_issue(case.link)
+def _lost(context: "ValidationContext") -> Iterator[Issue]:
+    if context.link is not None and context.link.share < LEAST_SHARE:
+        yield _rate_issue(context.link)
 
 
-@RULES.add(
+@RULES.warning(
     "link-rate-reduced",
-    Level.WARNING,
     f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of the planned rate",
     _SOURCE,
 )
-def _reduced(case: "Case") -> Iterator[Issue]:
-    if case.link is not None and LEAST_SHARE <= case.link.share < GOOD_SHARE:
-        yield _rate_issue(case.link)
+def _reduced(context: "ValidationContext") -> Iterator[Issue]:
+    if context.link is not None and LEAST_SHARE <= context.link.share < GOOD_SHARE:
+        yield _rate_issue(context.link)
 
 
 def _rate_issue(link: LinkCheck) -> Issue:
@@ -108,14 +108,13 @@ def _rate_issue(link: LinkCheck) -> Issue:
     )
 
 
-@RULES.add(
+@RULES.warning(
     "link-path",
-    Level.WARNING,
     "the predicted path leaves the planned one by more than the plan's path_tolerance",
     _SOURCE,
 )
-def _path(case: "Case") -> Iterator[Issue]:
-    link = case.link
+def _path(context: "ValidationContext") -> Iterator[Issue]:
+    link = context.link
     if link is not None and link.path_error > link.path_tolerance + PATH_ALLOWANCE:
         yield Issue(
             None,
@@ -126,15 +125,14 @@ def _path(case: "Case") -> Iterator[Issue]:
         )
 
 
-@RULES.add(
+@RULES.warning(
     "link-late",
-    Level.WARNING,
     f"the predicted flight ends later than planned by more than {100 * LATE_SHARE:g} % and "
     f"{LATE:g} s: what the plan has at its end is not done in its time",
     _SOURCE,
 )
-def _late(case: "Case") -> Iterator[Issue]:
-    link = case.link
+def _late(context: "ValidationContext") -> Iterator[Issue]:
+    link = context.link
     if link is not None:
         late = link.predicted_duration - link.planned_duration
         if late > max(LATE, LATE_SHARE * link.planned_duration):
@@ -147,14 +145,13 @@ def _late(case: "Case") -> Iterator[Issue]:
             )
 
 
-@RULES.add(
+@RULES.warning(
     "link-altitude",
-    Level.WARNING,
     f"the predicted flight is more than {ALTITUDE_ERROR:g} m above or below the planned altitude",
     _SOURCE,
 )
-def _altitude(case: "Case") -> Iterator[Issue]:
-    link = case.link
+def _altitude(context: "ValidationContext") -> Iterator[Issue]:
+    link = context.link
     if link is not None and link.altitude_error > ALTITUDE_ERROR:
         yield Issue(
             None,
@@ -164,14 +161,13 @@ def _altitude(case: "Case") -> Iterator[Issue]:
         )
 
 
-@RULES.add(
+@RULES.note(
     "link-timing",
-    Level.NOTE,
     "where the aircraft is predicted to be, beside where the plan has it at the same time",
     _SOURCE,
 )
-def _timing(case: "Case") -> Iterator[Issue]:
-    link = case.link
+def _timing(context: "ValidationContext") -> Iterator[Issue]:
+    link = context.link
     if link is not None:
         late = link.predicted_duration - link.planned_duration
         yield Issue(

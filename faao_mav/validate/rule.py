@@ -4,12 +4,11 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from faao_mav.plan.autopilots import Autopilot, Kind
 from faao_mav.validate.finding import Finding, Level
-from faao_mav.vehicle import Vehicle
+from faao_mav.vehicle import AutopilotFamily, Vehicle
 
 if TYPE_CHECKING:
-    from faao_mav.validate.case import Case
+    from faao_mav.validate.context import ValidationContext
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +20,7 @@ class Issue:
     action: str
 
 
-Check: TypeAlias = Callable[["Case"], Iterable[Issue]]
+Check: TypeAlias = Callable[["ValidationContext"], Iterable[Issue]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +29,8 @@ class Rule:
 
     `id` is short and stays the same from version to version. `summary` says in a line what is
     wrong when the rule speaks. `source` names where the rule comes from: a function or document of
-    the autopilot with its version, a measurement, or the limits that were set. `autopilot` and
-    `kind` are the vehicles that it is about, None: all.
+    the autopilot with its version, a measurement, or the limits that were set. `family` and `kind`
+    are the autopilot and the type of vehicle that it is about, None: all.
     """
 
     id: str
@@ -39,37 +38,57 @@ class Rule:
     summary: str
     source: str
     check: Check
-    autopilot: Autopilot | None = None
-    kind: Kind | None = None
+    family: AutopilotFamily | None = None
+    kind: str | None = None
+
+    @property
+    def autopilot(self) -> str | None:
+        """The name of the autopilot that it is about, None: all."""
+        return self.family.key if self.family is not None else None
 
     def applies_to(self, vehicle: Vehicle) -> bool:
         """Say whether the rule is about `vehicle`."""
-        return self.autopilot in (None, vehicle.autopilot) and self.kind in (None, vehicle.kind)
+        own = vehicle.type
+        return self.family in (None, own.family) and self.kind in (None, own.kind)
 
-    def findings(self, case: "Case") -> Iterator[Finding]:
-        """Yield what the rule finds in `case`."""
-        for issue in self.check(case):
+    def findings(self, context: "ValidationContext") -> Iterator[Finding]:
+        """Yield what the rule finds in `context`."""
+        for issue in self.check(context):
             item = None if issue.index is None else issue.index + 1
             yield Finding(self.level, self.id, item, issue.message, issue.action)
 
 
-class Rules(list[Rule]):
-    """The rules of one module, in the order of its functions."""
+Decorator: TypeAlias = Callable[[Check], Check]
 
-    def add(
-        self,
-        id: str,  # noqa: A002
-        level: Level,
-        summary: str,
-        source: str,
-        *,
-        autopilot: Autopilot | None = None,
-        kind: Kind | None = None,
-    ) -> Callable[[Check], Check]:
-        """Return a decorator that makes a rule of a check."""
+
+class Rules(list[Rule]):
+    """The rules of one module, in the order of its functions; all about `family`, if given.
+
+    `error`, `warning` and `note` return a decorator that makes a rule of that level of a check:
+    they take `Rule.id`, `summary`, `source` and, if it is about one type of vehicle, `kind`.
+    """
+
+    def __init__(self, family: AutopilotFamily | None = None) -> None:
+        super().__init__()
+        self._family = family
+
+    def error(self, *texts: str, kind: str | None = None) -> Decorator:
+        """Add a rule about what is refused, dangerous or breaks a limit that was set."""
+        return self._add(Level.ERROR, texts, kind)
+
+    def warning(self, *texts: str, kind: str | None = None) -> Decorator:
+        """Add a rule about what will not fly as it is written."""
+        return self._add(Level.WARNING, texts, kind)
+
+    def note(self, *texts: str, kind: str | None = None) -> Decorator:
+        """Add a rule about what is worth knowing."""
+        return self._add(Level.NOTE, texts, kind)
+
+    def _add(self, level: Level, texts: tuple[str, ...], kind: str | None) -> Decorator:
+        name, summary, source = texts
 
         def register(check: Check) -> Check:
-            self.append(Rule(id, level, summary, source, check, autopilot, kind))
+            self.append(Rule(name, level, summary, source, check, self._family, kind))
             return check
 
         return register

@@ -5,69 +5,71 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from faao_mav.mission.command import Command
-from faao_mav.validate import parameters
-from faao_mav.validate.case import HOME, Case, Leg
-from faao_mav.validate.finding import Level
+from faao_mav.validate.context import HOME, Straight, ValidationContext
 from faao_mav.validate.rule import Issue, Rules
 
 RULES = Rules()
 
 SHARP = 45.0
-"""A turn of more than this, degrees, slows a copter down."""
+"""The turn, degrees, above which a copter slows down for a corner. Measured on ArduCopter and
+PX4."""
 
 _SLOW = 3.0
-"""At this commanded speed, m/s, and below corners hardly matter."""
+"""The commanded speed, m/s, up to which corners hardly matter. Chosen."""
 
 _CLIMB_SHARE = 0.8
+"""The share of the climbing time that the way over ground may fall short to: less, and the leg is
+steep. Chosen."""
+
 _GRAVITY = 9.81
+"""Standard gravity, m/s²."""
+
 _SHORTEST = 1.0
-
-# PX4's speed at a corner, m/s: sqrt(kc a R / tan(turn / 2)^pc).
-_KC, _PC = 0.466, 1.013
+"""The length, m, below which a leg has no direction to turn from. Chosen."""
 
 
-def _corners(case: Case) -> Iterator[tuple[Leg, Leg, float]]:
+def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, float]]:
     """Yield the legs before and after each plain waypoint that is passed, and the turn, degrees."""
     # A return to launch starts from a stop.
     legs = [
         leg
-        for leg in case.legs
+        for leg in context.legs
         if not leg.jump and leg.end.index != HOME and leg.length >= _SHORTEST
     ]
     for before, after in pairwise(legs):
-        item = case.items[before.index]
+        item = context.items[before.index]
         passed = item.command == Command.NAV_WAYPOINT and not item.params[0] > 0
         if passed and after.start == before.end and not after.spline:
             yield before, after, math.degrees(abs(_turn(before, after)))
 
 
-def _turn(before: Leg, after: Leg) -> float:
+def _turn(before: Straight, after: Straight) -> float:
     angle = _heading(after) - _heading(before)
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
-def _heading(leg: Leg) -> float:
+def _heading(leg: Straight) -> float:
     return math.atan2(leg.end.east - leg.start.east, leg.end.north - leg.start.north)
 
 
-@RULES.add(
+@RULES.note(
     "sharp-corners",
-    Level.NOTE,
     f"turns of more than {SHARP:g} degrees at speed: the aircraft slows down for them",
     "measured on ArduCopter 4.7 and PX4 1.16.1",
     kind="copter",
 )
-def _sharp(case: Case) -> Iterator[Issue]:
+def _sharp(context: ValidationContext) -> Iterator[Issue]:
     sharp = [
         (turn, before)
-        for before, _, turn in _corners(case)
+        for before, _, turn in _corners(context)
         if turn > SHARP and before.speed > _SLOW
     ]
     if sharp:
         turn, leg = max(sharp, key=lambda corner: corner[0])
         slow = ""
-        if case.vehicle.autopilot == "px4":
-            slow = f", passed at about {_px4_corner_speed(case, turn):.1f} m/s"
+        if (passing := context.vehicle.type.corner_speed) is not None:
+            speed = passing(context.vehicle, math.radians(turn))
+            slow = f", passed at about {speed:.1f} m/s"
         corners = "1 corner" if len(sharp) == 1 else f"{len(sharp)} corners"
         yield Issue(
             leg.index,
@@ -77,56 +79,42 @@ def _sharp(case: Case) -> Iterator[Issue]:
         )
 
 
-def _px4_corner_speed(case: Case, turn: float) -> float:
-    acceleration = parameters.PX4_ACCELERATION.of(case.vehicle)
-    radius = parameters.acceptance_radius(case.vehicle).of(case.vehicle)
-    bend = math.tan(math.radians(min(turn, 179.0)) / 2) ** _PC
-    return math.sqrt(max(_KC * acceleration * radius / bend, 0.0))
-
-
-@RULES.add(
+@RULES.warning(
     "turn-too-tight",
-    Level.WARNING,
     "a corner that a plane cannot fly between its waypoints",
     "coordinated turn: radius v^2 / (g tan bank)",
     kind="plane",
 )
-def _tight(case: Case) -> Iterator[Issue]:
-    px4 = case.vehicle.autopilot == "px4"
-    bank = (parameters.PX4_PLANE_BANK if px4 else parameters.PLANE_BANK).of(case.vehicle)
-    if not 0 < bank < 90:
-        return
-    for before, after, turn in _corners(case):
-        radius = before.speed * before.speed / (_GRAVITY * math.tan(math.radians(bank)))
+def _tight(context: ValidationContext) -> Iterator[Issue]:
+    bank = context.vehicle.value("roll_limit")
+    shown = f"{math.degrees(bank):g} degrees of bank"
+    for before, after, turn in _corners(context):
+        radius = before.speed * before.speed / (_GRAVITY * math.tan(bank))
         needed = radius * math.tan(math.radians(min(turn, 179.0)) / 2)
         room = min(before.length, after.length)
         if needed > room:
             yield Issue(
                 before.index,
-                f"a turn of {turn:.0f} degrees at {before.speed:g} m/s and {bank:g} degrees of "
-                f"bank takes {needed:.0f} m of the legs before and after; the shorter one has "
+                f"a turn of {turn:.0f} degrees at {before.speed:g} m/s and {shown} "
+                f"takes {needed:.0f} m of the legs before and after; the shorter one has "
                 f"{room:.0f} m",
                 "make the legs longer, the turn wider or the speed lower",
             )
 
 
-@RULES.add(
+@RULES.warning(
     "steep-leg",
-    Level.WARNING,
     "a leg so steep that the climb or descent takes longer than the way over ground",
     "WPNAV_SPEED_UP and _DN, TECS_CLMB_MAX, MPC_Z_V_AUTO_UP and _DN, FW_T_CLMB_MAX",
 )
-def _steep(case: Case) -> Iterator[Issue]:
-    climb = parameters.climb_speed(case.vehicle).of(case.vehicle)
-    px4 = case.vehicle.autopilot == "px4"
-    descent = climb
-    if case.vehicle.kind == "copter":
-        descent = (parameters.PX4_DESCENT if px4 else parameters.COPTER_DESCENT).of(case.vehicle)
-    for leg in case.legs:
-        command = case.items[leg.index].command
+def _steep(context: ValidationContext) -> Iterator[Issue]:
+    climb = context.vehicle.value("climb_speed")
+    descent = context.vehicle.value("descent_speed")
+    for leg in context.legs:
+        command = context.items[leg.index].command
         limit = climb if leg.rise > 0 else descent
         on_ground = leg.start.index == HOME
-        if on_ground or command != Command.NAV_WAYPOINT or leg.length < _SHORTEST or limit <= 0:
+        if on_ground or command != Command.NAV_WAYPOINT or leg.length < _SHORTEST:
             continue
         level, vertical = leg.length / leg.speed, abs(leg.rise) / limit
         if math.isfinite(vertical) and level < _CLIMB_SHARE * vertical:

@@ -6,44 +6,40 @@ from itertools import groupby
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.mission.command import Command
-from faao_mav.validate import parameters
-from faao_mav.validate.case import HOME, Case, Leg, number
-from faao_mav.validate.finding import Level
+from faao_mav.validate.context import HOME, Straight, ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
-from faao_mav.vehicle.legs import ArduCopterLegs, Legs, Px4Legs
+from faao_mav.vehicle.vehicle_type import OVERSPEED
 
 RULES = Rules()
 
 REACHED_SHARE = 0.8
-"""Of the commanded speed; a leg that stays below it is reported."""
+"""The share of the commanded speed below which a leg is reported. Chosen."""
 
 TIME_LOST = 2.0
-"""Seconds that a run of such legs loses at least: in less, corners are taken and speeds changed."""
-
-HEADROOM = 1.1
-"""Of the vehicle's max_speed: more is an error; up to it speed makes up for corners."""
+"""The least time, s, that a reported run of slow legs loses: in less, corners are taken and speeds
+are changed. Chosen."""
 
 CRAWL_SHARE = 0.5
-"""Of the commanded speed; a row of legs below it is a crawl."""
+"""The share of the commanded speed below which a row of legs is a crawl. Chosen."""
 
 CRAWL_LEGS = 5
-"""Legs in a row that make a crawl."""
+"""The least number of legs in a row that make a crawl. Chosen."""
 
 _LIMIT = "the plan's vehicle.max_speed"
 _MEASURED = "flight models measured on ArduCopter 4.7 and PX4 1.16.1; the predicted flight"
 _SHORTEST = 1.0
-"""Legs shorter than this, m, are corrections, not legs to speed up on."""
+"""The length, m, below which a leg is a correction and not one to speed up on. Chosen."""
 
-_SLOWEST = 0.1  # m/s
+_SLOWEST = 0.1
+"""The least speed that is reckoned with, m/s, so that times stay finite."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
     """Neighbouring legs that stay below their commanded speed, and what they reach, m/s."""
 
-    legs: list[Leg]
+    legs: list[Straight]
     reached: list[float]
 
     @property
@@ -71,18 +67,17 @@ class _Run:
         return sum(self.reached) / len(self.reached)
 
 
-@RULES.add(
+@RULES.warning(
     "speed-not-reached",
-    Level.WARNING,
     f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed and lose "
     f"{TIME_LOST:g} s or more by it; with a plan its own clock is compared instead",
     _MEASURED,
     kind="copter",
 )
-def _not_reached(case: Case) -> Iterator[Issue]:
-    for run in _slow_runs(case):
+def _not_reached(context: ValidationContext) -> Iterator[Issue]:
+    for run in _slow_runs(context):
         # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
-        if run.crawls or run.time_lost < TIME_LOST or case.link is not None:
+        if run.crawls or run.time_lost < TIME_LOST or context.link is not None:
             continue
         first, low, high = run.legs[0], min(run.reached), max(run.reached)
         if len(run.legs) == 1:
@@ -100,16 +95,15 @@ def _not_reached(case: Case) -> Iterator[Issue]:
         )
 
 
-@RULES.add(
+@RULES.warning(
     "crawl",
-    Level.WARNING,
     f"waypoints so dense that {CRAWL_LEGS} legs or more stay below "
     f"{100 * CRAWL_SHARE:g} % of the commanded speed",
     _MEASURED,
     kind="copter",
 )
-def _crawl(case: Case) -> Iterator[Issue]:
-    for run in _slow_runs(case):
+def _crawl(context: ValidationContext) -> Iterator[Issue]:
+    for run in _slow_runs(context):
         if run.crawls:
             spacing = sum(leg.length for leg in run.legs) / len(run.legs)
             yield Issue(
@@ -121,16 +115,16 @@ def _crawl(case: Case) -> Iterator[Issue]:
             )
 
 
-def _slow_runs(case: Case) -> Iterator[_Run]:
+def _slow_runs(context: ValidationContext) -> Iterator[_Run]:
     """Yield the runs of neighbouring legs that stay below their commanded speed."""
-    pairs = zip(*_reached_speeds(case), strict=True)
+    pairs = zip(*_reached_speeds(context), strict=True)
     for slow, run in groupby(pairs, lambda pair: pair[1] < REACHED_SHARE * pair[0].speed):
         if slow:
             legs, reached = zip(*run, strict=True)
             yield _Run(list(legs), list(reached))
 
 
-def _reached_speeds(case: Case) -> tuple[list[Leg], list[float]]:
+def _reached_speeds(context: ValidationContext) -> tuple[list[Straight], list[float]]:
     """Return the level legs between waypoints, and the speed that each reaches, m/s.
 
     That is the greatest speed of the predicted flight towards the leg's end. Without one it is
@@ -138,62 +132,32 @@ def _reached_speeds(case: Case) -> tuple[list[Leg], list[float]]:
     """
     legs = [
         leg
-        for leg in case.legs
+        for leg in context.legs
         if leg.start.index != HOME
         and not leg.jump
         and leg.length >= _SHORTEST
-        and case.items[leg.index].command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+        and context.items[leg.index].command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
     ]
-    if case.track is not None:
-        fastest = np.full(len(case.items), -np.inf)
-        np.maximum.at(fastest, case.track.item, np.hypot(*case.track.velocity[:, :2].T))
+    if context.track is not None:
+        fastest = np.full(len(context.items), -np.inf)
+        np.maximum.at(fastest, context.track.item, np.hypot(*context.track.velocity[:, :2].T))
         legs = [leg for leg in legs if fastest[leg.index] >= 0]  # the others are not flown
         return legs, [float(fastest[leg.index]) for leg in legs]
     legs = [leg for leg in legs if not leg.spline]
     lengths = np.array([leg.length for leg in legs], dtype=float)
-    reachable = reachable_speed(_model(case), lengths)
+    reachable = context.vehicle.legs.reachable_speed(lengths)
     return legs, [min(float(v), leg.speed) for v, leg in zip(reachable, legs, strict=True)]
 
 
-def _model(case: Case) -> Legs:
-    vehicle = case.vehicle
-    if vehicle.autopilot == "px4":
-        return Px4Legs(
-            _positive(parameters.PX4_ACCELERATION, case), _positive(parameters.PX4_JERK, case)
-        )
-    return ArduCopterLegs(
-        _positive(parameters.COPTER_ACCELERATION, case), _positive(parameters.COPTER_JERK, case)
-    )
-
-
-def _positive(parameter: parameters.Parameter, case: Case) -> float:
-    value = parameter.of(case.vehicle)
-    return value if value > 0 else parameter.default
-
-
-def reachable_speed(model: Legs, lengths: Real) -> Real:
-    """Return the greatest speed that legs of `lengths` (n,), m, allow, m/s; same shape.
-
-    The speed whose shortest leg is as long as the leg, by bisection; at most 100 m/s.
-    """
-    low, high = np.zeros_like(lengths), np.full_like(lengths, 100.0)
-    for _ in range(40):
-        middle = (low + high) / 2
-        fits = model.shortest_leg(middle) <= lengths
-        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    return low
-
-
-@RULES.add(
+@RULES.error(
     "speed-above-limit",
-    Level.ERROR,
-    f"faster than the vehicle's max_speed by more than {100 * (HEADROOM - 1):.0f} %",
+    f"faster than the vehicle's max_speed by more than {100 * (OVERSPEED - 1):.0f} %",
     _LIMIT,
 )
-def _above_limit(case: Case) -> Iterator[Issue]:
-    limit = case.limits.max_speed
+def _above_limit(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.limits.max_speed
     if limit is not None:
-        for index, speed in _faster_than(HEADROOM * limit, case):
+        for index, speed in _faster_than(OVERSPEED * limit, context):
             yield Issue(
                 index,
                 f"{speed:g} m/s from here on; the vehicle's max_speed is {limit:g} m/s",
@@ -201,17 +165,16 @@ def _above_limit(case: Case) -> Iterator[Issue]:
             )
 
 
-@RULES.add(
+@RULES.note(
     "speed-headroom",
-    Level.NOTE,
-    f"faster than the vehicle's max_speed by up to {100 * (HEADROOM - 1):.0f} %",
+    f"faster than the vehicle's max_speed by up to {100 * (OVERSPEED - 1):.0f} %",
     _LIMIT,
 )
-def _headroom(case: Case) -> Iterator[Issue]:
-    limit = case.limits.max_speed
+def _headroom(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.limits.max_speed
     if limit is None:
         return
-    above = [found for found in _faster_than(limit, case) if found[1] <= HEADROOM * limit]
+    above = [found for found in _faster_than(limit, context) if found[1] <= OVERSPEED * limit]
     if above:
         index, speed = max(above, key=lambda found: found[1])
         yield Issue(
@@ -221,23 +184,22 @@ def _headroom(case: Case) -> Iterator[Issue]:
         )
 
 
-def _faster_than(speed: float, case: Case) -> Iterator[tuple[int, float]]:
+def _faster_than(speed: float, context: ValidationContext) -> Iterator[tuple[int, float]]:
     """Yield the index of each leg on which a speed above `speed` begins, and that speed, m/s."""
     before = None
-    for leg in (leg for leg in case.legs if leg.length >= _SHORTEST):
+    for leg in (leg for leg in context.legs if leg.length >= _SHORTEST):
         if leg.speed > speed and leg.speed != before:
             yield leg.index, leg.speed
         before = leg.speed
 
 
-@RULES.add(
+@RULES.warning(
     "acceleration-above-limit",
-    Level.WARNING,
     "the predicted flight accelerates more than the vehicle's max_acceleration",
     "the plan's vehicle.max_acceleration; the predicted flight",
 )
-def _acceleration(case: Case) -> Iterator[Issue]:
-    limit, track = case.limits.max_acceleration, case.track
+def _acceleration(context: ValidationContext) -> Iterator[Issue]:
+    limit, track = context.limits.max_acceleration, context.track
     if limit is None or track is None or len(track.t) < 3:
         return
     change = np.gradient(track.velocity[:, :2], track.t, axis=0)

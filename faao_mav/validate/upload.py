@@ -1,15 +1,12 @@
-"""What is refused when a mission is uploaded, and what is taken in another way than it looks."""
+"""What is refused when a mission is uploaded, and what the vehicle's storage loses of it."""
 
 import math
 from collections.abc import Iterator
 
-from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, Command, Frame
-from faao_mav.validate import parameters
-from faao_mav.validate.case import LARGEST, Case, fits_message
-from faao_mav.validate.finding import Level
+from faao_mav.mission.command import FLOWN_TO, Command, Frame
+from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.vehicle.dialect import name_of
-from faao_mav.vehicle.dialects import accepts, dialect_of
 
 RULES = Rules()
 
@@ -19,24 +16,13 @@ _PARSERS = (
 )
 _SIZES = "ArduPilot: 15 bytes an item; PX4: 1000 items on most boards; measured"
 
-_COPTER_SKIPS = (30, 83, 191, 194, 210, 212, 223, 3000)
-_PLANE_SKIPS = (Command.CONDITION_YAW, 213, 222, 42600)
 
-_ROI = (80, Command.DO_SET_ROI)
-_ROI_WITH_PLACE, _ROI_WITHOUT_PLACE = (0, 3), (0, 1, 2)
-
-_FENCE_VERTICES, _RALLY_POINTS = 64, 8
-
-
-@RULES.add(
-    "refused-on-upload",
-    Level.ERROR,
-    "the autopilot refuses the item, and the mission with it",
-    _PARSERS,
+@RULES.error(
+    "refused-on-upload", "the autopilot refuses the item, and the mission with it", _PARSERS
 )
-def _refused(case: Case) -> Iterator[Issue]:
-    for index, item in enumerate(case.items):
-        reason = accepts(item, case.vehicle)
+def _refused(context: ValidationContext) -> Iterator[Issue]:
+    for index, item in enumerate(context.items):
+        reason = context.vehicle.type.dialect.refusal(item)
         if reason is not None:
             message, _, action = reason.partition("; ")
             if not action:
@@ -44,14 +30,13 @@ def _refused(case: Case) -> Iterator[Issue]:
             yield Issue(index, message, action)
 
 
-@RULES.add(
+@RULES.error(
     "number-too-large",
-    Level.ERROR,
     "a number that a message cannot carry",
     "MAVLink: MISSION_ITEM_INT has numbers of single precision",
 )
-def _too_large(case: Case) -> Iterator[Issue]:
-    for index, item in enumerate(case.items):
+def _too_large(context: ValidationContext) -> Iterator[Issue]:
+    for index, item in enumerate(context.items):
         if not fits_message(item):
             largest = max(abs(v) for v in (*item.params, item.z) if not math.isnan(v))
             yield Issue(
@@ -71,56 +56,55 @@ def _replacement(command: int, frame: int) -> str:
     return "remove the item, or use a command that the autopilot has"
 
 
-@RULES.add("storage-full", Level.ERROR, "more items than any board of the autopilot stores", _SIZES)
-def _full(case: Case) -> Iterator[Issue]:
-    rows, most = _rows(case), dialect_of(case.vehicle).items.most
-    if rows > most and not _on_card(case):
+@RULES.error("storage-full", "more items than any board of the autopilot stores", _SIZES)
+def _full(context: ValidationContext) -> Iterator[Issue]:
+    rows, most = _rows(context), context.vehicle.type.dialect.items.most
+    if rows > most and not _on_card(context):
         yield Issue(
             None,
-            f"{rows} items{_with_home(case)}; {case.vehicle.type.name} stores {most} at "
+            f"{rows} items{_with_home(context)}; {context.vehicle.type.name} stores {most} at "
             "most (NO_SPACE)",
-            _thin(case),
+            _thin(context),
         )
 
 
-@RULES.add("storage-tight", Level.WARNING, "more items than common boards store", _SIZES)
-def _tight(case: Case) -> Iterator[Issue]:
-    rows, limit = _rows(case), dialect_of(case.vehicle).items
-    if limit.sure < rows <= limit.most and not _on_card(case):
+@RULES.warning("storage-tight", "more items than common boards store", _SIZES)
+def _tight(context: ValidationContext) -> Iterator[Issue]:
+    rows, limit = _rows(context), context.vehicle.type.dialect.items
+    if limit.sure < rows <= limit.most and not _on_card(context):
         yield Issue(
             None,
-            f"{rows} items{_with_home(case)}; {limit.sure} are known to fit, boards differ",
-            _thin(case),
+            f"{rows} items{_with_home(context)}; {limit.sure} are known to fit, boards differ",
+            _thin(context),
         )
 
 
-def _rows(case: Case) -> int:
-    return len(case.items) + dialect_of(case.vehicle).home_row
+def _rows(context: ValidationContext) -> int:
+    return len(context.items) + context.vehicle.type.dialect.home_row
 
 
-def _with_home(case: Case) -> str:
-    return " with home" if dialect_of(case.vehicle).home_row else ""
+def _with_home(context: ValidationContext) -> str:
+    return " with home" if context.vehicle.type.dialect.home_row else ""
 
 
-def _on_card(case: Case) -> bool:
-    return case.vehicle.autopilot == "ardupilot" and parameters.SD_STORAGE.of(case.vehicle) > 0
+def _on_card(context: ValidationContext) -> bool:
+    return context.vehicle.type.dialect.unlimited(context.vehicle)
 
 
-def _thin(case: Case) -> str:
-    if case.vehicle.autopilot == "ardupilot":
-        return "thin the waypoints, or set BRD_SD_MISSION to store missions on the card"
-    return "thin the waypoints"
+def _thin(context: ValidationContext) -> str:
+    return ", or ".join(
+        filter(None, ("thin the waypoints", context.vehicle.type.dialect.make_room))
+    )
 
 
-@RULES.add(
+@RULES.warning(
     "many-jumps",
-    Level.WARNING,
     "more DO_JUMPs than the autopilot counts the repeats of",
     "ArduPilot 4.7 AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS: 15, on large boards 100",
 )
-def _many_jumps(case: Case) -> Iterator[Issue]:
-    limit = dialect_of(case.vehicle).jumps
-    jumps = [index for index, _ in case.each(Command.DO_JUMP)]
+def _many_jumps(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.vehicle.type.dialect.jumps
+    jumps = [index for index, _ in context.each(Command.DO_JUMP)]
     if limit is not None and len(jumps) > limit.sure:
         yield Issue(
             jumps[limit.sure],
@@ -130,118 +114,62 @@ def _many_jumps(case: Case) -> Iterator[Issue]:
         )
 
 
-@RULES.add(
-    "ardupilot-command-skipped",
-    Level.WARNING,
-    "ArduPilot stores this command, but this kind of aircraft does nothing with it",
-    "ArduCopter 4.7 ModeAuto::start_command, ArduPlane 4.7 Plane::start_command",
-    autopilot="ardupilot",
-)
-def _skipped(case: Case) -> Iterator[Issue]:
-    skipped = _COPTER_SKIPS if case.vehicle.kind == "copter" else _PLANE_SKIPS
-    for index, item in case.each(*skipped):
+_SOURCE = "ArduPilot 4.7 AP_Mission, PX4 1.16 MavlinkMissionManager; read back from both"
+_HELD = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
+_MEANING: dict[tuple[int, int], str] = {
+    (Command.NAV_WAYPOINT, 1): "acceptance radius",
+    (Command.NAV_WAYPOINT, 2): "pass-by radius",
+    (Command.NAV_WAYPOINT, 3): "yaw",
+}
+_INSTEAD: dict[tuple[int, int], str] = {
+    (Command.NAV_WAYPOINT, 1): "set WPNAV_RADIUS (WP_RADIUS_M), which holds for all waypoints",
+    (Command.NAV_WAYPOINT, 3): "put a CONDITION_YAW before the waypoint",
+}
+_YAW = 3
+
+
+@RULES.warning("hold-changed", "a hold is not stored as it is written", _SOURCE)
+def _hold(context: ValidationContext) -> Iterator[Issue]:
+    for index, item in context.each(*_HELD):
+        stored = context.stored(item)
+        if stored is not None and not _same(item.params[0], stored.params[0]):
+            flies_on = not context.vehicle.type.hovers and item.command == Command.NAV_WAYPOINT
+            yield Issue(
+                index,
+                f"the hold of {item.params[0]:g} s is stored as {stored.params[0]:g} s",
+                "use NAV_LOITER_TIME: a plane waits in a circle"
+                if flies_on
+                else "use whole seconds from 0 to 65535; for fractions put a NAV_DELAY after a "
+                "plain waypoint",
+            )
+
+
+@RULES.note("value-dropped", "a parameter is not stored as it is written", _SOURCE)
+def _dropped(context: ValidationContext) -> Iterator[Issue]:
+    found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
+    for index, item in context.each(*FLOWN_TO):
+        stored = context.stored(item)
+        if stored is None:
+            continue
+        for n, (value, kept) in enumerate(zip(item.params, stored.params, strict=True)):
+            if n == 0 and item.command in _HELD:
+                continue  # the rule above
+            turned = n == _YAW and _same(value % 360, kept)
+            if value != 0 and not turned and not _same(value, kept):
+                found.setdefault((item.command, n), []).append((index, value, kept))
+    for (command, n), places in found.items():
+        index, value, kept = places[0]
+        meaning = _MEANING.get((command, n))
+        which = f"param{n + 1} ({meaning})" if meaning else f"param{n + 1}"
+        more = f", and so in {len(places)} items" if len(places) > 1 else ""
+        instead = _INSTEAD.get((command, n)) if context.vehicle.type.hovers else None
         yield Issue(
             index,
-            f"{name_of(item.command)} is stored, but a {case.vehicle.kind} skips it",
-            "remove the item, or check that --type is right",
+            f"{which} of {name_of(command)} is {value:g} and is stored as {kept:g}{more}",
+            instead or "write what can be stored",
         )
 
 
-@RULES.add(
-    "ardupilot-frame-mission",
-    Level.WARNING,
-    "ArduPilot takes coordinates in frame 2 for heights above sea level",
-    "ArduPilot 4.7 AP_Mission::mavlink_int_to_mission_cmd",
-    autopilot="ardupilot",
-)
-def _frame_mission(case: Case) -> Iterator[Issue]:
-    for index, item in case.each(*FLOWN_TO):
-        if item.frame == Frame.MISSION:
-            yield Issue(
-                index,
-                f"frame 2 says that there are no coordinates, but ArduPilot flies there, at "
-                f"{item.z:g} m above sea level",
-                "use frame 3 for heights above home, 0 for heights above sea level",
-            )
-
-
-@RULES.add(
-    "ardupilot-terrain",
-    Level.WARNING,
-    "heights above terrain: without terrain data ArduPilot does not arm",
-    "measured on ArduCopter 4.7: frame 10 uploads, then arming is refused",
-    autopilot="ardupilot",
-)
-def _terrain(case: Case) -> Iterator[Issue]:
-    above = _above_terrain(case)
-    if above and parameters.TERRAIN_ENABLE.of(case.vehicle) != 0:
-        yield Issue(
-            above[0],
-            f"{len(above)} of the heights count from the terrain (frame 10 or 11): ArduPilot does "
-            "not arm before it has the terrain data, and they are not checked here",
-            "load the terrain data onto the vehicle's card, or use frame 3: height above home",
-        )
-
-
-@RULES.add(
-    "ardupilot-terrain-off",
-    Level.ERROR,
-    "heights above terrain, but TERRAIN_ENABLE is 0",
-    "ArduPilot 4.7 AP_Arming::terrain_checks",
-    autopilot="ardupilot",
-)
-def _terrain_off(case: Case) -> Iterator[Issue]:
-    above = _above_terrain(case)
-    if above and parameters.TERRAIN_ENABLE.of(case.vehicle) == 0:
-        yield Issue(
-            above[0],
-            f"{len(above)} of the heights count from the terrain (frame 10 or 11), but "
-            "TERRAIN_ENABLE is 0",
-            "set TERRAIN_ENABLE to 1, or use frame 3: height above home",
-        )
-
-
-def _above_terrain(case: Case) -> list[int]:
-    return [index for index, item in case.each(*FLOWN_TO) if item.frame in ABOVE_TERRAIN]
-
-
-@RULES.add(
-    "px4-roi",
-    Level.ERROR,
-    "PX4 refuses this kind of region of interest (INVALID_PARAM1)",
-    "PX4 1.16 MavlinkMissionManager::parse_mavlink_mission_item",
-    autopilot="px4",
-)
-def _roi(case: Case) -> Iterator[Issue]:
-    for index, item in case.each(*_ROI):
-        allowed = _ROI_WITHOUT_PLACE if item.frame == Frame.MISSION else _ROI_WITH_PLACE
-        mode = item.params[0]
-        if math.isnan(mode) or math.trunc(mode) not in allowed:
-            yield Issue(
-                index,
-                f"region of interest {mode:g} in frame {item.frame}; PX4 takes "
-                f"{', '.join(map(str, allowed))} there",
-                "use DO_SET_ROI_LOCATION (195) or DO_SET_ROI_NONE (197)",
-            )
-
-
-@RULES.add(
-    "px4-fence-size",
-    Level.WARNING,
-    "more fence vertices or rally points than small PX4 boards store",
-    "PX4: 64 fence vertices and 8 rally points on the smallest boards",
-    autopilot="px4",
-)
-def _fence_size(case: Case) -> Iterator[Issue]:
-    fence = case.mission.fence
-    vertices = sum(len(polygon.vertices) for polygon in fence.polygons) + len(fence.circles)
-    for count, limit, what in (
-        (vertices, _FENCE_VERTICES, "fence vertices"),
-        (len(case.mission.rally), _RALLY_POINTS, "rally points"),
-    ):
-        if count > limit:
-            yield Issue(
-                None,
-                f"{count} {what}; the smallest boards store {limit}",
-                "use fewer, or check that your board stores them",
-            )
+def _same(value: float, kept: float) -> bool:
+    """Say whether `value` is kept; where it is not set, nothing is lost."""
+    return math.isnan(value) or abs(value - kept) <= 1e-4 + 1e-6 * abs(value)

@@ -5,7 +5,7 @@ The four vehicles that are known are registered here; `register` adds another.
 
 from faao_mav.vehicle.ardupilot.copter import ARDUCOPTER
 from faao_mav.vehicle.ardupilot.plane import ARDUPLANE
-from faao_mav.vehicle.flight_path import CopterModel, FlightModel, FlightPath, Flown, Track
+from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Flown, Track
 from faao_mav.vehicle.px4 import PX4_COPTER, PX4_PLANE
 from faao_mav.vehicle.registry import (
     families,
@@ -25,7 +25,6 @@ __all__ = [
     "PX4_COPTER",
     "PX4_PLANE",
     "AutopilotFamily",
-    "CopterModel",
     "FlightModel",
     "FlightPath",
     "Flown",
@@ -33,12 +32,8 @@ __all__ = [
     "Track",
     "Vehicle",
     "VehicleType",
-    "caveat",
-    "copter_model",
     "families",
     "family",
-    "flight_model",
-    "modelled",
     "register",
     "unregister",
     "vehicle_of",
@@ -49,5 +44,3 @@ __all__ = [
 
 for _vehicle_type in (ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE):
     register(_vehicle_type)
-
-from faao_mav.vehicle.models import caveat, copter_model, flight_model, modelled  # noqa: E402

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Protocol, TypeAlias
+from typing import ClassVar, Protocol, Self, TypeAlias
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +88,23 @@ class ParameterValues(Protocol):
     def value(self, key: str) -> float:
         """Return the value of the parameter `key` in the unit of its table."""
         ...
+
+
+class Limits:
+    """Values of some parameters of a `table`: base of dataclasses whose fields are its keys."""
+
+    __slots__ = ()
+    _keys: ClassVar[frozenset[str]] = frozenset()
+
+    def __init_subclass__(cls, table: ParameterTable | None = None) -> None:
+        if table is not None:
+            cls._keys = frozenset(table)
+
+    @classmethod
+    def from_vehicle(cls, vehicle: ParameterValues) -> Self:
+        """Return the values that `vehicle` has; raises `InputError` for one that is no use."""
+        own = {each.name for each in fields(cls) if each.init}  # type: ignore[arg-type]
+        return cls(**{key: vehicle.value(key) for key in own & cls._keys})
 
 
 def table(*parameters: Parameter) -> ParameterTable:

@@ -15,17 +15,23 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Track
+from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Track, VerticalProfile
 from faao_mav.vehicle.vehicle import Vehicle
-from faao_mav.vehicle.vertical import VerticalProfile
 
 LONGEST = 86_400.0
-"""A flight is followed for this long, s: no copter flies for a day."""
+"""The longest flight that is followed, s: no copter flies for a day."""
 
-_MOST_STEPS = 5000  # items flown, jumps included
-_REPEATS = 20  # of a jump that never ends
-_SAME_PLACE = 0.01  # m
-_SHORTEST = 1e-3  # s
+_MOST_STEPS = 5000
+"""The largest number of items that are flown, repeats by DO_JUMP included. Chosen."""
+
+_REPEATS = 20
+"""How often a DO_JUMP that never ends is followed. Chosen."""
+
+_SAME_PLACE = 0.01
+"""The distance, m, below which two places are one."""
+
+_SHORTEST = 1e-3
+"""The shortest motion, s, that is worth a sample."""
 
 
 def predict(
@@ -96,7 +102,7 @@ def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
 
 
 @dataclass
-class _Stretch:
+class _PathBuilder:
     """Waypoints to be flown in one go; the first is where the aircraft rests.
 
     `waits` are items that only make it wait at one of the points, with that point's number.
@@ -128,7 +134,7 @@ class _Walk:
     clock: float = 0.0
     speed: float = math.nan
     over: bool = False
-    stretch: _Stretch | None = None
+    stretch: _PathBuilder | None = None
     parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -236,7 +242,7 @@ class _Walk:
     def _towards(
         self, index: int, goal: Real, hold: float, *, spline: bool = False, radius: float = 0.0
     ) -> None:
-        stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
+        stretch = self.stretch = self.stretch or _PathBuilder([self.place], [index])
         if np.abs(goal - stretch.points[-1]).max() <= _SAME_PLACE:
             whole = self.vehicle.type.whole_second_holds
             stretch.delays[-1] += math.floor(hold) if whole else hold
@@ -251,7 +257,7 @@ class _Walk:
         stretch.radii.append(radius)
 
     def _delay(self, index: int, seconds: float) -> None:
-        stretch = self.stretch = self.stretch or _Stretch([self.place], [index])
+        stretch = self.stretch = self.stretch or _PathBuilder([self.place], [index])
         stretch.delays[-1] += seconds
         stretch.waits.append((index, len(stretch.points) - 1))
 

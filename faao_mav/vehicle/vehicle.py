@@ -5,10 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
-from faao_mav.vehicle.flight_path import FlightModel
+from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.registry import vehicle_type
 from faao_mav.vehicle.vehicle_type import LegLimits, VehicleType
-from faao_mav.vehicle.vertical import VerticalProfile
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan

@@ -6,9 +6,12 @@ from typing import Literal, Protocol
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.dialect import Dialect
-from faao_mav.vehicle.flight_path import FlightModel
+from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
-from faao_mav.vehicle.vertical import VerticalProfile
+
+OVERSPEED = 1.1
+"""The greatest speed that a mission may command, as a multiple of the plan's max_speed: it makes up
+for corners. Chosen; what a change costs is not measured."""
 
 
 @dataclass(frozen=True, slots=True)

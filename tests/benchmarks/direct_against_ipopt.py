@@ -13,13 +13,13 @@ import resource
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 import numpy as np
-import yaml
 from peer import GAIN, ROUNDS, Model, at_best, at_precoders
 
 from faao_mav.arrays import Real
@@ -29,10 +29,10 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.rates.slot_rate import FixedRate
-from faao_mav.optimizer.search.bound import upper_bound
-from faao_mav.optimizer.search.routes import starts
-from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.optimizer.search.bound import Bound, upper_bound
+from faao_mav.optimizer.search.starts import starts, straight_flight
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.radio.best_precoder import best_precoders
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -44,7 +44,7 @@ claims: list[tuple[str, bool, str]] = []
 
 def plan(name: str, **changes: Any) -> Plan:
     """Read a sample plan with `T`, `W`, `dt`, `modulation`, `fading` or `starts` replaced."""
-    data = yaml.safe_load((MISSIONS / f"{name}.yaml").read_text())
+    data = load_yaml((MISSIONS / f"{name}.yaml").read_text(), "test")
     data.setdefault("optimizer", {})["method"] = "direct"
     for key, value in changes.items():
         if key == "T":
@@ -58,7 +58,7 @@ def plan(name: str, **changes: Any) -> Plan:
             data["optimizer"]["starts"] = value
         else:
             data["radio"][key] = value
-    return parse_plan(yaml.safe_dump(data))
+    return parse_plan(dump_yaml(data))
 
 
 def timed(work: Callable[[], Any], times: int = 1) -> tuple[Any, float]:
@@ -112,6 +112,21 @@ def by_ipopt(problem: Problem) -> float:
     return best
 
 
+def rate_of(read: Plan) -> float:
+    """R_avg by the plan's method."""
+    return optimize(read).rates.R_avg
+
+
+def peer_rate(read: Plan) -> float:
+    """R_avg by IPOPT, the building of its model included."""
+    return by_ipopt(build_problem(read))
+
+
+def bound_of(read: Plan, reached: float) -> Bound:
+    """What no route can exceed, where a plan has `reached` so much."""
+    return upper_bound(build_problem(read), reached)
+
+
 def quality(quick: bool) -> None:
     """R_avg and whole times on every scenario."""
     print(f"{'scenario':28}{'direct':>9}{'s':>7}{'Alg. 1':>9}{'s':>7}{'IPOPT':>9}{'s':>7}")
@@ -131,7 +146,7 @@ def quality(quick: bool) -> None:
         rows.append(("10,000 slots, straight start", long, False, True))
     above_paper, above_peer, speedup = np.inf, np.inf, 0.0
     for name, read, with_paper, with_peer in rows:
-        solution, seconds = timed(lambda read=read: optimize(read))
+        solution, seconds = timed(partial(optimize, read))
         ours = solution.rates.R_avg
         line = f"{name:28}{ours:9.4f}{seconds:7.2f}"
         paper = None
@@ -139,7 +154,7 @@ def quality(quick: bool) -> None:
             options = replace(read.optimizer, method="algorithm1")
             paper_plan = replace(read, optimizer=options)
             try:
-                paper, took = timed(lambda p=paper_plan: optimize(p).rates.R_avg)
+                paper, took = timed(partial(rate_of, paper_plan))
             except PlanError:
                 paper = None
         if paper is None:
@@ -150,7 +165,7 @@ def quality(quick: bool) -> None:
             if name == "paper_active T=50 W=20":
                 speedup = took / seconds
         if with_peer:
-            peer, took = timed(lambda read=read: by_ipopt(build_problem(read)))
+            peer, took = timed(partial(peer_rate, read))
             line += f"{peer:9.4f}{took:7.2f}"
             above_peer = min(above_peer, ours - peer)
         print(line, flush=True)
@@ -216,7 +231,7 @@ def growth() -> None:
     print(f"\n{'slots':>8}{'s':>8}{'us/slot':>9}")
     for slots in (250, 1000, 2500, 5000, 10_000):
         read = plan("paper_active", dt=50 / slots, starts=["straight"])
-        _, seconds = timed(lambda read=read: optimize(read))
+        _, seconds = timed(partial(optimize, read))
         print(f"{slots:8}{seconds:8.2f}{1e6 * seconds / slots:9.0f}", flush=True)
 
 
@@ -227,7 +242,7 @@ def bound(quick: bool) -> None:
     for T in (50,) if quick else (50, 150):
         read = plan("paper_active", T=T)
         reached = optimize(read).rates.R_avg
-        found, seconds = timed(lambda r=read, k=reached: upper_bound(build_problem(r), k))
+        found, seconds = timed(partial(bound_of, read, reached))
         gaps.append(100 * (1 - reached / found.value))
         row = f"paper_active T={T} W=20"
         print(f"{row:28}{reached:9.4f}{found.value:9.4f}{gaps[-1]:7.2f}{seconds:7.1f}", flush=True)

@@ -13,10 +13,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.schedule.conversion import convert
 from faao_mav.schedule.prediction import predict_delivery
 
@@ -75,7 +74,7 @@ PLANS: dict[str, dict[str, Any]] = {
 
 def plan_of(changes: dict[str, Any], autopilot: str, parameters: str) -> Plan:
     """Return the sample plan with the dotted keys of `changes` replaced."""
-    data = yaml.safe_load(SAMPLE.read_text())
+    data = load_yaml(SAMPLE.read_text(), "test")
     changes = changes | {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
     for path, value in changes.items():
         *parents, last = path.split(".")
@@ -83,7 +82,7 @@ def plan_of(changes: dict[str, Any], autopilot: str, parameters: str) -> Plan:
         for key in parents:
             section = section[key]
         section[last] = value
-    return parse_plan(yaml.safe_dump(data))
+    return parse_plan(dump_yaml(data))
 
 
 def main() -> None:

@@ -61,7 +61,7 @@ def at_best(link: Link, w: Real) -> ClassRate:
     """The rate at the best precoders in closed form: BPSK, two antennas."""
     assert not link.follows_position or link.nlos is None
     strongest = np.linalg.svd(link.small_scale(w), compute_uv=False)[:, 0]
-    x = link.power * strongest**2 / (2 * link.noise)
+    x = np.asarray(link.power * strongest**2 / (2 * link.noise), dtype=np.float64)
     return ClassRate(link, 2.0, 2.0, 1.0, np.ones(1), x[None, :])
 
 
@@ -118,7 +118,7 @@ class Model:
         free = np.full(2 * (n - 1) + 1, np.inf)
         self.lower = np.concatenate([lower_w.ravel(), lower_v.ravel(), -free])
         self.upper = np.concatenate([upper_w.ravel(), upper_v.ravel(), free])
-        options = {
+        options: dict[str, Any] = {
             "print_time": False,
             "ipopt": {
                 "print_level": 0,
@@ -130,7 +130,12 @@ class Model:
             },
         }
         x = ca.vertcat(ca.vec(w), ca.vec(v), ca.vec(a), t)
-        program = {"x": x, "p": ca.vertcat(*parameters), "f": -t, "g": ca.vertcat(*g)}
+        program: dict[str, Any] = {
+            "x": x,
+            "p": ca.vertcat(*parameters),
+            "f": -t,
+            "g": ca.vertcat(*g),
+        }
         self.solver: Any = ca.nlpsol("peer", "ipopt", program, options)
 
     def solve(self, rates: list[ClassRate], start: Trajectory) -> Trajectory:

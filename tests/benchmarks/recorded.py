@@ -54,7 +54,7 @@ class Row:
 
 def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
     """Read a mission and its track; `home_row`: whether the current item counts home as 0."""
-    mission = read_wpl((folder / f"{name}.waypoints").read_text(), name)
+    mission = read_wpl((folder / f"{name}.waypoints").read_text(), name).mission
     assert mission.home is not None
     frame = LocalFrame(mission.home.latitude, mission.home.longitude)
     items, points, speeds, holds, splines = [], [], [], [], []

@@ -13,9 +13,8 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.validate import Limits, validate
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.track import Track
+from faao_mav.validate import Finding, Limits, validate
+from faao_mav.vehicle import Track, Vehicle
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 FRAME = LocalFrame(HOME.latitude, HOME.longitude)
@@ -82,7 +81,8 @@ def main() -> None:
     for autopilot in ("ardupilot", "px4"):
         vehicle = Vehicle(autopilot)
         for name, track in (("without a flight", None), ("with it", flight)):
-            best, findings = math.inf, ()
+            best = math.inf
+            findings: tuple[Finding, ...] = ()
             for _ in range(REPEATS):
                 started = time.perf_counter()
                 findings = validate(

@@ -1,6 +1,7 @@
 """Items and the numbers of commands and frames."""
 
 import math
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -10,12 +11,12 @@ from faao_mav.mission import Command, Frame, Home, MissionItem
 
 
 @pytest.mark.parametrize("command", Command)
-def test_commands_have_mavlinks_numbers(command):
+def test_commands_have_mavlinks_numbers(command: Command) -> None:
     assert mavlink.enums["MAV_CMD"][int(command)].name == f"MAV_CMD_{command.name}"
 
 
 @pytest.mark.parametrize("frame", Frame)
-def test_frames_have_mavlinks_numbers(frame):
+def test_frames_have_mavlinks_numbers(frame: Frame) -> None:
     assert mavlink.enums["MAV_FRAME"][int(frame)].name == f"MAV_FRAME_{frame.name}"
 
 
@@ -30,16 +31,16 @@ def test_frames_have_mavlinks_numbers(frame):
         ({"z": -math.inf}, "expected finite"),
     ],
 )
-def test_an_impossible_item_is_refused(fields, message):
+def test_an_impossible_item_is_refused(fields: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         MissionItem(**({"command": 16, "frame": 3} | fields))
 
 
-def test_yaw_may_be_not_set():
+def test_yaw_may_be_not_set() -> None:
     assert math.isnan(MissionItem(16, 3, (0.0, 0.0, 0.0, math.nan)).params[3])
 
 
 @pytest.mark.parametrize("home", [(91.0, 0.0, 0.0), (0.0, 180.1, 0.0), (0.0, 0.0, math.nan)])
-def test_an_impossible_home_is_refused(home):
+def test_an_impossible_home_is_refused(home: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match="home"):
         Home(*home)

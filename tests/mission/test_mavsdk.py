@@ -3,8 +3,9 @@
 import math
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mavsdk.component_type import ComponentType
@@ -17,6 +18,7 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import read_mission, write_qgc_plan, write_wpl
 from faao_mav.vehicle import Vehicle
+from faao_mav.vehicle.files import plan_target
 
 DATA = Path(__file__).parent.parent / "data" / "missions"
 
@@ -58,7 +60,7 @@ def client(request: pytest.FixtureRequest) -> Iterator[tuple[str, MissionRaw]]:
         vehicle.close()
 
 
-def test_mavsdk_imports_the_mission(client):
+def test_mavsdk_imports_the_mission(client: tuple[str, MissionRaw]) -> None:
     autopilot, raw = client
     mission = mission_of(*dash_hover_dash(), plan_with(autopilot=autopilot))
     imported = raw.import_mission_planner_mission_from_string(write_wpl(mission)).mission_items
@@ -67,13 +69,14 @@ def test_mavsdk_imports_the_mission(client):
     assert len(imported) - len(rows) == (1 if autopilot == "ardupilot" else 0)
 
     home = rows[0]
+    assert mission.home is not None
     assert (home.command, home.frame) == (16, 0)
     assert (home.x, home.y) == (round(mission.home.latitude * 1e7), 1491652370)
     assert home.z == mission.home.altitude
     assert_same(rows[1:], mission.items)
 
 
-def assert_same(rows, items):
+def assert_same(rows: Sequence[Any], items: Sequence[MissionItem]) -> None:
     for row, item in zip(rows, items, strict=True):
         assert (row.command, row.frame) == (item.command, item.frame)
         params = (row.param1, row.param2, row.param3, row.param4)
@@ -85,7 +88,7 @@ def assert_same(rows, items):
         assert row.autocontinue == item.autocontinue
 
 
-def test_mavsdk_imports_the_plan(client):
+def test_mavsdk_imports_the_plan(client: tuple[str, MissionRaw]) -> None:
     autopilot, raw = client
     planned = mission_of(*dash_hover_dash(), plan_with(autopilot=autopilot))
     pause = MissionItem(16, 3, (2.5, 0.0, 0.0, math.nan), 47.0, 8.0, 30.0, autocontinue=False)
@@ -99,7 +102,7 @@ def test_mavsdk_imports_the_plan(client):
         ),
         (RallyPoint(47.25, 8.25, 40.0), RallyPoint(47.125, 8.125, 30.0)),
     )
-    text = write_qgc_plan(mission, Vehicle(autopilot))
+    text = write_qgc_plan(mission, plan_target(Vehicle(autopilot)))
     imported = raw.import_qgroundcontrol_mission_from_string(text)
 
     rows = imported.mission_items
@@ -127,7 +130,9 @@ def test_mavsdk_imports_the_plan(client):
 
 
 @pytest.mark.parametrize("name", ["px4.plan", "survey.plan", "fence_and_rally.plan"])
-def test_plans_of_the_corpus_are_read_as_mavsdk_reads_them(client, name):
+def test_plans_of_the_corpus_are_read_as_mavsdk_reads_them(
+    client: tuple[str, MissionRaw], name: str
+) -> None:
     autopilot, raw = client
     mission = read_mission(DATA / name)
     rows = raw.import_qgroundcontrol_mission_from_string((DATA / name).read_text()).mission_items

@@ -8,7 +8,8 @@ import pytest
 from conftest import MISSIONS, MakePlan
 
 from faao_mav.errors import InfeasibleError, PlanError, SolverError
-from faao_mav.optimizer.algorithm1 import algorithm1 as module
+from faao_mav.optimizer import algorithm1 as module
+from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Progress
 from faao_mav.plan import read_plan
@@ -136,13 +137,12 @@ def test_a_solver_failure_keeps_the_best_so_far(
     paper_plan: MakePlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = []
-    original = module.optimize_precoders
 
     def failing(*arguments: Any, **options: Any) -> Any:
         calls.append(1)
         if len(calls) > 2:
             raise SolverError("no progress")
-        return original(*arguments, **options)
+        return optimize_precoders(*arguments, **options)
 
     monkeypatch.setattr(module, "optimize_precoders", failing)
     solution = optimize(paper_plan())

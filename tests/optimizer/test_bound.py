@@ -19,7 +19,7 @@ from faao_mav.optimizer.search.bound import (
     reachable_distances,
     upper_bound,
 )
-from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.plan import read_plan
 from faao_mav.radio.best_precoder import best_precoders
 

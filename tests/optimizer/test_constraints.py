@@ -24,7 +24,7 @@ from faao_mav.optimizer.interior.half_planes import HalfPlanes, Slacks
 from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.scaled import FlightVariables, flight_variables
-from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.optimizer.search.starts import straight_flight
 
 STAGE = links(bowl, 1e-5, 3e-5)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_forms import bpsk_two_antennas_rate
 from conftest import MISSIONS, MakePlan
 
 from faao_mav.errors import PlanError
@@ -14,7 +15,6 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Progress, load_solution, save_solution
 from faao_mav.plan import Plan, read_plan
 from faao_mav.radio.best_precoder import best_precoders
-from faao_mav.radio.precoder import bpsk_two_antennas_rate
 
 KNOWN = {"radio.fading": "realization"}
 

@@ -24,7 +24,7 @@ from faao_mav.optimizer.interior.newton import Newton
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.scaled import flight_variables, kkt_residual
-from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.optimizer.search.starts import straight_flight
 
 STATIONS = np.array([[0.0, 0.0], [300.0, 300.0]])
 HEIGHT = 100.0

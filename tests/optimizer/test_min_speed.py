@@ -15,8 +15,7 @@ from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.search.routes import starts
-from faao_mav.optimizer.search.start import straight_flight
+from faao_mav.optimizer.search.starts import starts, straight_flight
 from faao_mav.plan import parse_plan
 
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]

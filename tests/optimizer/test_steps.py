@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_forms import bpsk_two_antennas_rate
 from conftest import MakePlan
 
 from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
@@ -12,8 +13,7 @@ from faao_mav.optimizer.algorithm1.trajectory_step import (
     xi,
 )
 from faao_mav.optimizer.problem import Problem, build_problem
-from faao_mav.optimizer.search.start import straight_flight
-from faao_mav.radio.precoder import bpsk_two_antennas_rate
+from faao_mav.optimizer.search.starts import straight_flight
 
 
 def sums_of(problem: Problem) -> tuple[SumOfExponentials, ...]:
@@ -78,7 +78,7 @@ def test_27_reaches_a_stationary_point(paper_plan: MakePlan) -> None:
     for _ in range(200):
         other = straight_flight(kin)
         bump = rng.standard_normal((kin.slots, 2)) * rng.uniform(0, 2)
-        candidate = kin.integrate(kin.start_velocity, flight.a + 0.02 * (bump + other.a - flight.a))
+        candidate = kin.integrate(flight.v[0], flight.a + 0.02 * (bump + other.a - flight.a))
         if max(kin.residuals(candidate).values()) < 1e-9:
             gains.append(best - xi(sums, candidate.w))
     assert len(gains) > 20
@@ -95,7 +95,7 @@ def test_35_reaches_the_closed_form_for_bpsk_and_two_antennas(
         H_r = link.small_scale(w)
         H = link.channel(w, H_r)
         start = np.tile(np.sqrt(link.power / 2) * np.eye(2, dtype=complex), (len(w), 1, 1))
-        seen = []
+        seen: list[float] = []
         P = optimize_precoders(link, H, start, observe=seen.append)
         assert (np.diff(seen) <= 0).all()
         assert (np.sum(np.abs(P) ** 2, axis=(1, 2)) <= link.power * (1 + 1e-9)).all()

@@ -1,24 +1,100 @@
-"""Propositions 1 and 2, and (25), (26), (33), (34)."""
+"""Propositions 1 and 2 as (27) and (35) use them; the gradients (25), (26), (33), (34)."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
+import cvxpy as cp
 import numpy as np
 import pytest
-from hypothesis import given
+from conftest import MakePlan
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.optimizer.algorithm1.surrogate import (
-    precoder_bound_gradient,
-    precoder_exponents,
-    precoder_exponents_bound,
-    precoder_sum_gradient,
-    trajectory_bound_gradient,
-    trajectory_exponents,
-    trajectory_exponents_bound,
-    trajectory_sum_gradient,
+from faao_mav.optimizer.algorithm1.precoder_step import precoder_exponents, precoder_tangent
+from faao_mav.optimizer.algorithm1.successive import CAP, shrink
+from faao_mav.optimizer.algorithm1.trajectory_step import (
+    SumOfExponentials,
+    convex_bound,
+    merge_equal,
 )
+from faao_mav.optimizer.kinematics import LENGTH
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.radio.constellation import difference_classes
+
+
+def squared_distance(w: Real, station: Real) -> Real:
+    return np.asarray(np.sum((w - station) ** 2, axis=-1))
+
+
+def trajectory_exponents(A: Real, w: Real, station: Real, altitude: float) -> Real:
+    """D = rho_0 A / (||w - p||^2 + H^2), (n, k)."""
+    return np.asarray(A / (squared_distance(w, station) + altitude**2)[:, None])
+
+
+def trajectory_exponents_bound(A: Real, w: Real, w_i: Real, station: Real, altitude: float) -> Real:
+    """D^lb of Proposition 1 about the trajectory w_i, (n, k)."""
+    y, y_i = squared_distance(w, station), squared_distance(w_i, station)
+    d2 = y_i + altitude**2
+    return np.asarray(A / d2[:, None] * (1 - (y - y_i) / d2)[:, None])
+
+
+def trajectory_sum_gradient(
+    A: Real, multiplicity: Real, w: Real, station: Real, altitude: float
+) -> Real:
+    """The gradient of F = sum of multiplicity exp(-D) in w, (25), (n, 2).
+
+    (25) prints the derivative along ||w - p|| and with a minus in front: but F grows with the
+    distance. Here the vector w - p takes the place of its norm, and the sign is the true one.
+    """
+    d2 = squared_distance(w, station) + altitude**2
+    D = trajectory_exponents(A, w, station, altitude)
+    slope = (multiplicity * A * np.exp(-D)).sum(axis=1) * 2 / d2**2
+    return np.asarray(slope[:, None] * (w - station))
+
+
+def trajectory_bound_gradient(
+    A: Real, multiplicity: Real, w: Real, w_i: Real, station: Real, altitude: float
+) -> Real:
+    """The gradient of F^lb = sum of multiplicity exp(-D^lb) in w, (26), (n, 2)."""
+    d2 = squared_distance(w_i, station) + altitude**2
+    D = trajectory_exponents_bound(A, w, w_i, station, altitude)
+    slope = (multiplicity * A * np.exp(-D)).sum(axis=1) * 2 / d2**2
+    return np.asarray(slope[:, None] * (w - station))
+
+
+def precoder_exponents_bound(
+    M: Complex, P: Complex, P_i: Complex, u: Complex, noise: float, power: float = 2.0
+) -> Real:
+    """C^ap / (4 sigma^2) of Proposition 2 about P_i, (n, k), from the tangent that (35) uses."""
+    slope, c = precoder_tangent(M, P_i, u, power, noise)
+    flat = P.reshape(len(P), -1) / np.sqrt(power)
+    p = np.concatenate([flat.real, flat.imag], axis=1)
+    return np.asarray(np.einsum("nkp,np->nk", slope, p) - c)
+
+
+def precoder_sum_gradient(
+    M: Complex, multiplicity: Real, P: Complex, u: Complex, noise: float
+) -> Complex:
+    """The derivative (33) of E = sum of multiplicity exp(-C / 4 sigma^2), (n, N, N).
+
+    The change of E for a small change dP is the real part of sum(conj(derivative) dP).
+    """
+    weight = multiplicity * np.exp(-precoder_exponents(M, P, u, noise))
+    return precoder_slope(M, P, weight, u, noise)
+
+
+def precoder_bound_gradient(
+    M: Complex, multiplicity: Real, P: Complex, P_i: Complex, u: Complex, noise: float
+) -> Complex:
+    """The derivative (34) of E^ap = sum of multiplicity exp(-C^ap / 4 sigma^2), (n, N, N)."""
+    weight = multiplicity * np.exp(-precoder_exponents_bound(M, P, P_i, u, noise))
+    return precoder_slope(M, P_i, weight, u, noise)
+
+
+def precoder_slope(M: Complex, P: Complex, weight: Real, u: Complex, noise: float) -> Complex:
+    scatter = np.einsum("nk,ka,kb->nab", weight, u, u.conj(), optimize=True)
+    return np.asarray(-2 * (M @ P @ scatter) / (4 * noise))
 
 
 class Flown(NamedTuple):
@@ -60,7 +136,7 @@ def sent(seed: int, step: float) -> Sent:
     rng = np.random.default_rng(seed)
 
     def matrix() -> Complex:
-        return rng.standard_normal((3, 2, 2)) + 1j * rng.standard_normal((3, 2, 2))
+        return np.asarray(rng.standard_normal((3, 2, 2)) + 1j * rng.standard_normal((3, 2, 2)))
 
     H, P_i = matrix(), matrix()
     classes = difference_classes("qpsk", 2)
@@ -125,11 +201,11 @@ def test_25_and_26_are_derivatives(seed: int) -> None:
 
     def F(w: Real) -> Real:
         D = trajectory_exponents(f.A, w, f.station, f.altitude)
-        return np.exp(-D) @ f.multiplicity
+        return np.asarray(np.exp(-D) @ f.multiplicity)
 
     def F_lb(w: Real) -> Real:
         D = trajectory_exponents_bound(f.A, w, f.w_i, f.station, f.altitude)
-        return np.exp(-D) @ f.multiplicity
+        return np.asarray(np.exp(-D) @ f.multiplicity)
 
     h = 1e-3
     for axis in range(2):
@@ -147,11 +223,11 @@ def test_33_and_34_are_derivatives(seed: int) -> None:
     s = sent(seed, 0.3)
 
     def E(P: Complex) -> Real:
-        return np.exp(-precoder_exponents(s.M, P, s.u, s.noise)) @ s.multiplicity
+        return np.asarray(np.exp(-precoder_exponents(s.M, P, s.u, s.noise)) @ s.multiplicity)
 
     def E_ap(P: Complex) -> Real:
         C = precoder_exponents_bound(s.M, P, s.P_i, s.u, s.noise)
-        return np.exp(-C) @ s.multiplicity
+        return np.asarray(np.exp(-C) @ s.multiplicity)
 
     rng = np.random.default_rng(seed)
     direction = rng.standard_normal(s.P.shape) + 1j * rng.standard_normal(s.P.shape)
@@ -163,3 +239,44 @@ def test_33_and_34_are_derivatives(seed: int) -> None:
         expected = (function(s.P + h * direction) - function(s.P - h * direction)) / (2 * h)
         found = np.sum(np.conj(derivative) * direction, axis=(1, 2)).real
         assert found == pytest.approx(expected, rel=1e-4, abs=1e-6)
+
+
+@settings(deadline=None, max_examples=30)
+@given(SEEDS)
+def test_27_is_solved_with_the_bound_of_proposition_1(small_plan: MakePlan, seed: int) -> None:
+    f = flown(seed, 30.0)
+    link = build_problem(small_plan()).bs_uav
+    link = replace(link, station=f.station, altitude=f.altitude)
+    k = len(link.classes.multiplicity)
+    A = f.A[:, :1] * np.linspace(0.1, 1.0, k)
+    c = trajectory_exponents(A, f.w_i, f.station, f.altitude)
+    A *= np.minimum(1.0, 0.9 * CAP / c.max(axis=1))[:, None]
+    sums = SumOfExponentials(link, A, 0.0)
+    total, (quadratic,) = convex_bound(sums, f.w_i, cp.Constant(f.w / LENGTH), 2.0)
+    (q,) = total.variables()
+    q.value = quadratic.args[0].value
+    D_lb = trajectory_exponents_bound(A, f.w, f.w_i, f.station, f.altitude)
+    expected = (link.classes.multiplicity * np.exp(-D_lb)).sum()
+    assert 2.0 * total.value == pytest.approx(expected, rel=1e-6)
+    assert 2.0 * total.value >= sums.value(f.w) * (1 - 1e-9)
+
+
+ROWS = st.lists(st.sampled_from([0.0, 1.0, 1.5, 40.0]), min_size=4, max_size=4)
+
+
+@given(st.lists(ROWS, min_size=1))
+def test_merged_terms_have_the_same_sum(rows: list[list[float]]) -> None:
+    c, multiplicity = np.array(rows), np.array([1.0, 2.0, 4.0, 8.0])
+    slot, merged, weight = merge_equal(c, multiplicity)
+    total = np.bincount(slot, weights=weight * np.exp(-merged), minlength=len(c))
+    assert total == pytest.approx(np.exp(-c) @ multiplicity)
+    assert len(merged) == sum(len(set(row)) for row in rows)
+
+
+@given(st.floats(0, 1e6), st.floats(-3, 5))
+def test_a_shrunk_term_stays_an_upper_bound(c: float, relative: float) -> None:
+    """For an exponent worth c at the point of expansion and `relative` c elsewhere."""
+    factor = float(shrink(np.array(c)))
+    true = min(1.0, np.exp(-max(0.0, relative * c)))
+    assert np.exp(-relative * c * factor) >= true * (1 - 1e-12)
+    assert np.exp(-c * factor) - np.exp(-c) <= np.exp(-CAP)

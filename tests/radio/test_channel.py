@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.radio.channel import (
-    displacement,
     line_of_sight_all_ones,
     line_of_sight_ula,
     path_gain,
@@ -14,6 +14,11 @@ from faao_mav.radio.channel import (
 )
 
 ANGLES = st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1.0)
+
+
+def displacement(w: Real, p: Real, altitude: float) -> Real:
+    """The vector from a station at p to the UAV at w, (3,) m east, north, up."""
+    return np.array([*(w - p), altitude])
 
 
 def test_path_gain_is_the_inverse_square() -> None:

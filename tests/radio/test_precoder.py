@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
+from closed_forms import bpsk_two_antennas_rate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faao_mav.arrays import Complex
+from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import difference_classes
 from faao_mav.radio.precoder import (
     SCHEMES,
     bpsk_two_antennas,
-    bpsk_two_antennas_rate,
     mmse,
     mrt,
     waterfilling,
@@ -22,14 +22,14 @@ SHAPES = [(1, 1), (2, 2), (3, 3), (1, 2), (2, 3), (2, 1), (4, 2), (3, 2)]
 
 def channel(seed: int, *shape: int) -> Complex:
     parts = np.random.default_rng(seed).standard_normal((2, *shape))
-    return (parts[0] + 1j * parts[1]) * np.sqrt(0.5)
+    return np.asarray((parts[0] + 1j * parts[1]) * np.sqrt(0.5))
 
 
-def power_of(P: Complex) -> np.ndarray:
-    return np.sum(np.abs(P) ** 2, axis=(-2, -1))
+def power_of(P: Complex) -> Real:
+    return np.asarray(np.sum(np.abs(P) ** 2, axis=(-2, -1)))
 
 
-def parallel(A: Complex, B: Complex) -> None:
+def parallel(A: RealOrComplex, B: RealOrComplex) -> None:
     """A and B are equal up to a positive factor."""
     np.testing.assert_allclose(A / np.linalg.norm(A), B / np.linalg.norm(B), atol=1e-9)
 
@@ -130,7 +130,9 @@ def test_closed_form_is_never_beaten(seed: int, receive: int, exponent: float) -
 @pytest.mark.parametrize("noise", [1e-15, 1e-9, 1e3, 1e12, 1e15])
 def test_closed_form_rate_at_the_extremes(noise: float) -> None:
     H = np.diag([1.0, 2.0])
-    rate = bpsk_two_antennas_rate(H, 1.0, noise)
+    classes = difference_classes("bpsk", 2)
+    rate = cutoff_rate(H, bpsk_two_antennas(H, 1.0), classes, noise)
+    assert rate == pytest.approx(bpsk_two_antennas_rate(H, 1.0, noise), rel=1e-12)
     if noise < 1.0:
         assert rate == pytest.approx(2.0, abs=1e-15)
     else:

@@ -23,7 +23,7 @@ from faao_mav.schedule import Conversion
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.initial_route import Splines, initial_route
-from faao_mav.vehicle import copter_model, vehicle_of
+from faao_mav.vehicle import vehicle_of
 from faao_mav.vehicle.predict import predict
 
 STEP = 0.2
@@ -208,7 +208,7 @@ def test_a_flight_over_splines_keeps_the_plan_and_never_delays_after_one() -> No
     t, w = eight()
     plan = plan_with()
     vehicle = vehicle_of(plan)
-    scheduler = CopterScheduler(t, w, vehicle, copter_model(vehicle), 0.1, 8.0, 2.0)
+    scheduler = CopterScheduler(t, w, vehicle, vehicle.flight_model(), 0.1, 8.0, 2.0)
     first = scheduler.first(initial_route(t, w, plan, splines=Splines(15.0, 12.0)))
     schedule = scheduler.refined(first)
     route = schedule.route

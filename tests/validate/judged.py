@@ -11,8 +11,7 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.validate import Finding, Limits, LinkCheck, validate
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track, Vehicle
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 FRAME = LocalFrame(HOME.latitude, HOME.longitude)
@@ -47,6 +46,11 @@ def at(
     return raw(latitude, longitude, up, *params, command=command, frame=frame, go_on=autocontinue)
 
 
+def four(*params: float) -> tuple[float, float, float, float]:
+    one, two, three, last = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return one, two, three, last
+
+
 def raw(
     x: float,
     y: float,
@@ -56,13 +60,12 @@ def raw(
     frame: int = Frame.GLOBAL_RELATIVE_ALT,
     go_on: bool = True,
 ) -> MissionItem:
-    four = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return MissionItem(command, frame, four, x, y, z, go_on)
+    return MissionItem(command, frame, four(*params), x, y, z, go_on)
 
 
 def do(command: int, *params: float, frame: int = Frame.MISSION) -> MissionItem:
     """An item without a place."""
-    return MissionItem(command, frame, (*params, 0.0, 0.0, 0.0, 0.0)[:4])
+    return MissionItem(command, frame, four(*params))
 
 
 def speed(value: float, kind: float = 1.0) -> MissionItem:

@@ -26,42 +26,40 @@ from judged import (
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
-from faao_mav.validate.case import HOME as HOME_INDEX
-from faao_mav.validate.case import Case
+from faao_mav.mission.item import MissionItem
+from faao_mav.validate.context import HOME as HOME_INDEX
+from faao_mav.validate.context import ValidationContext
+from faao_mav.vehicle import Vehicle
 
 
-def ups(case: Case) -> list[float]:
+def ups(case: ValidationContext) -> list[float]:
     return [place.up for place in case.places]
 
 
 def test_heights_count_from_home_in_every_frame() -> None:
     items = (at(0, 9, 30), at(0, 9, 614, frame=0), at(0, 9, 614, frame=5), at(0, 9, 30, frame=6))
-    assert ups(Case(mission(*items), COPTER)) == [30, 30, 30, 30]
-    without = Case(mission(*items, home=None), COPTER)
+    assert ups(ValidationContext(mission(*items), COPTER)) == [30, 30, 30, 30]
+    without = ValidationContext(mission(*items, home=None), COPTER)
     assert [math.isnan(up) for up in ups(without)] == [False, True, True, False]
-    assert math.isnan(ups(Case(mission(at(0, 9, 30, frame=10)), COPTER))[0])
+    assert math.isnan(ups(ValidationContext(mission(at(0, 9, 30, frame=10)), COPTER))[0])
 
 
 def test_places_are_where_they_were_put() -> None:
-    case = Case(mission(at(120, -340, 30), at(-5, 6, 7)), COPTER)
+    case = ValidationContext(mission(at(120, -340, 30), at(-5, 6, 7)), COPTER)
     ground = np.array([(place.east, place.north) for place in case.places])
     assert ground == pytest.approx(np.array([(120, -340), (-5, 6)]), abs=1e-6)
 
 
 def test_zero_zero_is_here_for_ardupilot_and_africa_for_px4() -> None:
     items = (at(10, 20, 30), raw(0, 0, 15))
-    here = Case(mission(*items), COPTER).places[1]
-    assert (here.east, here.north, here.up) == (
-        pytest.approx(10, abs=1e-6),
-        pytest.approx(20, abs=1e-6),
-        15,
-    )
-    assert len(Case(mission(*items), PX4).places) == 1
+    here = ValidationContext(mission(*items), COPTER).places[1]
+    assert [here.east, here.north, here.up] == pytest.approx([10, 20, 15], abs=1e-6)
+    assert len(ValidationContext(mission(*items), PX4).places) == 1
 
 
 def test_legs_follow_items_jumps_and_the_way_home() -> None:
     items = (TAKEOFF, at(0, 100, 30), at(100, 100, 30), do(Command.DO_JUMP, 2, 1), RTL)
-    legs = Case(mission(*items), COPTER).legs
+    legs = ValidationContext(mission(*items), COPTER).legs
     assert [(leg.index, leg.start.index, leg.end.index, leg.jump) for leg in legs] == [
         (0, HOME_INDEX, 0, False),
         (1, 0, 1, False),
@@ -71,7 +69,7 @@ def test_legs_follow_items_jumps_and_the_way_home() -> None:
     ]
     assert [round(leg.length) for leg in legs] == [0, 100, 100, 100, 141]
     assert legs[0].rise == 30
-    to_a_rally_point = Case(flown(at(0, 9, 9), rally=(rally(0, 50),)), COPTER).legs
+    to_a_rally_point = ValidationContext(flown(at(0, 9, 9), rally=(rally(0, 50),)), COPTER).legs
     assert [leg.index for leg in to_a_rally_point] == [0, 1]
 
 
@@ -92,9 +90,9 @@ def test_legs_follow_items_jumps_and_the_way_home() -> None:
     ],
 )
 def test_speeds_hold_from_change_to_change(
-    vehicle: object, changes: list[object], expected: list[float]
+    vehicle: Vehicle, changes: list[MissionItem], expected: list[float]
 ) -> None:
-    case = Case(mission(*changes, at(0, 9, 9)), vehicle)
+    case = ValidationContext(mission(*changes, at(0, 9, 9)), vehicle)
     assert case.speeds == tuple(expected)
 
 
@@ -102,15 +100,16 @@ def test_a_track_in_another_frame_is_the_same_track() -> None:
     points = ((0, 0, 0), (0, 0, 30), (0, 100, 30))
     elsewhere = LocalFrame(*latlon(300, -200))
     moved = [(*elsewhere.to_local(*latlon(e, n)), u) for e, n, u in points]
-    case = Case(flown(), COPTER, track(points, [0, 1], 5))
-    other = Case(flown(), COPTER, track(moved, [0, 1], 5, frame=elsewhere))
-    assert case.track_positions is case.track.position
+    here = track(points, [0, 1], 5)
+    case = ValidationContext(flown(), COPTER, here)
+    other = ValidationContext(flown(), COPTER, track(moved, [0, 1], 5, frame=elsewhere))
+    assert case.track_positions is here.position
     assert other.track_positions == pytest.approx(case.track_positions, abs=1e-3)
 
 
 def test_without_home_the_first_place_is_the_origin() -> None:
-    case = Case(mission(do(93, 1), at(5, 5, 9), home=None), COPTER)
+    case = ValidationContext(mission(do(93, 1), at(5, 5, 9), home=None), COPTER)
     assert case.home is None
     assert case.frame == LocalFrame(*latlon(5, 5))
-    assert Case(mission(do(93, 1), home=None), COPTER).frame is None
-    assert Case(mission(home=HOME), COPTER).frame == FRAME
+    assert ValidationContext(mission(do(93, 1), home=None), COPTER).frame is None
+    assert ValidationContext(mission(home=HOME), COPTER).frame == FRAME

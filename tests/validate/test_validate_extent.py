@@ -4,7 +4,7 @@ import pytest
 from judged import COPTER, LAND, PX4, Given, at, check, flown, having, track
 
 from faao_mav.validate import Limits
-from faao_mav.vehicle.track import Track
+from faao_mav.vehicle import Track
 
 
 def flight(*points: tuple[float, float, float]) -> Track:

@@ -8,6 +8,7 @@ import pytest
 from judged import VEHICLES, Given, at, flown, having, mission, raw, speed
 
 from faao_mav.validate import RULES, Finding, Level, validate
+from faao_mav.vehicle import Vehicle
 
 MODULES = (
     *("ardupilot", "extent", "fences", "flyability", "items", "link", "px4", "storage", "upload"),
@@ -40,7 +41,7 @@ def test_worst_first_then_by_item() -> None:
     levels = [order.index(finding.level) for finding in found]
     assert levels == sorted(levels)
     assert len(set(levels)) == 3
-    errors = [finding.item for finding in found if finding.level is Level.ERROR]
+    errors = [finding.item or 0 for finding in found if finding.level is Level.ERROR]
     assert errors == sorted(errors)
 
 
@@ -56,7 +57,7 @@ def test_parameters_that_are_no_numbers_count_as_not_given() -> None:
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
-def test_a_finding_says_what_to_do(vehicle: object) -> None:
+def test_a_finding_says_what_to_do(vehicle: Vehicle) -> None:
     given = flown(speed(20), raw(0, 0, 30), at(0, 9, 0, 2.5, 3, 3, 3), at(0, 9, 9, frame=1))
     found: tuple[Finding, ...] = validate(given, vehicle)
     assert found

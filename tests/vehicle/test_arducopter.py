@@ -27,7 +27,7 @@ models = st.sampled_from([ArduCopter(), QUICK, ArduCopter(acceleration=1)])
     ],
     ids=["defaults", "quick"],
 )
-def test_measured_mean_speeds_by_spacing(model, speeds):
+def test_measured_mean_speeds_by_spacing(model: ArduCopter, speeds: dict[int, float]) -> None:
     for spacing, speed in speeds.items():
         legs = max(12, 240 // spacing)
         arrivals = model.fly(line(spacing, legs)).arrivals
@@ -36,14 +36,14 @@ def test_measured_mean_speeds_by_spacing(model, speeds):
         assert mean == pytest.approx(speed, abs=0.1), spacing
 
 
-def test_splines_do_not_crawl():
+def test_splines_do_not_crawl() -> None:
     path = line(5, 60)
     arrivals = ArduCopter().fly(replace(path, splines=np.arange(61) > 0)).arrivals
     assert 100 / (arrivals[40] - arrivals[20]) > 7.3
 
 
 @pytest.mark.parametrize(("degrees", "top"), [(30, 10.3), (45, 15.2)])
-def test_measured_top_speed_by_lean_angle(degrees, top):
+def test_measured_top_speed_by_lean_angle(degrees: float, top: float) -> None:
     model = ArduCopter(lean_angle=math.radians(degrees))
     flown = model.fly(line(1500, 1, 20.0))
     assert np.hypot(*flown.velocity[:, :2].T).max() == pytest.approx(top, rel=0.05)
@@ -83,7 +83,7 @@ def test_faster_is_never_much_later(path: FlightPath) -> None:
     assert fast < slow + 1.0
 
 
-def test_a_longer_straight_leg_takes_its_length_over_the_speed_longer():
+def test_a_longer_straight_leg_takes_its_length_over_the_speed_longer() -> None:
     ends = [ArduCopter().fly(line(length, 1, 6.0)).arrivals[-1] for length in (300, 900)]
     assert ends[1] - ends[0] == pytest.approx(100, abs=0.02)
 
@@ -110,7 +110,7 @@ def test_a_leg_to_where_it_is_takes_no_time() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, math.inf])
-def test_useless_speeds_are_refused(speed):
+def test_useless_speeds_are_refused(speed: float) -> None:
     with pytest.raises(InputError, match="speeds"):
         ArduCopter().fly(path_of([0, 9], speed))
 

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, half_overlap
 from faao_mav.vehicle.ardupilot.copter.leg import at_speed, planned
-from faao_mav.vehicle.ardupilot.copter.ramp import Limits
+from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
+from faao_mav.vehicle.ardupilot.copter.route import CornerLimits, half_overlap
 
-LIMITS = Limits(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
+LIMITS = LegBounds(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
 
 limits = st.builds(
-    Limits,
+    LegBounds,
     speed=st.floats(0.5, 15),
     acceleration=st.floats(0.5, 8),
     jerk=st.floats(0.5, 20),
@@ -24,7 +24,7 @@ limits = st.builds(
 
 
 @given(limits, st.floats(0.01, 500))
-def test_a_leg_keeps_its_limits_and_ends_at_rest(bounds, length):
+def test_a_leg_keeps_its_limits_and_ends_at_rest(bounds: LegBounds, length: float) -> None:
     leg = planned(length, bounds)
     t = np.linspace(0, leg.duration, 801)
     s, v, a = np.array([leg.at(x) for x in t]).T
@@ -39,7 +39,9 @@ def test_a_leg_keeps_its_limits_and_ends_at_rest(bounds, length):
 
 
 @given(limits, st.floats(0.01, 500))
-def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(bounds, length):
+def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(
+    bounds: LegBounds, length: float
+) -> None:
     leg = planned(length, bounds)
     t = np.linspace(0, leg.duration, 4001)
     s, v, a = np.array([leg.at(x) for x in t]).T
@@ -49,7 +51,7 @@ def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(bounds
     assert np.cumsum(v[1:] + v[:-1]) * h / 2 == pytest.approx(s[1:], abs=4 * slack * t[-1])
 
 
-def test_a_long_leg_has_two_full_ramps_and_a_cruise():
+def test_a_long_leg_has_two_full_ramps_and_a_cruise() -> None:
     # D = dv/A + A/J + t_j, S = v/2 D, T = 2 D + (L - 2 S)/v
     duration = 8 / 2.5 + 2.5 / 1 + 0.3
     leg = planned(200, LIMITS)
@@ -59,7 +61,7 @@ def test_a_long_leg_has_two_full_ramps_and_a_cruise():
     assert planned(400, LIMITS).duration - leg.duration == pytest.approx(200 / 8)
 
 
-def test_a_ramp_that_never_reaches_the_acceleration():
+def test_a_ramp_that_never_reaches_the_acceleration() -> None:
     # a²/J + a t_j = v, D = 2 (a/J + t_j)
     a = (math.sqrt(0.3**2 + 4 * 2) - 0.3) / 2
     leg = planned(100, replace(LIMITS, speed=2.0))
@@ -67,14 +69,16 @@ def test_a_ramp_that_never_reaches_the_acceleration():
     assert leg.up.duration == pytest.approx(2 * (a + 0.3))
 
 
-def test_measured_lengths_that_reach_8_metres_per_second():
+def test_measured_lengths_that_reach_8_metres_per_second() -> None:
     assert 48 < 2 * planned(500, LIMITS).up.length < 50
-    quick = Limits(8.0, 4.0, 10.0, 0.3)
+    quick = LegBounds(8.0, 4.0, 10.0, 0.3)
     assert 21 < 2 * planned(500, quick).up.length < 23
 
 
 @given(limits, st.floats(20, 300), st.floats(0.3, 15), st.floats(0, 1))
-def test_a_speed_change_keeps_what_was_flown_and_the_end(bounds, length, speed, share):
+def test_a_speed_change_keeps_what_was_flown_and_the_end(
+    bounds: LegBounds, length: float, speed: float, share: float
+) -> None:
     before = planned(length, bounds)
     elapsed = share * before.up.duration / 2
     after = at_speed(before, speed, elapsed)
@@ -87,7 +91,9 @@ def test_a_speed_change_keeps_what_was_flown_and_the_end(bounds, length, speed, 
 
 
 @given(limits, st.floats(0.01, 300), st.floats(0, 12), st.floats(0, 12))
-def test_a_leg_between_splines_has_its_length(bounds, length, start, end):
+def test_a_leg_between_splines_has_its_length(
+    bounds: LegBounds, length: float, start: float, end: float
+) -> None:
     leg = planned(length, bounds, start=start, end=end)
     assert leg.states[-1][0] == pytest.approx(length, rel=1e-6)
     assert leg.states[-1][1] == pytest.approx(leg.final, abs=1e-6)
@@ -95,7 +101,7 @@ def test_a_leg_between_splines_has_its_length(bounds, length, start, end):
 
 
 @pytest.mark.parametrize("degrees", [5, 30, 90, 150])
-def test_corners_are_as_early_as_their_limits_allow(degrees):
+def test_corners_are_as_early_as_their_limits_allow(degrees: float) -> None:
     angle = math.radians(degrees)
     u, w = (1.0, 0.0, 0.0), (math.cos(angle), math.sin(angle), 0.0)
     leg = planned(100, LIMITS)

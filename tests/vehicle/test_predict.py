@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
-from faao_mav.vehicle import Vehicle, modelled
+from faao_mav.vehicle import Track, Vehicle
 from faao_mav.vehicle.predict import predict
-from faao_mav.vehicle.track import Track
 
 HOME = Home(47.4, 8.5, 400.0)
 FRAME = LocalFrame(47.4, 8.5)
@@ -25,6 +24,11 @@ PX4 = Vehicle("px4")
 VEHICLES = [COPTER, PX4, Vehicle("ardupilot", "plane")]
 
 
+def four(*params: float) -> tuple[float, float, float, float]:
+    one, two, three, last = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return one, two, three, last
+
+
 def at(
     command: int,
     east: float = 0.0,
@@ -34,13 +38,11 @@ def at(
     frame: int = Frame.GLOBAL_RELATIVE_ALT,
 ) -> MissionItem:
     latitude, longitude = FRAME.to_geodetic([east, north])
-    padded = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return MissionItem(command, frame, padded, float(latitude), float(longitude), up)  # type: ignore[arg-type]
+    return MissionItem(command, frame, four(*params), float(latitude), float(longitude), up)
 
 
 def do(command: int, *params: float) -> MissionItem:
-    padded = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return MissionItem(command, Frame.MISSION, padded)  # type: ignore[arg-type]
+    return MissionItem(command, Frame.MISSION, four(*params))
 
 
 def waypoint(east: float, north: float, hold: float = 0.0, up: float = 30.0) -> MissionItem:
@@ -409,7 +411,57 @@ def test_items_are_flown_in_order(items: list[MissionItem], end: MissionItem) ->
 
 def test_px4_planes_are_not_predicted_as_copters() -> None:
     vehicle = Vehicle("px4", "plane")
-    assert not modelled(vehicle)
+    assert vehicle.type.flight_model is None
     with pytest.raises(InputError, match="no model of how PX4 flies planes"):
         predict(Mission((at(Command.NAV_WAYPOINT, 100),)), vehicle)
-    assert all(map(modelled, VEHICLES))
+    assert all(vehicle.type.flight_model for vehicle in VEHICLES)
+
+
+PLANE = Vehicle("ardupilot", "plane")
+
+
+def far_and_back(vehicle: Vehicle) -> Track:
+    """Take off to 50 m, fly 3 km out and return to launch."""
+    return flown(
+        at(Command.NAV_TAKEOFF, up=50.0, north=300.0),
+        at(Command.NAV_WAYPOINT, 0, 3000, 50),
+        RTL,
+        vehicle=vehicle,
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "height"),
+    [
+        ({}, 100),
+        ({"RTL_ALTITUDE": 200}, 200),
+        ({"ALT_HOLD_RTL": 15_000}, 150),
+        ({"RTL_ALTITUDE": 30}, 30),
+        ({"RTL_ALTITUDE": -1}, 50),
+        ({"RTL_ALT": 20_000}, 100),
+    ],
+)
+def test_a_plane_returns_at_its_own_height_and_stays_up(
+    parameters: dict[str, float], height: float
+) -> None:
+    track = far_and_back(replace(PLANE, parameters=parameters))
+    assert track.position[-1, 2] == pytest.approx(height, abs=3)
+    assert np.hypot(*track.position[-1, :2]) < 150
+
+
+def test_a_copter_climbs_to_its_return_height_and_lands() -> None:
+    track = far_and_back(replace(COPTER, parameters={"RTL_ALT": 8_000}))
+    assert track.position[:, 2].max() == pytest.approx(80, abs=0.5)
+    assert track.position[-1, 2] == pytest.approx(0, abs=1e-6)
+
+
+def test_px4_climbs_at_its_mission_speed_whatever_its_greatest_is() -> None:
+    steep = (at(Command.NAV_TAKEOFF), at(Command.NAV_WAYPOINT, 0, 20, 30), waypoint(0, 40, up=90))
+    climbs = {
+        most: flown(*steep, vehicle=replace(PX4, parameters={"MPC_Z_VEL_MAX_UP": most}))
+        .velocity[:, 2]
+        .max()
+        for most in (2.0, 6.0)
+    }
+    assert climbs[2.0] == pytest.approx(2, abs=0.3)
+    assert climbs[6.0] == pytest.approx(3, abs=0.5)

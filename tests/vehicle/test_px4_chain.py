@@ -65,14 +65,14 @@ def test_what_is_soon_there_is_there(share: float, angle: float, push: float, dt
 
 
 @given(
-    st.lists(st.floats(-5, 5), min_size=7, max_size=7),
+    st.tuples(*[st.floats(-5, 5)] * 7),
     st.floats(-1, 1),
     st.floats(-5, 5),
     st.floats(-5, 5),
     steps,
 )
 def test_response_solves_the_equations_of_motion(
-    motion: list[float], shift: float, velocity: float, acceleration: float, dt: float
+    motion: response.Motion[float], shift: float, velocity: float, acceleration: float, dt: float
 ) -> None:
     began, change = np.array(motion[4:]), np.array([shift, velocity, acceleration])
     change[1:] -= began[1:]
@@ -88,12 +88,6 @@ def test_response_solves_the_equations_of_motion(
         return np.array([speed, pull, (demand - thrust) / lag, integral * error])
 
     solved = solve_ivp(rates, (0, dt), motion[:4], rtol=1e-10, atol=1e-10).y[:, -1]
-    after = response.advance(
-        response.step_of(dt),
-        tuple(motion),
-        shift,
-        velocity,
-        acceleration,  # type: ignore[arg-type]
-    )
+    after = response.advance(response.step_of(dt), motion, shift, velocity, acceleration)
     np.testing.assert_allclose(after[:4], solved, atol=1e-7)
     np.testing.assert_allclose(after[4:], [began[0] + shift, velocity, acceleration])

@@ -19,7 +19,7 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock.firmware import MockFirmware
 from faao_mav.mavlink.protocol import ALL_TYPES, Address, MavSeverity, MissionType, Result
-from faao_mav.vehicle.ardupilot.family import ARDUPILOT
+from faao_mav.vehicle.ardupilot import ARDUPILOT
 
 
 @dataclass(slots=True)

@@ -1,13 +1,14 @@
 """Mission files, by the ending of their name."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from faao_mav.errors import MissionFileError
 from faao_mav.files import read_text
-from faao_mav.mission.formats.losses import losses
-from faao_mav.mission.formats.mission_file import MissionFile, NamedVehicle
-from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
+from faao_mav.mission.formats.losses import kml_losses, plan_losses, wpl_losses
+from faao_mav.mission.formats.mission_file import MissionFile, PlanTarget
 from faao_mav.mission.formats.qgc_plan_writer import write_qgc_plan
 from faao_mav.mission.formats.wpl import read_wpl, write_wpl
 from faao_mav.mission.item import Mission
@@ -15,27 +16,61 @@ from faao_mav.mission.item import Mission
 __all__ = [
     "MISSION_SUFFIXES",
     "MissionFile",
+    "PlanTarget",
     "check_readable",
     "check_suffix",
     "losses_in",
     "read_mission",
     "read_mission_file",
-    "read_qgc_plan",
     "read_wpl",
     "render_mission",
     "write_qgc_plan",
     "write_wpl",
 ]
 
-Format: TypeAlias = Literal["wpl", "plan", "kml"]
+Target: TypeAlias = PlanTarget | None
 
-_FORMATS: dict[str, Format] = {".waypoints": "wpl", ".txt": "wpl", ".plan": "plan", ".kml": "kml"}
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """How missions of one format are read and written.
+
+    `read(text, source)` is None for a format that only draws a mission. `write(mission, target,
+    name)` returns the text of a file with that name, and raises `MissionFileError` for a mission
+    that the format cannot hold at all; `losses(mission, target)` says what it leaves out, one line
+    each. Another format is one file beside this one and one entry of `_FORMATS`.
+    """
+
+    read: Callable[[str, str], MissionFile] | None
+    write: Callable[[Mission, Target, str], str]
+    losses: Callable[[Mission, Target], list[str]]
+
+
+def _read_plan(text: str, source: str) -> MissionFile:
+    from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan  # brings pydantic along
+
+    return read_qgc_plan(text, source)
+
+
+def _write_kml(mission: Mission, name: str) -> str:
+    from faao_mav.mission.formats.kml import write_kml  # brings an XML library along
+
+    return write_kml(mission, name=name)
+
+
+_WPL = Format(read_wpl, lambda mission, _, __: write_wpl(mission), wpl_losses)
+_FORMATS = {
+    ".waypoints": _WPL,
+    ".txt": _WPL,
+    ".plan": Format(_read_plan, lambda mission, to, _: write_qgc_plan(mission, to), plan_losses),
+    ".kml": Format(None, lambda mission, _, name: _write_kml(mission, name), kml_losses),
+}
 
 MISSION_SUFFIXES = tuple(_FORMATS)
 """What the name of a mission file may end in."""
 
 MAX_BYTES = 16_000_000
-"""More than any autopilot stores; keeps a wrong file name from filling the memory."""
+"""Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
 
 
 def read_mission(path: str | Path) -> Mission:
@@ -50,61 +85,56 @@ def read_mission_file(path: str | Path) -> MissionFile:
     the file cannot be opened, is not UTF-8 text, is larger than `MAX_BYTES` or is not a mission.
     """
     path = Path(path)
-    check_readable(path)
-    text = read_text(path, MAX_BYTES, "a mission", MissionFileError)
-    if _format(path) == "plan":
-        return read_qgc_plan(text, str(path))
-    return MissionFile(read_wpl(text, str(path)))
+    read = check_readable(path)
+    return read(read_text(path, MAX_BYTES, "a mission", MissionFileError), str(path))
 
 
-def render_mission(mission: Mission, path: str | Path, vehicle: NamedVehicle | None = None) -> str:
+def render_mission(mission: Mission, path: str | Path, target: Target = None) -> str:
     """Return the text to write to the file `path`, in the format that its name's ending tells.
 
-    `vehicle` is whom the mission is for: `.plan` says so, and holds what it takes. Raises
+    `target` is whom a `.plan` is for, which says so and holds what that autopilot takes. Raises
     `MissionFileError` if the ending is unknown or the format cannot hold the mission at all.
+
+    >>> render_mission(Mission(()), "flight.waypoints").splitlines()[0]
+    'QGC WPL 110'
     """
     path = Path(path)
-    check_suffix(path)
-    match _format(path):
-        case "wpl":
-            return write_wpl(mission)
-        case "plan":
-            try:
-                return write_qgc_plan(mission, vehicle)
-            except MissionFileError as error:
-                raise MissionFileError(f"{path}: {error}") from None
-        case "kml":
-            from faao_mav.mission.formats.kml import write_kml  # brings an XML library along
-
-            return write_kml(mission, name=path.stem)
+    found = check_suffix(path)
+    try:
+        return found.write(mission, target, path.stem)
+    except MissionFileError as error:
+        raise MissionFileError(f"{path}: {error}") from None
 
 
-def losses_in(mission: Mission, path: str | Path, vehicle: NamedVehicle | None = None) -> list[str]:
-    """Return what of `mission` the text of `render_mission` does not hold, one line each."""
-    path = Path(path)
-    check_suffix(path)
-    return losses(mission, _format(path), vehicle)
+def losses_in(mission: Mission, path: str | Path, target: Target = None) -> list[str]:
+    """Return what of `mission` the text of `render_mission` does not hold, one line each.
+
+    >>> losses_in(Mission(()), "flight.waypoints")
+    ['no home is known: the file says 0, 0, 0, which means none']
+    """
+    return check_suffix(Path(path)).losses(mission, target)
 
 
-def check_suffix(path: Path) -> None:
-    """Raise `MissionFileError` unless the name of `path` ends like a format that is known."""
+def check_suffix(path: Path) -> Format:
+    """Return the format by the ending of the name; raise `MissionFileError` for an unknown one."""
     if path.suffix.lower() not in _FORMATS:
         shown = repr(path.suffix) if path.suffix else "no ending"
         raise MissionFileError(
             f"{path}: {shown}; expected a name that ends in .waypoints or .txt (QGC WPL 110), "
             ".plan (QGroundControl) or .kml (Google Earth, write only)"
         )
+    return _FORMATS[path.suffix.lower()]
 
 
-def check_readable(path: Path) -> None:
-    """Raise `MissionFileError` unless the name of `path` ends like a format that can be read."""
-    check_suffix(path)
-    if _format(path) == "kml":
+def check_readable(path: Path) -> Callable[[str, str], MissionFile]:
+    """Return the reader for a file by the ending of its name.
+
+    Raises `MissionFileError` unless it is that of a format that can be read.
+    """
+    read = check_suffix(path).read
+    if read is None:
         raise MissionFileError(
             f"{path}: KML is written for drawing and lacks commands and speeds; "
             "give the .waypoints or .plan file of the mission"
         )
-
-
-def _format(path: Path) -> Format:
-    return _FORMATS[path.suffix.lower()]
+    return read

@@ -21,9 +21,15 @@ Spot: TypeAlias = tuple[float, float, float]
 
 _KML = "http://www.opengis.net/kml/2.2"
 _GX = "http://www.google.com/kml/ext/2.2"
-_LINE_COLOR = "ff00a5ff"  # opacity, blue, green, red
+_LINE_COLOR = "ff00a5ff"
+"""Opacity, blue, green and red of the route; chosen: orange shows on fields, towns and water."""
+
 _LINE_WIDTH = 3
-_DECIMALS = 9  # of a degree: 0.1 mm
+"""Width of the route in pixels; chosen by eye."""
+
+_DECIMALS = 9
+"""Decimals of a degree: 0.1 mm."""
+
 _ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 
 
@@ -129,11 +135,20 @@ def _description(item: MissionItem) -> str:
     return f"{name}, hold {hold:g} s" if held else name
 
 
+def _placemark(
+    parent: Xml.Element, name: str, *, styled: bool = False, description: str | None = None
+) -> Xml.Element:
+    placemark = _add(parent, "Placemark")
+    _add(placemark, "name", name)
+    if styled:
+        _add(placemark, "styleUrl", "#route")
+    if description is not None:
+        _add(placemark, "description", description)
+    return placemark
+
+
 def _add_line(document: Xml.Element, spots: Sequence[Spot], mode: AltitudeMode) -> None:
-    placemark = _add(document, "Placemark")
-    _add(placemark, "name", "Route")
-    _add(placemark, "styleUrl", "#route")
-    line = _add(placemark, "LineString")
+    line = _add(_placemark(document, "Route", styled=True), "LineString")
     _add(line, "tessellate", "1")
     _add(line, "altitudeMode", mode)
     _add(line, "coordinates", " ".join(_coordinates(spot, ",") for spot in spots))
@@ -142,19 +157,13 @@ def _add_line(document: Xml.Element, spots: Sequence[Spot], mode: AltitudeMode) 
 def _add_point(
     parent: Xml.Element, name: str, spot: Spot, mode: AltitudeMode, description: str | None = None
 ) -> None:
-    placemark = _add(parent, "Placemark")
-    _add(placemark, "name", name)
-    if description is not None:
-        _add(placemark, "description", description)
-    point = _add(placemark, "Point")
+    point = _add(_placemark(parent, name, description=description), "Point")
     _add(point, "altitudeMode", mode)
     _add(point, "coordinates", _coordinates(spot, ","))
 
 
 def _add_track(document: Xml.Element, track: TimedTrack) -> None:
-    placemark = _add(document, "Placemark")
-    _add(placemark, "name", "Flight")
-    _add(placemark, "styleUrl", "#route")
+    placemark = _placemark(document, "Flight", styled=True)
     line = Xml.SubElement(placemark, f"{{{_GX}}}Track")
     _add(line, "altitudeMode", "absolute")
     for seconds in track.t:

@@ -1,29 +1,45 @@
 """What a mission file cannot hold, said aloud."""
 
 import math
-from typing import Literal
 
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_TERRAIN, Command
-from faao_mav.mission.formats.mission_file import NamedVehicle
+from faao_mav.mission.formats.mission_file import PlanTarget
 from faao_mav.mission.item import Mission, MissionItem
 
 _NAMES = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude")
+
 _SHOWN_ITEMS = 5
+"""Values that a line names before it counts the rest; chosen to fit two lines."""
 
 
-def losses(
-    mission: Mission,
-    file_format: Literal["wpl", "plan", "kml"],
-    vehicle: NamedVehicle | None = None,
-) -> list[str]:
-    """Return what of `mission` a file of that format for `vehicle` does not hold, one line each."""
-    match file_format:
-        case "wpl":
-            return [*_beside(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
-        case "plan":
-            return [*_for_whom(mission, vehicle), *_home(mission)]
-        case "kml":
-            return [*_beside(mission, "KML"), *_drawn(mission)]
+def wpl_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
+    """Return what of `mission` a QGC WPL file does not hold, one line each."""
+    del target
+    return [*_beside(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
+
+
+def plan_losses(mission: Mission, target: PlanTarget | None) -> list[str]:
+    """Return what of `mission` a `.plan` file for `target` does not hold, one line each."""
+    if target is None:
+        return ["no autopilot is known: the plan is for a generic one", *_home(mission)]
+    return [*([] if target.takes_null else _not_set(mission)), *_home(mission)]
+
+
+def kml_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
+    """Return what of `mission` a KML file does not hold or show, one line each."""
+    del target
+    found = [
+        *_beside(mission, "KML"),
+        "KML holds the route alone: no commands, speeds or holds, and cannot be read back",
+    ]
+    frames = {item.frame for item in mission.items}
+    if mission.home is None and frames & ABOVE_HOME:
+        found.append("no home is known: heights above home are drawn above the ground")
+    if frames & ABOVE_TERRAIN:
+        found.append("heights above terrain are drawn above Google Earth's own")
+    if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
+        found.append("spline waypoints are joined by straight lines")
+    return found
 
 
 def _beside(mission: Mission, name: str) -> list[str]:
@@ -54,26 +70,8 @@ def _not_set(mission: Mission) -> list[str]:
     return [f"not set (NaN) becomes 0: {shown}{more}"]
 
 
-def _for_whom(mission: Mission, vehicle: NamedVehicle | None) -> list[str]:
-    if vehicle is None:
-        return ["no autopilot is known: the plan is for a generic one"]
-    return _not_set(mission) if vehicle.autopilot == "ardupilot" else []
-
-
 def _home(mission: Mission) -> list[str]:
     return [] if mission.home else ["no home is known: the file says 0, 0, 0, which means none"]
-
-
-def _drawn(mission: Mission) -> list[str]:
-    found = ["KML holds the route alone: no commands, speeds or holds, and cannot be read back"]
-    frames = {item.frame for item in mission.items}
-    if mission.home is None and frames & ABOVE_HOME:
-        found.append("no home is known: heights above home are drawn above the ground")
-    if frames & ABOVE_TERRAIN:
-        found.append("heights above terrain are drawn above Google Earth's own")
-    if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
-        found.append("spline waypoints are joined by straight lines")
-    return found
 
 
 def _values(item: MissionItem) -> tuple[float, ...]:

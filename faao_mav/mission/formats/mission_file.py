@@ -1,29 +1,31 @@
-"""What a mission file tells."""
+"""What a mission file tells, and whom it is for."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from faao_mav.mission.item import Mission
 
 
-class NamedVehicle(Protocol):
-    """A vehicle as far as mission files name it."""
+@dataclass(frozen=True, slots=True)
+class MissionFile:
+    """A mission, for whom it was made as far as the file says it, and what was odd about it.
 
-    @property
-    def autopilot(self) -> str:
-        """The name of its autopilot."""
-        ...
+    `firmware` is a MAV_AUTOPILOT and `vehicle_type` a MAV_TYPE, which only `.plan` files hold.
+    `warnings` are lines that name file and place.
+    """
 
-    @property
-    def kind(self) -> str:
-        """The name of its type."""
-        ...
+    mission: Mission
+    firmware: int | None = None
+    vehicle_type: int | None = None
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class MissionFile:
-    """A mission, and for whom it was made as far as the file says it."""
+class PlanTarget:
+    """Whom a `.plan` file is written for: a MAV_AUTOPILOT and a MAV_TYPE, 0 for a generic one.
 
-    mission: Mission
-    autopilot: str | None = None
-    kind: str | None = None
+    `takes_null`: whether that autopilot is sent null, not set, or 0 instead because it refuses it.
+    """
+
+    firmware: int
+    vehicle_type: int
+    takes_null: bool = True

@@ -1,29 +1,140 @@
 """QGroundControl's `.plan` files, read.
 
 JSON with a mission, a geofence and rally points. Sources: QGroundControl's developer guide, "Plan
-File Format", and what QGroundControl and MAVSDK accept.
+File Format", and what QGroundControl and MAVSDK accept. Importing this brings pydantic along.
 """
 
+import json
 import math
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar
 
-from faao_mav.errors import MissionFileError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    FailFast,
+    Field,
+    ValidationError,
+)
+
+from faao_mav.errors import InputError, MissionFileError, quote
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
-from faao_mav.mission.formats.json_tree import Node, parse_json
 from faao_mav.mission.formats.mission_file import MissionFile
 from faao_mav.mission.item import Home, Mission, MissionItem
 
-FIRMWARE: dict[str, int] = {"ardupilot": 3, "px4": 12}
-"""MAV_AUTOPILOT of each autopilot."""
+_AGAIN = "open the file in a current QGroundControl and save it again"
+_HINTS = {
+    "version": f": {_AGAIN}",
+    "params": " or null (not set)",
+    "complexItemType": ", or simple items: replace the pattern by waypoints, or upload the plan "
+    "from QGroundControl, read it back from the vehicle and save it",
+    "Items": f": the pattern was saved without its waypoints; {_AGAIN}",
+}
+"""What a message says besides, by the last key of its place."""
 
-VEHICLE_TYPES: dict[str, tuple[int, ...]] = {"copter": (2, 3, 4, 13, 14, 15), "plane": (1,)}
-"""MAV_TYPE of each kind of vehicle; the first is the one to write."""
+_ITEM_TYPES = ("SimpleItem", "ComplexItem")
+Made = TypeVar("Made")
 
-EXPANDED = ("survey", "CorridorScan")
-"""Complex items whose simple items are in the file."""
 
-_MAX_INTEGER = 2**31 - 1
+def _whole(value: object) -> object:
+    """Return 3 for 3.0, which some writers have for whole numbers, and a word for true."""
+    if isinstance(value, bool):  # which equals 1
+        return quote(value)
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Version1: TypeAlias = Annotated[Literal[1], BeforeValidator(_whole)]
+Version2: TypeAlias = Annotated[Literal[2], BeforeValidator(_whole)]
+Whole: TypeAlias = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1)]
+Byte: TypeAlias = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=255)]
+Command16: TypeAlias = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=65_535)]
+Pair: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2)]
+Triple: TypeAlias = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class _Object(BaseModel):
+    """An object of the file; keys that are not known are passed over."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+
+class _SimpleItem(_Object):
+    type: Literal["SimpleItem"]
+    command: Command16
+    frame: Byte
+    params: Annotated[list[float | None], FailFast(), Field(min_length=7, max_length=7)]
+    autoContinue: bool
+    doJumpId: Whole | None = None
+
+
+class _Transects(_Object):
+    Items: Annotated[list[_SimpleItem], FailFast()]
+
+
+class _ComplexItem(_Object):
+    """A pattern of the kinds whose simple items are in the file."""
+
+    type: Literal["ComplexItem"]
+    complexItemType: Literal["survey", "CorridorScan"]
+    TransectStyleComplexItem: _Transects
+
+
+_Item: TypeAlias = Annotated[_SimpleItem | _ComplexItem, Discriminator("type")]
+
+
+class _Mission(_Object):
+    version: Version2
+    firmwareType: Byte | None = None
+    vehicleType: Byte | None = None
+    plannedHomePosition: Triple | None = None
+    items: Annotated[list[_Item], FailFast()]
+
+
+class _Disc(_Object):
+    center: Pair
+    radius: float
+
+
+class _Circle(_Object):
+    version: Version1
+    circle: _Disc
+    inclusion: bool
+
+
+class _Polygon(_Object):
+    version: Version1
+    polygon: Annotated[list[Pair], FailFast()]
+    inclusion: bool
+
+
+class _Fence(_Object):
+    version: Version2
+    polygons: Annotated[list[_Polygon], FailFast()]
+    circles: Annotated[list[_Circle], FailFast()]
+    breachReturn: Triple | None = None
+
+
+class _Rally(_Object):
+    version: Version2
+    points: Annotated[list[Triple], FailFast()]
+
+
+def _or_none(part: object) -> object:
+    """Return None for a part of version 1 with nothing in it, as older files have it."""
+    if not isinstance(part, dict) or any(v for k, v in part.items() if k != "version"):
+        return part
+    return None if part.get("version") == 1 else part
+
+
+class _File(_Object):
+    fileType: Literal["Plan"]
+    version: Version1
+    mission: _Mission
+    geoFence: Annotated[_Fence | None, BeforeValidator(_or_none)] = None
+    rallyPoints: Annotated[_Rally | None, BeforeValidator(_or_none)] = None
 
 
 def read_qgc_plan(text: str, source: str) -> MissionFile:
@@ -36,159 +147,161 @@ def read_qgc_plan(text: str, source: str) -> MissionFile:
     `source` is the file's name, for messages. Raises `MissionFileError` for anything else; it
     names key, value and what is expected.
     """
-    root = parse_json(text, source)
-    _check_equal(root["fileType"], root["fileType"].text(), "Plan")
-    _check_version(root, 1)
-    mission = root["mission"]
-    _check_version(mission, 2)
-    return MissionFile(
-        Mission(_items(mission), _home(mission), _fence(root), _rally(root)),
-        _first(FIRMWARE, _type_of(mission, "firmwareType")),
-        _first_of(VEHICLE_TYPES, _type_of(mission, "vehicleType")),
+    try:
+        file = _File.model_validate(_parse(text))
+        read = _mission(file)
+    except ValidationError as error:
+        raise MissionFileError(f"{source}: {_describe(error)}") from None
+    except MissionFileError as error:
+        raise MissionFileError(f"{source}: {error}") from None
+    return MissionFile(read, file.mission.firmwareType, file.mission.vehicleType)
+
+
+def _describe(error: ValidationError) -> str:
+    """Return the first finding: its place, the value there and what is expected."""
+    detail = error.errors(include_url=False)[0]
+    steps = [step for step in detail["loc"] if step not in _ITEM_TYPES]
+    place = _place(steps)
+    last = next((step for step in reversed(steps) if isinstance(step, str)), "")
+    hint = _HINTS.get(last, "")
+    kind, told = detail["type"], detail.get("ctx", {})
+    if kind == "missing":
+        return f"{place}: is missing{hint}"
+    if kind == "union_tag_not_found":
+        return f"{place}.type: is missing"
+    if kind == "union_tag_invalid":
+        return f"{place}.type: {quote(told['tag'])}; expected {told['expected_tags']}"
+    if kind in ("too_short", "too_long"):
+        length = told.get("min_length", told.get("max_length"))
+        return f"{place}: {quote(detail['input'])}; expected an array of {length} values"
+    words = (
+        "an object" if kind.startswith("model_") else detail["msg"].removeprefix("Input should be ")
+    )
+    return f"{place}: {quote(detail['input'])}; expected {words}{hint}".removeprefix(": ")
+
+
+def _place(steps: list[str | int]) -> str:
+    return "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).removeprefix(".")
+
+
+class _Odd(NamedTuple):
+    """What stands in the tree for a value that no JSON can have."""
+
+    problem: str
+
+
+def _parse(text: str) -> Any:
+    """Return the JSON `text` as plain data.
+
+    Raises `MissionFileError` for what is no JSON or more than one meaning could be given to: a
+    key that an object has twice, NaN and Infinity, nesting beyond any use.
+    """
+    odd: list[_Odd] = []
+
+    def mark(problem: str) -> _Odd:
+        odd.append(_Odd(problem))
+        return odd[-1]
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        made: dict[str, Any] = {}
+        for key, value in pairs:
+            made[key] = mark("is there twice; remove one") if key in made else value
+        return made
+
+    def constant(word: str) -> _Odd:
+        return mark(f"{word}; expected a finite number or null (not set): JSON has no such number")
+
+    try:
+        tree = json.loads(
+            text.removeprefix("\ufeff"), object_pairs_hook=unique, parse_constant=constant
+        )
+        for steps, problem in _odd_in([], tree) if odd else ():
+            raise MissionFileError(f"{_place(steps)}: {problem}".removeprefix(": "))
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise MissionFileError(f"{where}: not JSON: {error.msg}") from None
+    except RecursionError:
+        raise MissionFileError("nested too deep for a plan") from None
+    except ValueError:  # an integer of thousands of digits
+        raise MissionFileError("a number of thousands of digits") from None
+    return tree
+
+
+def _odd_in(steps: list[str | int], value: Any) -> Iterator[tuple[list[str | int], str]]:
+    """Yield the places below `steps` where something odd stands, and what is wrong with it."""
+    if isinstance(value, _Odd):
+        yield steps, value.problem
+    inside = value.items() if isinstance(value, dict) else ()
+    for key, below in enumerate(value) if isinstance(value, list) else inside:
+        yield from _odd_in([*steps, key], below)
+
+
+def _mission(file: _File) -> Mission:
+    home, fence, rally = file.mission.plannedHomePosition, file.geoFence, file.rallyPoints
+    return Mission(
+        _items(file.mission),
+        _made("mission.plannedHomePosition", Home, home) if home and any(home) else None,
+        _fence(fence) if fence else Fence(),
+        _each("rallyPoints.points", RallyPoint, rally.points if rally else []),
     )
 
 
-def _check_version(node: Node, version: int) -> None:
-    _check_equal(node["version"], node["version"].integer(_MAX_INTEGER), version)
-
-
-def _check_equal(node: Node, value: str | int, expected: str | int) -> None:
-    if value != expected:
-        raise node.error(
-            f'"{expected}"'
-            if isinstance(expected, str)
-            else f"{expected}: open the file in a current QGroundControl and save it again"
-        )
-
-
-def _type_of(mission: Node, key: str) -> int | None:
-    return mission[key].integer(255) if key in mission else None
-
-
-def _first(numbers: dict[str, int], number: int | None) -> str | None:
-    return next((name for name, own in numbers.items() if own == number), None)
-
-
-def _first_of(numbers: dict[str, tuple[int, ...]], number: int | None) -> str | None:
-    return next((name for name, own in numbers.items() if number in own), None)
-
-
-def _home(mission: Node) -> Home | None:
-    if "plannedHomePosition" not in mission:
-        return None
-    node = mission["plannedHomePosition"]
-    latitude, longitude, altitude = (value.number() for value in node.items(3))
-    if latitude == longitude == altitude == 0:
-        return None
-    return node.make(lambda: Home(latitude, longitude, altitude))
-
-
-def _items(mission: Node) -> tuple[MissionItem, ...]:
-    nodes = [simple for node in mission["items"].items() for simple in _simple(node)]
-    places: dict[int, int] = {}
-    for place, node in enumerate(nodes, start=1):
-        if "doJumpId" in node:
-            places.setdefault(node["doJumpId"].integer(_MAX_INTEGER), place)
-    return tuple(_item(node, places) for node in nodes)
-
-
-def _simple(node: Node) -> list[Node]:
-    """Return the simple items that an item of the file stands for."""
-    kind = node["type"].text()
-    if kind == "SimpleItem":
-        return [node]
-    if kind != "ComplexItem":
-        raise node["type"].error('"SimpleItem" or "ComplexItem"')
-    name = node["complexItemType"]
-    if name.text() not in EXPANDED:
-        raise name.error(
-            f"simple items, {' or '.join(EXPANDED)}: replace the pattern by waypoints, or upload "
-            "the plan from QGroundControl, read it back from the vehicle and save it"
-        )
-    style = node["TransectStyleComplexItem"]
-    if "Items" not in style:
-        raise MissionFileError(
-            f"{node.source}: {style.place}.Items: is missing: the {name.text()} was saved "
-            "without its waypoints; open the file in a current QGroundControl and save it again"
-        )
-    nodes = style["Items"].items()
-    for inner in nodes:
-        _check_equal(inner["type"], inner["type"].text(), "SimpleItem")
-    return nodes
-
-
-def _item(node: Node, places: dict[int, int]) -> MissionItem:
-    command, frame = node["command"].integer(65_535), node["frame"].integer(255)
-    values = node["params"].items(7)
-    param1, param2, param3, param4, x, y, z = (value.number_or_null() for value in values)
-    if frame != Frame.MISSION:
-        # In the mission frame the three coordinates are plain parameters.
-        for value, number, limit in ((values[4], x, 90), (values[5], y, 180)):
-            if abs(number) > limit:
-                raise value.error(f"null or degrees from {-limit} to {limit}")
-    item = MissionItem(
-        command,
-        frame,
-        (param1, param2, param3, param4),
-        *(x, y, z),
-        autocontinue=node["autoContinue"].boolean(),
-    )
-    if command != Command.DO_JUMP:
-        return item
-    if math.isnan(param1) or param1 not in places:
-        raise values[0].error("the doJumpId of an item of the mission")
-    return replace(item, params=(float(places[int(param1)]), param2, param3, param4))
-
-
-def _fence(root: Node) -> Fence:
-    fence = _section(root, "geoFence")
-    if fence is None:
-        return Fence()
-    breach_return = None
-    if "breachReturn" in fence:
-        breach_return = _rally_point(fence["breachReturn"])
+def _fence(fence: _Fence) -> Fence:
+    polygons = [[tuple(map(tuple, part.polygon)), part.inclusion] for part in fence.polygons]
+    circles = [[tuple(c.circle.center), c.circle.radius, c.inclusion] for c in fence.circles]
+    back = fence.breachReturn
     return Fence(
-        tuple(map(_polygon, fence["polygons"].items())),
-        tuple(map(_circle, fence["circles"].items())),
-        breach_return,
+        _each("geoFence.polygons", Polygon, polygons),
+        _each("geoFence.circles", Circle, circles),
+        _made("geoFence.breachReturn", RallyPoint, back) if back else None,
     )
 
 
-def _rally(root: Node) -> tuple[RallyPoint, ...]:
-    rally = _section(root, "rallyPoints")
-    return () if rally is None else tuple(map(_rally_point, rally["points"].items()))
+def _each(place: str, make: Callable[..., Made], parts: Iterable[list[Any]]) -> tuple[Made, ...]:
+    return tuple(_made(f"{place}[{k}]", make, part) for k, part in enumerate(parts))
 
 
-def _section(root: Node, key: str) -> Node | None:
-    """Return a part of the plan that older files do not have, or have empty in version 1."""
-    if key not in root:
-        return None
-    node = root[key]
-    if node["version"].value == 1 and not any(v for k, v in node.value.items() if k != "version"):
-        return None
-    _check_version(node, 2)
-    return node
+def _made(place: str, make: Callable[..., Made], part: Iterable[Any]) -> Made:
+    """Return `make(*part)`, with its `InputError` as a complaint about this place."""
+    try:
+        return make(*part)
+    except InputError as error:
+        raise MissionFileError(f"{place}: {error}") from None
 
 
-def _polygon(node: Node) -> Polygon:
-    _check_version(node, 1)
-    vertices = tuple(_place(vertex) for vertex in node["polygon"].items())
-    inclusion = node["inclusion"].boolean()
-    return node["polygon"].make(lambda: Polygon(vertices, inclusion))
+def _items(mission: _Mission) -> tuple[MissionItem, ...]:
+    """Return the items, those of patterns in their place; a DO_JUMP's target is counted from 1."""
+    parts: list[tuple[str, _SimpleItem]] = []
+    for k, item in enumerate(mission.items):
+        place = f"mission.items[{k}]"
+        if isinstance(item, _SimpleItem):
+            parts.append((place, item))
+        else:
+            inner = enumerate(item.TransectStyleComplexItem.Items)
+            parts += [(f"{place}.TransectStyleComplexItem.Items[{j}]", part) for j, part in inner]
+    targets: dict[float | None, int] = {}
+    for number, (_, part) in enumerate(parts, start=1):
+        if part.doJumpId is not None:
+            targets.setdefault(part.doJumpId, number)
+    return tuple(_item(place, part, targets) for place, part in parts)
 
 
-def _circle(node: Node) -> Circle:
-    _check_version(node, 1)
-    center, radius = _place(node["circle"]["center"]), node["circle"]["radius"].number()
-    inclusion = node["inclusion"].boolean()
-    return node["circle"].make(lambda: Circle(center, radius, inclusion))
-
-
-def _place(node: Node) -> tuple[float, float]:
-    latitude, longitude = (value.number() for value in node.items(2))
-    return latitude, longitude
-
-
-def _rally_point(node: Node) -> RallyPoint:
-    latitude, longitude, altitude = (value.number() for value in node.items(3))
-    return node.make(lambda: RallyPoint(latitude, longitude, altitude))
+def _item(place: str, part: _SimpleItem, targets: dict[float | None, int]) -> MissionItem:
+    values = [math.nan if value is None else value for value in part.params]
+    if part.frame != Frame.MISSION:
+        # In the mission frame the three coordinates are plain parameters.
+        for index, limit in ((4, 90), (5, 180)):
+            if abs(values[index]) > limit:
+                raise MissionFileError(
+                    f"{place}.params[{index}]: {part.params[index]:.10g}; expected null or "
+                    f"degrees from {-limit} to {limit}"
+                )
+    if part.command == Command.DO_JUMP:
+        if part.params[0] not in targets:
+            raise MissionFileError(
+                f"{place}.params[0]: {values[0]:g}; expected the doJumpId of an item of the mission"
+            )
+        values[0] = targets[part.params[0]]
+    param1, param2, param3, param4, x, y, z = map(float, values)
+    params = (param1, param2, param3, param4)
+    return MissionItem(part.command, part.frame, params, x, y, z, part.autoContinue)

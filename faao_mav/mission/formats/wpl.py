@@ -2,8 +2,9 @@ r"""QGC WPL 110, the plain-text mission file (`.waypoints`, `.txt`).
 
 A header line `QGC WPL 110`, then one row per item with twelve tab-separated fields: index,
 current, frame, command, param1 to param4, latitude, longitude, altitude, autocontinue. Row 0 is
-the home position: QGroundControl drops it, ArduPilot replaces it. A DO_JUMP's target is the index
-of a row. Source: MAVLink developer guide, "File formats".
+the home position: QGroundControl drops it, ArduPilot replaces it. A DO_JUMP's target is the place
+of a row in the file, row 0 being home: its index, where indexes count up. Source: MAVLink developer
+guide, "File formats".
 
 Read, but not written: `QGC WPL 120`, QGroundControl's rows without a home row, and `QGC WPL 100`,
 thirteen fields in another order with command numbers of MAVLink before 1.0, as pymavlink reads it.
@@ -11,15 +12,15 @@ thirteen fields in another order with command numbers of MAVLink before 1.0, as 
 
 import math
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from faao_mav.errors import MissionFileError
-from faao_mav.mission.command import Command, Frame
-from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.mission.rows import home_item
+from faao_mav.errors import MissionFileError, quote
+from faao_mav.mission.command import ABOVE_HOME, Command, Frame
+from faao_mav.mission.formats.mission_file import MissionFile
+from faao_mav.mission.item import Home, Mission, MissionItem, home_item, jump_moved
 
 HEADER = "QGC WPL 110"
 
@@ -67,7 +68,6 @@ _COORDINATE_LIMITS = {"latitude": 90.0, "longitude": 180.0}
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _INTEGER = re.compile(r"\d{1,9}", re.ASCII)
-_MAX_SHOWN = 40
 
 
 def write_wpl(mission: Mission) -> str:
@@ -83,46 +83,55 @@ def write_wpl(mission: Mission) -> str:
     return "\n".join([HEADER, *rows, ""])
 
 
-def read_wpl(text: str, source: str) -> Mission:
+def read_wpl(text: str, source: str) -> MissionFile:
     """Return the mission that `text`, the content of a QGC WPL file, describes.
 
     Tolerated: spaces for tabs, CRLF or CR, a byte order mark, blank lines, lines that start with
     `#`, no newline at the end, no current item, a home row of command 0 (Mission Planner). A row
-    0 of zeros means that there is no home. A parameter may be `nan`: not set. `source` is the
-    file's name, for messages. Raises `MissionFileError` for anything else; it names line, field,
-    value and what is expected.
+    0 of zeros means that there is no home. A parameter may be `nan`: not set. Tolerated with a
+    warning, because autopilots' own tests have them: indexes that do not count up (rows are taken
+    in the file's order, as pymavlink takes them) and a home row in a frame above home. `source` is
+    the file's name, for messages. Raises `MissionFileError` for anything else; it names line,
+    field, value and what is expected.
     """
     lines = _lines(text)
     layout = _layout(next(lines, None), source)
-    rows = [_Row(source, number, line, layout) for number, line in lines]
+    rows = [_Line(source, number, line, layout) for number, line in lines]
     if not rows:
         first = "row 0, the home position, and the items" if layout.home_row else "items"
         raise MissionFileError(f"{source}: a header but no items; expected {first}")
     current = None
-    for expected, row in enumerate(rows):
-        index = row.integer("index")
-        if index != expected:
-            raise row.error("index", f"expected {expected}: rows count up from 0")
+    for row in rows:
         if row.integer("current"):
             if current is not None:
                 raise row.error("current", f"expected 0: line {current} is already current")
             current = row.number
     if layout.home_row:
-        return Mission(tuple(row.item() for row in rows[1:]), rows[0].home())
-    return Mission(tuple(_after_home(row.item()) for row in rows))
+        mission = Mission(tuple(row.item() for row in rows[1:]), rows[0].home())
+    else:
+        mission = Mission(tuple(jump_moved(row.item(), 1) for row in rows))
+    return MissionFile(mission, warnings=tuple(_oddities(rows, layout, mission)))
+
+
+def _oddities(rows: "Sequence[_Line]", layout: _Layout, mission: Mission) -> Iterator[str]:
+    """Yield what is odd about a file that is read nevertheless."""
+    if layout.home_row and rows[0].integer("frame") in ABOVE_HOME and mission.home is not None:
+        yield rows[0].place("frame") + (
+            ": row 0 is the home position; its altitude is taken as above mean sea level"
+        )
+    odd = [row for place, row in enumerate(rows) if row.integer("index") != place]
+    if odd:
+        jumps = any(item.command == Command.DO_JUMP for item in mission.items)
+        yield odd[0].place("index") + (
+            ": indexes do not count up; rows are taken in the file's order"
+            f"{', in which targets of DO_JUMP count too' if jumps else ''}"
+        )
 
 
 def _row(index: int, item: MissionItem) -> str:
     floats = map(_format, (*item.params, item.x, item.y, item.z))
     head = (index, int(index == 0), int(item.frame), int(item.command))
     return "\t".join([*map(str, head), *floats, str(int(item.autocontinue))])
-
-
-def _after_home(item: MissionItem) -> MissionItem:
-    """Return `item` with a jump to the same item, counted with a home row before it."""
-    if item.command != Command.DO_JUMP:
-        return item
-    return replace(item, params=(item.params[0] + 1, *item.params[1:]))
 
 
 def _format(value: float) -> str:
@@ -145,11 +154,11 @@ def _layout(line: tuple[int, str] | None, source: str) -> _Layout:
     number, content = line
     layout = _LAYOUTS.get(" ".join(content.split()))
     if layout is None:
-        raise MissionFileError(f"{source}: line {number}: {_shown(content)}; expected '{HEADER}'")
+        raise MissionFileError(f"{source}: line {number}: {quote(content)}; expected '{HEADER}'")
     return layout
 
 
-class _Row:
+class _Line:
     """A line's fields, read on demand so that every complaint can name its place."""
 
     def __init__(self, source: str, number: int, line: str, layout: _Layout) -> None:
@@ -162,11 +171,12 @@ class _Row:
             )
         self._texts = dict(zip(layout.fields, fields, strict=True))
 
+    def place(self, field: str) -> str:
+        value = quote(self._texts[field])
+        return f"{self.source}: line {self.number}, field {field}: {value}"
+
     def error(self, field: str, expected: str) -> MissionFileError:
-        value = _shown(self._texts[field])
-        return MissionFileError(
-            f"{self.source}: line {self.number}, field {field}: {value}; {expected}"
-        )
+        return MissionFileError(f"{self.place(field)}; {expected}")
 
     def integer(self, field: str) -> int:
         limit = _INTEGER_LIMITS[field]
@@ -219,14 +229,10 @@ class _Row:
         # Every reader takes row 0 for home: an item there would never be flown.
         if self.integer("command") != 0 and self.command() != Command.NAV_WAYPOINT:
             raise self.error("command", "expected 16: row 0 is the home position, not an item")
-        if self.integer("frame") != Frame.GLOBAL:
+        if self.integer("frame") not in (Frame.GLOBAL, *ABOVE_HOME):
             raise self.error("frame", "expected 0: row 0 is the home position, not an item")
         latitude, longitude = (self.real(name, limit) for name, limit in _COORDINATE_LIMITS.items())
         altitude = self.real("altitude")
         if latitude == longitude == altitude == 0:
             return None
         return Home(latitude, longitude, altitude)
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "...")

@@ -1,8 +1,11 @@
-"""Problem (35): the precoders for a given trajectory, by successive convex approximation.
+"""Step 4 of Algorithm 1, problem (35): the precoders for given positions.
 
-P_B(n) stands only in the first sum of (35) and P_U(n) only in the second, so that minimising
-each sum by itself solves (35): its xi is the larger of the two minima. Of the many solutions
-that (35) has for the link with room to spare, this is the one that serves that link best too.
+P_B(n) occurs in the first sum of (35) only and P_U(n) in the second only, so that minimising each
+sum by itself solves (35): its xi is the larger of the two minima. Of the many solutions that (35)
+has for the better link, this one is the best for that link too.
+
+Proposition 2: C = u^H P^H M P u, M = H^H H, is a convex quadratic form of P, so that its tangent
+plane C^ap lies below it.
 """
 
 import cvxpy as cp
@@ -11,14 +14,7 @@ import scipy.sparse as sp
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import SolverError
-from faao_mav.optimizer.algorithm1.exponential import shrink
-from faao_mav.optimizer.algorithm1.surrogate import precoder_exponents
-from faao_mav.optimizer.algorithm1.trajectory_step import (
-    MAX_STEPS,
-    MIN_DECREASE,
-    NEGLIGIBLE,
-    Observer,
-)
+from faao_mav.optimizer.algorithm1.successive import Observer, shrink, successive_approximation
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.scaled import solve
 
@@ -26,40 +22,67 @@ from faao_mav.optimizer.scaled import solve
 def optimize_precoders(
     link: Link, H: Complex, P: Complex, *, observe: Observer | None = None
 ) -> Complex:
-    """Minimise the sum of (15) of `link` over its precoders, from `P`, within tr(P^H P) <= W.
+    """Return precoders that minimise the sum of (15) of `link` within tr(P^H P) <= W.
 
-    `H` (N + 2, N_r, N_t) is (1) or (2), `P` (N + 2, N_t, N_t) in sqrt(W). Stops like
-    `optimize_trajectory`; the sum never increases. `observe` is told the sum over the non-zero
-    classes. Raises `SolverError` when Clarabel fails.
+    Args:
+        link: the link.
+        H: (N + 2, N_r, N_t) channels (1) or (2).
+        P: (N + 2, N_t, N_t) precoders to start from, sqrt(W).
+        observe: is told the sum over the non-zero classes, which never increases.
+
+    Raises:
+        SolverError: Clarabel fails.
     """
-    M = np.conj(np.swapaxes(H, -1, -2)) @ H
+    M = H.conj().mT @ H
 
-    def value(precoders: Complex) -> float:
+    def objective(precoders: Complex) -> float:
         C = precoder_exponents(M, precoders, link.classes.vectors, link.noise)
         return float((link.classes.multiplicity * np.exp(-C)).sum())
 
-    current = value(P)
-    for _ in range(MAX_STEPS):
-        if current <= NEGLIGIBLE * len(P) * link.classes.symbols:
-            break
-        candidate = _solve_35(link, M, P, current)
-        reached = value(candidate)
-        decrease = max(0.0, current - reached)
-        if observe is not None:
-            observe(min(current, reached))
-        if reached < current:
-            P = candidate
-        done = decrease <= MIN_DECREASE * current
-        current = min(current, reached)
-        if done:
-            break
-    return P
+    return successive_approximation(
+        P,
+        objective,
+        lambda last, gap: _solve_35(link, M, last, gap),
+        floor=0.0,
+        scale=len(P) * link.classes.symbols,
+        observe=observe,
+    )
+
+
+def precoder_exponents(M: Complex, P: Complex, u: Complex, noise: float) -> Real:
+    """Return the exponents C / (4 sigma²) = u^H P^H M P u / (4 sigma²), (n, k).
+
+    `M` (n, N, N), `P` (n, N, N) in sqrt(W), `u` (k, N), `noise` sigma² in W.
+    """
+    Pu = np.einsum("nab,kb->nka", P, u)
+    C = np.einsum("nka,nab,nkb->nk", Pu.conj(), M, Pu, optimize=True).real
+    return np.asarray(C / (4 * noise))
+
+
+def precoder_tangent(
+    M: Complex, P_i: Complex, u: Complex, power: float, noise: float
+) -> tuple[Real, Real]:
+    """Return the tangent C^ap / (4 sigma²) = slope p - c of Proposition 2 about the precoders P_i.
+
+    p (n, 2 N²) is [Re P, Im P] row by row, in units of sqrt(W), W = `power`.
+
+    Returns:
+        slope (n, k, 2 N²) and c (n, k), the exponents at P_i.
+    """
+    N = P_i.shape[1]
+    b = np.einsum("nab,nbc,kc->nka", M, P_i, u, optimize=True)
+    z = b.conj()[..., :, None] * u[None, :, None, :]
+    z = z.reshape(*z.shape[:2], N * N) * (2 * np.sqrt(power) / (4 * noise))
+    return np.concatenate([z.real, -z.imag], axis=-1), precoder_exponents(M, P_i, u, noise)
 
 
 def _solve_35(link: Link, M: Complex, P_i: Complex, scale: float) -> Complex:
-    """Solve the part of (35) that belongs to `link`, about `P_i`."""
+    """Return the solution of the part of (35) that belongs to `link` about P_i.
+
+    `scale`, the sum at P_i, is the unit of the objective.
+    """
     slots, N = P_i.shape[:2]
-    slope, c = _tangent(link, M, P_i)
+    slope, c = precoder_tangent(M, P_i, link.classes.vectors, link.power, link.noise)
     factor = shrink(c)
     width = 2 * N * N
     terms = c.size
@@ -80,15 +103,3 @@ def _solve_35(link: Link, M: Complex, P_i: Complex, scale: float) -> Complex:
     P = solved[:, 0] + 1j * solved[:, 1]
     norm = np.maximum(np.linalg.norm(P, axis=(1, 2), keepdims=True), 1.0)
     return np.asarray(np.sqrt(link.power) * P / norm)
-
-
-def _tangent(link: Link, M: Complex, P_i: Complex) -> tuple[Real, Real]:
-    """Return C^ap / (4 sigma²) = slope p - c: slope (n, k, 2 N²) and c (n, k).
-
-    p holds Re P and Im P row by row, in units of sqrt(W).
-    """
-    u, N = link.classes.vectors, P_i.shape[1]
-    b = np.einsum("nab,nbc,kc->nka", M, P_i, u, optimize=True)
-    z = b.conj()[..., :, None] * u[None, :, None, :]
-    z = z.reshape(*z.shape[:2], N * N) * (2 * np.sqrt(link.power) / (4 * link.noise))
-    return np.concatenate([z.real, -z.imag], axis=-1), precoder_exponents(M, P_i, u, link.noise)

@@ -1,6 +1,11 @@
-"""Problem (27): the trajectory for given precoders, by successive convex approximation."""
+"""Step 3 of Algorithm 1, problem (27): the trajectory for given precoders.
 
-from collections.abc import Callable
+Proposition 1: the exponent D = rho_0 A / (||w - p||² + H²) of (16) is a convex function of
+y = ||w - p||², so that its tangent in y, D^lb, lies below it and exp(-D^lb) above exp(-D); D^lb is
+concave in w. (The gradients (25), (26) hold with the vector w - p in place of its norm and without
+the minus sign: the sum of exponentials grows with the distance.)
+"""
+
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,28 +13,25 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import SolverError
-from faao_mav.optimizer.algorithm1.exponential import merge_equal, shrink
-from faao_mav.optimizer.algorithm1.surrogate import trajectory_exponents
+from faao_mav.optimizer.algorithm1.successive import (
+    Observer,
+    shrink,
+    successive_approximation,
+)
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.radio.rate import exponents
 
-MAX_STEPS = 20
-MIN_DECREASE = 1e-4
-NEGLIGIBLE = 1e-12
-
-Observer = Callable[[float], None]
-"""Is told xi after every convex problem."""
-
 
 @dataclass(frozen=True, slots=True)
 class SumOfExponentials:
-    """One link's constraint (16b) or (16c): its terms, and the constant that xi is offset by.
+    """The constraint (16b) or (16c) of one link.
 
-    `A` (N + 2, k) is rho_0 A_mk(n) in m², `offset` is O_j minus the (N + 2) rho^N_s zero terms.
+    `A` (N + 2, k) is rho_0 A_mk(n) in m² for the k classes of differences. `offset` is O_B or O_U
+    minus the (N + 2) rho^N_t terms of the zero class.
     """
 
     link: Link
@@ -37,16 +39,20 @@ class SumOfExponentials:
     offset: float
 
     def value(self, w: Real) -> float:
-        """Return the sum over slots and non-zero classes of multiplicity exp(-D)."""
-        D = trajectory_exponents(self.A, w, self.link.station, self.link.altitude)
-        return float((self.link.classes.multiplicity * np.exp(-D)).sum())
+        """Return the sum over slots and non-zero classes of multiplicity exp(-D) at w."""
+        d2 = _squared_distance(self.link, w)
+        return float((self.link.classes.multiplicity * np.exp(-self.A / d2[:, None])).sum())
+
+
+def _squared_distance(link: Link, w: Real) -> Real:
+    return np.asarray(np.sum((w - link.station) ** 2, axis=-1) + link.altitude**2)
 
 
 def link_sum(link: Link, H_r: Complex, P: Complex) -> SumOfExponentials:
-    """Return the sum of `link` for the fading H_r (N + 2, N_r, N_t) and the precoders P."""
+    """Return the constraint of `link` for H_r (N + 2, N_r, N_t) and P (N + 2, N_t, N_t)."""
     slots, classes = len(H_r), link.classes
     A = link.reference_gain * exponents(H_r, P, classes.vectors, link.noise)
-    # O_B, O_U = 2 (N + 2) N_s log2 rho
+    # O_B, O_U = 2 (N + 2) N_t log2 rho
     return SumOfExponentials(link, A, slots * (2 * classes.bits - classes.symbols))
 
 
@@ -64,28 +70,20 @@ def optimize_trajectory(
 ) -> Trajectory:
     """Solve (27) again and again about its last solution, from the feasible `flight`.
 
-    Stops when xi falls by less than `MIN_DECREASE` of what is left above its floor (the xi of
-    two faultless links), or after `MAX_STEPS`. xi never increases. Raises `SolverError` when
-    Clarabel fails.
+    The objective is xi, which never increases; its floor is the xi of two links without errors.
+
+    Raises:
+        SolverError: Clarabel fails.
     """
     floor = max(-s.offset for s in sums)
-    scale = len(flight.w) * max(s.link.classes.symbols for s in sums)
-    current = xi(sums, flight.w)
-    for _ in range(MAX_STEPS):
-        gap = current - floor
-        if gap <= NEGLIGIBLE * scale:
-            break
-        candidate = _solve_27(problem, sums, flight, floor, gap)
-        reached = xi(sums, candidate.w)
-        if reached < current:
-            flight, current, decrease = candidate, reached, current - reached
-        else:
-            decrease = 0.0
-        if observe is not None:
-            observe(current)
-        if decrease <= MIN_DECREASE * gap:
-            break
-    return flight
+    return successive_approximation(
+        flight,
+        lambda trajectory: xi(sums, trajectory.w),
+        lambda last, gap: _solve_27(problem, sums, last, floor, gap),
+        floor=floor,
+        scale=len(flight.w) * max(s.link.classes.symbols for s in sums),
+        observe=observe,
+    )
 
 
 def _solve_27(
@@ -100,20 +98,21 @@ def _solve_27(
     objective = cp.Variable()
     constraints: list[Any] = list(flight.constraints)
     for s in sums:
-        sum_lb, more = _surrogate(s, last.w, flight.w, gap)
+        sum_lb, more = convex_bound(s, last.w, flight.w, gap)
         constraints += [*more, sum_lb - (s.offset + floor) / gap <= objective]
     if solve(cp.Problem(cp.Minimize(objective), constraints)) == cp.INFEASIBLE:
         raise SolverError("Clarabel calls (27) infeasible, although a feasible flight is known")
     return flight.trajectory()
 
 
-def _surrogate(
-    s: SumOfExponentials, w_i: Real, w: cp.Variable, gap: float
+def convex_bound(
+    s: SumOfExponentials, w_i: Real, w: cp.Expression, gap: float
 ) -> tuple[cp.Expression, list[Any]]:
-    """Return F^lb / gap as an expression of the scaled positions w, with its constraints.
+    """Return the sum of multiplicity exp(-D^lb) / gap about w_i (N + 2, 2), and its constraints.
 
-    D^lb = c (1 - q), q >= (||w - p||² - ||w_i - p||²) / d_i², so that one quadratic per slot
-    serves all classes.
+    w (N + 2, 2) are positions in units of `LENGTH`. With c = D(w_i) the tangent of Proposition 1 is
+    D^lb = c (1 - q), q >= (||w - p||² - ||w_i - p||²) / d_i²: one quadratic per slot serves all
+    classes.
     """
     link = s.link
     y_i = np.sum((w_i - link.station) ** 2, axis=1)
@@ -125,3 +124,27 @@ def _surrogate(
     select = sp.csr_array((c, (np.arange(len(c)), slot)), shape=(len(c), len(w_i)))
     terms = cp.exp(select @ q - c + np.log(multiplicity / gap))
     return cp.sum(terms), [cp.sum(cp.square(offset), axis=1) - y_i / d2 <= q]
+
+
+def merge_equal(c: Real, multiplicity: Real) -> tuple[Integers, Real, Real]:
+    """Merge the terms multiplicity exp(-c) of one slot whose exponents agree to 1e-12.
+
+    Args:
+        c: (n, k) exponents.
+        multiplicity: (k,) factors.
+
+    Returns:
+        Slot index, exponent and multiplicity of the remaining terms, flat, slot by slot.
+
+    >>> merge_equal(np.array([[1.0, 2.0, 1.0]]), np.array([1.0, 2.0, 4.0]))
+    (array([0, 0]), array([1., 2.]), array([5., 2.]))
+    """
+    order = np.argsort(c, axis=1)
+    c = np.take_along_axis(c, order, axis=1)
+    weight = multiplicity[order]
+    new = np.ones(c.shape, dtype=bool)
+    new[:, 1:] = np.diff(c, axis=1) > 1e-12 * (1 + c[:, 1:])
+    term = np.cumsum(new.ravel()) - 1
+    merged = np.bincount(term, weights=weight.ravel()).astype(np.float64)
+    slots = np.repeat(np.arange(len(c)), c.shape[1]).reshape(c.shape)
+    return slots[new], c[new], merged

@@ -8,7 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.rates.place import PlaceRate, place
+from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.rate_model import rate_model
 
 
@@ -17,13 +17,13 @@ class RateField:
     """The rates of the `links` by their models `rates`: a `Stage` of J = 2 rewards in bits."""
 
     links: tuple[Link, ...]
-    rates: tuple[PlaceRate, ...]
+    rates: tuple[RateModel, ...]
 
     def value(self, w: Real) -> Real:
         """Return the rates (2, ..., n) at positions w (2, ..., n), bits."""
         rates = []
         for link, rate in zip(self.links, self.rates, strict=True):
-            at = place(link, w)
+            at = link_coordinates(link, w)
             rates.append(rate.value(at.gain_log, at.cosine))
         return np.stack(rates)
 
@@ -32,7 +32,7 @@ class RateField:
         shape = (len(self.links), *w.shape[1:])
         value, gradient, hessian = np.empty(shape), np.empty((2, *shape)), np.empty((3, *shape))
         for j, (link, rate) in enumerate(zip(self.links, self.rates, strict=True)):
-            at = place(link, w)
+            at = link_coordinates(link, w)
             partials = rate.partials(at.gain_log, at.cosine)
             value[j] = partials.value
             gradient[:, j], hessian[:, j] = at.by_position(partials)

@@ -1,41 +1,43 @@
 """The best rate of a link with one or two modes, for fading known slot by slot.
 
-The best rate depends on H through its singular values alone. With two of them it is one function of
-two numbers for all slots and both links: searched once on a grid, then read off, the same at every
-visit.
+The best rate depends on H through its singular values λ_1 >= λ_2 alone. It is therefore one
+function f(a, κ) of a = ln(W λ_1² / σ²) and κ = λ_2 / λ_1 for all slots: the best precoders are
+searched once on a grid of a and κ, and a bicubic spline interpolates their rates. With
+H = sqrt(gain) H_r, a = l + ln(W λ_1² / σ²) of H_r, and κ does not depend on l.
 """
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.optimizer.problem import Link
-from faao_mav.optimizer.rates.bicubic import Bicubic, Rows
-from faao_mav.optimizer.rates.place import Partials, Turning
-from faao_mav.radio.best_precoder import best_precoders
+from faao_mav.optimizer.rates import DirectionPartials, RatePartials
+from faao_mav.optimizer.rates.spline import BicubicSpline, GridPosition
+from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 
-_SPACING = 0.125  # of a
-_SNAP = 2  # ends of the grid of a, so that links of one plan share it
-_RATIOS = 17
-_SEARCH_EVERY = (8, 4)
-_STEP = 1e-3  # of u, for the derivatives of singular values
-_DIRECTIONS = 33
+# Chosen; what a change costs is not measured.
+_SPACING = 0.125  # spacing of the grid of a: 0.54 dB
+_WHOLE = 2  # the grid of a ends at multiples of this, so that the links of a plan share a table
+_MARGIN = 0.1  # margin of the grid of a beyond the values at the sampled directions
+_RATIOS = 17  # grid points of κ, evenly from 0 to 1
+_SEARCH_EVERY = (8, 4)  # steps of a and of κ between points that are searched from all starts
+_STEP = 1e-3  # step of u in the central differences of a and κ, whose errors are about 1e-6
+_DIRECTIONS = 33  # directions u at which the range of a is sampled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
-    """The best rate over a = ln(W lambda_1² gain / sigma²) and kappa = lambda_2 / lambda_1.
+class ModeTable:
+    """The best rate f(a, κ).
 
-    `gains` (m,) and `ratios` (c,) are the grid, `Q` (m, c, N_t, N_t) the best precoders there for
-    unit power, in the basis of the right singular vectors; `exact` says that they are known in
-    closed form, so that only the spline errs.
+    `gains` (m,) and `ratios` (c,) are the grids of a and κ, `Q` (m, c, N_t, N_t) the best precoders
+    there for unit power, in the basis of the right singular vectors. `exact` tells that they have a
+    closed form; the only error of the rate is then that of the spline.
     """
 
-    spline: Bicubic
+    spline: BicubicSpline
     gains: Real
     ratios: Real
     Q: Complex
@@ -44,36 +46,38 @@ class Table:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModeRate:
-    """The cutoff rate (7), (8) at the best precoders, for links with one or two modes."""
+    """The cutoff rate (7), (8) at the best precoders, for links with one or two modes.
+
+    `fixed` is the result of `_located` for a link whose H_r does not depend on u, else None.
+    """
 
     link: Link
-    table: Table
-    fixed: tuple[Real, Rows] | None
-    """What `_modes` finds, as the table is asked, for links on which it is the same everywhere."""
+    table: ModeTable
+    fixed: tuple[Real, GridPosition] | None
 
     @property
     def exact(self) -> bool:
-        """Whether the best precoders are known in closed form."""
+        """Whether the best precoders have a closed form."""
         return self.table.exact
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
-        """Return the rate of every slot, bits (..., n)."""
-        strength, rows = self.fixed or _asked(self.table, *_modes(self.link, cosine))
-        return self.table.spline.value(gain_log + strength, rows)
+        """Return the rate R of every slot, bits (..., n)."""
+        strength, ratio = self.fixed or _located(self.table, *_modes(self.link, cosine))
+        return self.table.spline.value(gain_log + strength, ratio)
 
-    def partials(self, gain_log: Real, cosine: Real) -> Partials:
-        """Return the rate and its derivatives by l and u."""
+    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
+        """Return the rate and its derivatives by l and u, bits (..., n)."""
         if self.fixed:
-            strength, rows = self.fixed
-            return Partials(*self.table.spline.by_x(gain_log + strength, rows))
+            strength, ratio = self.fixed
+            return RatePartials(*self.table.spline.by_x(gain_log + strength, ratio))
         here, up, down = (_modes(self.link, cosine + h) for h in (0, _STEP, -_STEP))
         a_u, k_u = ((x - y) / (2 * _STEP) for x, y in zip(up, down, strict=True))
         a_uu, k_uu = ((x - 2 * m + y) / _STEP**2 for x, m, y in zip(up, here, down, strict=True))
-        strength, rows = _asked(self.table, *here)
+        strength, ratio = _located(self.table, *here)
         value, by_a, by_k, by_aa, by_ak, by_kk = self.table.spline.by_both(
-            gain_log + strength, rows
+            gain_log + strength, ratio
         )
-        turning = Turning(
+        direction = DirectionPartials(
             by_u=by_a * a_u + by_k * k_u,
             by_lu=by_aa * a_u + by_ak * k_u,
             by_uu=by_aa * a_u**2
@@ -82,45 +86,49 @@ class ModeRate:
             + by_a * a_uu
             + by_k * k_uu,
         )
-        return Partials(value, by_a, by_aa, turning)
+        return RatePartials(value, by_a, by_aa, direction)
 
-    def start(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return nearly the best precoders (n, N_t, N_t): the grid's, in each slot's own basis."""
+    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
+        """Return precoders (n, N_t, N_t) close to the best at l and u (n,).
+
+        They are those of the nearest grid points, in the basis of each slot's singular vectors.
+        """
         strength, ratio = _modes(self.link, cosine)
         i = _nearest(self.table.gains, gain_log + strength)
         j = _nearest(self.table.ratios, ratio)
         H_r = self.link.fade(self.link.line_of_sight_at(cosine))
         _, _, Vh = np.linalg.svd(H_r)
-        return np.asarray(np.conj(np.swapaxes(Vh, -1, -2)) @ self.table.Q[i, j])
+        return np.asarray(Vh.conj().mT @ self.table.Q[i, j])
 
 
 def has_few_modes(link: Link) -> bool:
-    """Return whether `ModeRate` can describe `link`."""
+    """Return whether `link` has at most two modes, so that `ModeRate` holds for it."""
     return min(link.receive, link.transmit) <= 2
 
 
 def mode_rate(link: Link, least: float, most: float) -> ModeRate:
-    """Search the best rates of `link` between two logarithms of the path gain."""
+    """Return the best rate of `link`, whose draws are known, from l = `least` to l = `most`."""
     directions = np.linspace(-1, 1, _DIRECTIONS) if link.follows_position else np.zeros(1)
     slots = 1 if link.nlos is None else len(link.nlos)
     strengths = [_modes(link, np.full(slots, u))[0] for u in directions]
-    low = least + min(s.min() for s in strengths) - 0.1
-    high = most + max(s.max() for s in strengths) + 0.1
-    snapped = (math.floor(low / _SNAP) * _SNAP, math.ceil(high / _SNAP) * _SNAP)
+    low = least + min(s.min() for s in strengths) - _MARGIN
+    high = most + max(s.max() for s in strengths) + _MARGIN
+    ends = (math.floor(low / _WHOLE) * _WHOLE, math.ceil(high / _WHOLE) * _WHOLE)
     modes = min(2, link.receive, link.transmit)
-    table = _table(link.modulation, link.transmit, modes, *snapped)
+    table = _table(link.modulation, link.transmit, modes, *ends)
     if link.follows_position:
         return ModeRate(link, table, None)
-    return ModeRate(link, table, _asked(table, *_modes(link, np.zeros(slots))))
+    return ModeRate(link, table, _located(table, *_modes(link, np.zeros(slots))))
 
 
-def _asked(table: Table, strength: Real, ratio: Real) -> tuple[Real, Rows]:
-    return strength, table.spline.rows(ratio)
+def _located(table: ModeTable, strength: Real, ratio: Real) -> tuple[Real, GridPosition]:
+    """Return a - l as it is, and κ by its position on the grid of the table."""
+    return strength, table.spline.locate(ratio)
 
 
 @lru_cache(maxsize=8)
-def _table(modulation: str, antennas: int, modes: int, low: int, high: int) -> Table:
-    """Search the grid: every point is reached from the searched points around it, the best kept."""
+def _table(modulation: str, antennas: int, modes: int, low: int, high: int) -> ModeTable:
+    """Return the table for an alphabet and a number of modes, from a = `low` to a = `high`."""
     gains = np.linspace(low, high, round((high - low) / _SPACING) + 1)
     ratios = np.linspace(0, 1, _RATIOS)
     H = np.zeros((len(gains), len(ratios), modes, antennas), dtype=np.complex128)
@@ -128,14 +136,18 @@ def _table(modulation: str, antennas: int, modes: int, low: int, high: int) -> T
     if modes == 2:
         H[..., 1, 1] = np.exp(gains / 2)[:, None] * ratios
     rate, Q, exact = _search(modulation, H)
-    return Table(Bicubic.through(gains, ratios, rate), gains, ratios, Q, exact)
+    return ModeTable(BicubicSpline.through(gains, ratios, rate), gains, ratios, Q, exact)
 
 
 def _search(modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
-    exact = best_precoders(H[:1, :1], 1.0, modulation, 1.0).exact
-    if exact:
-        found = best_precoders(H, 1.0, modulation, 1.0)
-        return found.rate, found.P, True
+    """Return best rates (m, c) and precoders (m, c, N, N) for H (m, c, modes, N); whether exact.
+
+    Without a closed form, every `_SEARCH_EVERY`-th point is searched from all starts. All points
+    are then searched from the four of these around them, and keep the best.
+    """
+    if has_closed_form(modulation, H.shape[-1]):
+        best = best_precoders(H, 1.0, modulation, 1.0)
+        return best.rate, best.P, True
     every_a, every_k = _SEARCH_EVERY
     coarse = best_precoders(H[::every_a, ::every_k], 1.0, modulation, 1.0).P
     i, j = np.arange(H.shape[0]) // every_a, np.arange(H.shape[1]) // every_k
@@ -144,15 +156,15 @@ def _search(modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
         for right in (0, 1):
             near = coarse[np.minimum(i + up, coarse.shape[0] - 1)]
             near = near[:, np.minimum(j + right, coarse.shape[1] - 1)]
-            found = best_precoders(H, 1.0, modulation, 1.0, start=near)
-            better = found.rate > rate
-            rate = np.where(better, found.rate, rate)
-            Q = np.where(better[..., None, None], found.P, Q)
+            best = best_precoders(H, 1.0, modulation, 1.0, start=near)
+            better = best.rate > rate
+            rate = np.where(better, best.rate, rate)
+            Q = np.where(better[..., None, None], best.P, Q)
     return rate, Q, False
 
 
 def _modes(link: Link, cosine: Real) -> tuple[Real, Real]:
-    """Return ln(W lambda_1² / sigma²) and kappa of H_r (..., n) at direction cosines u (..., n)."""
+    """Return a - l = ln(W λ_1² / σ²) and κ = λ_2 / λ_1 of H_r, (..., n), at u (..., n)."""
     snr = math.log(link.power / link.noise)
     H_r = link.fade(link.line_of_sight_at(cosine))
     if H_r.shape[-2] > H_r.shape[-1]:
@@ -160,12 +172,13 @@ def _modes(link: Link, cosine: Real) -> tuple[Real, Real]:
     trace = np.sum(H_r.real**2 + H_r.imag**2, axis=(-2, -1))
     if H_r.shape[-2] == 1:
         return np.log(trace) + snr, np.zeros_like(trace)
-    gram = H_r @ np.conj(np.swapaxes(H_r, -1, -2))
+    gram = H_r @ H_r.conj().mT
     apart = np.hypot((gram[..., 0, 0] - gram[..., 1, 1]).real, 2 * np.abs(gram[..., 0, 1]))
     ratio = np.sqrt(np.maximum(trace - apart, 0) / (trace + apart))
     return np.log((trace + apart) / 2) + snr, ratio
 
 
-def _nearest(grid: Real, x: Real) -> Any:
+def _nearest(grid: Real, x: Real) -> Integers:
+    """Return the indices (...) of the grid points nearest to x (...)."""
     index = np.rint((x - grid[0]) / (grid[1] - grid[0])).astype(np.intp)
-    return np.clip(index, 0, len(grid) - 1)
+    return np.asarray(np.clip(index, 0, len(grid) - 1))

@@ -1,30 +1,33 @@
-"""Choose for each link the quickest exact form of its rate as a function of the position.
+"""Choose for each link of a plan the quickest exact rate model; tables over distance and direction.
 
-Without known draws the best rate depends on the distance alone: by the symmetry of the fading, a
-turn of the line of sight is undone by turning the precoders. It is then one curve, tabulated once.
-A scheme that does not turn its streams with the arrays depends on the direction too: a surface.
-With a draw known for every slot the slots differ, but links with two modes share one function of
-their singular values.
+Without known draws the best rate depends on the distance alone: the distribution of the fading does
+not change when the line of sight is rotated, and precoders undo the rotation. It is then one curve,
+tabulated once. A classical scheme does not rotate its streams with the arrays, so that its rate
+depends on the direction too: a surface. With a draw known for every slot the slots differ, but
+links of two modes at most share one function of their singular values.
 """
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
-from faao_mav.optimizer.rates.bicubic import Bicubic
+from faao_mav.optimizer.rates import DirectionPartials, RateModel, RatePartials
 from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
-from faao_mav.optimizer.rates.place import Partials, PlaceRate, Turning
 from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate
-from faao_mav.optimizer.rates.spline import Spline
+from faao_mav.optimizer.rates.spline import BicubicSpline, CubicSpline
 
 _CURVE_POINTS = 97
-_SEARCH_EVERY = 12
 _SURFACE_POINTS = (49, 65)
+"""Grid points of a curve over l, and of a surface over l and u. Chosen so that tables differ from
+exact rates by less than 2e-4 bit in the tests (test_rate_models.py)."""
+
+_SEARCH_EVERY = 12
+"""Every so many points of a curve the best precoders are searched from all starts; between, from
+these. Chosen; what a change costs is not measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,48 +38,54 @@ class CurveRate:
     """
 
     link: Link
-    spline: Any
+    spline: CubicSpline
     gain_log: Real
     precoders: Complex
 
     def value(self, gain_log: Real, cosine: Real) -> Real:  # noqa: ARG002
-        """Return the rate of every slot, bits (..., n)."""
-        return np.asarray(self.spline(gain_log))
+        """Return the rate R of every slot, bits (..., n)."""
+        return self.spline(gain_log)
 
-    def partials(self, gain_log: Real, cosine: Real) -> Partials:  # noqa: ARG002
-        """Return the rate and its derivatives by l."""
-        value, by_l, by_ll = (np.asarray(self.spline(gain_log, k)) for k in range(3))
-        return Partials(value, by_l, by_ll)
+    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:  # noqa: ARG002
+        """Return the rate and its derivatives by l, bits (..., n)."""
+        value, by_l, by_ll = (self.spline(gain_log, order) for order in range(3))
+        return RatePartials(value, by_l, by_ll)
 
-    def start(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return nearly the best precoders ((S,) n, N_t, N_t): the grid's, turned to u."""
+    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
+        """Return precoders ((S,) n, N_t, N_t) close to the best at l and u (n,).
+
+        They are those of the nearest grid points, rotated from u = 0 to u.
+        """
         step = self.gain_log[1] - self.gain_log[0]
         nearest = np.rint((gain_log - self.gain_log[0]) / step).astype(np.intp)
         steering = self.link.line_of_sight_at(cosine)[:, 0]  # conj(D_t): D_r is 1 at antenna 0
-        found = self.precoders[..., np.clip(nearest, 0, len(self.gain_log) - 1), :, :]
-        return np.asarray(np.conj(steering)[:, :, None] * found)
+        near = self.precoders[..., np.clip(nearest, 0, len(self.gain_log) - 1), :, :]
+        return np.asarray(np.conj(steering)[:, :, None] * near)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceRate:
     """A rate that depends on l and u: a bicubic spline through exact values."""
 
-    spline: Bicubic
+    spline: BicubicSpline
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
-        """Return the rate of every slot, bits (..., n)."""
-        return self.spline.value(gain_log, self.spline.rows(cosine))
+        """Return the rate R of every slot, bits (..., n)."""
+        return self.spline.value(gain_log, self.spline.locate(cosine))
 
-    def partials(self, gain_log: Real, cosine: Real) -> Partials:
-        """Return the rate and its derivatives by l and u."""
+    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
+        """Return the rate and its derivatives by l and u, bits (..., n)."""
         value, by_l, by_u, by_ll, by_lu, by_uu = self.spline.by_both(
-            gain_log, self.spline.rows(cosine)
+            gain_log, self.spline.locate(cosine)
         )
-        return Partials(value, by_l, by_ll, Turning(by_u, by_lu, by_uu))
+        return RatePartials(value, by_l, by_ll, DirectionPartials(by_u, by_lu, by_uu))
 
 
-def rate_model(link: Link, design: Design, farthest: float) -> PlaceRate:
-    """Return the rate of `link` under `design`, up to `farthest` metres (horizontal) away."""
+def rate_model(link: Link, design: Design, farthest: float) -> RateModel:
+    """Return the rate model of `link` under `design`.
+
+    `farthest` is the largest horizontal distance from the station, in metres, that it covers.
+    """
     nearest = np.log(link.reference_gain / link.altitude**2)
     least = np.log(link.reference_gain / (farthest**2 + link.altitude**2))
     if link.nlos is not None and not design.averaged:
@@ -89,36 +98,29 @@ def rate_model(link: Link, design: Design, farthest: float) -> PlaceRate:
 
 
 def best_curve(link: Link, design: Design, least: float, most: float) -> CurveRate:
-    """Tabulate the rate of `link` between two logarithms of the path gain."""
+    """Return the rate of `link` tabulated from l = `least` to l = `most`."""
     gain_log = _grid(least, most, _CURVE_POINTS)
     H_r = link.fade(link.line_of_sight_at(np.zeros(len(gain_log))))
     H = np.exp(gain_log / 2)[:, None, None] * H_r
     P = _along(link, design, H) if design.optimal else design.precoders(link, H)
-    return CurveRate(link, Spline.through(gain_log, design.rate(link, H, P)), gain_log, P)
+    return CurveRate(link, CubicSpline.through(gain_log, design.rate(link, H, P)), gain_log, P)
 
 
 def _along(link: Link, design: Design, H: Complex) -> Complex:
-    """The best precoders along the grid: searched from all starts here and there, followed between.
+    """Return the best precoders ((S,) m, N_t, N_t) of the channels H along the grid of a curve.
 
-    Every point is reached from the searched point below and from the one above, and takes the
-    better: where two kinds of precoder cross, the curve keeps the upper one.
+    Every `_SEARCH_EVERY`-th point is searched from all starts. The others are searched from the
+    results below and above them and keep the better: where two kinds of precoder cross, the curve
+    follows the upper one.
     """
     points = H.shape[-3]
     searched = np.arange(0, points, _SEARCH_EVERY)
     P = design.precoders(link, H[..., searched, :, :])
     below = np.arange(points) // _SEARCH_EVERY
     above = np.minimum(below + 1, len(searched) - 1)
-    best, rate = None, None
-    for neighbour in (below, above):
-        found = design.precoders(link, H, start=P[..., neighbour, :, :])
-        reached = design.rate(link, H, found)
-        if best is None or rate is None:
-            best, rate = found, reached
-        else:
-            better = (reached > rate)[:, None, None]
-            best = np.where(better, found, best)
-    assert best is not None
-    return best
+    first, second = (design.precoders(link, H, start=P[..., k, :, :]) for k in (below, above))
+    better = design.rate(link, H, second) > design.rate(link, H, first)
+    return np.where(better[:, None, None], second, first)
 
 
 def _grid(least: float, most: float, points: int) -> Real:
@@ -132,7 +134,7 @@ def _surface(link: Link, design: Design, least: float, most: float) -> SurfaceRa
     H_r = link.fade(link.line_of_sight_at(np.tile(cosine, len(gain_log))))
     H = np.exp(np.repeat(gain_log, len(cosine)) / 2)[:, None, None] * H_r
     rate = _rate(link, design, H).reshape(len(gain_log), len(cosine))
-    return SurfaceRate(Bicubic.through(gain_log, cosine, rate))
+    return SurfaceRate(BicubicSpline.through(gain_log, cosine, rate))
 
 
 def _rate(link: Link, design: Design, H: Complex) -> Real:

@@ -1,14 +1,17 @@
-"""What no trajectory and no precoder can exceed.
+"""An upper bound on R_avg over all trajectories and precoders, by a convex relaxation.
 
-Given its position a slot's best rate falls with the distance r to the station. Any line that lies
-above that curve over the distances the UAV can have at that instant, with a slope of at most zero,
-is a concave function of the position; so is the lowest of many such lines. Maximising the smaller
-mean of these majorants over all flights is a convex problem, whose value bounds R_avg of every
-trajectory under (11)-(13f) and every precoder under (13b), (13c).
+The best rate of a slot falls with the distance r to the station. A line of slope at most zero that
+lies above this curve, over the distances that the UAV can have in that slot, is a concave function
+of the position; so is the minimum of many such lines, the majorant. Maximising the smaller mean of
+the majorants over all flights is a convex problem. Its value bounds R_avg of every trajectory under
+(11)-(13f) with every precoder under (13b), (13c).
 
 The shorter the range of distances, the lower the majorant. A known plan shortens it: a flight that
-is far away at one instant is not near at the next, and loses more rate on its way out and back than
-it may if it is to be better than that plan.
+is far away in one slot is not near in the next, and on its way out and back it loses more rate than
+it may if it is to be better than the known plan.
+
+More lines, weights, blocks, cells and passes below make the bound tighter and slower; fewer never
+make it wrong. They were chosen; what a change costs is not measured.
 """
 
 from dataclasses import dataclass, replace
@@ -23,26 +26,26 @@ from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
 from faao_mav.optimizer.rates.rate_model import best_curve
-from faao_mav.radio.best_precoder import best_precoders
+from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 
-_LINES = 64
-_DISTANCES = 600
-_SEARCHED = 25
-_DIRECTIONS = 257
-_WEIGHTS = (0.3, 0.4, 0.45, 0.5, 0.55, 0.6, 0.7)
-_BISECTIONS = 11
-_BLOCKS = 150
-_PASSES = 2
-_CELLS = 12
-_MOST_SLOTS = 2_000
+_LINES = 64  # tangents of the majorant of each slot
+_DISTANCES = 600  # distances at which the best rate of each slot is tabulated
+_SEARCHED = 25  # distances at which precoders are searched where there is no table of modes
+_DIRECTIONS = 257  # directions u over which the largest singular values are taken
+_WEIGHTS = (0.3, 0.4, 0.45, 0.5, 0.55, 0.6, 0.7)  # weights lambda of R_B against R_U
+_BISECTIONS = 11  # bisections of the greatest distance: it is found to 1 / 2048 of the range
+_BLOCKS = 150  # blocks of slots in which the rate along a way out and back is summed
+_PASSES = 2  # rounds of limiting the distances; the second tabulates the shorter ranges
+_SPEED_CELLS = 12  # cells of the radial speed between -v_max and v_max
+_MOST_SLOTS = 2_000  # slots up to which known plans limit the distances: memory grows with them
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """An upper bound on R_avg, bit/s/Hz.
+    """An upper bound on R_avg: `value`, bit/s/Hz.
 
-    `exact`: the best precoders are known in closed form. Otherwise they are searched numerically,
-    and the bound holds as far as the search is right.
+    `exact` tells that the best precoders have a closed form. Otherwise they are searched, and the
+    bound holds if the search has found the global optimum.
     """
 
     value: float
@@ -50,10 +53,14 @@ class Bound:
 
 
 def upper_bound(problem: Problem, known: float = 0.0) -> Bound:
-    """Return what no trajectory under (11)-(13f) with any precoders can exceed.
+    """Return an upper bound on R_avg over all trajectories and precoders of `problem`.
 
-    `known` is the R_avg of any plan for the problem: the better it is, the tighter the bound.
-    Raises `SolverError` when Clarabel fails.
+    Args:
+        problem: the feasible set and the links.
+        known: R_avg of any plan for the problem, bit/s/Hz: the better it is, the tighter the bound.
+
+    Raises:
+        SolverError: Clarabel fails.
     """
     import cvxpy as cp
 
@@ -61,8 +68,8 @@ def upper_bound(problem: Problem, known: float = 0.0) -> Bound:
 
     kin = problem.kinematics
     ranges = [reachable_distances(kin, link.station) for link in problem.links]
-    for _ in range(_PASSES):  # the second sees the shorter ranges in more detail
-        ranges, exact = _without_excursions(problem, ranges, known)
+    for _ in range(_PASSES):
+        ranges, exact = _shortened(problem, ranges, known)
     flight = flight_variables(kin)
     value, constraints = cp.Variable(), list(flight.constraints)
     for link, (nearest, farthest) in zip(problem.links, ranges, strict=True):
@@ -77,26 +84,26 @@ def upper_bound(problem: Problem, known: float = 0.0) -> Bound:
         ]
     relaxed = cp.Problem(cp.Maximize(value), constraints)
     if solve(relaxed) == cp.INFEASIBLE:
-        # Every flight leaves the ranges that a better one than the known plan would keep to.
+        # A flight better than the known plan would stay within the ranges, and none does.
         return Bound(known, exact)
-    # The solver stops within 1e-8 of the optimum, or 1e-4 where it had to be content with less.
+    # Clarabel stops within 1e-8 of the optimum, or within 1e-4 where it made no more progress.
     slack = 1e-6 if relaxed.status == cp.OPTIMAL else 1e-3
     ceiling = min(link.classes.bits for link in problem.links)
     return Bound(min(ceiling, max(known, float(value.value) + slack)), exact)
 
 
 Ranges: TypeAlias = list[tuple[Real, Real]]
-"""For each link the least and the greatest distance (n,), m."""
+"""For each link the least and the greatest horizontal distance of every slot (n,), m."""
 
 
-def _without_excursions(problem: Problem, ranges: Ranges, known: float) -> tuple[Ranges, bool]:
-    """Shorten `ranges` to what a flight better than `known` can use; and whether rates are exact.
+def _shortened(problem: Problem, ranges: Ranges, known: float) -> tuple[Ranges, bool]:
+    """Return `ranges` without distances that exclude R_avg > `known`; and whether rates are exact.
 
     For any weight lambda, R_avg <= mean of lambda R_B + (1 - lambda) R_U. At a distance s from one
-    station the other is no nearer than |s - L|, L the distance between both: that bounds a slot's
-    share by a function of s, and Phi(s), its maximum from s on, bounds it at s or farther. A flight
-    rho away at slot n cannot be near at the slots around it. If the mean of Phi along its way is
-    below `known`, rho is not reached by anything better.
+    station the other is no nearer than |s - L|, L the distance between the stations. That bounds
+    the term of a slot by a function of s; let Phi(s) be its maximum over s and beyond. A flight at
+    distance rho in slot n is not near in the slots around it either. If the mean of Phi over its
+    least distances is below `known`, no better flight is at rho or beyond in slot n.
     """
     kin, links = problem.kinematics, problem.links
     apart = float(np.linalg.norm(links[0].station - links[1].station))
@@ -116,17 +123,19 @@ def _without_excursions(problem: Problem, ranges: Ranges, known: float) -> tuple
         for weight in _WEIGHTS:
             share = weight * rate + (1 - weight) * seen
             best_beyond = np.maximum.accumulate(share[:, ::-1], axis=1)[:, ::-1]
-            limit = np.minimum(limit, _excursion(kin, s, best_beyond, farthest, known))
+            limit = np.minimum(limit, _greatest_distance(kin, s, best_beyond, farthest, known))
         shortened.append((nearest, np.maximum(limit, nearest)))
     return shortened, exact
 
 
-def _excursion(kin: Kinematics, s: Real, best_beyond: Real, farthest: Real, known: float) -> Real:
-    """The greatest rho (n,) at which the mean of Phi is still `known`, by bisection from above.
+def _greatest_distance(
+    kin: Kinematics, s: Real, best_beyond: Real, farthest: Real, known: float
+) -> Real:
+    """Return the greatest rho (n,), m, at which the mean of Phi is at least `known`, by bisection.
 
-    Moving outwards at v_r when rho away, a flight is at least rho + v_r tau - a_max tau²/2 away
-    tau seconds later (or earlier, tau < 0): nothing pulls it in faster. v_r is taken from cells
-    that cover -v_max..v_max, and of the cells the one that suits the flight best.
+    `best_beyond` (n, m) is Phi at the distances s (m,). A flight at distance rho with radial speed
+    v_r is at least rho + v_r tau - a_max tau²/2 away tau seconds later (or earlier, tau < 0). v_r
+    is in one of the cells that cover -v_max to v_max; the cell with the largest mean counts.
     """
     slots = np.arange(kin.slots)
     first = np.arange(0, kin.slots, max(1, kin.slots // _BLOCKS))
@@ -136,8 +145,8 @@ def _excursion(kin: Kinematics, s: Real, best_beyond: Real, farthest: Real, know
     slow = -kin.max_speed * np.maximum(*np.abs(ends))
     if not kin.bound_first_acceleration:
         slow[:, 0] -= 2 * kin.max_speed * kin.time_step
-    edges = np.linspace(-kin.max_speed, kin.max_speed, _CELLS + 1)
-    # All of it is concave in tau: over a block of slots the least is at one of its ends.
+    edges = np.linspace(-kin.max_speed, kin.max_speed, _SPEED_CELLS + 1)
+    # The distance is concave in tau: over a block of slots its minimum is at one of the ends.
     fall = kin.max_acceleration / 2
     cells = [
         np.minimum(*(np.minimum(u * tau, v * tau) - fall * tau**2 for tau in ends))
@@ -161,21 +170,29 @@ def _excursion(kin: Kinematics, s: Real, best_beyond: Real, farthest: Real, know
 
 
 def reachable_distances(kin: Kinematics, station: Real) -> tuple[Real, Real]:
-    """Return the least and the greatest horizontal distance (n,) from `station`, m.
+    """Return the least and the greatest horizontal distance (n,) from `station` (2,), m.
 
-    At each instant the UAV is no farther from w_I than it can have come, and no farther from w_F
-    than it can still go.
+    In slot n the UAV is no farther from w_I than it can fly since slot 0, and no farther from w_F
+    than it can fly until slot N + 1.
+
+    >>> kin = Kinematics(np.zeros(2), np.array([10.0, 0.0]), 5, 1.0, 4.0, 9.0, None, None, True)
+    >>> nearest, farthest = reachable_distances(kin, np.array([10.0, 0.0]))
+    >>> nearest.tolist(), farthest.tolist()
+    ([10.0, 6.0, 2.0, 0.0, 0.0], [10.0, 12.0, 8.0, 4.0, 0.0])
     """
-    come = _travelled(kin, kin.start_velocity, free_jump=not kin.bound_first_acceleration)
-    still = _travelled(kin, kin.end_velocity, free_jump=False)[::-1]
+    since = _longest_way(kin, kin.start_velocity, free_jump=not kin.bound_first_acceleration)
+    until = _longest_way(kin, kin.end_velocity, free_jump=False)[::-1]
     from_start = float(np.linalg.norm(kin.start - station))
     from_end = float(np.linalg.norm(kin.end - station))
-    nearest = np.maximum(0.0, np.maximum(from_start - come, from_end - still))
-    return nearest, np.minimum(from_start + come, from_end + still)
+    nearest = np.maximum(0.0, np.maximum(from_start - since, from_end - until))
+    return nearest, np.minimum(from_start + since, from_end + until)
 
 
-def _travelled(kin: Kinematics, velocity: Real | None, *, free_jump: bool) -> Real:
-    """The longest way (n,) in 0, 1, ... steps from an end with the given velocity."""
+def _longest_way(kin: Kinematics, velocity: Real | None, *, free_jump: bool) -> Real:
+    """Return the longest way (n,), m, in 0, 1, ... steps from an end with the given velocity.
+
+    `free_jump`: the first acceleration has no limit.
+    """
     n = np.arange(kin.slots, dtype=float)
     speed = np.full(kin.slots, kin.max_speed)
     if velocity is not None:
@@ -189,65 +206,68 @@ def _travelled(kin: Kinematics, velocity: Real | None, *, free_jump: bool) -> Re
 def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     """Return the best rate of every slot at distances r (n, m), bits, and whether it is exact.
 
-    Where a known draw meets arrays that turn, the direction is chosen in the bound's favour: each
-    singular value of H_r is the largest that any direction gives it.
+    Where a draw is known for every slot and the channel depends on the direction, the result is an
+    upper bound: each singular value of H_r is the largest over all directions.
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
+    exact = has_closed_form(link.modulation, link.transmit)
     gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
     if link.nlos is None or optimal.averaged:
         curve = best_curve(link, optimal, gain_log.min(), gain_log.max())
-        return curve.value(gain_log, gain_log), False if optimal.averaged else _closed_form(link)
+        return curve.value(gain_log, gain_log), not optimal.averaged and exact
     singular = _largest_singular_values(link, len(r))
     H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
     k = np.arange(singular.shape[1])
     H_r[:, k, k] = singular
-    if _closed_form(link):
+    if exact:
         H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
         return best_precoders(H, link.power, link.modulation, link.noise).rate, True
     diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
     if has_few_modes(link):
         rate = mode_rate(diagonal, gain_log.min(), gain_log.max())
         return np.stack([rate.value(column, column) for column in gain_log.T], axis=1), False
-    # Searched on a coarse grid of each slot, one distance after the other, and interpolated.
+    # One distance after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
 
     columns = np.linspace(0, r.shape[1] - 1, _SEARCHED).astype(np.intp)
-    found, start = [], None
+    rates, start = [], None
     for column in columns:
         H = np.exp(gain_log[:, column] / 2)[:, None, None] * H_r
         best = best_precoders(H, link.power, link.modulation, link.noise, start=start)
-        found.append(best.rate)
+        rates.append(best.rate)
         start = best.P
-    spline = CubicSpline(columns, np.stack(found, axis=1), axis=1)
+    spline = CubicSpline(columns, np.stack(rates, axis=1), axis=1)
     return np.asarray(spline(np.arange(r.shape[1]))), False
 
 
-def _closed_form(link: Link) -> bool:
-    return link.transmit == 1 or (link.modulation == "bpsk" and link.transmit == 2)
-
-
 def _largest_singular_values(link: Link, slots: int) -> Real:
+    """Return upper bounds on the singular values of H_r over all directions, (slots, modes)."""
     directions = np.linspace(-1, 1, _DIRECTIONS) if link.follows_position else np.zeros(1)
     largest = np.zeros((slots, min(link.receive, link.transmit)))
     for u in directions:
         H_r = link.fade(link.line_of_sight_at(np.full(slots, u)))
         largest = np.maximum(largest, np.linalg.svd(H_r, compute_uv=False))
-    # Between two directions of the grid, a singular value moves by less than H_r does: no phase
-    # turns by more than pi (antennas - 1) du.
+    # Between two directions of the grid a singular value changes by less than the norm of the
+    # change of H_r, in which no phase changes by more than pi (antennas - 1) du.
     du = 1 / (len(directions) - 1) if len(directions) > 1 else 0.0
-    turn = np.pi * (max(link.receive, link.transmit) - 1) * du
-    return np.asarray(largest + turn * link.los_share * np.sqrt(link.receive * link.transmit))
+    phase = np.pi * (max(link.receive, link.transmit) - 1) * du
+    return np.asarray(largest + phase * link.los_share * np.sqrt(link.receive * link.transmit))
 
 
 def majorant_lines(r: Real, rates: Real) -> tuple[Real, Real]:
-    """Return slopes and offsets (n, lines): slope r + offset is above `rates` for every line.
+    """Return slopes and offsets (n, lines) of lines slope r + offset that lie above `rates`.
 
-    `r` and `rates` (n, m), r evenly spaced and increasing in each row. Slopes are at most zero.
-    Offsets allow for what the curve may do between the points.
+    `r` and `rates` are (n, m), r evenly spaced and increasing in each row. Slopes are at most zero.
+    The offsets allow for the curvature of the rates between the points.
+
+    >>> slope, offset = majorant_lines(np.array([[0.0, 1.0, 2.0]]), np.array([[2.0, 1.0, 0.0]]))
+    >>> float(slope.min()), float(offset.max())
+    (-1.0, 2.0)
     """
     step = r[:, 1:2] - r[:, :1]
     moving = np.where(step > 0, step, 1.0)
-    # h² |R''| / 8 is what a curve may rise above its chord; twice that, as R'' is seen on the grid.
+    # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being known
+    # on the grid only.
     between = np.abs(np.diff(rates, 2, axis=1)).max(axis=1, keepdims=True) / 4
     tangent = np.minimum(0.0, np.diff(rates, axis=1) / moving)
     whole = np.minimum(0.0, (rates[:, -1:] - rates[:, :1]) / (moving * (r.shape[1] - 1)))

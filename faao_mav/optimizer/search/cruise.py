@@ -1,9 +1,9 @@
-"""Flights to start from for an aircraft that cannot hover: ||v|| >= v_min all the way.
+"""Starts for an aircraft that cannot hover: feasible flights with ||v|| >= v_min throughout.
 
-What time is left over is spent on the way: in a weave about the line, or in full circles. Both are
-made in the space of velocities, where a circle adds nothing to the way: headings theta(n) at one
-speed c, with c delta_t sum (cos, sin) theta the way to go. Given end velocities add a turn and a
-change of speed at the ends.
+Where there is more time than the line from w_I to w_F takes, the flight weaves about the line or
+flies full circles. Both are built as headings theta(n) at one speed c: the displacement is
+c delta_t sum (cos, sin) theta(n), to which a full circle adds nothing. Given end velocities add a
+turn and a change of speed at each end.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,21 +15,24 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 
-_SPARE = 0.95  # of the acceleration that turns use: the corrections need some, too
-_WIDEST = 2.404825557695773  # amplitude of a weave that gets nowhere: the first zero of J_0
-_WEAVES = (16, 8, 4, 2, 1)
-_SPEEDS = (1.1, 1.02, 1.3, 1.0)  # in v_min: room for the optimiser first
-_TOLERANCE = 1e-9
-_ROUNDS = 40
+# Chosen, but for _WIDEST.
+_TURN_SHARE = 0.95  # share of a_max that turns use; the rest is for meeting the ends
+_WIDEST = 2.404825557695773  # amplitude of a weave of no displacement: the first zero of J_0
+_WEAVES = (16, 8, 4, 2, 1)  # numbers of waves that are tried; many stay close to the line
+_SPEEDS = (1.1, 1.02, 1.3, 1.0)  # speeds c that are tried, in v_min; above 1 there is room
+_TOLERANCE = 1e-9  # violation of a limit, in its SI unit, and length in metres that are zero
+_ROUNDS = 40  # bisections of an amplitude, and fixed-point rounds of a line between two turns
 
-Shape = Callable[[int, float], Real]
-"""Headings (k,) about the mean one, for k samples that get on by a share of their way."""
+Headings = Callable[[int, float], Real]
+"""A function of k and a share: k headings (k,), radians, relative to the mean direction, whose
+displacement is that share of the distance flown."""
 
 
 def cruise(kin: Kinematics) -> Trajectory:
-    """Return a feasible flight: weaving towards w_F, or with circles on the way.
+    """Return a feasible flight that weaves towards w_F or circles on the way.
 
-    Raises `InfeasibleError` where none was found. That is no proof that there is none.
+    Raises:
+        InfeasibleError: none was found, which is no proof that there is none.
     """
     for flight in _attempts(kin, []):
         return flight
@@ -42,11 +45,12 @@ def cruise(kin: Kinematics) -> Trajectory:
 
 
 def cruise_by(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
-    """Return a flight by way of `stations` that circles at them, or None if none was found."""
+    """Return a feasible flight that circles at each of `stations`, or None if none was found."""
     return next(_attempts(kin, stations), None)
 
 
 def _attempts(kin: Kinematics, stations: list[Real]) -> Iterator[Trajectory]:
+    """Yield the feasible ones of the flights that are tried, in the order of preference."""
     speeds = sorted({min(kin.max_speed, share * kin.min_speed) for share in _SPEEDS}, reverse=True)
     middle = (kin.min_speed + kin.max_speed) / 2
     if stations:
@@ -57,8 +61,8 @@ def _attempts(kin: Kinematics, stations: list[Real]) -> Iterator[Trajectory]:
     ends = product(first, last)
     for extra in sorted(ends, key=lambda pair: abs(pair[0]) + abs(pair[1])):
         for c in (*speeds, middle):
-            for shape in (*(_weave(m) for m in _WEAVES), _circle(1), _circle(-1)):
-                yield from _feasible(kin, _way(kin, shape, c, extra))
+            for headings in (*(_weave(m) for m in _WEAVES), _circle(1), _circle(-1)):
+                yield from _feasible(kin, _between_turns(kin, headings, c, extra))
 
 
 def _ends(kin: Kinematics) -> tuple[Real | None, Real | None]:
@@ -66,16 +70,17 @@ def _ends(kin: Kinematics) -> tuple[Real | None, Real | None]:
 
 
 def _feasible(kin: Kinematics, v: Real | None) -> Iterator[Trajectory]:
-    """Yield the flight with velocities v (n, 2) if it keeps the limits once it meets the ends."""
+    """Yield the flight with velocities v (n, 2), corrected to meet the ends, if it is feasible."""
     if v is None:
         return
-    a = np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)])
-    flight = kin.integrate(v[0], a)
+    flight = kin.follow(v)
     if max(kin.residuals(flight).values()) < _TOLERANCE:
         yield flight
 
 
-def _weave(waves: int) -> Shape:
+def _weave(waves: int) -> Headings:
+    """Return headings that swing about the mean direction `waves` times."""
+
     def headings(count: int, share: float) -> Real:
         phase = np.sin(2 * np.pi * waves * np.arange(count) / (count - 1))
         low, high = 0.0, _WIDEST
@@ -87,8 +92,8 @@ def _weave(waves: int) -> Shape:
     return headings
 
 
-def _circle(turns: int) -> Shape:
-    """Straight on, with full circles half way."""
+def _circle(turns: int) -> Headings:
+    """Return straight headings with `turns` full circles half way, left if positive."""
 
     def headings(count: int, share: float) -> Real:
         straight = round((count - 1) * share)
@@ -101,34 +106,41 @@ def _circle(turns: int) -> Shape:
 
 
 def _mean(headings: Real) -> float:
-    """The share of its way that a flight with these headings gets on, trapezoid rule."""
+    """Return the displacement along the mean direction as a share of the distance flown."""
     along = np.cos(headings)
     return float((along[1:] + along[:-1]).mean() / 2)
 
 
 def _turn(kin: Kinematics, v: Real, heading: float, extra: float, c: float) -> Real:
-    """Velocities (k, 2) from v to speed c along `heading`, v included, by `extra` radians more."""
+    """Return velocities (k, 2) from v to speed c along `heading`, `extra` radians added."""
     speed, first = float(np.hypot(*v)), float(np.arctan2(v[1], v[0]))
     angle = (heading - first + np.pi) % (2 * np.pi) - np.pi + extra
-    limit = _SPARE * kin.max_acceleration * kin.time_step
-    # both at once, each at a part of the limit: their sum of squares stays below it
+    limit = _TURN_SHARE * kin.max_acceleration * kin.time_step
+    # turning and speeding up share the limit: the sum of their squares stays below its square
     steps = int(np.ceil(np.hypot(abs(angle) * max(speed, c), speed - c) / limit))
     share = np.arange(steps + 1) / max(1, steps)
     size, at = speed + (c - speed) * share, first + angle * share
     return np.asarray(size[:, None] * np.stack([np.cos(at), np.sin(at)], axis=1))
 
 
-def _flown(kin: Kinematics, v: Real) -> Real:
+def _displacement(kin: Kinematics, v: Real) -> Real:
+    """Return the displacement (2,) at the velocities v (k, 2), m."""
     return np.asarray(kin.time_step * (v[1:] + v[:-1]).sum(axis=0) / 2)
 
 
-def _way(kin: Kinematics, shape: Shape, c: float, extra: tuple[float, float]) -> Real | None:
-    """Turn from v(0) to the way, follow `shape`, turn to v(N+1): velocities (n, 2)."""
+def _between_turns(
+    kin: Kinematics, headings: Headings, c: float, extra: tuple[float, float]
+) -> Real | None:
+    """Return velocities (n, 2): a turn from v(0), `headings` at speed c, a turn to v(N+1).
+
+    `extra` are the radians, 0 or a full circle, by which the turns are longer than they must be.
+    None where there is no time for the turns or c exceeds v_max.
+    """
     goal = kin.end - kin.start
-    way, fallback = goal, next((v for v in _ends(kin) if v is not None), np.array([1.0, 0.0]))
+    line, fallback = goal, next((v for v in _ends(kin) if v is not None), np.array([1.0, 0.0]))
     ends: list[Real] = []
-    for _ in range(_ROUNDS):  # the turns depend on the way left between them, and the other way
-        towards = way if np.hypot(*way) > _TOLERANCE else fallback
+    for _ in range(_ROUNDS):  # the turns depend on the line between them, and the line on them
+        towards = line if np.hypot(*line) > _TOLERANCE else fallback
         heading = float(np.arctan2(towards[1], towards[0]))
         on = c * np.array([np.cos(heading), np.sin(heading)])
         first, last = (
@@ -136,20 +148,20 @@ def _way(kin: Kinematics, shape: Shape, c: float, extra: tuple[float, float]) ->
             for k, (v, at) in enumerate(zip(_ends(kin), (heading, heading + np.pi), strict=True))
         )
         ends = [first, -last[::-1] if kin.end_velocity is not None else last]
-        way = goal - _flown(kin, ends[0]) - _flown(kin, ends[1])
+        line = goal - _displacement(kin, ends[0]) - _displacement(kin, ends[1])
         count = kin.slots - len(ends[0]) - len(ends[1]) + 2
         if count < 3:
             return None
         whole = kin.time_step * (count - 1)
-        c = max(c, float(np.hypot(*way)) / whole)
+        c = max(c, float(np.hypot(*line)) / whole)
         if c > kin.max_speed:
             return None
-    share = float(np.hypot(*way)) / (c * whole)
-    theta = shape(count, share)
-    # whole steps of a circle leave a little: that is made up by the speed
-    got = _mean(theta)
-    if share > 0 and got > 0:
-        c = float(np.clip(c * share / got, kin.min_speed, kin.max_speed))
+    share = float(np.hypot(*line)) / (c * whole)
+    theta = headings(count, share)
+    # a circle of whole steps misses the share by a little, which the speed makes up for
+    reached = _mean(theta)
+    if share > 0 and reached > 0:
+        c = float(np.clip(c * share / reached, kin.min_speed, kin.max_speed))
     theta = theta + heading
     inner = c * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     if kin.start_velocity is not None:
@@ -160,7 +172,10 @@ def _way(kin: Kinematics, shape: Shape, c: float, extra: tuple[float, float]) ->
 
 
 def _circling(kin: Kinematics, stations: list[Real], c: float) -> Real | None:
-    """Straight to each of `stations`, equally many circles there, straight on to w_F."""
+    """Return velocities (n, 2) straight to each of `stations`, with circles there, and to w_F.
+
+    The time that is left is shared evenly among the stations. None where it is too short.
+    """
     points = [kin.start, *stations, kin.end]
     lines = np.diff(np.array(points), axis=0)
     lengths = np.hypot(*lines.T)
@@ -177,7 +192,7 @@ def _circling(kin: Kinematics, stations: list[Real], c: float) -> Real | None:
     spare = kin.slots - 1 - int(steps.sum()) - len(lead) - len(tail)
     each = np.full(len(stations), max(0, spare) // len(stations))
     each[0] += max(0, spare) % len(stations)
-    fastest = _SPARE * kin.max_acceleration * kin.time_step / c  # radians per step
+    fastest = _TURN_SHARE * kin.max_acceleration * kin.time_step / c  # radians per step
     theta = [np.full(steps[0] + 1, headings[0])]
     for k, count in enumerate(each):
         corner = (headings[k + 1] - headings[k] + np.pi) % (2 * np.pi) - np.pi

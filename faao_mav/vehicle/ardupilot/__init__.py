@@ -1,1 +1,49 @@
-"""ArduPilot: ArduCopter and ArduPlane."""
+"""ArduPilot: what ArduCopter and ArduPlane share."""
+
+from faao_mav.vehicle.parameter import Parameter, ParameterValues
+from faao_mav.vehicle.vehicle_type import AutopilotFamily
+
+ARDUPILOT = AutopilotFamily(
+    key="ardupilot",
+    name="ArduPilot",
+    mav_autopilot=3,
+    parameter_suffix=".param",
+    parameter_style="list",
+    parameter_prefixes=("WPNAV_", "WP_", "ATC_", "PSC_", "ARMING_"),
+)
+
+_UNION = 2
+"""The bit of FENCE_OPTIONS by which being inside one of several inclusions is enough."""
+
+
+def needs_one_inclusion(vehicle: ParameterValues) -> bool:
+    """Tell whether being inside one of several inclusion areas is enough for `vehicle`."""
+    return bool(int(vehicle.value("fence_options")) & _UNION)
+
+
+SOURCE = "ArduPilot 4.7: parameter lists of Copter and Plane"
+
+
+def switch(key: str, default: float, name: str, unit: str = "") -> Parameter:
+    """Return a parameter with one name in all generations, in its own unit."""
+    return Parameter(key, unit, default, {name: 1.0}, source=SOURCE)
+
+
+SHARED = (
+    switch("arming_items", 0, "ARMING_MIS_ITEMS"),
+    switch("fence_enable", 0, "FENCE_ENABLE"),
+    switch("fence_options", 0, "FENCE_OPTIONS"),
+    switch("fence_ceiling", 100.0, "FENCE_ALT_MAX", "m"),
+    switch("fence_floor", -10.0, "FENCE_ALT_MIN", "m"),
+    switch("fence_radius", 300.0, "FENCE_RADIUS", "m"),
+    switch("sd_storage", 0, "BRD_SD_MISSION"),
+    switch("terrain_enable", 1, "TERRAIN_ENABLE"),
+)
+"""Arming, fence, storage and terrain. The bits of FENCE_TYPE, whose default is each vehicle's own,
+are 1 ceiling, 2 circle, 4 areas, 8 floor."""
+
+
+def rally_limit(default: float) -> Parameter:
+    """Return how far the autopilot looks for a rally point, m; 0: any distance."""
+    names = {"RALLY_LIMIT_KM": 1000.0}
+    return Parameter("rally_limit", "m", default, names, source=SOURCE)

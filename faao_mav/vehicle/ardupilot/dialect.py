@@ -37,7 +37,7 @@ from faao_mav.vehicle.dialect import (
 )
 
 _HIGHEST = 83_000.0
-"""Altitudes are refused from here on, m."""
+"""The altitude from which on items are refused, m. Read in AP_Mission."""
 
 _uint8, _uint16, _int8, _int16 = (
     whole(0, 255),
@@ -132,7 +132,8 @@ _COPTER_SPEEDS: dict[float, SpeedAxis] = {
     3: "descent",
 }
 _PLANE_SPEEDS: dict[float, SpeedAxis] = {0: "airspeed", 1: "least ground speed"}
-_PLANE_DEFAULT = -2.0  # as an airspeed
+_PLANE_DEFAULT = -2.0
+"""The airspeed of a DO_CHANGE_SPEED that stands for the plane's own, m/s."""
 
 
 def _refusal(item: MissionItem, known: dict[int, Codecs], kind: str) -> str | None:

@@ -11,16 +11,14 @@ simulation.
 from collections.abc import Iterator, Mapping
 from math import cos
 
-from faao_mav.vehicle.flight_path import FlightModel
+from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.px4.dialect import DIALECT
-from faao_mav.vehicle.px4.guidance import corner_speed
-from faao_mav.vehicle.px4.legs import Px4Legs
+from faao_mav.vehicle.px4.guidance import Px4Legs, corner_speed
 from faao_mav.vehicle.px4.model import Px4
 from faao_mav.vehicle.px4.parameters import COPTER_TABLE, PLANE_TABLE
 from faao_mav.vehicle.recommend import accelerations_to_try
-from faao_mav.vehicle.vehicle_type import AutopilotFamily, VehicleType
-from faao_mav.vehicle.vertical import VerticalProfile
+from faao_mav.vehicle.vehicle_type import OVERSPEED, AutopilotFamily, VehicleType
 
 __all__ = ["PX4", "PX4_COPTER", "PX4_PLANE", "Px4", "Px4Legs"]
 
@@ -38,7 +36,8 @@ _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (the documented maximum of MPC_XY_CRUISE)."""
 
 _CURVED_ACCELERATION = 5.0
-"""The acceleration, m/s², for corners and short legs at speed. Measured: about 130 flights."""
+"""The recommended acceleration for corners and short legs at speed, m/s². Measured: about 130
+flights."""
 
 _JERK = 20.0
 """The recommended jerk, m/s³. Measured: about 130 flights."""
@@ -46,9 +45,6 @@ _JERK = 20.0
 _ERROR_LIMIT, _HEIGHT_RADIUS = 10.0, 3.0
 """The recommended MPC_XY_ERR_MAX and NAV_MC_ALT_RAD, m. Measured: with the default of 2 m progress
 slows whenever the aircraft lags; with that of 0.8 m it missed waypoints for their altitude."""
-
-_HEADROOM = 1.1
-"""The greatest speed that a schedule may command, as a multiple of the plan's. Chosen."""
 
 
 def _vertical(vehicle: ParameterValues) -> VerticalProfile:
@@ -77,7 +73,7 @@ def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # 
 
 def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
     speed = min(max_speed, _FASTEST)
-    top = round(min(_HEADROOM * speed, _FASTEST), 2)
+    top = round(min(OVERSPEED * speed, _FASTEST), 2)
     table = COPTER_TABLE
     for acceleration in accelerations_to_try(
         table["acceleration"], max_acceleration, _CURVED_ACCELERATION
@@ -109,7 +105,7 @@ PX4_COPTER = VehicleType(
     dialect=DIALECT,
     vertical=_vertical,
     fastest=_FASTEST,
-    legs=Px4Legs.of,
+    legs=Px4Legs.from_vehicle,
     flight_model=_model,
     calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),

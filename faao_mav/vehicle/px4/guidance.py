@@ -4,48 +4,37 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import sqrt
-from typing import TypeVar
+from typing import ClassVar, TypeVar
+
+import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.vehicle.px4.parameters import Px4Limits
 
 _ALIGNED = 0.98
-"""Cosine of the angle to the target from which an aircraft no longer counts as turning."""
+"""The cosine of the angle between velocity and target from which an aircraft no longer counts as
+turning (about 11 degrees). PX4's own."""
 
 _BLEND = 0.01
-"""Half the range of that cosine over which turning fades, so that flights depend smoothly on it."""
+"""Half the range of that cosine over which turning fades: flights then depend smoothly on their
+speeds. Chosen; what a change costs is not measured."""
 
 _LOOKAHEAD = 5.0
-"""Least distance, m, at which a turning aircraft aims along the leg."""
+"""The least distance, m, at which a turning aircraft aims along its leg. PX4's own."""
 
 _SLOW = 0.5
-"""A direction slower than this never holds up the other, horizontal and vertical, m/s."""
+"""The least speed, m/s, to which the slower of the horizontal and the vertical motion holds up the
+other. PX4's own."""
 
 _TINY = 1e-9
+"""Added to lengths, so that nothing is divided by 0."""
 
 
 _Speed = TypeVar("_Speed", float, Real)
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """What bounds a trajectory: m/s² and m/s³, horizontally, upwards and downwards.
-
-    `error` m is how far behind the aircraft may be for the trajectory's clock to stop.
-    """
-
-    acceleration: float
-    jerk: float
-    corner_gain: float
-    climb_acceleration: float
-    climb_speed: float
-    descent_acceleration: float
-    descent_speed: float
-    height_radius: float
-    error: float
-
-
-@dataclass(frozen=True, slots=True)
-class Leg:
+class GuidedLeg:
     """A leg: horizontal places and directions are complex, east + i north.
 
     `target` m and `height` m are the end, `along` and `onward` the unit directions of this leg and
@@ -82,12 +71,12 @@ def stopping_distance(jerk: float, acceleration: float, speed: _Speed) -> _Speed
 
 
 def legs(
-    limits: Limits,
+    limits: Px4Limits,
     points: Real,
     radii: Sequence[float],
     speeds: Sequence[float],
     holds: Sequence[float],
-) -> list[Leg]:
+) -> list[GuidedLeg]:
     """Return the legs between `points` (m, 3), m - 1 of them.
 
     `radii` are (m,), `speeds` (m - 1,), `holds` (m,). Only the waypoint after the target is
@@ -106,7 +95,7 @@ def legs(
         passable = following > 1e-3 and following >= radii[k + 1] and hold <= 0
         slopes = complex(abs(moves[k]), rises[k]), complex(following, rises[k + 1])
         result.append(
-            Leg(
+            GuidedLeg(
                 target=places[k + 1],
                 height=heights[k + 1],
                 along=along[k],
@@ -122,7 +111,7 @@ def legs(
     return result
 
 
-def _exit_climb(limits: Limits, slope: complex, onward: complex) -> float:
+def _exit_climb(limits: Px4Limits, slope: complex, onward: complex) -> float:
     """Return the vertical speed at which the end of a leg may be passed, m/s.
 
     `slope` and `onward` are this leg and the next, m: along the ground + i upwards.
@@ -141,7 +130,7 @@ def _half_turn(cosine: float) -> float:
 
 
 def level_setpoint(
-    limits: Limits, leg: Leg, place: complex, velocity: complex, remembered: float
+    limits: Px4Limits, leg: GuidedLeg, place: complex, velocity: complex, remembered: float
 ) -> tuple[complex, float, float]:
     """Return the unit direction and the speed, m/s, asked for, and the speed to remember for turns.
 
@@ -178,7 +167,7 @@ def corner_speed(gain: float, acceleration: float, radius: float, cosine: float)
     return sqrt(gain * acceleration * radius * _half_turn(cosine))
 
 
-def _slowing(limits: Limits, leg: Leg, direction: complex, distance: float) -> float:
+def _slowing(limits: Px4Limits, leg: GuidedLeg, direction: complex, distance: float) -> float:
     """Return the speed from which the target `distance` away is passed slowly enough.
 
     The passing speed is the corner's, at most the leg's `exit_speed`.
@@ -193,7 +182,7 @@ def _ramp(share: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def _along_leg(leg: Leg, offset: complex, straight: complex) -> complex:
+def _along_leg(leg: GuidedLeg, offset: complex, straight: complex) -> complex:
     """Return the unit direction to the leg's point that is max(R, 5 m) away."""
     rest = offset * leg.along.conjugate()
     if rest.real <= 0:
@@ -204,7 +193,7 @@ def _along_leg(leg: Leg, offset: complex, straight: complex) -> complex:
 
 
 def climb_setpoint(
-    limits: Limits, leg: Leg, distance: float, height: float, speed: float
+    limits: Px4Limits, leg: GuidedLeg, distance: float, height: float, speed: float
 ) -> tuple[float, float]:
     """Return the horizontal speed and the vertical velocity asked for, m/s.
 
@@ -222,3 +211,53 @@ def climb_setpoint(
     vertical = min(climb, max(speed, _SLOW) * left / distance)
     speed = min(speed, max(climb, _SLOW) * distance / left)
     return speed, vertical if up else -vertical
+
+
+_RADIUS = 4.0
+"""The least acceptance radius that is asked for on long legs, m. Measured: about 130 flights."""
+
+_RADIUS_SHARE = 0.45
+"""The greatest acceptance radius as a share of the shorter leg at the waypoint. Chosen below 0.5,
+so that the circles of two waypoints do not meet; a radius as long as its leg counts at once."""
+
+_CUT, _CUT_WITH_HIGH_JERK = 1.3, 1.0
+"""How much of a corner a wide acceptance radius may cut, m: the second from `_HIGH_JERK` on, where
+an aircraft is soon at speed again and loses less in a corner. Chosen; what a change costs is not
+measured."""
+
+_HIGH_JERK = 10.0
+"""The jerk from which corners cost little time, m/s³: between the default of 4 and the recommended
+20. Chosen; what a change costs is not measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class Px4Legs(Px4Limits):
+    """How PX4 flies a leg between plain waypoints: a in m/s², j in m/s³."""
+
+    least: ClassVar[float] = 3.0  # NAV_ACC_RAD is 2 m
+    run_in: ClassVar[float] = 1.2
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg flown at `speed`, m; same shape.
+
+        It must be able to stop at the next waypoint: that is its stopping distance.
+
+        >>> float(Px4Legs(acceleration=5.0, jerk=10.0).shortest_leg(np.array(8.0)))
+        14.4
+        """
+        return stopping_distance(self.jerk, self.acceleration, speed)
+
+    def reachable_speed(self, length: Real) -> Real:
+        """Return the speed from which it can stop within legs of `length`, m, in m/s."""
+        speeds = [stopping_speed(self.jerk, self.acceleration, way, 0.0) for way in length.flat]
+        return np.reshape(np.array(speeds), np.shape(length))
+
+    def radii(self, room: Real, turn: Real) -> Real:
+        """Return acceptance radii, m, for waypoints whose shorter leg is `room` (n,), m.
+
+        A wider one costs less speed in a corner, of sqrt(a r tan(alpha / 2)) at the inner angle
+        alpha, but cuts it: by r tan(turn / 4) about, `turn` (n,) in radians.
+        """
+        most_cut = _CUT if self.jerk < _HIGH_JERK else _CUT_WITH_HIGH_JERK
+        cut = most_cut / np.maximum(np.tan(turn / 4), 1e-9)
+        return np.minimum(np.maximum(_RADIUS, cut), _RADIUS_SHARE * room)

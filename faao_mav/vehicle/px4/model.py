@@ -1,5 +1,6 @@
 """A PX4 multicopter as a flight model."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -8,15 +9,12 @@ from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.flight_path import FlightPath, Flown
-from faao_mav.vehicle.parameter import ParameterValues
-from faao_mav.vehicle.px4.guidance import Limits
-from faao_mav.vehicle.px4.parameters import COPTER_TABLE as TABLE
-from faao_mav.vehicle.px4.sampling import grid, sampled
-from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, Simulation
+from faao_mav.vehicle.px4.parameters import Px4Limits
+from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, FlightLog, Simulation
 
 
 @dataclass(frozen=True, slots=True)
-class Px4:
+class Px4(Px4Limits):
     """How a PX4 multicopter flies plain waypoints in mission mode, without wind.
 
     A simulation of PX4's own chain: guidance with a look at the next waypoint only, smoothing
@@ -27,31 +25,10 @@ class Px4:
     m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
     """
 
-    cruise_speed: float = TABLE["cruise_speed"].default
-    max_speed: float = TABLE["max_speed"].default
-    acceleration: float = TABLE["acceleration"].default
-    jerk: float = TABLE["jerk"].default
-    corner_gain: float = TABLE["corner_gain"].default
-    error_limit: float = TABLE["error_limit"].default
-    acceptance_radius: float = TABLE["acceptance_radius"].default
-    height_radius: float = TABLE["height_radius"].default
-    climb_speed: float = TABLE["climb_speed"].default
-    descent_speed: float = TABLE["descent_speed"].default
-    climb_acceleration: float = TABLE["climb_acceleration"].default
-    descent_acceleration: float = TABLE["descent_acceleration"].default
-
     _simulations: list[Simulation] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
     """The last one: flights along the same points come one after the other."""
-
-    @classmethod
-    def from_vehicle(cls, vehicle: ParameterValues) -> "Px4":
-        """Return the model with the parameters of `vehicle`.
-
-        Raises `InputError` for a value that is too small to fly with or not finite.
-        """
-        return cls(**{key: vehicle.value(key) for key in cls.__slots__ if key in TABLE})
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -90,21 +67,8 @@ class Px4:
     def _simulation(self, points: Real, radii: Real) -> Simulation:
         """Return what has flown legs of this path already, if it is that of the last call."""
         if not (self._simulations and self._simulations[0].leads_along(points, radii)):
-            self._simulations[:] = [Simulation(self._limits(), points, radii)]
+            self._simulations[:] = [Simulation(self, points, radii)]
         return self._simulations[0]
-
-    def _limits(self) -> Limits:
-        return Limits(
-            self.acceleration,
-            self.jerk,
-            self.corner_gain,
-            self.climb_acceleration,
-            self.climb_speed,
-            self.descent_acceleration,
-            self.descent_speed,
-            self.height_radius,
-            self.error_limit,
-        )
 
 
 def _standing(point: Real, holds: Real, step: float) -> list[Flown]:
@@ -113,3 +77,43 @@ def _standing(point: Real, holds: Real, step: float) -> list[Flown]:
     t = grid(float(ends.max()), step)
     position = np.tile(point, (len(t), 1))
     return [Flown(np.zeros(1), end, t, position, np.zeros_like(position)) for end in ends[:, None]]
+
+
+def grid(end: float, step: float) -> Real:
+    """Return the multiples of `step` from 0 to the first that is at least `end`."""
+    return np.arange(math.ceil(end / step - 1e-9) + 1, dtype=float) * step
+
+
+def sampled(logs: Sequence[FlightLog], height: float, step: float) -> list[Flown]:
+    """Return the flights of `logs` every `step` seconds up to the latest end.
+
+    `height` m is that of a path that does not climb.
+    """
+    t = grid(max(float(log.departures[-1]) for log in logs), step)
+    flights = []
+    for log in logs:
+        place, velocity = _between(t, log.time, log.motion)
+        if place.shape[1] == 2:
+            place = np.column_stack([place, np.full(len(t), height)])
+            velocity = np.column_stack([velocity, np.zeros(len(t))])
+        flights.append(Flown(log.arrivals, log.departures, t, place, velocity))
+    return flights
+
+
+def _between(t: Real, time: Real, motion: Real) -> tuple[Real, Real]:
+    """Return places and velocities (len(t), n): cubic and linear between samples (k, 2, n)."""
+    left = np.clip(np.searchsorted(time, t, side="right") - 1, 0, len(time) - 2)
+    right = left + 1
+    width = (time[right] - time[left])[:, None]
+    s = np.clip((t - time[left])[:, None] / np.maximum(width, 1e-9), 0.0, 1.0)
+    rest = 1 - s
+    (place_left, velocity_left), (place_right, velocity_right) = (
+        motion[side].swapaxes(0, 1) for side in (left, right)
+    )
+    bends = rest * velocity_left - s * velocity_right
+    places = (
+        rest * rest * (1 + 2 * s) * place_left
+        + s * s * (3 - 2 * s) * place_right
+        + s * rest * width * bends
+    )
+    return places, rest * velocity_left + s * velocity_right

@@ -1,8 +1,9 @@
 """PX4's parameters, of its multicopters and of its planes."""
 
+from dataclasses import dataclass
 from math import inf, radians
 
-from faao_mav.vehicle.parameter import Parameter, table
+from faao_mav.vehicle.parameter import Limits, Parameter, table
 
 _SOURCE = "PX4 1.16: parameter reference"
 
@@ -63,12 +64,32 @@ COPTER_TABLE = table(
 """A PX4 multicopter's parameters. In missions it climbs at MPC_Z_V_AUTO_UP, which PX4 lowers to
 MPC_Z_VEL_MAX_UP (mc_pos_control, parameters_update); likewise down, and over the ground."""
 
+
+@dataclass(frozen=True, slots=True)
+class Px4Limits(Limits, table=COPTER_TABLE):
+    """What bounds a multicopter's flight, in SI units: keys and defaults of `COPTER_TABLE`."""
+
+    cruise_speed: float = COPTER_TABLE["cruise_speed"].default
+    max_speed: float = COPTER_TABLE["max_speed"].default
+    acceleration: float = COPTER_TABLE["acceleration"].default
+    jerk: float = COPTER_TABLE["jerk"].default
+    corner_gain: float = COPTER_TABLE["corner_gain"].default
+    error_limit: float = COPTER_TABLE["error_limit"].default
+    acceptance_radius: float = COPTER_TABLE["acceptance_radius"].default
+    height_radius: float = COPTER_TABLE["height_radius"].default
+    climb_speed: float = COPTER_TABLE["climb_speed"].default
+    descent_speed: float = COPTER_TABLE["descent_speed"].default
+    climb_acceleration: float = COPTER_TABLE["climb_acceleration"].default
+    descent_acceleration: float = COPTER_TABLE["descent_acceleration"].default
+
+
 PLANE_TABLE = table(
     _parameter("cruise_speed", "m/s", 15.0, "FW_AIRSPD_TRIM", 1.0),
     _parameter("min_speed", "m/s", 10.0, "FW_AIRSPD_MIN", 1.0),
     _parameter("max_speed", "m/s", 20.0, "FW_AIRSPD_MAX", 1.0),
     _parameter("roll_limit", "rad", radians(50), "FW_R_LIM", radians(5), radians(85), radians(1)),
     _parameter("climb_speed", "m/s", 8.0, "FW_T_CLMB_MAX", 0.1),
+    _parameter("descent_speed", "m/s", 5.0, "FW_T_SINK_MAX", 0.1),
     _parameter("landing_angle", "rad", radians(5), "FW_LND_ANG", 0.0, radians(85), radians(1)),
     _parameter("acceptance_radius", "m", 10.0, "NAV_ACC_RAD", 0.05),
     *_SHARED,

@@ -14,19 +14,21 @@ VELOCITY_GAINS = (1.8, 0.4, 0.2)
 """MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC."""
 
 ATTITUDE_LAG = 0.25
-"""Time constant from the acceleration asked for to the thrust's, s. Fitted."""
+"""The time constant from the acceleration asked for to the thrust's, s. Fitted to recorded
+flights."""
 
 DRAG = 0.1
-"""Air drag over mass, 1/s. Fitted."""
+"""The air drag over mass, 1/s. Fitted to recorded flights."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
 _TRAJECTORY, _CHANGES, _STATES = 4, 7, 10
 """First of the trajectory's position, velocity, acceleration; of their changes; how many in all."""
 
 _CAUSES = [_POSITION, _VELOCITY, _THRUST, _INTEGRAL, 5, 7, 6, 8, 9]
-"""The states that a `Step` looks at: the position's lag says all of the two positions."""
+"""The states that a `StepFactors` looks at: the position's lag says all of the two positions."""
 
 _TERMS = 12
+"""The number of terms of the series of exp(A dt)."""
 
 Number = TypeVar("Number", float, complex)
 
@@ -35,14 +37,14 @@ Motion: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number
 position, velocity and acceleration. Horizontal motion is complex, vertical motion real: altitude is
 taken to be held as tightly as position."""
 
-Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
-Step: TypeAlias = tuple[Row, Row, Row, Row]
+FactorRow: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+StepFactors: TypeAlias = tuple[FactorRow, FactorRow, FactorRow, FactorRow]
 """What the aircraft's four states become, as factors of: the lag of its position; its other states;
 the trajectory's velocity, displacement and acceleration, changes of velocity and acceleration."""
 
 
 def advance(
-    step: Step, motion: Motion[Number], shift: Number, velocity: Number, acceleration: Number
+    step: StepFactors, motion: Motion[Number], shift: Number, velocity: Number, acceleration: Number
 ) -> Motion[Number]:
     """Return `motion` after a step that takes the trajectory to the new velocity, and by `shift`.
 
@@ -66,14 +68,14 @@ def advance(
 
 
 def _sum(
-    row: Row, lag: Number, a: Number, b: Number, c: Number, d: Number, shift: Number
+    row: FactorRow, lag: Number, a: Number, b: Number, c: Number, d: Number, shift: Number
 ) -> Number:
     of_lag, of_a, of_b, of_c, of_d, of_shift, _, _, _ = row
     return of_lag * lag + of_a * a + of_b * b + of_c * c + of_d * d + of_shift * shift
 
 
 @lru_cache(maxsize=16)
-def step_of(dt: float) -> Step:
+def step_of(dt: float) -> StepFactors:
     """Return the step of `dt` s: rows of exp(A dt), by its series."""
     powers = dt ** np.arange(_TERMS)
     rows = (powers @ _series()).reshape(4, -1).tolist()
@@ -82,7 +84,7 @@ def step_of(dt: float) -> Step:
 
 @lru_cache(maxsize=1)
 def _series() -> Real:
-    """Return the terms A^k / k! as far as `Step` needs them, (_TERMS, 4 * 9).
+    """Return the terms A^k / k! as far as `StepFactors` needs them, (_TERMS, 4 * 9).
 
     Changes are rates times dt: their columns are one power of dt ahead.
     """

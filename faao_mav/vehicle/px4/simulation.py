@@ -8,20 +8,24 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.px4.guidance import Leg, Limits, legs
-from faao_mav.vehicle.px4.step import State, at_rest, moved
+from faao_mav.vehicle.px4.guidance import GuidedLeg, legs
+from faao_mav.vehicle.px4.parameters import Px4Limits
+from faao_mav.vehicle.px4.step import FlightState, at_rest, moved
 
 STEP = 0.1
-"""Longest step of the simulation, s: what was calibrated."""
+"""The longest step of the simulation, s: the one that was calibrated."""
 
 SWITCH_DELAY = 0.1
-"""From reaching a waypoint, or from the end of a hold there, to leaving for the next, s."""
+"""How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
+next, s. Measured: 0.1 s late after holds."""
 
 START_LAG = 0.12
-"""From the first leg becoming current to the trajectory moving, s. Fitted."""
+"""How long after the first leg becomes current the trajectory moves, s. Fitted to recorded
+flights."""
 
 _SETTLED = 2e-3
-"""Slower than this, m/s, a holding aircraft is taken to stand."""
+"""The speed, m/s, below which a holding aircraft is taken to stand. Chosen; what a change costs is
+not measured."""
 
 _ALIKE = 3e-4
 """States that differ by less, m, m/s, m/s², are taken to be the same.
@@ -30,13 +34,15 @@ Variants of a flight take some 20 s to move alike again; ten times less would ta
 """
 
 _STEADY = 1e-5
-"""A velocity off by less, m/s, stays as it is along a leg: a few mm in minutes."""
+"""The deviation of a velocity, m/s, below which it is taken to stay as it is along a leg: a few
+millimetres in minutes."""
 
 _TINY = 1e-9
+"""The shortest time, s, and length, m, that count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stretch:
+class FlownLeg:
     """A leg as it is flown: `arrival` and `departure` at its end, s, and its `end`.
 
     `time` (k,) s and `motion` (k, 2, n), position m and velocity m/s, are at the end of each step;
@@ -47,14 +53,14 @@ class Stretch:
     departure: float
     time: Real
     motion: Real
-    end: State
+    end: FlightState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Log:
+class FlightLog:
     """A flight: `arrivals`, `departures` (m,) s, and after each step time (k,) s and `motion`.
 
-    `motion` (k, 2, n) is as in `Stretch`. Steps are not uniform: they end when a waypoint is left.
+    `motion` (k, 2, n) is as in `FlownLeg`. Steps are not uniform: they end when a waypoint is left.
     """
 
     arrivals: Real
@@ -63,7 +69,7 @@ class Log:
     motion: Real
 
 
-_Entered: TypeAlias = dict[Leg, list[tuple[State, Stretch]]]
+_Entered: TypeAlias = dict[GuidedLeg, list[tuple[FlightState, FlownLeg]]]
 """The legs that variants have flown, with the states in which they were entered."""
 
 
@@ -76,15 +82,15 @@ class Simulation:
     same state are remembered: what is flown does not depend on what was flown before.
     """
 
-    def __init__(self, limits: Limits, points: Real, radii: Real) -> None:
+    def __init__(self, limits: Px4Limits, points: Real, radii: Real) -> None:
         self._limits, self._points, self._radii = limits, points, radii.tolist()
-        self._known: dict[tuple[Leg, State], Stretch] = {}
+        self._known: dict[tuple[GuidedLeg, FlightState], FlownLeg] = {}
 
     def leads_along(self, points: Real, radii: Real) -> bool:
         """Tell whether these are the points and radii."""
         return np.array_equal(points, self._points) and self._radii == radii.tolist()
 
-    def fly(self, speeds: Real, holds: Real, beyond: float) -> list[Log]:
+    def fly(self, speeds: Real, holds: Real, beyond: float) -> list[FlightLog]:
         """Fly every variant until the last one has ended, and on for `beyond` seconds.
 
         `speeds` are (B, m - 1), `holds` (B, m).
@@ -107,11 +113,11 @@ class Simulation:
             logs.append(self._log(start, [*flight, after]))
         return logs
 
-    def _start(self) -> State:
+    def _start(self) -> FlightState:
         east, north, up = self._points[0].tolist()
         return at_rest(complex(east, north), up if np.ptp(self._points[:, 2]) > 0 else None)
 
-    def _flight(self, route: list[Leg], alike: _Entered) -> list[Stretch]:
+    def _flight(self, route: list[GuidedLeg], alike: _Entered) -> list[FlownLeg]:
         state, result = self._start(), []
         for leg in route:
             flown = alike.setdefault(leg, [])
@@ -124,12 +130,12 @@ class Simulation:
             state = stretch.end
         return result
 
-    def _log(self, start: float, stretches: list[Stretch]) -> Log:
+    def _log(self, start: float, stretches: list[FlownLeg]) -> FlightLog:
         moving = start + START_LAG
         begun = moving + np.cumsum([0.0] + [stretch.departure for stretch in stretches[:-1]])
         arrivals = [stretch.arrival for stretch in stretches[:-1]]
         times = [at + stretch.time for at, stretch in zip(begun, stretches, strict=True)]
-        return Log(
+        return FlightLog(
             np.concatenate([[0.0], begun[:-1] + arrivals]),
             np.concatenate([[start], begun[1:]]),
             np.concatenate([[moving], *times]),
@@ -137,7 +143,7 @@ class Simulation:
         )
 
 
-def _alike(one: State, other: State) -> bool:
+def _alike(one: FlightState, other: FlightState) -> bool:
     if abs(one.remembered - other.remembered) > _ALIKE:
         return False
     if one.climb is not None and other.climb is not None:
@@ -147,10 +153,10 @@ def _alike(one: State, other: State) -> bool:
     return all(abs(mine - yours) <= _ALIKE for mine, yours in pairs)
 
 
-def _fly(limits: Limits, leg: Leg, state: State) -> Stretch:
+def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
     """Fly along `leg` until its end is left."""
     times: list[float] = []
-    states: list[State] = []
+    states: list[FlightState] = []
     time, due, arrival = 0.0, inf, inf
     near = _distances(limits, leg, state)
     while due - time >= _TINY:
@@ -172,10 +178,10 @@ def _fly(limits: Limits, leg: Leg, state: State) -> Stretch:
         if due == inf and max(near) <= 0:
             arrival = time - dt * (1 - _share(leg, before, dt, far, near))
             due = arrival + SWITCH_DELAY + max(leg.hold, 0.0)
-    return Stretch(arrival, due, np.array(times), _motion(states), state)
+    return FlownLeg(arrival, due, np.array(times), _motion(states), state)
 
 
-def _steady_steps(leg: Leg, before: State, state: State) -> int:
+def _steady_steps(leg: GuidedLeg, before: FlightState, state: FlightState) -> int:
     """Return how many more steps towards the target will change nothing but places.
 
     None unless a level flight has settled, and none close to the target.
@@ -191,15 +197,15 @@ def _steady_steps(leg: Leg, before: State, state: State) -> int:
     return int(way / abs(shift)) - 1
 
 
-def _carried_on(before: State, state: State, steps: int) -> State:
+def _carried_on(before: FlightState, state: FlightState, steps: int) -> FlightState:
     """Return `state` after `steps` like the one that led to it."""
     position, velocity, thrust, integral, place, wanted, push = state.level
     way = steps * (place - before.level[4])
     level = (position + way, velocity, thrust, integral, place + way, wanted, push)
-    return State(level, state.climb, state.remembered)
+    return FlightState(level, state.climb, state.remembered)
 
 
-def _stay(limits: Limits, leg: Leg, state: State, duration: float) -> Stretch:
+def _stay(limits: Px4Limits, leg: GuidedLeg, state: FlightState, duration: float) -> FlownLeg:
     """Go on for `duration` s after the last waypoint is done."""
     times: list[float] = [0.0]
     states = [state]
@@ -207,10 +213,10 @@ def _stay(limits: Limits, leg: Leg, state: State, duration: float) -> Stretch:
         state = moved(limits, leg, state, STEP)
         times.append(times[-1] + STEP)
         states.append(state)
-    return Stretch(inf, inf, np.array(times), _motion(states), state)
+    return FlownLeg(inf, inf, np.array(times), _motion(states), state)
 
 
-def _stands(state: State) -> bool:
+def _stands(state: FlightState) -> bool:
     """Tell whether the aircraft and its trajectory have come to rest."""
     _, velocity, _, _, _, wanted, _ = state.level
     if abs(velocity) + abs(wanted) >= _SETTLED:
@@ -218,7 +224,7 @@ def _stands(state: State) -> bool:
     return state.climb is None or abs(state.climb[1]) + abs(state.climb[5]) < _SETTLED
 
 
-def _distances(limits: Limits, leg: Leg, state: State) -> tuple[float, ...]:
+def _distances(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> tuple[float, ...]:
     """Return how far the aircraft is from being accepted at the target, m: 0 and less is in."""
     across = abs(state.level[0] - leg.target) - leg.radius
     if state.climb is None:
@@ -227,7 +233,7 @@ def _distances(limits: Limits, leg: Leg, state: State) -> tuple[float, ...]:
 
 
 def _share(
-    leg: Leg, before: State, dt: float, far: tuple[float, ...], near: tuple[float, ...]
+    leg: GuidedLeg, before: FlightState, dt: float, far: tuple[float, ...], near: tuple[float, ...]
 ) -> float:
     """Return the share of the step of `dt` s after which the target was accepted."""
     shares = [
@@ -248,8 +254,8 @@ def _crossing(start: float, slope: float, end: float) -> float:
     return min(max(2 * start / max(root - slope, _TINY), 0.0), 1.0)
 
 
-def _motion(states: Sequence[State]) -> Real:
-    """Return positions and velocities as in `Stretch`."""
+def _motion(states: Sequence[FlightState]) -> Real:
+    """Return positions and velocities as in `FlownLeg`."""
     level = np.array([state.level[:2] for state in states])
     axes = [level.real, level.imag]
     if states[0].climb is not None:

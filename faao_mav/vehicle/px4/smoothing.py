@@ -4,6 +4,7 @@ from math import sqrt
 from typing import TypeAlias
 
 _TINY = 1e-16
+"""Added to squares of accelerations, so that nothing is divided by 0."""
 
 Axis: TypeAlias = tuple[float, float, float, float]
 """Velocity m/s, acceleration m/s², the velocity that is asked for and the greatest acceleration."""

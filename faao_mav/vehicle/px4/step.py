@@ -3,17 +3,20 @@
 from math import hypot
 from typing import NamedTuple
 
-from faao_mav.vehicle.px4.guidance import Leg, Limits, climb_setpoint, level_setpoint
+from faao_mav.vehicle.px4.guidance import GuidedLeg, climb_setpoint, level_setpoint
+from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.response import Motion, Number, advance, step_of
 from faao_mav.vehicle.px4.smoothing import Axis, follow, soon_there
 
 WANDER = 0.08
-"""How far the position estimate strays from the trajectory all the time, m. Fitted."""
+"""How far the position estimate strays from the trajectory all the time, m. Fitted to recorded
+flights."""
 
 _TINY = 1e-9
+"""The speed, m/s, below which nothing moves."""
 
 
-class State(NamedTuple):
+class FlightState(NamedTuple):
     """How an aircraft moves, horizontally (east + i north) and, where the path climbs, upwards.
 
     `remembered` is what speed was allowed before a turn, m/s.
@@ -24,13 +27,13 @@ class State(NamedTuple):
     remembered: float
 
 
-def at_rest(place: complex, height: float | None) -> State:
+def at_rest(place: complex, height: float | None) -> FlightState:
     """Return the state of an aircraft that hovers; `height` is None for level paths."""
     climb = None if height is None else (height, 0.0, 0.0, 0.0, height, 0.0, 0.0)
-    return State((place, 0j, 0j, 0j, place, 0j, 0j), climb, 0.0)
+    return FlightState((place, 0j, 0j, 0j, place, 0j, 0j), climb, 0.0)
 
 
-def moved(limits: Limits, leg: Leg, state: State, dt: float) -> State:
+def moved(limits: Px4Limits, leg: GuidedLeg, state: FlightState, dt: float) -> FlightState:
     """Return `state` after `dt` s on the way along `leg`.
 
     What is asked for halfway along the step is pursued all along it.
@@ -39,7 +42,7 @@ def moved(limits: Limits, leg: Leg, state: State, dt: float) -> State:
     position, _, _, _, place, velocity, acceleration = level
     midway = place + velocity * (dt / 2)
     direction, speed, remembered = level_setpoint(limits, leg, midway, velocity, remembered)
-    clock = dt * _pace(limits.error, place - position, velocity)
+    clock = dt * _pace(limits.error_limit, place - position, velocity)
     step = step_of(dt)
     if climb is None:
         after, push, _ = _pursued(limits, level, direction * speed, None, clock)
@@ -52,7 +55,7 @@ def moved(limits: Limits, leg: Leg, state: State, dt: float) -> State:
         after, push, up = _pursued(limits, level, direction * speed, upwards, clock)
         climb = advance(step, climb, _shift(rate, lift, *up, clock), *up)
     shift = _shift(velocity, acceleration, after, push, clock)
-    return State(advance(step, level, shift, after, push), climb, remembered)
+    return FlightState(advance(step, level, shift, after, push), climb, remembered)
 
 
 def _pace(limit: float, lag: complex, velocity: complex) -> float:
@@ -66,7 +69,7 @@ def _pace(limit: float, lag: complex, velocity: complex) -> float:
 
 
 def _pursued(
-    limits: Limits, level: Motion[complex], setpoint: complex, upwards: Axis | None, dt: float
+    limits: Px4Limits, level: Motion[complex], setpoint: complex, upwards: Axis | None, dt: float
 ) -> tuple[complex, complex, tuple[float, float]]:
     """Return horizontal velocity and acceleration after `dt` s, and the two upwards, if any."""
     _, _, _, _, _, velocity, acceleration = level

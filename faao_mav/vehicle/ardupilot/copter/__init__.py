@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 
-from faao_mav.vehicle.ardupilot.copter.legs import ArduCopterLegs
+from faao_mav.vehicle.ardupilot import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
-from faao_mav.vehicle.ardupilot.family import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.recommend import accelerations_to_try
 from faao_mav.vehicle.vehicle_type import VehicleType
-from faao_mav.vehicle.vertical import VerticalProfile
 
 __all__ = ["ARDUCOPTER", "ArduCopter", "ArduCopterLegs"]
 
@@ -18,10 +18,11 @@ _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""
 
 _CURVED_ACCELERATION = 4.0
-"""The acceleration, m/s², for corners and short legs at speed. Measured: about 130 flights."""
+"""The recommended acceleration for corners and short legs at speed, m/s². Measured: about 130
+flights."""
 
 _JERK = 10.0
-"""The recommended jerk, m/s³. Measured: with 1, the default, no curved plan kept its time."""
+"""The recommended jerk, m/s³. Measured: about 130 flights."""
 
 
 def _vertical(vehicle: ParameterValues) -> VerticalProfile:
@@ -62,7 +63,7 @@ ARDUCOPTER = VehicleType(
     whole_second_holds=True,
     fastest=_FASTEST,
     fence_needs_one_inclusion=needs_one_inclusion,
-    legs=ArduCopterLegs.of,
+    legs=ArduCopterLegs.from_vehicle,
     flight_model=ArduCopter.from_vehicle,
     calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),

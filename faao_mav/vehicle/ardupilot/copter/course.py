@@ -9,22 +9,22 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.ardupilot.copter.leg import Leg
+from faao_mav.vehicle.ardupilot.copter.leg import StraightLeg
 from faao_mav.vehicle.ardupilot.copter.spline import CurvedLeg
 
 GRID = 0.1
 """The step of the target's clock and of the pursuit, s."""
 
-Row: TypeAlias = Sequence[float]
+TargetRow: TypeAlias = Sequence[float]
 """What the target does at a sample, each value with its change up to the next sample: position
 east, north; speed east, north; climb rate squared; acceleration east, north."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class PlacedLeg:
     """A leg from `origin` on by `step`, both (3,) m, that begins `start` s into the course."""
 
-    leg: Leg | CurvedLeg
+    leg: StraightLeg | CurvedLeg
     start: float
     origin: Real
     step: Real
@@ -53,7 +53,7 @@ class Course:
     """
 
     origin: Real
-    legs: Sequence[Placed]
+    legs: Sequence[PlacedLeg]
     passed: Real
     wait: float
     stops: Sequence[Stop]
@@ -73,7 +73,7 @@ def motions(courses: Sequence[Course], clocks: Sequence[Real], derivatives: int)
     bounds = np.cumsum([0, *map(len, clocks)])
     motion: Real = np.zeros((bounds[-1], 3 * (derivatives + 1)))
     parts = [motion[first:last] for first, last in pairwise(bounds.tolist())]
-    under_way: list[tuple[Placed, Leg, int, int]] = []
+    under_way: list[tuple[PlacedLeg, StraightLeg, int, int]] = []
     for course, clock, part, first in zip(
         courses, clocks, parts, bounds[:-1].tolist(), strict=True
     ):
@@ -86,7 +86,7 @@ def motions(courses: Sequence[Course], clocks: Sequence[Real], derivatives: int)
         np.add.at(steps, ends, np.reshape([placed.step for placed in course.legs], (-1, 3)))
         np.cumsum(steps[:-1], axis=0, out=part[:, :3])
         for placed, begin, end in zip(course.legs, begins.tolist(), ends.tolist(), strict=True):
-            if isinstance(placed.leg, Leg):
+            if isinstance(placed.leg, StraightLeg):
                 under_way.append((placed, placed.leg, first + begin, end - begin))
             else:
                 _add_curved(part, clock, slice(begin, end), placed, placed.leg)
@@ -95,7 +95,7 @@ def motions(courses: Sequence[Course], clocks: Sequence[Real], derivatives: int)
     return parts
 
 
-def table_of(motion: Real) -> Sequence[Row]:
+def table_of(motion: Real) -> Sequence[TargetRow]:
     """Return the rows of `motion` (n, 9) across the ground."""
     values = np.column_stack([motion[:, :2], motion[:, 3:5], motion[:, 5] ** 2, motion[:, 6:8]])
     rows = np.stack([values[:-1], np.diff(values, axis=0)], axis=2).reshape(len(motion) - 1, -1)
@@ -108,7 +108,9 @@ def grid_of(course: Course) -> Real:
     return grid
 
 
-def _add_straight(motion: Real, clock: Real, legs: Sequence[tuple[Placed, Leg, int, int]]) -> None:
+def _add_straight(
+    motion: Real, clock: Real, legs: Sequence[tuple[PlacedLeg, StraightLeg, int, int]]
+) -> None:
     """Add the motion under way on straight legs to `motion` (n, 3 to 9).
 
     Each comes with its first sample and the number of its samples.
@@ -140,7 +142,7 @@ def _add_straight(motion: Real, clock: Real, legs: Sequence[tuple[Placed, Leg, i
 
 
 def _add_curved(
-    motion: Real, clock: Real, under_way: slice, placed: Placed, leg: CurvedLeg
+    motion: Real, clock: Real, under_way: slice, placed: PlacedLeg, leg: CurvedLeg
 ) -> None:
     """Add position and velocity under way on a spline leg."""
     local = clock[under_way] - placed.start

@@ -7,29 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Row, Stop
+from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Stop, TargetRow
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 
 _MARGIN = 0.05
-"""The target waits for an aircraft that is slower than it by more than this part."""
-
-
-@dataclass(frozen=True, slots=True)
-class Follower:
-    """The position controller and the aircraft, across the ground.
-
-    `position` (1/s), `velocity` (1/s) and `integral` (1/s²) are the gains on the errors of
-    position and velocity and on the integral of the latter. `lean` is the acceleration at the
-    largest lean angle, m/s², `lag` the time constant of leaning, s, and the air takes
-    `linear` v + `quadratic` v², m/s² at v m/s.
-    """
-
-    position: float
-    velocity: float
-    integral: float
-    lean: float
-    lag: float
-    linear: float
-    quadratic: float
+"""The share by which an aircraft may be slower than its target before the target's clock waits for
+it. The autopilot's own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,17 +32,18 @@ class Pursuit:
     arrivals: Real
 
 
-def pursue(course: Course, table: Sequence[Row], follower: Follower, patience: float) -> Pursuit:
+def pursue(course: Course, table: Sequence[TargetRow], limits: ArduCopterLimits) -> Pursuit:
     """Return the flight along `course`, given as `table`, up to the end of its last hold.
 
-    The target's clock runs at a rate s <= 1 with the time constant `patience`, s: towards the
+    The target's clock runs at a rate s <= 1 with the time constant A/J: towards the
     aircraft's speed along the target's, less the position error times its gain, over the target's
     speed, plus a margin. The aircraft is asked for the target's acceleration plus what the errors
     call for, up to the lean limit, where the integral stands still.
     """
-    kp, kv, ki = follower.position, follower.velocity, follower.integral
-    linear, quadratic, lean = follower.linear, follower.quadratic, follower.lean
-    leaning, adapting = 1 - math.exp(-GRID / follower.lag), 1 - math.exp(-GRID / patience)
+    kp, kv, ki = limits.position_gain, limits.velocity_gain, limits.velocity_integral
+    linear, quadratic, lean = limits.linear_drag, limits.quadratic_drag, limits.lean
+    patience = limits.acceleration / limits.jerk
+    leaning, adapting = 1 - math.exp(-GRID / limits.lag), 1 - math.exp(-GRID / patience)
     hypot, last = math.hypot, len(table) - 1
     stops = iter(course.stops)
     stop: Stop | None = next(stops, None)

@@ -2,43 +2,46 @@
 
 import math
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.ramp import (
-    Limits,
+    LegBounds,
     Phase,
     Ramp,
     ramp_between,
     ramp_from_rest,
 )
 
-State: TypeAlias = tuple[float, float, float]
+LegState: TypeAlias = tuple[float, float, float]
 """Distance along the leg, m; speed, m/s; acceleration, m/s²."""
 
 _JERK_TIMES = 12
-"""A second ramp needs a cruise of so many jerk times: the autopilot's own rule of thumb."""
+"""The least length of the cruise that has room for a second ramp, in jerk times at the speed: the
+autopilot's own rule."""
 
 
 @dataclass(frozen=True)
-class Leg:
+class StraightLeg:
     """A leg of `length` metres: a ramp up, perhaps a second ramp, a cruise, a ramp down.
 
     `times` and `states` are those at the beginning of every phase, and at the end.
     """
 
     length: float
-    limits: Limits
+    limits: LegBounds
     up: Ramp
     down: Ramp
     phases: tuple[Phase, ...] = field(repr=False)
     times: tuple[float, ...] = field(repr=False)
-    states: tuple[State, ...] = field(repr=False)
+    states: tuple[LegState, ...] = field(repr=False)
 
     @property
     def duration(self) -> float:
@@ -64,7 +67,7 @@ class Leg:
         ]
         return np.array(rows)
 
-    def at(self, time: float) -> State:
+    def at(self, time: float) -> LegState:
         """Return where the target is `time` s, 0 to `duration`, after the beginning."""
         k = min(bisect_right(self.times, time), len(self.phases)) - 1
         span, c, d = self.phases[k]
@@ -81,7 +84,9 @@ class Leg:
         )
 
 
-def planned(length: float, limits: Limits, *, start: float = 0.0, end: float = 0.0) -> Leg:
+def planned(
+    length: float, limits: LegBounds, *, start: float = 0.0, end: float = 0.0
+) -> StraightLeg:
     """Return the leg that begins at the speed `start` and ends at `end`, m/s: 0 except at splines.
 
     A ramp from rest that does not fit in half of the leg ends at a lower speed, which is the
@@ -93,7 +98,7 @@ def planned(length: float, limits: Limits, *, start: float = 0.0, end: float = 0
     return _assembled(length, limits, up, up.high, up.phases(), up.length, end)
 
 
-def at_speed(leg: Leg, speed: float, elapsed: float) -> Leg:
+def at_speed(leg: StraightLeg, speed: float, elapsed: float) -> StraightLeg:
     """Return how `leg` goes on when its speed limit becomes `speed` after `elapsed` s.
 
     Before its beginning it is planned anew, on its ramp down nothing changes. Otherwise the ramp
@@ -121,7 +126,7 @@ def at_speed(leg: Leg, speed: float, elapsed: float) -> Leg:
     return _assembled(leg.length, limits, up, reached, phases, covered, leg.final)
 
 
-def _second(speed: float, limits: Limits, cruise: float) -> Ramp | None:
+def _second(speed: float, limits: LegBounds, cruise: float) -> Ramp | None:
     """The ramp between `speed` and the limit that the `cruise` metres have room for."""
     change = abs(limits.speed - speed)
     jerk_time = min((change * math.pi / (4 * limits.snap)) ** (1 / 3), limits.rise)
@@ -136,13 +141,13 @@ def _second(speed: float, limits: Limits, cruise: float) -> Ramp | None:
 
 def _assembled(
     length: float,
-    limits: Limits,
+    limits: LegBounds,
     up: Ramp,
     speed: float,
     phases: list[Phase],
     covered: float,
     end: float,
-) -> Leg:
+) -> StraightLeg:
     if end > 0:
         down = ramp_between(min(end, speed), speed, limits, length / 2)
         if down.high < speed:
@@ -154,10 +159,10 @@ def _assembled(
         phases.append((cruise, 0.0, 0.0))
     phases += down.phases(down=True)
     times = tuple(accumulate((phase[0] for phase in phases), initial=0.0))
-    return Leg(length, limits, up, down, tuple(phases), times, _states(phases, up.low))
+    return StraightLeg(length, limits, up, down, tuple(phases), times, _states(phases, up.low))
 
 
-def _states(phases: list[Phase], speed: float) -> tuple[State, ...]:
+def _states(phases: list[Phase], speed: float) -> tuple[LegState, ...]:
     s, v, a = 0.0, speed, 0.0
     states = [(s, v, a)]
     for span, c, d in phases:
@@ -167,3 +172,42 @@ def _states(phases: list[Phase], speed: float) -> tuple[State, ...]:
         a += span * c
         states.append((s, v, a))
     return tuple(states)
+
+
+@dataclass(frozen=True, slots=True)
+class ArduCopterLegs(ArduCopterLimits):
+    """How ArduCopter flies a leg between plain waypoints.
+
+    Every leg is planned as if it began and ended at rest, with the ramps of the flight model.
+    """
+
+    least: ClassVar[float] = 0.0
+    run_in: ClassVar[float] = 1.2
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg that reaches `speed`, m: two ramps; same shape.
+
+        >>> float(ArduCopterLegs().shortest_leg(np.array(8.0)).round(1))
+        48.0
+        """
+        return _each(lambda v: 2 * self._ramp_length(v), speed)
+
+    def reachable_speed(self, length: Real) -> Real:
+        """Return the speed that legs of `length`, m, reach, m/s; same shape."""
+        bounds = self._bounds(math.inf)
+        return _each(lambda way: ramp_from_rest(bounds, way / 2).high if way > 0 else 0.0, length)
+
+    def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
+        """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
+        return np.zeros_like(turn)
+
+    def _ramp_length(self, speed: float) -> float:
+        return ramp_from_rest(self._bounds(speed), math.inf).length if speed > 0 else 0.0
+
+    def _bounds(self, speed: float) -> LegBounds:
+        return LegBounds(speed, self.acceleration, self.jerk, self.rise)
+
+
+def _each(law: Callable[[float], float], values: Real) -> Real:
+    found: Real = np.array([law(value) for value in np.ravel(values).tolist()])
+    return found.reshape(np.shape(values))

@@ -1,9 +1,12 @@
-"""ArduCopter's parameters: names of 4.8 and later (SI units) first, those before it (cm) second."""
+"""ArduCopter's parameters: the newer names (SI units) first, those up to 4.7 (cm) second."""
 
+import math
+from dataclasses import dataclass, replace
 from math import radians
+from typing import Self
 
-from faao_mav.vehicle.ardupilot.parameters import SHARED, SOURCE, rally_limit, switch
-from faao_mav.vehicle.parameter import Parameter, table
+from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.parameter import Limits, Parameter, ParameterValues, table
 
 
 def _parameter(
@@ -14,11 +17,9 @@ def _parameter(
     old: str,
     factor: float = 0.01,
     least: float = 0.1,
-    documented: tuple[float, float] | None = None,
+    documented: tuple[float, float] = (-math.inf, math.inf),
 ) -> Parameter:
     names = {new: 1.0, old: factor}
-    if documented is None:
-        return Parameter(key, unit, default, names, least, source=SOURCE)
     return Parameter(key, unit, default, names, least, documented=documented, source=SOURCE)
 
 
@@ -51,3 +52,78 @@ TABLE = table(
     rally_limit(300.0),
 )
 """ArduCopter's parameters. A `corner_acceleration` of 0 stands for twice `acceleration`."""
+
+
+_G = 9.80665
+"""Standard gravity, m/s²."""
+
+_LEAST_INPUT_TIME = 0.1
+"""The autopilot's own lower bound of ATC_INPUT_TC, s."""
+
+_DEGREE = 111_318.845
+"""Metres to a degree, north, and times the cosine of the latitude east, to the autopilot."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArduCopterLimits(Limits, table=TABLE):
+    """What bounds a flight of ArduCopter, in SI units: keys and defaults of `TABLE`.
+
+    `east_metre` and `north_metre` are the autopilot's metres per metre: it takes the Earth for a
+    sphere. The last three describe the aircraft and are no parameters of the autopilot: the time
+    constant of leaning, s, and the drag per mass `linear_drag` v + `quadratic_drag` v², m/s². They
+    are fitted to flights of the autopilot's simulated quadrotor.
+    """
+
+    cruise_speed: float = TABLE["cruise_speed"].default
+    climb_speed: float = TABLE["climb_speed"].default
+    descent_speed: float = TABLE["descent_speed"].default
+    acceleration: float = TABLE["acceleration"].default
+    climb_acceleration: float = TABLE["climb_acceleration"].default
+    corner_acceleration: float = TABLE["corner_acceleration"].default
+    jerk: float = TABLE["jerk"].default
+    radius: float = TABLE["radius"].default
+    lean_angle: float = TABLE["lean_angle"].default
+    input_time: float = TABLE["input_time"].default
+    position_gain: float = TABLE["position_gain"].default
+    velocity_gain: float = TABLE["velocity_gain"].default
+    velocity_integral: float = TABLE["velocity_integral"].default
+    east_metre: float = 1.0
+    north_metre: float = 1.0
+    lag: float = 0.17
+    linear_drag: float = 0.28
+    quadratic_drag: float = 0.026
+
+    @classmethod
+    def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> Self:
+        """Return the values that `vehicle` has; raises `InputError` for one that is no use.
+
+        With the `latitude` of the flight, degrees, metres are counted as the autopilot does.
+        """
+        limits = super(ArduCopterLimits, cls).from_vehicle(vehicle)
+        if latitude is None:
+            return limits
+        east, north = _metres(latitude)
+        return replace(limits, east_metre=east, north_metre=north)
+
+    @property
+    def rise(self) -> float:
+        """t_j: how long the jerk takes to rise, s: twice ATC_INPUT_TC."""
+        return 2 * max(self.input_time, _LEAST_INPUT_TIME)
+
+    @property
+    def corner(self) -> float:
+        """The greatest acceleration in a corner, m/s²."""
+        return self.corner_acceleration or 2 * self.acceleration
+
+    @property
+    def lean(self) -> float:
+        """The acceleration at the largest lean angle, m/s²."""
+        return _G * math.tan(self.lean_angle)
+
+
+def _metres(latitude: float) -> tuple[float, float]:
+    """The autopilot's metres per metre of WGS84 at `latitude` degrees, east and north."""
+    a, e2 = 6_378_137.0, 6.69437999014e-3
+    w = 1 - e2 * math.sin(math.radians(latitude)) ** 2
+    degree = math.pi / 180 * a / math.sqrt(w)
+    return _DEGREE / degree, _DEGREE * w / (degree * (1 - e2))

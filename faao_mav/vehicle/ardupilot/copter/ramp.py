@@ -12,20 +12,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeAlias
 
-_LEAST_INPUT_TIME = 0.1
-"""The autopilot's own lower bound of ATC_INPUT_TC, s."""
-
 Phase: TypeAlias = tuple[float, float, float]
 """(T, c, d): T seconds with the jerk c + d cos(pi t / T)."""
 
 
-def rise_time(input_time: float) -> float:
-    """Return t_j, s, for ATC_INPUT_TC: twice it."""
-    return 2 * max(input_time, _LEAST_INPUT_TIME)
-
-
 @dataclass(frozen=True, slots=True)
-class Limits:
+class LegBounds:
     """What bounds the motion along a leg: m/s, m/s², m/s³.
 
     `rise` is t_j, s, in which the jerk goes from 0 to `jerk`: it stands for the time the aircraft
@@ -42,9 +34,9 @@ class Limits:
         """The largest rate of change of the jerk, pi J / (2 t_j), m/s⁴."""
         return math.pi * self.jerk / (2 * self.rise)
 
-    def at(self, speed: float) -> "Limits":
+    def at(self, speed: float) -> "LegBounds":
         """Return these limits with another speed."""
-        return Limits(speed, self.acceleration, self.jerk, self.rise)
+        return LegBounds(speed, self.acceleration, self.jerk, self.rise)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +82,7 @@ class Ramp:
 
 
 @lru_cache(maxsize=4096)  # a leg asks for the same ramp several times, flights share legs
-def ramp_from_rest(limits: Limits, room: float) -> Ramp:
+def ramp_from_rest(limits: LegBounds, room: float) -> Ramp:
     """Return the ramp from rest to the highest speed that `limits` and `room` metres allow.
 
     With the full jerk and the peak acceleration a, v = a (a/J + t_j + steady) over v/2 D. Where
@@ -109,7 +101,7 @@ def ramp_from_rest(limits: Limits, room: float) -> Ramp:
     return _ramp(0.0, speed, A, J, rise)
 
 
-def ramp_between(low: float, high: float, limits: Limits, room: float) -> Ramp:
+def ramp_between(low: float, high: float, limits: LegBounds, room: float) -> Ramp:
     """Return the ramp from `low` > 0 up to `high`, or to what `room` metres allow.
 
     t_j is kept: a change too small for the full jerk has a smaller one. Without room for any the

@@ -1,17 +1,19 @@
 """The legs of a flight: planned one after the other, as the autopilot does."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.ardupilot.copter.corner import CornerLimits, Direction, half_overlap
-from faao_mav.vehicle.ardupilot.copter.course import Course, Placed, Stop
-from faao_mav.vehicle.ardupilot.copter.leg import Leg, at_speed, planned
-from faao_mav.vehicle.ardupilot.copter.ramp import Limits
+from faao_mav.vehicle.ardupilot.copter.course import Course, PlacedLeg, Stop
+from faao_mav.vehicle.ardupilot.copter.leg import StraightLeg, at_speed, planned
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
+from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
 from faao_mav.vehicle.ardupilot.copter.spline import (
     Curve,
     CurvedLeg,
@@ -20,48 +22,73 @@ from faao_mav.vehicle.ardupilot.copter.spline import (
     hermite,
 )
 
-_POINT = 1e-6
-"""A leg shorter than this, m, is none: its end counts as reached where it begins."""
+Direction: TypeAlias = tuple[float, float, float]
+"""A unit vector: east, north, up."""
+
+_TICKS = 1 << 40
+"""The number of steps into which the longest overlap of two legs is divided to find it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
-    """The autopilot's limits: m/s, m/s², m/s³, s and m, as in `ArduCopter`."""
+class CornerLimits:
+    """What must hold half-way round: metres from the waypoint, m/s² across the ground and up."""
 
-    up: float
-    down: float
+    radius: float
     acceleration: float
     vertical: float
-    corner: float
-    jerk: float
-    rise: float
-    radius: float
 
-    def along(self, direction: Direction, speed: float) -> Limits:
-        """Return the limits along `direction` where `speed` across the ground is commanded."""
-        east, north, up = direction
-        ground = math.hypot(east, north)
-        return Limits(
-            min(_over(speed, ground), _over(self.up if up > 0 else self.down, abs(up))),
-            min(_over(self.acceleration, ground), _over(self.vertical, abs(up))),
-            self.jerk,
-            self.rise,
+
+def half_overlap(
+    leg: StraightLeg, u: Direction, following: StraightLeg, w: Direction, limits: CornerLimits
+) -> float:
+    """Return h, s: the `following` leg begins 2 h before `leg` ends, along `u` and `w`.
+
+    The target moves by the sum of both. h is the largest, up to half of either leg's ramp, at
+    which after h s of the overlap it is within the limits and slower than both legs' limits.
+    """
+    longest = min(leg.down.duration, following.up.duration) / 2
+    end, length = leg.duration, leg.length
+    slowest = min(leg.limits.speed, following.limits.speed)
+    across = u[0] * w[0] + u[1] * w[1]
+    along = across + u[2] * w[2]
+    u_ground, w_ground = u[0] ** 2 + u[1] ** 2, w[0] ** 2 + w[1] ** 2
+
+    def excess(h: float) -> float:
+        s, v, a = leg.at(end - h)
+        t, x, b = following.at(h)
+        left = length - s
+        position = math.sqrt(max(0.0, left * left + t * t - 2 * left * t * along))
+        velocity = math.sqrt(max(0.0, v * v + x * x + 2 * v * x * along))
+        ground = math.sqrt(max(0.0, a * a * u_ground + b * b * w_ground + 2 * a * b * across))
+        return (
+            max(
+                position / limits.radius,
+                velocity / slowest,
+                ground / limits.acceleration,
+                abs(a * u[2] + b * w[2]) / limits.vertical,
+            )
+            - 1
         )
 
-    def spline(self, speed: float) -> SplineLimits:
-        """Return the limits along a spline where `speed` is commanded."""
-        return SplineLimits(speed, self.up, self.down, self.acceleration, self.vertical)
+    if excess(longest) <= 1e-9:
+        return longest
+    tick = longest / _TICKS
+    return tick * bisect_left(range(_TICKS), 0.0, key=lambda ticks: excess(ticks * tick))
+
+
+_POINT = 1e-6
+"""The length, m, below which a leg is none: its end counts as reached where it begins."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _PlannedLeg:
     """A leg, if there is one, and how the flight goes on after it.
 
     The next leg begins 2 `early` seconds before this one ends, planned at this one's speed if it
     `overlaps`; a leg that does not begins at the speed `entry`, m/s.
     """
 
-    leg: Leg | CurvedLeg | None
+    leg: StraightLeg | CurvedLeg | None
     early: float = 0.0
     overlaps: bool = False
     entry: float = 0.0
@@ -77,19 +104,23 @@ class Router:
     """
 
     def __init__(
-        self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_], bounds: Bounds
+        self,
+        points: Real,
+        splines: NDArray[np.bool_],
+        stopping: NDArray[np.bool_],
+        limits: ArduCopterLimits,
     ) -> None:
-        self._points, self._bounds = points, bounds
+        self._points, self._limits = points, limits
         self._marks = np.stack([splines, stopping])
         self._stopping: list[bool] = stopping.tolist()
         self._steps = np.diff(points, axis=0)
         self._lengths: list[float] = np.linalg.norm(self._steps, axis=1).tolist()
         self._directions = [_direction(step) for step in self._steps.tolist()]
         self._curves = [self._curve(k, splines) for k in range(len(self._steps))]
-        self._corner = CornerLimits(bounds.radius, bounds.corner, bounds.vertical)
+        self._corner = CornerLimits(limits.radius, limits.corner, limits.climb_acceleration)
         # flights that differ in a few speeds have most of their legs in common
-        self._known: dict[tuple[int, float, float | None, float, float], _Step] = {}
-        self._from_rest: dict[tuple[int, float], Leg] = {}
+        self._known: dict[tuple[int, float, float | None, float, float], _PlannedLeg] = {}
+        self._from_rest: dict[tuple[int, float], StraightLeg] = {}
 
     def leads_along(
         self, points: Real, splines: NDArray[np.bool_], stopping: NDArray[np.bool_]
@@ -101,7 +132,7 @@ class Router:
 
     def course(self, speeds: Sequence[float], waits: Sequence[float]) -> Course:
         """Return the course at `speeds` (m - 1,), m/s, with `waits` (m,), s, at the stops."""
-        legs: list[Placed] = []
+        legs: list[PlacedLeg] = []
         stops: list[Stop] = []
         passed = [0.0]
         start, planned_at, early, entry = 0.0, None, 0.0, 0.0
@@ -111,7 +142,7 @@ class Router:
                 step = self._known[key] = self._step(*key)
             end = start
             if step.leg is not None:
-                legs.append(Placed(step.leg, start, self._points[k], self._steps[k]))
+                legs.append(PlacedLeg(step.leg, start, self._points[k], self._steps[k]))
                 end = legs[-1].end
             if self._stopping[k + 1]:
                 stops.append(Stop(k + 1, end, waits[k + 1]))
@@ -122,53 +153,53 @@ class Router:
 
     def _step(
         self, k: int, speed: float, planned_at: float | None, elapsed: float, entry: float
-    ) -> _Step:
+    ) -> _PlannedLeg:
         """Leg k at `speed`: if it was planned at another speed it has begun `elapsed` s ago."""
-        leg: Leg | CurvedLeg | None = None
+        leg: StraightLeg | CurvedLeg | None = None
         if planned_at is not None:
             begun = self._begun(k, planned_at)
-            leg = at_speed(begun, self._bounds.along(self._directions[k], speed).speed, elapsed)
+            leg = at_speed(begun, _along(self._limits, self._directions[k], speed).speed, elapsed)
         elif self._lengths[k] > _POINT:
             leg = self._planned(k, speed, entry)
         if leg is None or self._stopping[k + 1]:
-            return _Step(leg)
-        if isinstance(leg, Leg) and self._is_straight(k + 1):
+            return _PlannedLeg(leg)
+        if isinstance(leg, StraightLeg) and self._is_straight(k + 1):
             following = self._begun(k + 1, speed)
             u, w = self._directions[k], self._directions[k + 1]
-            return _Step(leg, half_overlap(leg, u, following, w, self._corner), overlaps=True)
-        return _Step(leg, entry=leg.final)
+            return _PlannedLeg(leg, half_overlap(leg, u, following, w, self._corner), overlaps=True)
+        return _PlannedLeg(leg, entry=leg.final)
 
     def _is_straight(self, k: int) -> bool:
         return self._curves[k] is None and self._lengths[k] > _POINT
 
-    def _planned(self, k: int, speed: float, entry: float) -> Leg | CurvedLeg:
+    def _planned(self, k: int, speed: float, entry: float) -> StraightLeg | CurvedLeg:
         """Leg k, begun at the speed `entry`."""
         curve = self._curves[k]
         if curve is None:
             return self._straight(k, speed, entry)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
-        return flown(curve, self._bounds.spline(speed), entry, end)
+        return flown(curve, _spline_limits(self._limits, speed), entry, end)
 
-    def _begun(self, k: int, speed: float) -> Leg:
+    def _begun(self, k: int, speed: float) -> StraightLeg:
         """Return the straight leg k that begins at rest, as the one before it ends."""
         if (leg := self._from_rest.get((k, speed))) is None:
             leg = self._from_rest[k, speed] = self._straight(k, speed)
         return leg
 
-    def _straight(self, k: int, speed: float, entry: float = 0.0) -> Leg:
-        limits = self._bounds.along(self._directions[k], speed)
+    def _straight(self, k: int, speed: float, entry: float = 0.0) -> StraightLeg:
+        limits = _along(self._limits, self._directions[k], speed)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
         return planned(self._lengths[k], limits, start=entry, end=end)
 
     def _final(self, k: int, speed: float) -> float:
         """The speed at the end of leg k, where a spline goes on: 0 between straight legs."""
-        spline = self._bounds.spline(speed)
+        spline = _spline_limits(self._limits, speed)
         here, following = self._curves[k], self._curves[k + 1]
         if following is not None:
             final = float(following.allowed(spline)[0])
             return final if here is None else min(final, float(here.allowed(spline)[-1]))
         if here is not None and self._is_straight(k + 1):
-            limits = self._bounds.along(self._directions[k + 1], speed)
+            limits = _along(self._limits, self._directions[k + 1], speed)
             straight = planned(self._lengths[k + 1], limits)
             return min(straight.up.high, float(here.allowed(spline)[-1]))
         return 0.0
@@ -198,3 +229,29 @@ def _direction(step: Sequence[float]) -> Direction:
 
 def _over(limit: float, share: float) -> float:
     return limit / share if share > 0 else math.inf
+
+
+def _along(limits: ArduCopterLimits, direction: Direction, speed: float) -> LegBounds:
+    """Return the limits along `direction` where `speed` across the ground is commanded."""
+    east, north, up = direction
+    ground = math.hypot(east, north)
+    return LegBounds(
+        min(
+            _over(speed, ground),
+            _over(limits.climb_speed if up > 0 else limits.descent_speed, abs(up)),
+        ),
+        min(_over(limits.acceleration, ground), _over(limits.climb_acceleration, abs(up))),
+        limits.jerk,
+        limits.rise,
+    )
+
+
+def _spline_limits(limits: ArduCopterLimits, speed: float) -> SplineLimits:
+    """Return the limits along a spline where `speed` is commanded."""
+    return SplineLimits(
+        speed,
+        limits.climb_speed,
+        limits.descent_speed,
+        limits.acceleration,
+        limits.climb_acceleration,
+    )

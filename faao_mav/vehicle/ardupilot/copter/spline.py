@@ -7,10 +7,12 @@ import numpy as np
 from faao_mav.arrays import Real
 
 _SCALE = 4.0
-"""The tangents at both ends together are at most so many times as long as the chord."""
+"""The greatest length of both tangents of a spline together, in lengths of its chord. The
+autopilot's own."""
 
 _SPACING = 0.5
-"""Metres between the points at which a curve is evaluated, about."""
+"""About the distance, m, between the points at which a curve is evaluated. Chosen; what a change
+costs is not measured."""
 
 
 @dataclass(frozen=True, slots=True)

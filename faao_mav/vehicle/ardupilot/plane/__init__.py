@@ -1,14 +1,12 @@
 """ArduPlane: what it is, and how it flies a mission."""
 
+from faao_mav.vehicle.ardupilot import ARDUPILOT, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
-from faao_mav.vehicle.ardupilot.family import ARDUPILOT, needs_one_inclusion
-from faao_mav.vehicle.ardupilot.plane.legs import ArduPlaneLegs
-from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
+from faao_mav.vehicle.ardupilot.plane.model import ArduPlane, ArduPlaneLegs
 from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
-from faao_mav.vehicle.flight_path import FlightModel
+from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.vehicle_type import VehicleType
-from faao_mav.vehicle.vertical import VerticalProfile
 
 __all__ = ["ARDUPLANE", "ArduPlane", "ArduPlaneLegs"]
 
@@ -44,7 +42,7 @@ ARDUPLANE = VehicleType(
     dialect=PLANE_DIALECT,
     vertical=_vertical,
     fence_needs_one_inclusion=needs_one_inclusion,
-    legs=ArduPlaneLegs.of,
+    legs=ArduPlaneLegs.from_vehicle,
     flight_model=_model,
 )
 """ArduPlane 4.7, by its documents. How it turns and how fast it may fly is tuned on each aircraft:

@@ -3,21 +3,42 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.vehicle.ardupilot.plane.motion import Motion, Tuning
-from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
+from faao_mav.vehicle.ardupilot.plane.motion import Motion
+from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.flight_path import FlightPath, Flown
-from faao_mav.vehicle.parameter import ParameterValues
+
+
+@dataclass(frozen=True, slots=True)
+class ArduPlaneLegs(ArduPlaneLimits):
+    """How ArduPlane flies a leg."""
+
+    least: ClassVar[float] = 0.0
+    run_in: ClassVar[float] = 4.0  # chosen: room to come onto a track, whatever its course
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg flown at `speed`, m: one look-ahead; same shape."""
+        return self.look_ahead * speed
+
+    def reachable_speed(self, length: Real) -> Real:
+        """Return the speed at which legs of `length`, m, are not cut short, m/s; same shape."""
+        return length / self.look_ahead
+
+    def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
+        """Return acceptance radii, m: 0, ArduPlane's own; the shape of `turn`."""
+        return np.zeros_like(turn)
+
 
 _HEADED = math.radians(10)
 """A loiter is left when the course is this close to the next waypoint."""
 
 
 @dataclass(frozen=True, slots=True)
-class ArduPlane:
+class ArduPlane(ArduPlaneLimits):
     """How ArduPlane flies plain waypoints in AUTO, without wind. Not calibrated against flights.
 
     After ArduPilot's documentation (Plane: navigation tuning, parameter list): lateral guidance
@@ -29,25 +50,6 @@ class ArduPlane:
     loiters: ArduPlane has no hold at a plain waypoint. Limits are SI, angles radians; a negative
     `loiter_radius` turns left.
     """
-
-    cruise_speed: float = TABLE["cruise_speed"].default
-    min_speed: float = TABLE["min_speed"].default
-    max_speed: float = TABLE["max_speed"].default
-    roll_limit: float = TABLE["roll_limit"].default
-    waypoint_radius: float = TABLE["waypoint_radius"].default
-    loiter_radius: float = TABLE["loiter_radius"].default
-    climb_speed: float = TABLE["climb_speed"].default
-    descent_speed: float = TABLE["descent_speed"].default
-    period: float = TABLE["period"].default
-    damping: float = TABLE["damping"].default
-
-    @classmethod
-    def from_vehicle(cls, vehicle: ParameterValues) -> "ArduPlane":
-        """Return the model with the parameters of `vehicle`.
-
-        Raises `InputError` for a value that is too small to fly with or not finite.
-        """
-        return cls(**{key: vehicle.value(key) for key in cls.__slots__ if key in TABLE})
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -87,16 +89,9 @@ class _Flight:
         self._plane, self._path = plane, path
         self._places = [complex(east, north) for east, north in path.points[:, :2]]
         speed = plane.airspeed(float(path.speeds[0]) if len(path.speeds) else 0.0)
-        tuning = Tuning(
-            plane.period,
-            plane.damping,
-            plane.roll_limit,
-            plane.climb_speed,
-            plane.descent_speed,
-        )
         moves = [b - a for a, b in zip(self._places, self._places[1:], strict=False) if b != a]
         course = math.atan2(moves[0].imag, moves[0].real) if moves else math.pi / 2
-        self._motion = Motion(tuning, self._places[0], float(path.points[0, 2]), course, speed)
+        self._motion = Motion(plane, self._places[0], float(path.points[0, 2]), course, speed)
         self._track = [self._motion.sample()]
 
     def flown(self, step: float) -> Flown:

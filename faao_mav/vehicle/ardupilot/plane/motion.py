@@ -2,12 +2,15 @@
 
 import cmath
 import math
-from dataclasses import dataclass
+
+from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 
 STEP = 0.1
-"""Step of the simulation, s."""
+"""The step of the simulation, s. Chosen; what a change costs is not measured."""
 
 _GRAVITY = 9.80665
+"""Standard gravity, m/s²."""
+
 _ROLL_LAG = 0.5
 """Time constant of the bank, s: ArduPlane's default RLL2SRV_TCONST."""
 
@@ -16,17 +19,6 @@ _ENERGY_LAG = 5.0
 
 _INTERCEPT = math.radians(45)
 """Steepest angle at which a track is approached."""
-
-
-@dataclass(frozen=True, slots=True)
-class Tuning:
-    """NAVL1's period (s) and damping; roll limit, rad; climb and sink limits, m/s."""
-
-    period: float
-    damping: float
-    roll_limit: float
-    climb_speed: float
-    descent_speed: float
 
 
 class Motion:
@@ -38,12 +30,12 @@ class Motion:
     """
 
     def __init__(
-        self, tuning: Tuning, place: complex, height: float, course: float, speed: float
+        self, limits: ArduPlaneLimits, place: complex, height: float, course: float, speed: float
     ) -> None:
         self.time = 0.0
         self.place = place
         self.course = course
-        self._tuning, self._height, self._speed = tuning, height, speed
+        self._limits, self._height, self._speed = limits, height, speed
         self._bank = self._climb = 0.0
 
     def sample(self) -> tuple[float, ...]:
@@ -62,7 +54,7 @@ class Motion:
 
     def look_ahead(self) -> float:
         """Return L, m."""
-        return self._tuning.damping * self._tuning.period * self._speed / math.pi
+        return self._limits.look_ahead * self._speed
 
     def bearing_to(self, place: complex) -> float:
         """Return the angle from the course to `place`, rad, positive to the left."""
@@ -98,12 +90,12 @@ class Motion:
         distance = max(abs(offset), abs(radius) / 2)
         velocity = cmath.rect(self._speed, self.course)
         outward = (velocity * offset.conjugate()).real / distance
-        stiffness = 2 * math.pi / self._tuning.period
+        stiffness = 2 * math.pi / self._limits.period
         excess = abs(offset) - abs(radius)
         inward = (
             self._speed**2 / distance
             + stiffness**2 * excess
-            + 2 * self._tuning.damping * stiffness * outward
+            + 2 * self._limits.damping * stiffness * outward
         )
         straight = self._towards(centre)
         circling = excess <= 0 or side * straight >= inward
@@ -116,18 +108,18 @@ class Motion:
     def _lateral(self, eta: float) -> float:
         """Return the acceleration to the left that turns the course by `eta` rad."""
         bounded = min(max(eta, -math.pi / 2), math.pi / 2)
-        gain = 4 * self._tuning.damping**2
+        gain = 4 * self._limits.damping**2
         return gain * self._speed**2 / self.look_ahead() * math.sin(bounded)
 
     def _go(self, lateral: float, height: float, climb: float, speed: float) -> None:
         """Move on for one step with `lateral` acceleration to the left, m/s², as far as it goes."""
-        tuning = self._tuning
+        limits = self._limits
         bank = math.atan2(lateral, _GRAVITY)
-        bank = min(max(bank, -tuning.roll_limit), tuning.roll_limit)
+        bank = min(max(bank, -limits.roll_limit), limits.roll_limit)
         self._bank += (bank - self._bank) * (1 - math.exp(-STEP / _ROLL_LAG))
         self._speed += (speed - self._speed) * (1 - math.exp(-STEP / _ENERGY_LAG))
         rate = climb + (height - self._height) / _ENERGY_LAG
-        self._climb = min(max(rate, -tuning.descent_speed), tuning.climb_speed)
+        self._climb = min(max(rate, -limits.descent_speed), limits.climb_speed)
         turn = _GRAVITY * math.tan(self._bank) / self._speed * STEP
         self.place += cmath.rect(self._ground_speed() * STEP, self.course + turn / 2)
         self.course += turn

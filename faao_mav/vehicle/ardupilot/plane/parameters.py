@@ -1,9 +1,10 @@
-"""ArduPlane's parameters: names of 4.5 and later first, those before it second."""
+"""ArduPlane's parameters: the newer names first, the older ones second."""
 
-from math import radians
+from dataclasses import dataclass
+from math import pi, radians
 
-from faao_mav.vehicle.ardupilot.parameters import SHARED, SOURCE, rally_limit, switch
-from faao_mav.vehicle.parameter import Parameter, table
+from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.parameter import Limits, Parameter, table
 
 
 def _parameter(
@@ -40,3 +41,24 @@ TABLE = table(
 )
 """ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate
 with an idling engine; a `return_height` below 0 keeps the height at which the return begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArduPlaneLimits(Limits, table=TABLE):
+    """What bounds a flight of ArduPlane, in SI units: keys and defaults of `TABLE`."""
+
+    cruise_speed: float = TABLE["cruise_speed"].default
+    min_speed: float = TABLE["min_speed"].default
+    max_speed: float = TABLE["max_speed"].default
+    roll_limit: float = TABLE["roll_limit"].default
+    waypoint_radius: float = TABLE["waypoint_radius"].default
+    loiter_radius: float = TABLE["loiter_radius"].default
+    climb_speed: float = TABLE["climb_speed"].default
+    descent_speed: float = TABLE["descent_speed"].default
+    period: float = TABLE["period"].default
+    damping: float = TABLE["damping"].default
+
+    @property
+    def look_ahead(self) -> float:
+        """How far ahead the guidance aims, s: ζ T / π."""
+        return self.damping * self.period / pi

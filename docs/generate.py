@@ -1,0 +1,133 @@
+"""Build hook of the site: fills in what the package itself says.
+
+A page holds lines `<!-- generated: WHAT -->`; the hook replaces them by Markdown. WHAT is
+
+- `file NAME`: a file beside this folder, as README.md, with links as seen from here;
+- `plan`: the keys of plan.yaml, one table per section, from the schema;
+- `command NAME`: usage and options of a command, from its `--help`;
+- `rules`: the rules of `faao-mission validate --rules`;
+- `names`: the public names of the package with the first sentence of their docstrings.
+"""
+
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+from faao_mav.plan.schema import PlanSection
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from typer.testing import CliRunner
+
+import faao_mav
+from faao_mav.cli.main import app
+from faao_mav.validate import RULES
+
+_DOCS = Path(__file__).parent
+_MARK = re.compile(r"^<!-- generated: (\w+) ?([\w.]*) -->$", re.MULTILINE)
+_OPTION = re.compile(r"^  (-.*?)(?:  +|\n +)((?:.|\n   )*)$", re.MULTILINE)
+"""An option and what it is for, on the same or on the next lines of a `--help`."""
+_BRACES = str.maketrans("", "", "{}")
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Replace the marks of a page; the name and arguments are those that MkDocs expects."""
+    return _MARK.sub(lambda mark: _WRITERS[mark[1]](*filter(None, [mark[2]])), markdown)
+
+
+def file(name: str) -> str:
+    """Return a file of the folder above, with links and pictures as seen from docs/."""
+    text = (_DOCS.parent / name).read_text(encoding="utf-8")
+    text = re.sub(r"\]\(docs/", "](", text)
+    return re.sub(r"\]\(([A-Z]+)\.md\)", lambda link: f"]({link[1].lower()}.md)", text)
+
+
+def plan() -> str:
+    """Return the keys of plan.yaml: a heading and a table for each section."""
+    return "\n".join(_section(PlanSection, ""))
+
+
+def command(name: str) -> str:
+    """Return usage line and table of options of a command."""
+    shown = (
+        CliRunner()
+        .invoke(app, [name, "--help"], prog_name="faao-mission", terminal_width=400)
+        .stdout
+    )
+    usage, _, options = shown.partition("Options:\n")
+    words = usage.splitlines()[0].removeprefix("Usage: ").replace("[OPTIONS]", "").split()
+    if name == "plan":  # the command of an argument list that names none
+        words.remove(name)
+    lines = ["```text", " ".join([*words, "[options]"]).translate(_BRACES), "```", ""]
+    lines += ["| option | meaning |", "|---|---|"]
+    for option, meaning in _OPTION.findall(options):
+        lines.append(f"| `{option.replace('|', ', ')}` | {_escaped(' '.join(meaning.split()))} |")
+    return "\n".join(lines)
+
+
+def rules() -> str:
+    """Return the table of validation rules."""
+    lines = ["| rule | level | says | source |", "|---|---|---|---|"]
+    for rule in RULES:
+        summary, source = _escaped(rule.summary), _escaped(rule.source)
+        lines.append(f"| `{rule.id}` | {rule.level.name.lower()} | {summary} | {source} |")
+    return "\n".join(lines)
+
+
+def names() -> str:
+    """Return the public names of the package with the first sentence of their docstrings."""
+    lines = ["| name | what it is |", "|---|---|"]
+    for name in faao_mav.__all__:
+        first = inspect.cleandoc(getattr(faao_mav, name).__doc__).split("\n\n")[0]
+        lines.append(f"| `{name}` | {_escaped(' '.join(first.split()))} |")
+    return "\n".join(lines)
+
+
+_WRITERS: dict[str, Callable[..., str]] = {
+    "file": file,
+    "plan": plan,
+    "command": command,
+    "rules": rules,
+    "names": names,
+}
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("<", "&lt;")
+
+
+def _section(section: type[BaseModel], path: str) -> Iterator[str]:
+    rows, inner = [], []
+    for key, field in section.model_fields.items():
+        below = _sections_of(field)
+        if below:
+            inner.append((below[0], f"{path}{key}"))
+        else:
+            description = _escaped(_description(field))
+            rows.append(f"| `{path}{key}` | {description} | {_default(field)} |")
+    if rows:
+        yield from (f"### {path.rstrip('.') or 'top level'}", "")
+        yield from ("| key | accepted | default |", "|---|---|---|", *rows, "")
+    for each, name in inner:
+        yield from _section(each, f"{name}.")
+
+
+def _sections_of(field: FieldInfo) -> list[type[BaseModel]]:
+    options = [field.annotation, *get_args(field.annotation)]
+    return [each for each in options if inspect.isclass(each) and issubclass(each, BaseModel)]
+
+
+def _description(field: FieldInfo) -> str:
+    return field.description or ""
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    value = field.get_default(call_default_factory=True)
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, list):
+        return f"`[{', '.join(map(str, value))}]`"
+    return "none" if value is None or value == "" else f"`{value}`"

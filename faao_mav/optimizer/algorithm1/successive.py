@@ -1,0 +1,75 @@
+"""Successive convex approximation: what the trajectory step and the precoder step share."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from faao_mav.arrays import Real
+
+MAX_STEPS = 20
+"""Convex problems per step of Algorithm 1 at most. Chosen: the paper gives no number."""
+
+MIN_DECREASE = 1e-4
+"""Decrease of the objective, relative to its gap, below which a step ends. Chosen."""
+
+NEGLIGIBLE = 1e-12
+"""Gap of the objective, as a share of its largest value, that counts as zero: rounding errors."""
+
+CAP = 40.0
+"""Largest exponent that is handed to the solver: e^-40 is 4e-18."""
+
+Observer = Callable[[float], None]
+"""Is told the objective after every convex problem."""
+
+Point = TypeVar("Point")
+
+
+def successive_approximation(
+    start: Point,
+    objective: Callable[[Point], float],
+    solve_about: Callable[[Point, float], Point],
+    *,
+    floor: float,
+    scale: float,
+    observe: Observer | None,
+) -> Point:
+    """Return the point that repeated convex problems lead to; `objective` never increases.
+
+    Args:
+        start: the first point of expansion, feasible.
+        objective: the true value of a point.
+        solve_about: the solution of the convex problem about a point, given its gap.
+        floor: a lower bound on the objective; the gap is the distance to it.
+        scale: the largest possible gap.
+        observe: is told the objective after every convex problem.
+    """
+    point, value = start, objective(start)
+    for _ in range(MAX_STEPS):
+        gap = value - floor
+        if gap <= NEGLIGIBLE * scale:
+            break
+        candidate = solve_about(point, gap)
+        reached = objective(candidate)
+        decrease = max(0.0, value - reached)
+        if reached < value:
+            point, value = candidate, reached
+        if observe is not None:
+            observe(value)
+        if decrease <= MIN_DECREASE * gap:
+            break
+    return point
+
+
+def shrink(c: Real) -> Real:
+    """Return the factor min(1, CAP / c) for exponents worth `c` at the point of expansion.
+
+    Exponents of 10^4 make cones that no solver scales. Such a term is worth e^-10000 and may be
+    replaced by any larger one that is negligible as well: t -> t CAP / c. For t >= 0 that raises
+    e^-t; for t < 0 the term stays above 1, which the true term never exceeds. The surrogate remains
+    an upper bound, with an error below e^-CAP at the point of expansion.
+
+    >>> shrink(np.array([4.0, 400.0])).tolist()
+    [1.0, 0.1]
+    """
+    return np.minimum(1.0, CAP / np.maximum(c, CAP))

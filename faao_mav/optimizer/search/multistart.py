@@ -1,0 +1,134 @@
+"""Improve all starts roughly, side by side, and choose those to improve to the end.
+
+Long flights are improved on a coarse copy with fewer slots, which costs a fraction of the time.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.interior.maximize import feasible, maximize_all
+from faao_mav.optimizer.interior.rewards import Stage, StageValues
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+
+COARSE_SLOTS = 60
+"""Slots of the coarse copy: enough for the shape of a route. Chosen."""
+
+FEWEST_SLOTS = 2 * COARSE_SLOTS
+"""Slots from which a coarse copy is used. Chosen; what a change costs is not measured."""
+
+_COARSE_TOLERANCE = 3e-3  # least tolerance on the copy, which differs from the flight by more
+_COARSE_ERROR = 5e-3  # share of the best value within which starts are equally good on the copy
+_SAME = 0.02  # distance of flights that count as one, in the longer of their extents in x and y
+
+
+@dataclass(frozen=True, slots=True)
+class BlockStage:
+    """The rewards of `slots` positions, each of which stands for a block of the slots of `stage`.
+
+    (1 / slots) sum_m F_m is the mean of `stage` over its `fine` slots with w_n = w_m(n), so that
+    every draw of the fading counts.
+    """
+
+    stage: Stage
+    fine: int
+    slots: int
+
+    def __call__(self, w: Real) -> StageValues:
+        """Return values (J, ..., slots), gradients and Hessians at positions w (2, ..., slots)."""
+        block = np.rint(np.linspace(0, self.slots - 1, self.fine)).astype(int)
+        first = np.searchsorted(block, np.arange(self.slots))
+        at = self.stage(w[..., block])
+        share = self.slots / self.fine
+        return StageValues(
+            *(
+                np.add.reduceat(part, first, axis=-1) * share
+                for part in (at.value, at.gradient, at.hessian)
+            )
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ImprovedStarts:
+    """The flights near the local optima that the starts lead to, by the name of the start.
+
+    `promising` names those that may be improved to the best local optimum, the best first.
+    """
+
+    flights: dict[str, Trajectory]
+    promising: list[str]
+
+
+def improve_starts(
+    kin: Kinematics,
+    stage: Stage,
+    flights: Mapping[str, Trajectory],
+    *,
+    tolerance: float,
+    max_iterations: int,
+) -> ImprovedStarts:
+    """Improve the feasible `flights` to `tolerance` and compare them.
+
+    Not promising are flights that end clearly below the best, and those that end where a better one
+    does. No coarse copy is used for short flights, for those with a least speed (the copy cannot
+    make their turns), and for a single start, which needs no comparison.
+
+    Args:
+        kin: the feasible set.
+        stage: the rewards of the slots.
+        flights: the starts by name.
+        tolerance: relative tolerance of the search, at least 3e-3 on a coarse copy.
+        max_iterations: steps of each search at most.
+    """
+    copy, reward, on_copy = kin, stage, list(flights.values())
+    if len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
+        copy, reward = _coarse(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
+        tolerance = max(tolerance, _COARSE_TOLERANCE)
+        on_copy = [copy.follow(_resampled(kin, flight, copy)) for flight in on_copy]
+    solved = maximize_all(copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations)
+    optima = dict(zip(flights, solved, strict=True))
+    ranked = sorted(optima, key=lambda name: -optima[name].value)
+    least = optima[ranked[0]].value * (1 - (0.0 if copy is kin else _COARSE_ERROR))
+    promising: list[str] = []
+    for name in ranked:
+        w = optima[name].trajectory.w
+        near = _SAME * float(np.ptp(w, axis=0).max())
+        others = (optima[other].trajectory.w for other in promising)
+        if optima[name].value >= least and all(np.abs(w - other).max() > near for other in others):
+            promising.append(name)
+    ends = {name: optimum.trajectory for name, optimum in optima.items()}
+    if copy is not kin:
+        ends = {
+            name: feasible(kin, flights[name], _resampled(copy, end, kin))
+            for name, end in ends.items()
+        }
+    return ImprovedStarts(ends, promising)
+
+
+def _coarse(kin: Kinematics) -> Kinematics:
+    """Return the feasible set `kin` in `COARSE_SLOTS` slots.
+
+    Where a(0) has no bound, v(0) does not limit v(1). The first slot of the copy stands for several
+    of `kin`: on it v(0) is free and a(0) bounded.
+    """
+    duration = kin.time_step * (kin.slots - 1)
+    return replace(
+        kin,
+        slots=COARSE_SLOTS,
+        time_step=duration / (COARSE_SLOTS - 1),
+        start_velocity=kin.start_velocity if kin.bound_first_acceleration else None,
+        bound_first_acceleration=True,
+    )
+
+
+def _resampled(kin: Kinematics, flight: Trajectory, other: Kinematics) -> Real:
+    """Return the velocities of `flight`, one of `kin`, at the slots of `other`, (slots, 2)."""
+    now, then = (k.time_step * np.arange(k.slots) for k in (kin, other))
+    velocities = np.stack([np.interp(then, now, v) for v in flight.v.T], axis=1)
+    if other.start_velocity is not None:
+        velocities[0] = other.start_velocity
+    elif kin.start_velocity is not None:
+        velocities[0] = flight.v[1]
+    return velocities

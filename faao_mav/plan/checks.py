@@ -1,0 +1,158 @@
+"""What no single key can tell: whether the keys of a plan agree with each other."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from faao_mav.errors import quote
+from faao_mav.plan.autopilots import VEHICLES
+from faao_mav.plan.fields import Vector, listed
+from faao_mav.plan.keys import unknown_key, varied_twice
+from faao_mav.plan.model import Flight, Plan, VehicleOptions
+
+MAX_SLOTS = 100_000
+"""Most time slots; chosen: the direct method solves 10,000 in 0.6 s; more is not measured."""
+
+_SLACK = 1e-6
+"""Metres that the reach may be short: a plan at the very limit is not refused for rounding."""
+
+
+def problems(plan: Plan) -> Iterator[str]:
+    """Yield what is wrong with `plan`, key first; each may rest on those before it being right."""
+    yield from _not_yet(plan)
+    yield from _vehicle(plan)
+    yield from _speeds(plan)
+    yield from _steps(plan.flight)
+    yield from _distance(plan)
+    yield from _study(plan)
+
+
+def _not_yet(plan: Plan) -> Iterator[str]:
+    """Values that the keys accept and the program cannot make anything of."""
+    if plan.radio.causal:
+        yield "radio.causal: true does not work yet; leave it false"
+    if plan.fence is not None:
+        yield "fence: does not work yet; leave it out"
+
+
+def _vehicle(plan: Plan) -> Iterator[str]:
+    vehicle = plan.vehicle
+    known = VEHICLES.get((vehicle.autopilot, vehicle.type))
+    if known is None or not known.planned:
+        others = [v.autopilot for v in VEHICLES.values() if v.type == vehicle.type and v.planned]
+        yield (
+            f"vehicle.type: {vehicle.type}: missions for {vehicle.type}s are made for "
+            f"{listed(others, 'and')}, not for {vehicle.autopilot} (vehicle.autopilot)"
+        )
+    elif known.hovers:
+        return
+    if vehicle.min_speed == 0:
+        yield "vehicle.min_speed: 0 m/s: a plane cannot hover; give its slowest speed, m/s"
+    if plan.mission.on_finish == "land":
+        yield (
+            "mission.on_finish: land: a plane needs an approach, which is not planned; give rtl "
+            "or hover (it circles)"
+        )
+
+
+def _speeds(plan: Plan) -> Iterator[str]:
+    vehicle, flight = plan.vehicle, plan.flight
+    least, most = vehicle.min_speed, vehicle.max_speed
+    if least > most:
+        yield f"vehicle.min_speed: {least:g} m/s is above vehicle.max_speed ({most:g} m/s)"
+    for end, velocity in (("start", flight.start_velocity), ("end", flight.end_velocity)):
+        if velocity is None:
+            continue
+        speed = math.hypot(*velocity)
+        given = quote(list(velocity)) if any(velocity) else "hover"
+        told = f"flight.{end}_velocity: {given} is {speed:.6g} m/s; vehicle."
+        if speed > most:
+            yield f"{told}max_speed allows {most:g} m/s"
+        if speed < least:
+            yield f"{told}min_speed asks for at least {least:g} m/s: give free or a velocity"
+
+
+def _steps(flight: Flight) -> Iterator[str]:
+    ratio = flight.duration / flight.time_step
+    given = f"flight.duration: {flight.duration:g} s is "
+    step = f"of {flight.time_step:g} s (flight.time_step); "
+    if ratio > MAX_SLOTS + 0.5:
+        count = f"{ratio:,.0f}" if ratio < 1e9 else f"{ratio:.3g}"
+        yield f"{given}{count} steps {step}at most {MAX_SLOTS:,} are accepted"
+    if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio):
+        low, high = (whole(ratio) * flight.time_step for whole in (math.floor, math.ceil))
+        yield f"{given}not a whole number of steps {step}{low:.10g} or {high:.10g} would be"
+    if flight.slots < 3:
+        yield f"{given}{flight.slots} step(s) {step}give at least 3 steps"
+
+
+def _distance(plan: Plan) -> Iterator[str]:
+    flight, vehicle = plan.flight, plan.vehicle
+    distance = math.dist(flight.start, flight.end)
+    if reach(flight.slots - 1, flight, vehicle) >= distance - _SLACK:
+        return
+    needed = shortest_duration(flight, vehicle)
+    takes = f"at least {needed:.10g} s" if needed else "longer than can be planned"
+    yield (
+        f"flight.duration: {flight.duration:g} s is too short: from start to end is "
+        f"{distance:.6g} m, which takes {takes} at {vehicle.max_speed:g} m/s and "
+        f"{vehicle.max_acceleration:g} m/s^2 with the given end velocities"
+    )
+
+
+def _study(plan: Plan) -> Iterator[str]:
+    varied = plan.study.vary if plan.study else ()
+    for key in varied:
+        if problem := unknown_key(key):
+            yield f"study.vary.{key}: {problem}"
+    if both := varied_twice(varied):
+        yield f"study.vary: {both} vary the same value; leave one out"
+
+
+def reach(steps: int, flight: Flight, vehicle: VehicleOptions) -> float:
+    """Return the farthest w(N+1) - w(0) along the line from start to end, m.
+
+    Under (11)-(13f) the component of v(n) along any direction is at most
+    min(v_0 + n a dt, v_end + (steps - n) a dt, v_max), and a straight flight attains that bound
+    when the end velocities are zero or free. With end velocities across the line the result is
+    only an upper bound. `steps` is N + 1; a displacement is the trapezoid sum of v.
+    """
+    dt, limit = flight.time_step, vehicle.max_speed
+    gain = vehicle.max_acceleration * dt
+    direction = _direction(flight)
+    n = np.arange(steps + 1, dtype=float)
+    speed = np.full(steps + 1, limit)
+    if flight.start_velocity is not None:
+        first = math.fsum(v * d for v, d in zip(flight.start_velocity, direction, strict=True))
+        if flight.bound_first_acceleration:
+            np.minimum(speed, first + n * gain, out=speed)
+        speed[0] = min(first, limit)
+    if flight.end_velocity is not None:
+        last = math.fsum(v * d for v, d in zip(flight.end_velocity, direction, strict=True))
+        np.minimum(speed, last + n[::-1] * gain, out=speed)
+    return float(dt * (speed[:-1] + speed[1:]).sum() / 2)
+
+
+def shortest_duration(flight: Flight, vehicle: VehicleOptions) -> float | None:
+    """Return the least T = (N + 2) dt whose reach covers the distance, s; None past `MAX_SLOTS`."""
+    distance = math.dist(flight.start, flight.end)
+
+    def enough(slots: int) -> bool:
+        return reach(slots - 1, flight, vehicle) >= distance
+
+    low, high = 2, 4
+    while not enough(high):
+        low, high = high, 2 * high
+        if high > 2 * MAX_SLOTS:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high * flight.time_step
+
+
+def _direction(flight: Flight) -> Vector:
+    east, north = (b - a for a, b in zip(flight.start, flight.end, strict=True))
+    distance = math.hypot(east, north)
+    return (east / distance, north / distance) if distance else (0.0, 0.0)

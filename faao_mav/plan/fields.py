@@ -1,0 +1,225 @@
+"""How a key of `plan.yaml` is declared, read and checked: the types that `model` is made of.
+
+People write decibels and degrees; the plan holds watts, linear gains and local metres. A key is
+declared where its value is held, in the annotation of a dataclass's field: the type, what the key
+means, its unit, its limits.
+
+    duration: Annotated[Number, key("Duration T.", "s", gt=0, le=1e7)]
+
+What is accepted follows from type and limits (`keys.reference`) unless it is said in words.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import AfterValidator, AllowInfNan, Field, PlainValidator, Strict, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+from faao_mav.geodesy import LocalFrame
+from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
+
+Vector: TypeAlias = tuple[float, float]
+"""East and north components, metres or m/s."""
+
+MAX_LOCAL_DISTANCE = 100_000.0
+"""Largest distance of a position from the origin in metres: the frame is flat to 0.01 % there."""
+
+Number: TypeAlias = Annotated[float, Strict(), AllowInfNan(False)]
+Whole: TypeAlias = Annotated[int, Strict()]
+Flag: TypeAlias = Annotated[bool, Strict()]
+Text: TypeAlias = Annotated[str, Strict()]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """How a value stands in the file: what is accepted there, and the plan's value as written."""
+
+    accepted: str | Callable[[], str]
+    convert: Callable[[Any], object] = lambda value: value
+
+
+def listed(words: Sequence[str], last: str = "or") -> str:
+    """Return `words` as a sentence has them.
+
+    >>> listed(["bpsk", "qpsk", "8psk"])
+    'bpsk, qpsk or 8psk'
+    """
+    return f" {last} ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+
+
+def _one_of(names: Callable[[], tuple[str, ...]]) -> PlainValidator:
+    """Check that a value is one of the `names` known when it is read."""
+
+    def check(value: object) -> object:
+        if value not in names():
+            raise PydanticCustomError("unknown_name", "is none of the names")
+        return value
+
+    return PlainValidator(check)
+
+
+def key(
+    description: str, unit: str = "", accepted: str = "", *, name: str | None = None, **limits: Any
+) -> Any:
+    """Declare a key: what it means, its unit, what is accepted where type and limits do not tell.
+
+    `name` is its name in the file, if another than the field's; `limits` are pydantic's: `ge`,
+    `gt`, `le`, `lt`, `min_length`, `max_length`.
+    """
+    extra: dict[str, Any] = {"unit": unit, "accepted": accepted}
+    return Field(description=description, alias=name, json_schema_extra=extra, **limits)
+
+
+def watts(dbm: float) -> float:
+    """Return a power in watts of `dbm`: 10^((dbm - 30) / 10).
+
+    >>> watts(20.0)
+    0.1
+    """
+    return float(10 ** ((dbm - 30) / 10))
+
+
+def _dbm(power: float) -> float:
+    return 10 * math.log10(power) + 30
+
+
+def linear(db: float) -> float:
+    """Return the linear gain of `db`: 10^(db / 10)."""
+    return float(10 ** (db / 10))
+
+
+def _db(gain: float) -> float:
+    return 10 * math.log10(gain)
+
+
+def told(reason: str) -> PydanticCustomError:
+    """Return an error whose message is `reason` alone."""
+    return PydanticCustomError("told", "{reason}", {"reason": reason})
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _to_float(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _finite_pair(value: object, unit: str) -> Vector:
+    """Check `[east, north]`."""
+    if not (isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))):
+        raise ValueError(f"not two numbers [east, north] in {unit}")
+    east, north = map(_to_float, value)
+    for component in (east, north):
+        if not math.isfinite(component):
+            raise ValueError(f"{component} is not a finite number of {unit}")
+    return east, north
+
+
+def check_degrees(latitude: float, longitude: float) -> None:
+    """Raise ValueError unless both are on the globe; say so when they look swapped."""
+    if not abs(latitude) <= 90:
+        swapped = abs(longitude) <= 90 and abs(latitude) <= 180
+        hint = "; latitude and longitude look swapped" if swapped else ""
+        raise ValueError(f"latitude {latitude} is outside -90..90 degrees{hint}")
+    if not abs(longitude) <= 180:
+        raise ValueError(f"longitude {longitude} is outside -180..180 degrees")
+
+
+def _position(value: object, info: ValidationInfo) -> Vector:
+    if isinstance(value, dict):
+        context: Any = info.context
+        return _local(value, context.get("origin"))
+    east, north = _finite_pair(value, "metres")
+    if max(abs(east), abs(north)) > MAX_LOCAL_DISTANCE:
+        raise ValueError(f"farther than {MAX_LOCAL_DISTANCE / 1000:.0f} km from the origin")
+    return east, north
+
+
+def _local(value: Mapping[str, Any], origin: Vector | None) -> Vector:
+    """Return the metres about `origin` of {latitude, longitude}; zeros for a bad origin."""
+    if set(value) != {"latitude", "longitude"} or not all(map(_is_number, value.values())):
+        raise ValueError("not {latitude: degrees, longitude: degrees}")
+    place = (_to_float(value["latitude"]), _to_float(value["longitude"]))
+    check_degrees(*place)
+    if origin is None:
+        return 0.0, 0.0
+    east, north = map(float, LocalFrame(*origin).to_local(*place))
+    distance = math.hypot(east, north)
+    if distance <= MAX_LOCAL_DISTANCE:
+        return east, north
+    raise told(
+        f"latitude {place[0]}, longitude {place[1]} lies {distance / 1000:,.0f} km from "
+        f"site.origin ({origin[0]}, {origin[1]}), at most {MAX_LOCAL_DISTANCE / 1000:.0f} km is "
+        f"accepted{_slip(place, origin)}"
+    )
+
+
+def _slip(place: Vector, origin: Vector) -> str:
+    """Return what slip of the pen would explain a position far from the origin."""
+    (lat, lon), (home_lat, home_lon) = place, origin
+
+    def close(a: Vector, b: Vector) -> bool:
+        if max(abs(a[0]), abs(b[0])) > 90:
+            return False
+        return math.hypot(*LocalFrame(*a).to_local(*b)) <= MAX_LOCAL_DISTANCE
+
+    if close(origin, (lon, lat)) or close((home_lon, home_lat), place):
+        return "; latitude and longitude look swapped in one of the two"
+    if any(close(origin, pair) for pair in ((-lat, lon), (lat, -lon), (-lat, -lon))):
+        return "; a sign differs: south and west are negative"
+    return ""
+
+
+def _velocity(value: object) -> Vector | None:
+    if value in ("hover", "free"):
+        return (0.0, 0.0) if value == "hover" else None
+    if isinstance(value, str):
+        raise ValueError("not hover, free or a velocity")
+    return _finite_pair(value, "m/s")
+
+
+def _velocity_word(velocity: Vector | None) -> object:
+    if velocity is None:
+        return "free"
+    return velocity if any(velocity) else "hover"
+
+
+_PLACE = "[east, north] in metres or {latitude: degrees, longitude: degrees}"
+
+Position: TypeAlias = Annotated[Vector, PlainValidator(_position), Written(_PLACE)]
+Velocity: TypeAlias = Annotated[
+    Vector | None,
+    PlainValidator(_velocity),
+    Written("hover, free or [east, north] in m/s", _velocity_word),
+]
+Power: TypeAlias = Annotated[
+    Number,
+    Field(ge=-200, le=100),
+    AfterValidator(watts),
+    Written("a power from -200 to 100 dBm", _dbm),
+]
+Noise: TypeAlias = Annotated[
+    Number,
+    Field(ge=-250, le=100),
+    AfterValidator(watts),
+    Written("a noise power from -250 to 100 dBm", _dbm),
+]
+Gain: TypeAlias = Annotated[
+    Number,
+    Field(ge=-200, le=200),
+    AfterValidator(linear),
+    Written("a gain from -200 to 200 dB", _db),
+]
+AutopilotName: TypeAlias = Annotated[
+    Autopilot, _one_of(autopilots), Written(lambda: listed(autopilots()))
+]
+TypeName: TypeAlias = Annotated[Kind, _one_of(types), Written(lambda: listed(types()))]
+Antennas: TypeAlias = Annotated[
+    Whole, Field(ge=1, le=64), Written("a whole number of antennas, 1 to 64")
+]

@@ -1,0 +1,271 @@
+"""What the rules look at: a mission, its vehicle, and what follows from both."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
+from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.validate.fence_map import FenceMap, fence_map
+from faao_mav.validate.link import LinkCheck
+from faao_mav.vehicle import Track, Vehicle
+
+NAV_LAST = 95
+"""Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""
+
+LARGEST = float(np.finfo(np.float32).max)
+"""The largest number of single precision, which messages have."""
+
+HOME = -1
+"""The index of home, which is no item."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a flight must stay within; None: no limit.
+
+    `max_duration`, s, of the whole flight; `max_distance`, m, from home over ground;
+    `max_altitude`, m above home; `max_speed`, m/s, over ground; `max_acceleration`, m/s², over
+    ground. Raises `InputError` for one that is not a finite number above 0.
+    """
+
+    max_duration: float | None = None
+    max_distance: float | None = None
+    max_altitude: float | None = None
+    max_speed: float | None = None
+    max_acceleration: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name}: {value}; expected a number above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedItem:
+    """Where an item flies to: metres east and north of `ValidationContext.frame`, and above home.
+
+    `index` is the item's, `HOME` for home. `up` is NaN where nothing tells it: heights above
+    terrain, or above the sea without a home.
+    """
+
+    index: int
+    east: float
+    north: float
+    up: float
+
+    @property
+    def from_origin(self) -> float:
+        """Metres over ground from the origin of the frame, which is home if there is one."""
+        return math.hypot(self.east, self.north)
+
+
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """A straight from one place to the next, ordered by the item at `index`.
+
+    `speed` is what is commanded, m/s; `spline`: the aircraft curves to its end; `jump`: the item
+    is a DO_JUMP.
+    """
+
+    index: int
+    start: PlacedItem
+    end: PlacedItem
+    speed: float
+    spline: bool = False
+    jump: bool = False
+
+    @property
+    def length(self) -> float:
+        """Metres over ground."""
+        return math.hypot(self.end.east - self.start.east, self.end.north - self.start.north)
+
+    @property
+    def rise(self) -> float:
+        """Metres upwards; NaN if a height is unknown."""
+        return self.end.up - self.start.up
+
+
+@dataclass(frozen=True)
+class ValidationContext:
+    """A mission to judge; parameters of its vehicle that are no use count as not given.
+
+    `track` is how it is predicted to fly, if that is known; `link` what it is predicted to
+    deliver, if there is a plan to compare with.
+    """
+
+    mission: Mission
+    vehicle: Vehicle
+    track: Track | None = None
+    limits: Limits = field(default_factory=Limits)
+    link: LinkCheck | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vehicle", self.vehicle.usable())
+
+    @property
+    def items(self) -> tuple[MissionItem, ...]:
+        """The items of the mission."""
+        return self.mission.items
+
+    def each(self, *commands: int) -> Iterator[tuple[int, MissionItem]]:
+        """Yield index and item of the items with one of `commands`."""
+        return ((k, item) for k, item in enumerate(self.items) if item.command in commands)
+
+    @cached_property
+    def frame(self) -> LocalFrame | None:
+        """The local frame: about home, else about the first item that has coordinates."""
+        if self.mission.home is not None:
+            return LocalFrame(self.mission.home.latitude, self.mission.home.longitude)
+        for item in self.items:
+            if item.command in FLOWN_TO and on_earth(item) and not at_zero(item):
+                return LocalFrame(item.x, item.y)
+        return None
+
+    @cached_property
+    def home(self) -> PlacedItem | None:
+        """Home, at the origin of the local frame, or None."""
+        return PlacedItem(HOME, 0.0, 0.0, 0.0) if self.mission.home is not None else None
+
+    @cached_property
+    def places(self) -> tuple[PlacedItem, ...]:
+        """Where the items fly to, in order; without those whose coordinates are unusable.
+
+        ArduPilot takes 0, 0 for the place where it is.
+        """
+        if self.frame is None:
+            return ()
+        here = (0.0, 0.0)
+        dialect = self.vehicle.type.dialect
+        indices = [k for k, item in enumerate(self.items) if self._is_place(item)]
+        local = self.frame.to_local(
+            [self.items[k].x for k in indices], [self.items[k].y for k in indices]
+        )
+        places = []
+        for k, (east, north) in zip(indices, local.tolist(), strict=True):
+            item = self.items[k]
+            if at_zero(item):
+                if not dialect.zero_means_here:
+                    continue
+            elif math.isfinite(east) and math.isfinite(north):  # not so at the antipode
+                here = (east, north)
+            else:
+                continue
+            places.append(PlacedItem(k, *here, self._height(item)))
+        return tuple(places)
+
+    def _is_place(self, item: MissionItem) -> bool:
+        if item.command not in FLOWN_TO or not on_earth(item):
+            return False
+        return item.frame != Frame.MISSION or self.vehicle.type.dialect.placed_in_mission_frame
+
+    def _height(self, item: MissionItem) -> float:
+        if item.frame in ABOVE_HOME:
+            return item.z
+        above_sea = item.frame in ABOVE_SEA or item.frame == Frame.MISSION
+        if above_sea and self.mission.home is not None:
+            return item.z - self.mission.home.altitude
+        return math.nan
+
+    @cached_property
+    def legs(self) -> tuple[Straight, ...]:
+        """The straights that the items order: from home, between the places, back, by DO_JUMP.
+
+        A return to launch ends at home, unless there are rally points to go to instead.
+        """
+        return tuple(self._legs())
+
+    def _legs(self) -> Iterator[Straight]:
+        by_index = {place.index: place for place in self.places}
+        here = self.home
+        for k, item in enumerate(self.items):
+            speed = self.speeds[k]
+            place = by_index.get(k)
+            if place is not None:
+                if here is not None:
+                    yield Straight(
+                        k, here, place, speed, item.command == Command.NAV_SPLINE_WAYPOINT
+                    )
+                here = place
+            elif here is None:
+                continue
+            elif item.command == Command.NAV_RETURN_TO_LAUNCH:
+                if self.home is not None and not self.mission.rally:
+                    yield Straight(k, here, replace(self.home, up=math.nan), speed)
+            elif item.command == Command.DO_JUMP:
+                target = self.jump_target(k)
+                reached = range(len(self.items))[target:] if target is not None else ()
+                after = next((by_index[j] for j in reached if j in by_index), None)
+                if after is not None:
+                    yield Straight(k, here, after, speed, jump=True)
+
+    def stored(self, item: MissionItem) -> MissionItem | None:
+        """Return what the vehicle gives back for `item`, None if it refuses it."""
+        dialect = self.vehicle.type.dialect
+        if not fits_message(item) or dialect.refusal(item):
+            return None
+        return dialect.stored(item)
+
+    def jump_target(self, index: int) -> int | None:
+        """Return the index that the DO_JUMP at `index` goes to, None if there is no such item."""
+        number = self.items[index].params[0]
+        if math.isnan(number) or not 1 <= int(number) <= len(self.items):
+            return None
+        return int(number) - 1
+
+    @cached_property
+    def speeds(self) -> tuple[float, ...]:
+        """The speed over ground commanded for the leg to each item, m/s."""
+        cruise = self.vehicle.value("cruise_speed")
+        speed, speeds = cruise, []
+        for item in self.items:
+            change = None
+            if item.command == Command.DO_CHANGE_SPEED:
+                change = self.vehicle.type.dialect.speed_change(item)
+            if change is not None and change.axis in ("horizontal", "airspeed"):
+                speed = cruise if change.speed is None else change.speed
+            speeds.append(speed)
+        return tuple(speeds)
+
+    @cached_property
+    def fence(self) -> FenceMap | None:
+        """The fence in the local frame, None without one."""
+        return fence_map(self)
+
+    @cached_property
+    def track_positions(self) -> Real | None:
+        """The track's positions (n, 3) in the local frame, or None without a track."""
+        if self.track is None or self.frame is None:
+            return None
+        if self.track.frame == self.frame:
+            return self.track.position
+        latitude, longitude = self.track.frame.to_geodetic(self.track.position[:, :2])
+        ground = self.frame.to_local(latitude, longitude)
+        return np.column_stack([ground, self.track.position[:, 2]])
+
+
+def number(index: int) -> int:
+    """Return the number of the item at `index` that people see."""
+    return index + 1
+
+
+def on_earth(item: MissionItem) -> bool:
+    """Say whether x and y are a latitude and a longitude."""
+    return abs(item.x) <= 90 and abs(item.y) <= 180
+
+
+def at_zero(item: MissionItem) -> bool:
+    """Say whether x and y are 0, 0: for most files, not set."""
+    return item.x == 0 and item.y == 0
+
+
+def fits_message(item: MissionItem) -> bool:
+    """Say whether a MISSION_ITEM_INT can carry the numbers of `item`."""
+    return not any(abs(value) > LARGEST for value in (*item.params, item.z))

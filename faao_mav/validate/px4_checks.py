@@ -1,0 +1,358 @@
+"""PX4's checks of an uploaded mission: it acknowledges the mission first and then rejects it."""
+
+import math
+from collections.abc import Iterator
+
+from faao_mav.mission.command import FLOWN_TO, Command, Frame
+from faao_mav.validate.context import PlacedItem, ValidationContext, number
+from faao_mav.validate.rule import Issue, Rules
+from faao_mav.vehicle import PX4_COPTER
+from faao_mav.vehicle.dialect import name_of
+
+RULES = Rules(PX4_COPTER.family)
+
+_CHECKER = "PX4 1.16 FeasibilityChecker::"
+_CONDITION_GATE = 4501
+_NEVER = frozenset({Command.CONDITION_DELAY, Command.CONDITION_DISTANCE})
+_VTOL = (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000)
+_TAKEOFFS = (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF)
+_FLIES = FLOWN_TO | {_CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH, 187, 211, 42600}
+"""What checkTakeoff counts as flying: actuators, grippers and winches as well."""
+
+_CLOSEST_GATE = 0.05
+"""The least distance of a gate from its neighbours, m. PX4's own."""
+
+_TAKEOFF, _LANDING, _BOTH, _BOTH_OR_NONE, _BOTH_OR_NONE_ON_GROUND = 1, 2, 3, 4, 5
+
+
+@RULES.error(
+    "px4-command-rejected",
+    "PX4 acknowledges this command on upload and then rejects the mission",
+    f"{_CHECKER}checkMissionItemValidity; measured on 1.16.1",
+)
+def _rejected(context: ValidationContext) -> Iterator[Issue]:
+    for index, item in context.each(*_NEVER):
+        if item.frame == Frame.MISSION:
+            yield Issue(
+                index,
+                f"{name_of(item.command)} is acknowledged on upload, then the mission is rejected",
+                "remove the item; to wait, use a hold (param1 of a waypoint) or NAV_DELAY",
+            )
+
+
+@RULES.error(
+    "px4-vtol-items", "items for VTOL aircraft only", f"{_CHECKER}checkItemsFitToVehicleType"
+)
+def _vtol(context: ValidationContext) -> Iterator[Issue]:
+    for index, item in context.each(*_VTOL):
+        yield Issue(
+            index,
+            f"{name_of(item.command)} is for VTOL aircraft, this is a {context.vehicle.kind}",
+            "use NAV_TAKEOFF and NAV_LAND",
+        )
+
+
+@RULES.error(
+    "px4-starts-with-land",
+    "the mission starts with a landing",
+    f"{_CHECKER}checkMissionItemValidity, checkLandPatternValidity",
+)
+def _starts_with_land(context: ValidationContext) -> Iterator[Issue]:
+    if context.items and context.items[0].command in (Command.NAV_LAND, Command.NAV_VTOL_LAND):
+        yield Issue(0, "the first item is a landing", "put a take-off and waypoints before it")
+
+
+@RULES.error(
+    "px4-takeoff-first",
+    "a take-off is not the first item that flies",
+    f"{_CHECKER}checkTakeoff; measured on 1.16.1",
+)
+def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
+    before = next((k for k, item in enumerate(context.items) if item.command in _FLIES), None)
+    for index, _ in context.each(*_TAKEOFFS):
+        if before is not None and before < index:
+            second = context.items[before].command in _TAKEOFFS
+            yield Issue(
+                index,
+                f"a second take-off, after item {number(before)}"
+                if second
+                else f"the take-off comes after item {number(before)}",
+                "remove it" if second else f"move it before item {number(before)}",
+            )
+
+
+@RULES.error(
+    "px4-takeoff-altitude",
+    "a take-off to home's height or below",
+    f"{_CHECKER}checkTakeoff; measured on 1.16.1",
+)
+def _takeoff_altitude(context: ValidationContext) -> Iterator[Issue]:
+    for place in _takeoffs(context):
+        if place.up <= 0:
+            yield Issue(
+                place.index,
+                f"the take-off ends {place.up:g} m above home; it must be above 0",
+                "give the take-off an altitude",
+            )
+
+
+@RULES.warning(
+    "px4-takeoff-low",
+    "a take-off lower than older PX4 versions accept or any version flies",
+    f"PX4 before 1.15 {_CHECKER.split()[-1]}checkTakeoff; MIS_TAKEOFF_ALT",
+)
+def _takeoff_low(context: ValidationContext) -> Iterator[Issue]:
+    vehicle = context.vehicle
+    radius = vehicle.name_of("acceptance_radius")
+    least, first = vehicle.value("acceptance_radius") + 1, vehicle.value("takeoff_height")
+    for place in _takeoffs(context):
+        if 0 < place.up < max(least, first):
+            yield Issue(
+                place.index,
+                f"the take-off ends {place.up:g} m above home; older versions want "
+                f"{least:g} m (acceptance radius {radius} + 1 m), and "
+                f"all first climb to {first:g} m ({vehicle.name_of('takeoff_height')})",
+                f"take off to {max(least, first):g} m or more",
+            )
+
+
+def _takeoffs(context: ValidationContext) -> Iterator[PlacedItem]:
+    for place in context.places:
+        if context.items[place.index].command in _TAKEOFFS:
+            yield place
+
+
+@RULES.error(
+    "px4-takeoff-or-landing-missing",
+    "MIS_TKO_LAND_REQ asks for a take-off or landing that the mission does not have",
+    f"{_CHECKER}checkTakeoffLandAvailable; measured on 1.16.1",
+)
+def _takeoff_landing(context: ValidationContext) -> Iterator[Issue]:
+    required = int(context.vehicle.value("takeoff_land_required"))
+    takeoff, landing = any(context.each(*_TAKEOFFS)), any(context.each(Command.NAV_LAND))
+    wanted = {
+        _TAKEOFF: takeoff,
+        _LANDING: landing,
+        _BOTH: takeoff and landing,
+        _BOTH_OR_NONE: takeoff == landing,
+        _BOTH_OR_NONE_ON_GROUND: takeoff == landing,
+    }
+    if wanted.get(required, True):
+        return
+    missing = {
+        _TAKEOFF: "a take-off",
+        _LANDING: "a landing",
+        _BOTH: "a take-off and a landing",
+    }.get(required, "both a take-off and a landing, or neither,")
+    yield Issue(
+        None,
+        f"MIS_TKO_LAND_REQ is {required} and asks for {missing}; the mission has "
+        f"{'a' if takeoff else 'no'} take-off and {'a' if landing else 'no'} landing",
+        f"add {'NAV_LAND' if takeoff else 'NAV_TAKEOFF'}, or change MIS_TKO_LAND_REQ",
+    )
+
+
+@RULES.warning(
+    "px4-first-waypoint-far",
+    "the first item is farther from home than MIS_DIST_1WP",
+    f"{_CHECKER}checkHorizontalDistanceToFirstWaypoint",
+)
+def _first_far(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.vehicle.value("first_waypoint_distance")
+    if context.home is not None and context.places and limit > 0:
+        first = context.places[0]
+        distance = first.from_origin
+        if distance >= limit:
+            yield Issue(
+                first.index,
+                f"the first item is {distance:.0f} m from home, MIS_DIST_1WP is {limit:g} m",
+                "check the coordinates and the home position, or raise MIS_DIST_1WP",
+            )
+
+
+@RULES.error(
+    "px4-gate-close",
+    "a CONDITION_GATE at the place of the item before or after it",
+    f"{_CHECKER}checkDistancesBetweenWaypoints",
+)
+def _gate(context: ValidationContext) -> Iterator[Issue]:
+    if context.frame is None:
+        return
+    placed = [
+        (k, item)
+        for k, item in context.each(*FLOWN_TO, _CONDITION_GATE)
+        if abs(item.x) <= 90 and abs(item.y) <= 180
+    ]
+    local = context.frame.to_local([item.x for _, item in placed], [item.y for _, item in placed])
+    for n in range(1, len(placed)):
+        (before, first), (index, second) = placed[n - 1], placed[n]
+        distance = math.dist(local[n - 1], local[n])
+        if _CONDITION_GATE in (first.command, second.command) and distance < _CLOSEST_GATE:
+            yield Issue(
+                index,
+                f"{distance:.3f} m from item {number(before)}; a gate and its neighbour must be "
+                f"{_CLOSEST_GATE} m apart",
+                "move the gate",
+            )
+
+
+@RULES.error(
+    "px4-max-horizontal",
+    "farther from home than GF_MAX_HOR_DIST",
+    "PX4 1.16 Geofence::check, MissionFeasibilityChecker::checkGeofence",
+)
+def _max_horizontal(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.vehicle.value("fence_distance")
+    if limit > 0 and context.home is not None:
+        for place in context.places:
+            distance = place.from_origin
+            if distance > limit:
+                yield Issue(
+                    place.index,
+                    f"{distance:.0f} m from home, GF_MAX_HOR_DIST is {limit:g} m",
+                    "move the item or raise GF_MAX_HOR_DIST",
+                )
+
+
+@RULES.error(
+    "px4-max-vertical",
+    "higher above home than GF_MAX_VER_DIST",
+    "PX4 1.16 Geofence::check, MissionFeasibilityChecker::checkGeofence",
+)
+def _max_vertical(context: ValidationContext) -> Iterator[Issue]:
+    limit = context.vehicle.value("fence_height")
+    if limit > 0:
+        for place in context.places:
+            if abs(place.up) > limit:
+                yield Issue(
+                    place.index,
+                    f"{place.up:g} m above home, GF_MAX_VER_DIST is {limit:g} m",
+                    "lower the item or raise GF_MAX_VER_DIST",
+                )
+
+
+_APPROACH = "PX4 1.16 FeasibilityChecker::checkFixedWindLandApproach"
+_PATTERN = "PX4 1.16 FeasibilityChecker::checkLandPatternValidity"
+_SPARE_ANGLE = 0.1
+"""How much steeper than FW_LND_ANG PX4 lets an approach be, degrees. PX4's own."""
+
+_ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)
+
+
+def _approaches(context: ValidationContext) -> Iterator[tuple[PlacedItem, PlacedItem]]:
+    """Yield the place before each landing, and the landing."""
+    by_index = {place.index: place for place in context.places}
+    for index, _ in context.each(Command.NAV_LAND):
+        if index - 1 in by_index and index in by_index:
+            yield by_index[index - 1], by_index[index]
+
+
+@RULES.error(
+    "px4-approach-entrance",
+    "a landing approach starts neither at a waypoint nor at a loiter to altitude",
+    _APPROACH,
+    kind="plane",
+)
+def _entrance(context: ValidationContext) -> Iterator[Issue]:
+    for index, _ in context.each(Command.NAV_LAND):
+        before = context.items[index - 1] if index else None
+        if before is not None and before.command in FLOWN_TO and before.command not in _ENTRANCES:
+            yield Issue(
+                index,
+                f"the item before the landing is {name_of(before.command)}",
+                "put a NAV_WAYPOINT or NAV_LOITER_TO_ALT before the landing",
+            )
+
+
+@RULES.error(
+    "px4-approach-below",
+    "a landing approach starts below the landing point",
+    _APPROACH,
+    kind="plane",
+)
+def _below(context: ValidationContext) -> Iterator[Issue]:
+    for entrance, landing in _approaches(context):
+        if entrance.up - landing.up <= 0:
+            yield Issue(
+                landing.index,
+                f"the approach starts {entrance.up:g} m above home, the landing is at "
+                f"{landing.up:g} m",
+                "raise the item before the landing",
+            )
+
+
+@RULES.error(
+    "px4-approach-orbit",
+    "a landing point lies inside the orbit that its approach starts from",
+    _APPROACH,
+    kind="plane",
+)
+def _orbit(context: ValidationContext) -> Iterator[Issue]:
+    for entrance, landing in _approaches(context):
+        distance, radius = _distance(entrance, landing), _orbit_radius(context, entrance)
+        if radius > 0 and distance <= radius:
+            yield Issue(
+                landing.index,
+                f"the landing is {distance:.0f} m from the centre of an orbit of {radius:g} m",
+                "move the landing point out of the orbit, or make the orbit smaller",
+            )
+
+
+@RULES.error(
+    "px4-approach-steep", "a landing approach is steeper than FW_LND_ANG", _APPROACH, kind="plane"
+)
+def _steep(context: ValidationContext) -> Iterator[Issue]:
+    angle = math.degrees(context.vehicle.value("landing_angle"))
+    slope = math.tan(math.radians(angle + _SPARE_ANGLE))
+    for entrance, landing in _approaches(context):
+        if context.items[entrance.index].command not in _ENTRANCES:
+            continue
+        height = entrance.up - landing.up
+        square = _distance(entrance, landing) ** 2 - _orbit_radius(context, entrance) ** 2
+        if square > 0 and height > 0 and height / math.sqrt(square) > slope:
+            distance = math.sqrt(square)
+            yield Issue(
+                landing.index,
+                f"{height:g} m of descent in {distance:.0f} m are "
+                f"{math.degrees(math.atan2(height, distance)):.1f} degrees, FW_LND_ANG is "
+                f"{angle:g}",
+                f"start the approach at most {slope * distance:.0f} m above the landing, or "
+                f"{math.ceil(height / slope)} m away from it",
+            )
+
+
+def _distance(a: PlacedItem, b: PlacedItem) -> float:
+    return math.hypot(a.east - b.east, a.north - b.north)
+
+
+def _orbit_radius(context: ValidationContext, entrance: PlacedItem) -> float:
+    item = context.items[entrance.index]
+    if item.command != Command.NAV_LOITER_TO_ALT or math.isnan(item.params[1]):
+        return 0.0
+    return abs(item.params[1])
+
+
+@RULES.error(
+    "px4-land-start",
+    "DO_LAND_START is there twice, before a return to launch, or without a landing after it",
+    _PATTERN,
+    kind="plane",
+)
+def _land_start(context: ValidationContext) -> Iterator[Issue]:
+    starts = [index for index, _ in context.each(Command.DO_LAND_START)]
+    if not starts:
+        return
+    start = starts[0]
+    for second in starts[1:]:
+        yield Issue(second, f"a second DO_LAND_START, after item {number(start)}", "remove it")
+    for index, _ in context.each(Command.NAV_RETURN_TO_LAUNCH):
+        if index > start:
+            yield Issue(
+                index,
+                f"a return to launch after the DO_LAND_START of item {number(start)}",
+                "remove one of both",
+            )
+    landings = [index for index, _ in context.each(Command.NAV_LAND, Command.NAV_VTOL_LAND)]
+    # The landing's approach, the item before it, may be the DO_LAND_START itself.
+    if not any(index - 1 >= start for index in landings):
+        yield Issue(start, "there is no landing after DO_LAND_START", "add NAV_LAND, or remove it")

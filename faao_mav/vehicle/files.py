@@ -1,0 +1,59 @@
+"""What the files of missions and parameters say of a vehicle, and what they are to say."""
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.formats import MissionFile, PlanTarget
+from faao_mav.mission.item import MissionItem
+from faao_mav.plan.autopilots import Autopilot, Kind
+from faao_mav.vehicle.registry import families, family, vehicle_type_by_numbers, vehicle_types
+from faao_mav.vehicle.vehicle import Vehicle
+
+_NOT_SET = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, (math.nan, 0.0, 0.0, 0.0))
+
+
+def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:
+    """Return whom a `.plan` file for `vehicle` is for.
+
+    >>> plan_target(Vehicle("px4", "copter"))
+    PlanTarget(firmware=12, vehicle_type=2, takes_null=True)
+    """
+    if vehicle is None:
+        return None
+    takes_null = vehicle.type.dialect.refusal(_NOT_SET) is None
+    return PlanTarget(vehicle.type.family.mav_autopilot, vehicle.type.mav_types[0], takes_null)
+
+
+def vehicle_in(file: MissionFile) -> Vehicle | None:
+    """Return the vehicle that a mission file names, a copter unless it says otherwise, or None."""
+    if file.firmware is None:
+        return None
+    found = vehicle_type_by_numbers(file.firmware, file.vehicle_type)
+    return None if found is None else Vehicle(found.family.key, found.kind)
+
+
+def kind_in(file: MissionFile) -> Kind | None:
+    """Return the kind of aircraft that a mission file names, whatever its autopilot, or None."""
+    return next((t.kind for t in vehicle_types() if file.vehicle_type in t.mav_types), None)
+
+
+def parameter_path(mission: Path, autopilot: Autopilot) -> Path:
+    """Return the file of parameters beside `mission`.
+
+    >>> parameter_path(Path("flight.plan"), "px4").name
+    'flight.params'
+    """
+    return mission.with_suffix(family(autopilot).parameter_suffix)
+
+
+def autopilot_of(parameters: Iterable[str]) -> Autopilot | None:
+    """Return whose names `parameters` are, None where they do not tell."""
+    names = tuple(parameters)
+    found = [
+        each.key
+        for each in families()
+        if any(name.startswith(each.parameter_prefixes) for name in names)
+    ]
+    return found[0] if len(found) == 1 else None

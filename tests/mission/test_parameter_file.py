@@ -1,0 +1,173 @@
+"""Files of autopilot parameters, against themselves, pymavlink and damaged files."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.mavparm import MAVParmDict
+
+from faao_mav.errors import InputError, ParameterFileError
+from faao_mav.mission.formats.parameter_file import read_parameters, render_parameters
+
+names = st.from_regex(r"[A-Z][A-Z0-9_]{0,15}", fullmatch=True)
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+integers = st.integers(-(2**31), 2**31 - 1)
+
+
+def read(text: str, folder: Path) -> dict[str, float]:
+    path = folder / "x.param"
+    path.write_text(text, newline="", encoding="utf-8")
+    return read_parameters(path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("parameters")
+
+
+@given(st.dictionaries(names, numbers, min_size=1, max_size=8))
+def test_ardupilot_files_are_read_back(folder: Path, parameters: dict[str, float]) -> None:
+    text = render_parameters(parameters, "list", header="for a test\n\nof it")
+    assert repr(read(text, folder)) == repr(parameters)
+
+
+@given(st.dictionaries(names, numbers | integers, min_size=1, max_size=8))
+def test_px4_files_are_read_back_with_their_types(
+    folder: Path, parameters: dict[str, float]
+) -> None:
+    assert repr(read(render_parameters(parameters, "qgroundcontrol"), folder)) == repr(parameters)
+
+
+@given(st.dictionaries(names, st.floats(-1e6, 1e6), min_size=1, max_size=8))
+def test_pymavlink_reads_the_same(
+    tmp_path_factory: pytest.TempPathFactory, parameters: dict[str, float]
+) -> None:
+    path = tmp_path_factory.mktemp("pymavlink") / "x.param"
+    path.write_text(render_parameters(parameters, "list", header="for a test"))
+    loaded = MAVParmDict()
+    assert loaded.load(str(path), use_excludes=False)
+    assert dict(loaded) == parameters
+
+
+def test_what_pymavlink_writes_is_read(tmp_path: Path) -> None:
+    written = MAVParmDict()
+    written.update({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5, "A_VERY_LONG_NAME": -0.25})
+    path = tmp_path / "x.parm"
+    written.save(str(path))
+    assert read_parameters(path) == written
+
+
+def test_the_form_that_qgroundcontrol_reads() -> None:
+    text = render_parameters({"MPC_ACC_HOR": 5.0, "MIS_TKO_LAND_REQ": 2, "NAV_ACC_RAD": 2e-5},
+                             "qgroundcontrol", header="Timed for these.")  # fmt: skip
+    assert text == (
+        "# Timed for these.\n"
+        "#\n"
+        "# Vehicle-Id Component-Id Name Value Type\n"
+        "1\t1\tMPC_ACC_HOR\t5\t9\n"
+        "1\t1\tMIS_TKO_LAND_REQ\t2\t6\n"
+        "1\t1\tNAV_ACC_RAD\t0.00002\t9\n"
+    )
+    assert render_parameters({"A": 1}, "qgroundcontrol", system=7).endswith("7\t1\tA\t1\t6\n")
+
+
+def test_the_form_that_mission_planner_reads() -> None:
+    text = render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}, "list", header="x")
+    assert text == "# x\nWPNAV_SPEED,800\nWPNAV_JERK,1.5\n"
+
+
+def test_qgroundcontrols_own_file(tmp_path: Path) -> None:
+    text = (
+        "# Onboard parameters for Vehicle 1\n#\n# Stack: PX4 Pro\n# Vehicle: Multi-Rotor\n"
+        "# Version: 1.16.1 dev\n# Git Revision: 0123456789abcdef\n#\n"
+        "# Vehicle-Id Component-Id Name Value Type\n"
+        "1\t1\tCOM_RC_IN_MODE\t1\t6\n"
+        "1\t1\tMPC_ACC_HOR\t3.000000000000000000\t9\n"
+        "1\t154\tGMB_USR1\t5\t6\n"
+    )
+    parameters = read(text, tmp_path)
+    assert parameters == {"COM_RC_IN_MODE": 1, "MPC_ACC_HOR": 3.0}
+    assert [type(value) for value in parameters.values()] == [int, float]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "A,1\nB,2.5\n",
+        "A 1\nB\t2.5\n",
+        "A      1\r\nB , 2.5\r\n",
+        "\ufeffA,1\nB,2.5",
+        "# by hand\n\n  A,1 # one\n#C,3\nB,2.5\n\n",
+        "A,0x1\nB,2.5e0\n",
+        "A,1\nB,2.5\nA,1.0\n",
+        "A 1 @READONLY\nB 2.5\n",
+    ],
+)
+def test_harmless_oddities_are_read(text: str, tmp_path: Path) -> None:
+    assert read(text, tmp_path) == {"A": 1, "B": 2.5}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no parameters in it; expected lines of NAME,VALUE"),
+        ("# A,1\n", "no parameters in it"),
+        ("A,1\nA,2\n", "line 2: A 2; line 1 says 1: remove one"),
+        ("A,1\nB\n", "line 2: 'B'; expected NAME,VALUE or NAME VALUE"),
+        ("A,1,2\n", "line 1: 'A,1,2'; expected NAME,VALUE"),
+        ("A=1\n", "line 1: 'A=1'; expected NAME,VALUE"),
+        ("A,nan\n", "line 1: value 'nan'; expected a finite number"),
+        ("A,1e999\n", "line 1: value '1e999'; expected a finite number"),
+        ("A,1_0\n", "value '1_0'"),
+        ("A,1.5.2\n", "value '1.5.2'"),
+        ("wpnav_speed,1\n", "name 'wpnav_speed'; expected at most 16 capitals"),
+        ("ABCDEFGHIJKLMNOPQ,1\n", "name 'ABCDEFGHIJKLMNOPQ'"),
+        ("1\t1\tA\t1.5\t6\n", "value '1.5'; expected a whole number, as its type says"),
+        ("1\t1\tA\t1.5\t11\n", "type '11'; expected a number 1 to 10"),
+        ("1\tx\tA\t1.5\t9\n", "component 'x'; expected a number"),
+        ("1\t1\tA\tx\t9\n", "value 'x'; expected a finite number"),
+        ("1\t2\tA\t1\t9\n", "no parameters in it"),
+    ],
+)
+def test_damage_is_named(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ParameterFileError, match=re.escape(message)) as caught:
+        read(text, tmp_path)
+    assert str(caught.value).startswith(str(tmp_path / "x.param: "))
+    assert isinstance(caught.value, InputError)
+
+
+def test_files_that_are_no_text(tmp_path: Path) -> None:
+    with pytest.raises(ParameterFileError, match="cannot be read: No such file"):
+        read_parameters(tmp_path / "absent.param")
+    (tmp_path / "x.param").write_bytes(b"A,1\nB,\xff\n")
+    with pytest.raises(ParameterFileError, match="line 2: byte 0xff is not UTF-8"):
+        read_parameters(tmp_path / "x.param")
+    (tmp_path / "x.param").write_bytes(b"#" * 4_000_001)
+    with pytest.raises(ParameterFileError, match="more than 4 MB; expected a file of parameters"):
+        read_parameters(tmp_path / "x.param")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("speed", 1.0, "parameter 'speed'; expected at most 16 capitals"),
+        ("A" * 17, 1.0, "expected at most 16 capitals"),
+        ("A", math.nan, "parameter A: nan; expected a finite number"),
+        ("A", 2**31, "parameter A: 2147483648; expected a finite number, an integer within 32"),
+    ],
+)
+def test_what_no_autopilot_has_is_not_written(name: str, value: float, message: str) -> None:
+    with pytest.raises(ParameterFileError, match=re.escape(message)):
+        render_parameters({name: value}, "qgroundcontrol")
+
+
+@given(st.text())
+def test_any_text_is_read_or_refused(folder: Path, text: str) -> None:
+    try:
+        parameters = read(text, folder)
+    except ParameterFileError:
+        return
+    assert read(render_parameters(parameters, "list"), folder) == parameters

@@ -1,0 +1,90 @@
+"""Starts are compared on a coarse copy of the flight, and the one that would win is kept."""
+
+import numpy as np
+import pytest
+from conftest import MISSIONS, MakePlan, edited
+
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.interior.maximize import maximize
+from faao_mav.optimizer.interior.rewards import StageValues
+from faao_mav.optimizer.kinematics import Trajectory
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search.multistart import (
+    COARSE_SLOTS,
+    FEWEST_SLOTS,
+    BlockStage,
+    improve_starts,
+)
+from faao_mav.optimizer.search.starts import starts
+from faao_mav.plan import Plan, parse_plan
+
+
+def long_plan(power: int) -> Plan:
+    """Return the paper's plan at T = 100 s: 500 slots, several local optima at low power."""
+    powers = {f"radio.{name}.power_dbm": power for name in ("base_station", "relay")}
+    text = (MISSIONS / "paper_active.yaml").read_text()
+    return parse_plan(edited(text, powers | {"flight.duration": 100, "optimizer.method": "direct"}))
+
+
+def starts_of(problem: Problem) -> dict[str, Trajectory]:
+    """Return the flights that the plan starts from."""
+    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    return starts(problem.kinematics, problem.plan.optimizer.starts, stations)
+
+
+def test_a_block_has_the_mean_of_its_slots() -> None:
+    rng = np.random.default_rng(0)
+    slope = rng.normal(size=(2, 2, 501))
+
+    def stage(w: np.ndarray) -> StageValues:
+        value = np.einsum("cjn,cn->jn", slope, w)
+        return StageValues(value, slope, np.zeros((3, 2, 501)))
+
+    w = rng.normal(size=(2, COARSE_SLOTS))
+    found = BlockStage(stage, 501, COARSE_SLOTS)(w)
+    held = w[:, np.rint(np.arange(501) * (COARSE_SLOTS - 1) / 500).astype(int)]
+    assert found.value.mean(axis=1) == pytest.approx(stage(held).value.mean(axis=1))
+    shift = rng.normal(size=w.shape)
+    moved = BlockStage(stage, 501, COARSE_SLOTS)(w + shift).value - found.value
+    assert moved == pytest.approx(np.einsum("cjn,cn->jn", found.gradient, shift))
+
+
+@pytest.mark.parametrize("power", [0, 10])
+def test_what_is_rejected_would_not_have_won(power: int) -> None:
+    plan = long_plan(power)
+    solution = optimize(plan)
+    names = plan.optimizer.starts
+    assert tuple(solution.starts) == names
+    alone = {
+        name: optimize(parse_plan(edited(plan.text, {"optimizer.starts": [name]}))).rates.R_avg
+        for name in names
+    }
+    assert solution.rates.R_avg == pytest.approx(max(alone.values()), abs=plan.optimizer.tolerance)
+    problem = build_problem(plan)
+    routes = starts_of(problem)
+    rough = improve_starts(
+        problem.kinematics,
+        rate_field(problem, design(plan)),
+        routes,
+        tolerance=1e-3,
+        max_iterations=50,
+    )
+    assert 0 < len(rough.promising) < len(names)
+    dropped = set(names) - set(rough.promising)
+    assert all(solution.starts[name] <= solution.rates.R_avg for name in dropped)
+    for flight in rough.flights.values():
+        assert max(problem.kinematics.residuals(flight).values()) < 1e-7
+
+
+def test_short_flights_are_improved_as_they_are(small_plan: MakePlan) -> None:
+    plan = small_plan()
+    problem = build_problem(plan)
+    kin, field = problem.kinematics, rate_field(problem, design(plan))
+    assert kin.slots < FEWEST_SLOTS
+    routes = starts_of(problem)
+    rough = improve_starts(kin, field, routes, tolerance=1e-3, max_iterations=50)
+    for name, flight in routes.items():
+        alone = maximize(kin, field, flight, tolerance=1e-3, max_iterations=50)
+        assert rough.flights[name].w == pytest.approx(alone.trajectory.w, abs=1e-6)

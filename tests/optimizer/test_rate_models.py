@@ -1,0 +1,169 @@
+"""Rates as functions of the position: derivatives, and tables against exact values."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import MakePlan
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.design import Design, design
+from faao_mav.optimizer.problem import Link, build_problem
+from faao_mav.optimizer.rates import RateModel, link_coordinates
+from faao_mav.optimizer.rates.rate_model import rate_model
+from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate, FixedRate
+from faao_mav.radio.precoder import SCHEMES
+from faao_mav.radio.rate import cutoff_rate
+
+FARTHEST = 400.0
+
+
+def gradient_by_differences(f: Callable[[Real], Real], w: Real, h: float = 0.02) -> Real:
+    return np.stack([(f(w + h * e) - f(w - h * e)) / (2 * h) for e in np.eye(2)], axis=1)
+
+
+def hessian_by_differences(f: Callable[[Real], Real], w: Real, h: float = 0.05) -> Real:
+    def slope(along: Real) -> Real:
+        return gradient_by_differences(f, w + along)
+
+    return np.stack([(slope(h * e) - slope(-h * e)) / (2 * h) for e in np.eye(2)], axis=1)
+
+
+def places(link: Link, seed: int = 3) -> Real:
+    rng = np.random.default_rng(seed)
+    return link.station + rng.uniform(-150, 150, (20, 2))
+
+
+def coordinates(link: Link, w: Real) -> tuple[Real, Real]:
+    at = link_coordinates(link, w.T)
+    return at.gain_log, at.cosine
+
+
+def derivatives(link: Link, rate: RateModel, w: Real) -> tuple[Real, Real]:
+    at = link_coordinates(link, w.T)
+    gradient, hessian = at.by_position(rate.partials(at.gain_log, at.cosine))
+    return gradient.T, hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
+
+
+@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
+@pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
+@pytest.mark.parametrize("rotating", [True, False])
+@pytest.mark.parametrize("hop", [0, 1])
+def test_fixed_precoders(
+    small_plan: MakePlan, line_of_sight: str, modulation: str, rotating: bool, hop: int
+) -> None:
+    link = build_problem(
+        small_plan(
+            {
+                "radio.line_of_sight": line_of_sight,
+                "radio.modulation": modulation,
+                "radio.fading": "realization",
+            }
+        )
+    ).links[hop]
+    rng = np.random.default_rng(1)
+    P = rng.standard_normal((20, 2, 2)) + 1j * rng.standard_normal((20, 2, 2))
+    P *= np.sqrt(link.power) / np.linalg.norm(P, axis=(1, 2), keepdims=True)
+    w = places(link)
+
+    def rate(at: Real) -> Real:
+        """The rate of precoders that are fixed, or turn with the line of sight from w on."""
+        moved = P
+        if rotating and link.follows_position:
+            first = link.line_of_sight_at(coordinates(link, w)[1])[:, 0]
+            then = link.line_of_sight_at(coordinates(link, at)[1])[:, 0]
+            moved = (first * np.conj(then))[:, :, None] * P
+        return link.rates(at, link.small_scale(at), moved)
+
+    gradient, hessian = derivatives(link, FixedRate(link, P, rotating=rotating), w)
+    assert gradient == pytest.approx(gradient_by_differences(rate, w), rel=1e-4, abs=1e-7)
+    assert hessian == pytest.approx(hessian_by_differences(rate, w), rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
+@pytest.mark.parametrize("hop", [0, 1])
+def test_the_envelope_theorem(small_plan: MakePlan, line_of_sight: str, hop: int) -> None:
+    """At the best precoders: the exact slope, and a curvature that is never too high."""
+    plan = small_plan({"radio.line_of_sight": line_of_sight, "radio.fading": "realization"})
+    link = build_problem(plan).links[hop]
+    w, rate = places(link), BestRate(link)
+
+    def best(at: Real) -> Real:
+        return rate.value(*coordinates(link, at))
+
+    gradient, hessian = derivatives(link, rate, w)
+    assert gradient == pytest.approx(gradient_by_differences(best, w), rel=1e-4, abs=1e-7)
+    excess = hessian - hessian_by_differences(best, w)
+    assert np.linalg.eigvalsh(excess).max() < 1e-5
+
+
+def test_rates_by_differences(small_plan: MakePlan) -> None:
+    link = build_problem(small_plan({"radio.fading": "realization"})).bs_uav
+    w = places(link)
+
+    def scheme(H: Any) -> Real:
+        return cutoff_rate(H, SCHEMES["mmse"](H, link.power, link.noise), link.classes, link.noise)
+
+    rate = DifferencedRate(link, scheme)
+    gradient, hessian = derivatives(link, rate, w)
+
+    def at(moved: Real) -> Real:
+        return rate.value(*coordinates(link, moved))
+
+    assert gradient == pytest.approx(gradient_by_differences(at, w), rel=1e-3, abs=1e-5)
+    assert hessian == pytest.approx(hessian_by_differences(at, w), rel=1e-2, abs=1e-4)
+
+
+def exactly(link: Link, wanted: Design, w: Real) -> Real:
+    H = link.channel(w, link.small_scale(w))
+    return wanted.rate(link, H, wanted.precoders(link, H))
+
+
+@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
+@pytest.mark.parametrize(
+    ("fading", "csi"),
+    [("none", "statistical"), ("ergodic", "statistical"), ("ergodic", "instantaneous")],
+)
+@pytest.mark.parametrize(
+    ("precoder", "inputs"),
+    [("faao", "alphabet"), ("zf", "alphabet"), ("faao", "gaussian"), ("mrt", "gaussian")],
+)
+def test_tables_hold_the_rate_at_every_place(
+    small_plan: MakePlan, line_of_sight: str, fading: str, csi: str, precoder: str, inputs: str
+) -> None:
+    plan = small_plan(
+        {
+            "radio.line_of_sight": line_of_sight,
+            "radio.fading": fading,
+            "radio.csi": csi,
+            "radio.fading_samples": 4,
+            "optimizer.precoder": precoder,
+            "optimizer.inputs": inputs,
+        }
+    )
+    wanted = design(plan)
+    for link in build_problem(plan).links:
+        rate, w = rate_model(link, wanted, FARTHEST), places(link)
+        tabled = rate.value(*coordinates(link, w))
+        assert tabled == pytest.approx(exactly(link, wanted, w), abs=2e-4)
+
+        def value(at: Real, rate: RateModel = rate, link: Link = link) -> Real:
+            return rate.value(*coordinates(link, at))
+
+        gradient, hessian = derivatives(link, rate, w)
+        assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
+        assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+
+
+def test_the_best_rate_falls_with_the_distance_and_not_with_the_direction(
+    small_plan: MakePlan,
+) -> None:
+    plan = small_plan({"radio.fading": "ergodic", "radio.fading_samples": 8})
+    link, wanted = build_problem(plan).uav_user, design(plan)
+    angle = np.linspace(0, 2 * np.pi, 9)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    rings = [exactly(link, wanted, link.station + r * circle) for r in (20, 60, 120)]
+    for ring in rings:
+        assert np.ptp(ring) < 1e-5
+    assert rings[0].min() > rings[1].max() > rings[1].min() > rings[2].max()

@@ -1,0 +1,180 @@
+"""What README and the pages of docs/ show is true, and the site builds without a warning."""
+
+import contextlib
+import io
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from conftest import free_port
+from pages import PAGES, ROOT, blocks, difference
+from test_architecture import FLOORS
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.plan import parse_plan, read_plan
+
+COMMAND = Path(sys.executable).with_name("faao-mission")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to run commands in, with what a checkout has."""
+    for name in ("missions", "tests", "docs"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@contextlib.contextmanager
+def running(command: str) -> Iterator[None]:
+    """Run a command that lasts, from its first line of output on."""
+    arguments = [str(COMMAND), *shlex.split(command)[1:]]
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    try:
+        assert process.stdout is not None
+        process.stdout.readline()
+        yield
+    finally:
+        process.terminate()
+        process.communicate(timeout=10)
+
+
+def output_of(command: str) -> str:
+    """Run a command and return what it prints."""
+    if command.startswith("faao-mission "):
+        result = CliRunner().invoke(app, shlex.split(command)[1:])
+        assert result.exception is None or isinstance(result.exception, SystemExit)
+        return result.output
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if {b.kind for b in blocks(page)} & {"console", "python"}]
+)
+def test_what_a_page_shows_is_printed(page: str, folder: Path) -> None:
+    port = f"127.0.0.1:{free_port()}"
+    names: dict[str, object] = {}
+    found = [replace(b, text=b.text.replace("127.0.0.1:14550", port)) for b in blocks(page)]
+    with contextlib.ExitStack() as lasting:
+        for block, following in zip(found, [*found[1:], None], strict=True):
+            if not block.run:
+                continue
+            for command, shown in block.commands:
+                if command.endswith(" &"):
+                    listen = f" --listen udpin:{port}"
+                    lasting.enter_context(running(command.removesuffix(" &") + listen))
+                else:
+                    assert difference(shown, output_of(command)) is None, command
+            if block.kind == "python":
+                with contextlib.redirect_stdout(io.StringIO()) as printed:
+                    exec(block.text, names)
+                if following is not None and following.kind == "text":
+                    assert difference(following.text, printed.getvalue()) is None
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "same"),
+    [
+        ("rate 2.2572 bit", "rate  2.2571 bit", True),
+        ("rate 2.2572 bit", "rate 2.2574 bit", False),
+        ("rate 2.26 bit", "rate 2.2572134 bit", True),
+        ("items 32", "items 33", False),
+        ("items 32", "items 32.0000", True),
+        ("stationary to 4.6e-05", "stationary to 9.1e-05", True),
+        ("stationary to 4.6e-05", "stationary to 4.6e-03", False),
+        ("optimiser converged, 0.5 s: so", "optimiser converged, 1.2 s: so", True),
+        ("predicted in 120.0 s", "predicted in 121.0 s", False),
+        ("a\n...\nc", "a\nb\nb\nc", True),
+        ("a\n...", "a\nb", True),
+        ("a", "a\nb", False),
+        ("a\nb", "a", False),
+        ("a", "b", False),
+    ],
+)
+def test_when_a_text_is_as_shown(shown: str, printed: str, same: bool) -> None:
+    assert (difference(shown, printed) is None) == same
+
+
+def test_commands_that_are_not_run_have_options_that_exist() -> None:
+    commands = ("validate", "upload", "download", "convert", "autopilot", "study")
+    known = {c: CliRunner().invoke(app, [c, "--help"]).stdout for c in ("plan", *commands)}
+    wrong = []
+    for page in PAGES:
+        for block in blocks(page):
+            for line in block.text.splitlines() if block.kind in ("sh", "console") else ():
+                for arguments in re.findall(r"faao-mission ([^&]*)", line):
+                    words = arguments.split()
+                    shown = known[words[0] if words[0] in commands else "plan"]
+                    options = [word for word in words if word.startswith("--")]
+                    wrong += [(page, line) for option in options if f" {option} " not in shown]
+                    files = [word for word in words if word.startswith(("missions/", "tests/"))]
+                    wrong += [(page, line) for name in files if not (ROOT / name).exists()]
+    assert wrong == []
+
+
+def test_files_and_modules_that_pages_name_exist() -> None:
+    rooms = r"`((?:faao_mav|tests|missions|docs)/[\w./-]*|\.ci/run)`"
+    named = {(page, name) for page, text in PAGES.items() for name in re.findall(rooms, text)}
+    assert named
+    assert sorted(each for each in named if not (ROOT / each[1]).exists()) == []
+
+
+def test_links_between_pages_lead_somewhere() -> None:
+    links = [
+        (page, re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text)) for page, text in PAGES.items()
+    ]
+    targets = [(page, (ROOT / page).parent / target) for page, found in links for target in found]
+    assert [each for each in targets if not each[1].exists()] == []
+
+
+def test_the_plan_that_is_shown_has_every_default() -> None:
+    plans = [parse_plan(block.text) for block in blocks("docs/plan.md") if block.kind == "yaml"]
+    shortest, full = (replace(plan, text="") for plan in plans)
+    assert shortest == full
+
+
+@pytest.mark.parametrize("row", re.findall(r"^\| `(missions/.*) \|$", PAGES["README.md"], re.M))
+def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
+    name, _, start, best, _ = re.split(r" *\| ", row)
+    plan = read_plan(ROOT / name.split("`")[0])
+    if "--method direct" in name:
+        plan = replace(plan, optimizer=replace(plan.optimizer, method="direct"))
+    solution = optimize(plan)
+    assert solution.rates.R_avg == pytest.approx(float(best.split()[0]), abs=1e-4)
+    assert solution.history[0] == pytest.approx(float(start), abs=1e-4)
+
+
+def test_the_house_that_is_shown_has_the_floors_of_the_house() -> None:
+    rows = re.findall(r"^\| (\d+) \| (`.*?`) \|", PAGES["docs/house.md"], re.MULTILINE)
+    shown = {int(floor): set(re.findall(r"`(\w+)`", rooms)) for floor, rooms in rows}
+    assert shown == {floor: set(rooms) for floor, rooms in enumerate(FLOORS, start=1)}
+
+
+def test_the_readme_is_short() -> None:
+    assert 700 <= len(PAGES["README.md"].split()) <= 900
+
+
+def test_the_site_builds_without_a_warning_and_fetches_nothing(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", tmp_path / "site"],
+        cwd=ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    assert "generated:" not in (tmp_path / "site" / "plan.html").read_text()
+    for page in (tmp_path / "site").rglob("*.html"):
+        fetched = re.findall(r'(?:src|<link[^>]* href)="(https?://[^"]*)"', page.read_text())
+        assert fetched == [], page
