@@ -24,7 +24,7 @@ from faao_mav.optimizer.pricing import (
 )
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.bound import Bound
-from faao_mav.optimizer.solution import Observer, Progress, Solution
+from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
@@ -114,23 +114,26 @@ class Result:
         return mission, *beside
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the JSON object of `--json`: bit/s/Hz, seconds, metres, dB.
+        """Return the JSON object of `--json`: bit/s/Hz, seconds, metres, dB, 10^6 bytes.
 
         A part that is not there is null.
         """
-        solution, rates, conversion = self.solution, self.solution.rates, self.conversion
+        solution, plan, conversion = self.solution, self.solution.plan, self.conversion
         information, fresh, flown = self.information, self.fresh, self.prediction
         return {
-            "name": solution.plan.name,
-            "average_rate": rates.R_avg,
-            "rate_bs_uav": rates.R_U,
-            "rate_uav_user": rates.R_G,
+            "name": plan.name,
+            **_rates_as_dict(plan, solution.rates, solution.delivered_rate),
+            "causal": plan.radio.causal,
+            "duplex": plan.radio.duplex,
+            "bandwidth_mhz": plan.radio.bandwidth_mhz,
             "mutual_information": information.average if information else None,
             "mutual_information_bs_uav": information.bs_uav if information else None,
             "mutual_information_uav_user": information.uav_user if information else None,
             "mutual_information_error": information.error if information else None,
             "fresh_rate": fresh.average if fresh else None,
             "fresh_rate_error": fresh.error if fresh else None,
+            "fresh_delivered_rate": fresh.delivered if fresh else None,
+            "fresh_delivered_rate_error": fresh.delivered_error if fresh else None,
             "upper_bound": self.bound.value if self.bound else None,
             "upper_bound_exact": self.bound.exact if self.bound else None,
             "starts": dict(solution.starts),
@@ -152,10 +155,9 @@ class Result:
             if conversion and flown
             else None,
             "predicted": {
-                "average_rate": flown.rates.R_avg,
-                "rate_bs_uav": flown.rates.R_U,
-                "rate_uav_user": flown.rates.R_G,
+                **_rates_as_dict(plan, flown.rates, flown.delivered_rate),
                 "average_rate_by_position": flown.by_position.R_avg,
+                "delivered_rate_by_position": flown.delivered_by_position,
                 "duration": flown.duration,
                 "max_path_error": flown.max_path_error,
                 "max_position_error": flown.max_position_error,
@@ -166,6 +168,23 @@ class Result:
             else None,
             "validation": [asdict(finding) for finding in self.findings],
         }
+
+
+def _rates_as_dict(plan: Plan, rates: Rates, delivered: float) -> dict[str, Any]:
+    """Return rates by their names in `--json`, bit/s/Hz, and with a bandwidth in Mbit/s too."""
+    named = {
+        "average_rate": rates.R_avg,
+        "rate_bs_uav": rates.R_U,
+        "rate_uav_user": rates.R_G,
+        "delivered_rate": delivered,
+    }
+    has_bandwidth = plan.radio.bandwidth_mhz is not None
+    megabits = {name: plan.megabits(rate) for name, rate in named.items()}
+    return {
+        **named,
+        "mbit_per_second": megabits if has_bandwidth else None,
+        "delivered_mbytes": plan.megabytes(delivered),
+    }
 
 
 def optimize_plan(plan: Plan, *, observe: Observer | None = None) -> Result:
@@ -211,7 +230,7 @@ def plan_mission(
     result = optimize_plan(plan, observe=observe)
     solution = result.solution
     if observe is not None:
-        observe(Progress(1, 1, "the mission's timing", solution.rates.R_avg))
+        observe(Progress(1, 1, "the mission's timing", solution.history[-1]))
     result = _with_mission(result)
     ceiling = None
     if bound:

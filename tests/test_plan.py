@@ -182,16 +182,35 @@ def test_required_keys(key: str) -> None:
         parse_plan(dump_yaml(data))
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("radio.causal", True),
-        ("fence", {"inclusion": [[0, 0], [9, 0], [9, 9]]}),
-    ],
-)
-def test_what_does_not_work_yet_says_so(key: str, value: object) -> None:
-    assert f"{key}: " in (message := refused({key: value}))
-    assert "does not work yet" in message
+def test_what_does_not_work_yet_says_so() -> None:
+    assert "fence: does not work yet" in refused({"fence": {"inclusion": [[0, 0], [9, 0], [9, 9]]}})
+
+
+def test_a_relay_is_causal_unless_the_plan_says_otherwise() -> None:
+    data = load_yaml(SMALL, "test")
+    assert data["radio"].pop("causal") is False
+    radio = parse_plan(dump_yaml(data)).radio
+    assert (radio.causal, radio.duplex, radio.bandwidth_mhz) == (True, "full", None)
+    assert radio.relay.buffer_mbytes is None
+
+
+def test_algorithm_1_does_not_plan_for_what_is_delivered() -> None:
+    message = refused({"radio.causal": True, "optimizer.method": "algorithm1"})
+    assert "radio.causal: true: algorithm1 (optimizer.method)" in message
+    assert "give radio.causal: false" in message
+    with pytest.raises(PlanError, match=r"radio\.causal: true: algorithm1"):
+        parse_plan(edited(SMALL, {"radio.causal": True}), method="algorithm1")
+
+
+def test_a_buffer_needs_a_bandwidth() -> None:
+    message = refused({"radio.relay.buffer_mbytes": 20})
+    assert "radio.relay.buffer_mbytes: 20: " in message
+    assert "give radio.bandwidth_mhz too" in message
+    limits = {"radio.relay.buffer_mbytes": 20, "radio.bandwidth_mhz": 5}
+    plan = parse_plan(edited(SMALL, limits))
+    # 2 bit/s/Hz on 5 MHz for 10 s are 100 Mbit
+    assert (plan.megabits(2.0), plan.megabytes(2.0)) == (10.0, 12.5)
+    assert parse_plan(SMALL).megabytes(2.0) is None
 
 
 PLANE = {
@@ -387,4 +406,4 @@ def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
 
 
 SMALL_KEYS = {"site.origin.elevation", "flight.time_step", "radio.base_station.power_dbm",
-              "radio.relay.power_dbm"}  # fmt: skip
+              "radio.relay.power_dbm", "radio.causal"}  # fmt: skip

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from faao_mav.arrays import Complex
+from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.solution import Solution
@@ -103,12 +103,14 @@ def _mean_information(
 
 @dataclass(frozen=True, slots=True)
 class FreshRates:
-    """R_U and R_G of (10) on draws that the plan does not know, and standard errors, bit/s/Hz."""
+    """R_U, R_G of (10) and R_del on draws that the plan does not know; standard errors; bit/s/Hz."""
 
     bs_uav: float
     uav_user: float
+    delivered: float
     bs_uav_error: float
     uav_user_error: float
+    delivered_error: float
 
     @property
     def average(self) -> float:
@@ -125,7 +127,8 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
     Every slot has draws of its own. Precoders that know the draw are searched for each of them, on
-    every so many slots.
+    every so many slots. What is delivered is the mean over flights that have one of the draws in
+    each slot, forwarded with the planned shares.
     """
     problem, how = build_problem(solution.plan), design(solution.plan)
     if not how.averaged:
@@ -135,28 +138,38 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     step = 1 if how.blind else -(-slots // _FRESH_SEARCHES)
     chosen = np.arange(step // 2, slots, step)
     w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
-    found = []
+    found, rates = [], []
     for link, P in zip(problem.links, (solution.P_B, solution.P_U), strict=True):
         nlos = rayleigh(rng, draws * len(w), link.receive, link.transmit)
         fresh = replace(link, nlos=nlos.reshape(draws, len(w), link.receive, link.transmit))
         H = link.channel(w, fresh.small_scale(w))
         known = P[chosen] if how.blind else how.precoders(link, H)
-        rates = cutoff_rate(H, known, link.classes, link.noise)
+        at = cutoff_rate(H, known, link.classes, link.noise)
+        rates.append(at)
         # The error is that of the draws within each slot, not the spread from slot to slot. With
         # one draw per slot only the spread over all slots is known, an upper estimate.
-        spread = rates.var(axis=0, ddof=1).mean() if draws > 1 else rates.var(ddof=1)
-        found.append((float(rates.mean()), float(np.sqrt(spread / rates.size))))
+        spread = at.var(axis=0, ddof=1).mean() if draws > 1 else at.var(ddof=1)
+        found.append((float(at.mean()), float(np.sqrt(spread / at.size))))
     (bs_uav, first), (uav_user, second) = found
-    return FreshRates(bs_uav, uav_user, first, second)
+    # each chosen slot stands for those about it
+    nearest = np.minimum(np.arange(slots) // step, len(chosen) - 1)
+    delivered = [
+        solution.relay(I_U[nearest], I_G[nearest], solution.shares).rate
+        for I_U, I_G in zip(*rates, strict=True)
+    ]
+    error = np.std(delivered, ddof=1) / np.sqrt(draws) if draws > 1 else max(first, second)
+    mean = float(np.mean(delivered))
+    return FreshRates(bs_uav, uav_user, mean, first, second, float(error))
 
 
 @dataclass(frozen=True, slots=True)
 class Saturation:
     """Whether the alphabet, not the power, limits the rate.
 
-    `ceiling` is the smaller N log2(rho) of the two links, bit/s/Hz. `spare_db` is by how many dB
-    both powers could fall before R_avg is below `SATURATED` times the ceiling; 0 for a plan that is
-    not saturated.
+    `ceiling` is what the alphabet allows of the rate that the plan maximises, bit/s/Hz: the smaller
+    N log2(rho) of the two links, or what the relay delivers of it. `spare_db` is by how many dB
+    both powers could fall before that rate is below `SATURATED` times the ceiling; 0 for a plan
+    that is not saturated.
     """
 
     ceiling: float
@@ -169,11 +182,20 @@ class Saturation:
 
 
 def saturation(solution: Solution) -> Saturation:
-    """Return how far into saturation `solution` is, with its own route and precoders."""
-    ceiling = min(link.classes.bits for link in build_problem(solution.plan).links)
+    """Return how far into saturation `solution` is, with its own route, precoders and shares."""
+    causal, slots = solution.plan.radio.causal, len(solution.w)
+    bits = [np.full(slots, link.classes.bits) for link in build_problem(solution.plan).links]
+
+    def maximised(I_U: Real, I_G: Real, shares: Real | None) -> float:
+        if causal:
+            return solution.relay(I_U, I_G, shares).rate
+        return float(min(I_U.mean(), I_G.mean()))
+
+    ceiling = maximised(bits[0], bits[1], None)
 
     def enough(db: float) -> bool:
-        return solution.recomputed(10 ** (-db / 10)).R_avg >= SATURATED * ceiling
+        rates = solution.recomputed_slots(10 ** (-db / 10))
+        return maximised(*rates, solution.shares) >= SATURATED * ceiling
 
     if not enough(0.0):
         return Saturation(ceiling, 0.0)

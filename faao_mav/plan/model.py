@@ -178,10 +178,8 @@ class Relay(_Section):
     buffer_mbytes: Annotated[
         Number | None,
         key(
-            "What the relay can hold, 10^6 bytes, for which radio.bandwidth_mhz is needed; "
-            "unlimited without.",
-            "10^6 bytes",
-            "10^6 bytes, above 0 and at most 1e+09",
+            "What the relay can hold, 10^6 bytes each, with radio.bandwidth_mhz; without: no limit.",
+            "megabytes",
             gt=0,
             le=1e9,
         ),
@@ -246,7 +244,6 @@ class Radio(_Section):
         key(
             "Bandwidth of a hop: rates are told in Mbit/s too, and flights in megabytes.",
             "MHz",
-            "MHz, above 0 and at most 100000",
             gt=0,
             le=1e5,
         ),

@@ -5,6 +5,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TypeAlias
 
+from faao_mav.plan import Plan
 from faao_mav.validate.check import Check
 from faao_mav.validate.finding import Finding, Level
 from faao_mav.workflow import Result
@@ -14,6 +15,9 @@ Line: TypeAlias = tuple[str, str]
 
 _LABEL_WIDTH = 13
 """Characters that a label takes on the terminal."""
+
+_LOSS_TOLD = 0.01
+"""Share of R_avg that may be lost on the way before a plan for R_avg is warned about. Chosen."""
 
 _MAX_RUNS_SHOWN = 8
 """Runs of item numbers that are named in one line; chosen: about a line of a terminal."""
@@ -35,27 +39,21 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
 
     With `timed` it says how long that took, which no two runs have in common.
     """
-    solution, rates = result.solution, result.solution.rates
-    information, limit, bound = result.information, result.saturation, result.bound
-    most = f" of at most {limit.ceiling:g}" if limit else ""
-    yield (
-        "rate",
-        f"{rates.R_avg:.4f} bit/s/Hz{most} "
-        f"(base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f})",
-    )
-    start = f"{solution.history[0]:.4f} on the straight start"
-    if information is not None:
-        start += f"; mutual information {information.average:.3f} +- {information.error:.1g}"
-    yield "", start
-    if fresh := result.fresh:
-        yield "", f"{fresh.average:.4f} +- {fresh.error:.1g} on fading that was not planned on"
+    solution, plan = result.solution, result.solution.plan
+    limit, bound, causal = result.saturation, result.bound, plan.radio.causal
+    # what was maximised comes first, with how that came about
+    yield from (_delivered if causal else _rate)(result)
+    yield from (_rate if causal else _delivered)(result)
     if bound is not None:
-        short = 100 * (1 - rates.R_avg / bound.value) if bound.value else 0.0
+        reached = solution.delivered_rate if causal else solution.rates.R_avg
+        short = 100 * (1 - reached / bound.value) if bound.value else 0.0
         yield (
             "bound",
             f"within {short:.2g} % of the best that any route can do: at most "
-            f"{bound.value:.4f} bit/s/Hz{'' if bound.exact else ' (numerical)'}",
+            f"{told_rate(plan, bound.value)}{'' if bound.exact else ' (numerical)'}",
         )
+        if causal:
+            yield "", "it is a bound of R_avg, and no relay delivers more than that"
     if limit is not None and limit.saturated:
         yield (
             "saturated",
@@ -73,8 +71,65 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     yield from _flown(result)
 
 
+def told_rate(plan: Plan, rate: float) -> str:
+    """Return `rate`, bit/s/Hz, as text, with a bandwidth in Mbit/s too."""
+    megabits = plan.megabits(rate)
+    return f"{rate:.4f} bit/s/Hz" + ("" if megabits is None else f" ({megabits:.4g} Mbit/s)")
+
+
+def _rate(result: Result) -> Iterator[Line]:
+    solution, plan = result.solution, result.solution.plan
+    rates, information, fresh = solution.rates, result.information, result.fresh
+    limit = None if plan.radio.causal else result.saturation
+    most = f" of at most {limit.ceiling:g}" if limit else ""
+    yield (
+        "rate",
+        f"{told_rate(plan, rates.R_avg)}{most} "
+        f"(base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f})",
+    )
+    start = "" if plan.radio.causal else f"{solution.history[0]:.4f} on the straight start"
+    priced = ""
+    if information is not None:
+        priced = f"mutual information {information.average:.3f} +- {information.error:.1g}"
+    if start or priced:
+        yield "", "; ".join(filter(None, (start, priced)))
+    if fresh and not plan.radio.causal:
+        yield "", f"{fresh.average:.4f} +- {fresh.error:.1g} on fading that was not planned on"
+
+
+def _delivered(result: Result) -> Iterator[Line]:
+    solution, plan, fresh = result.solution, result.solution.plan, result.fresh
+    delivered, R_avg, causal = solution.delivered_rate, solution.rates.R_avg, plan.radio.causal
+    limit = result.saturation if causal else None
+    most = f" of at most {limit.ceiling:.5g}" if limit else ""
+    megabytes = plan.megabytes(delivered)
+    share = delivered / R_avg if R_avg else 1.0
+    yield (
+        "delivered",
+        f"{told_rate(plan, delivered)}{most}"
+        + ("" if megabytes is None else f", {megabytes:.4g} megabytes")
+        + f"; {100 * share:.2f} % of the rate below" * causal
+        + f"; {100 * share:.2f} % of the rate" * (not causal)
+        + " in half duplex" * (plan.radio.duplex == "half"),
+    )
+    if causal:
+        yield "", f"{solution.history[0]:.4f} on the straight start"
+    elif share < 1 - _LOSS_TOLD:
+        yield (
+            "",
+            f"warning: {100 * (1 - share):.0f} % of the rate does not arrive, since the relay has "
+            "nothing to forward yet; radio.causal: true plans for what arrives",
+        )
+    if fresh:
+        yield (
+            "",
+            f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} on fading that was not planned "
+            "on",
+        )
+
+
 def _flown(result: Result) -> Iterator[Line]:
-    conversion, flown, rates = result.conversion, result.prediction, result.solution.rates
+    conversion, flown, solution = result.conversion, result.prediction, result.solution
     if result.no_mission is not None:
         yield "mission", f"none: {result.no_mission}"
     if conversion is None or flown is None:
@@ -82,12 +137,19 @@ def _flown(result: Result) -> Iterator[Line]:
     distance = conversion.schedule.route.distance
     items = _count(len(conversion.mission.items), "item")
     yield "mission", f"{items}; relay route of {distance:.0f} m"
-    share = 100 * flown.rates.R_avg / rates.R_avg if rates.R_avg else 100.0
-    yield (
-        "predicted",
-        f"{flown.rates.R_avg:.4f} bit/s/Hz, {share:.2f} % of the plan, in "
-        f"{flown.duration:.1f} s (planned: {result.solution.plan.flight.duration:g} s)",
+    told = (
+        ("delivered", flown.delivered_rate, solution.delivered_rate),
+        ("R_avg", flown.rates.R_avg, solution.rates.R_avg),
     )
+    parts = [
+        f"{name} {rate:.4f} bit/s/Hz, {100 * rate / planned if planned else 100:.2f} % of the plan"
+        for name, rate, planned in told
+    ]
+    planned = f"(planned: {solution.plan.flight.duration:g} s)"
+    megabytes = solution.plan.megabytes(flown.delivered_rate)
+    carried = "" if megabytes is None else f", {megabytes:.4g} megabytes"
+    yield "predicted", f"{parts[0]}, in {flown.duration:.1f} s {planned}{carried}"
+    yield "", parts[1]
     yield "", _apart(flown.rms_position_error, flown.max_position_error, flown.max_path_error)
     if doubt := conversion.vehicle.type.caveat:
         yield "", doubt
@@ -104,8 +166,10 @@ def check_lines(check: Check) -> Iterator[Line]:
     if link := check.link:
         yield (
             "predicted link",
-            f"{link.predicted_rate:.4f} bit/s/Hz, {100 * link.share:.2f} % of the plan's "
-            f"{link.planned_rate:.4f}",
+            f"delivers {link.predicted_delivered:.4f} bit/s/Hz, {100 * link.share:.2f} % of the "
+            f"plan's {link.planned_delivered:.4f}"
+            + (f": {link.predicted_mbytes:.4g} megabytes" if link.predicted_mbytes else "")
+            + f"; R_avg {link.predicted_rate:.4f} of {link.planned_rate:.4f}",
         )
         yield "", _apart(link.rms_position_error, link.max_position_error, link.path_error)
 

@@ -13,7 +13,8 @@ def precoder_table(solution: Solution) -> str:
     """Return a CSV text with a row for each slot.
 
     Columns: `slot`; `t_s`, when it begins on the plan's clock, s; `east_m`, `north_m`,
-    `latitude_deg`, `longitude_deg`, where the aircraft then is; and the entries of P_B and P_U,
+    `latitude_deg`, `longitude_deg`, where the aircraft then is; in half duplex `receive_share`, the
+    share of the slot in which it receives, before it sends; and the entries of P_B and P_U,
     row by row, sqrt(W), each as `P_B_1_1_re`, `P_B_1_1_im`. A radio that knows its position takes
     the row nearest to it (`nearest_slots`), and so stays right when the aircraft is early or late.
 
@@ -29,6 +30,9 @@ def precoder_table(solution: Solution) -> str:
     latitude, longitude = frame.to_geodetic(solution.w)
     names = ["slot", "t_s", "east_m", "north_m", "latitude_deg", "longitude_deg"]
     columns = [np.arange(len(solution.t)), solution.t, *solution.w.T, latitude, longitude]
+    if solution.shares is not None:
+        names.append("receive_share")
+        columns.append(solution.shares)
     for name, P in (("P_B", solution.P_B), ("P_U", solution.P_U)):
         rows, entries = P.shape[1:]
         places = [f"{i + 1}_{j + 1}" for i in range(rows) for j in range(entries)]

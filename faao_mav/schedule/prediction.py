@@ -8,6 +8,7 @@ from faao_mav.arrays import Integers, Real
 from faao_mav.errors import InputError
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Rates, Solution
+from faao_mav.radio.relay import Relayed
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.schedule import deviation, positions_at
 from faao_mav.vector import lengths
@@ -18,8 +19,10 @@ class Prediction:
     """The relay flight as it is predicted, on the plan's clock.
 
     `w` (n, 2), m, is where the aircraft is in each of the plan's slots. `I_U` and `I_G` (n,) of
-    (7), (8), bits, are what it gets there with the slot's precoders; `by_position` are R_U and
-    R_G if the radio takes the precoders of the slot planned nearest to where it is instead.
+    (7), (8), bits, are what it gets there with the slot's precoders, and `relayed` is what becomes of
+    it: forwarded as fast as it can be, in half duplex within the slot's planned share. `by_position`
+    are R_U and R_G, and `delivered_by_position` the delivered rate, bit/s/Hz, if the radio takes
+    precoders and share of the slot planned nearest to where it is instead.
     `duration`, s, is T plus by how much later than planned the aircraft comes to w_F, within
     the path tolerance and for good. Errors are metres, at equal times and of the path.
     """
@@ -27,7 +30,9 @@ class Prediction:
     w: Real
     I_U: Real
     I_G: Real
+    relayed: Relayed
     by_position: Rates
+    delivered_by_position: float
     duration: float
     max_path_error: float
     max_position_error: float
@@ -37,6 +42,11 @@ class Prediction:
     def rates(self) -> Rates:
         """R_U, R_G and R_avg of (9), (10), bit/s/Hz."""
         return Rates(float(self.I_U.mean()), float(self.I_G.mean()))
+
+    @property
+    def delivered_rate(self) -> float:
+        """The delivered rate of the predicted flight, bit/s/Hz."""
+        return self.relayed.rate
 
 
 def predict_delivery(solution: Solution, conversion: Conversion) -> Prediction:
@@ -53,13 +63,17 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     """
     at = positions_at(solution.t, t, w)
     errors = deviation(solution.t, solution.w, t, w, solution.plan.mission.path_tolerance)
-    I_U, I_G = delivered(solution, at)
-    near_U, near_G = delivered(solution, at, nearest_slots(solution, at))
+    I_U, I_G = rates_along(solution, at)
+    nearest, shares = nearest_slots(solution, at), solution.shares
+    near_U, near_G = rates_along(solution, at, nearest)
+    near_shares = shares[nearest] if shares is not None else None
     return Prediction(
         w=at,
         I_U=I_U,
         I_G=I_G,
+        relayed=solution.relay(I_U, I_G, shares),
         by_position=Rates(float(np.mean(near_U)), float(np.mean(near_G))),
+        delivered_by_position=solution.relay(near_U, near_G, near_shares).rate,
         duration=solution.plan.flight.duration + errors.late,
         max_path_error=errors.path,
         max_position_error=errors.max,
@@ -67,7 +81,7 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     )
 
 
-def delivered(solution: Solution, w: Real, slots: Integers | None = None) -> tuple[Real, Real]:
+def rates_along(solution: Solution, w: Real, slots: Integers | None = None) -> tuple[Real, Real]:
     """Return I_U (7) and I_G (8), bits, each (n,), where the aircraft is at `w` (n, 2) in slot n.
 
     Each slot keeps its fading; the line of sight and the path gain are those at `w`. The

@@ -44,6 +44,9 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
     return LinkCheck(
         planned_rate=solution.rates.R_avg,
         predicted_rate=flown.rates.R_avg,
+        planned_delivered=solution.delivered_rate,
+        predicted_delivered=flown.delivered_rate,
+        predicted_mbytes=plan.megabytes(flown.delivered_rate),
         planned_duration=plan.flight.duration,
         predicted_duration=flown.duration,
         rms_position_error=flown.rms_position_error,
@@ -86,9 +89,21 @@ def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> flo
 
 
 def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
-    """Return the stretch of slots that costs the link that limits the rate most."""
-    first = flown.rates.R_U <= flown.rates.R_G
-    loss = solution.I_U - flown.I_U if first else solution.I_G - flown.I_G
+    """Return the stretch of slots that costs most of what is delivered.
+
+    Until the queue is emptied for the last time, more could be delivered only of more that comes
+    in; from then on only by a better second hop.
+    """
+    relayed = flown.relayed
+    emptied = int(np.flatnonzero(relayed.forwarded >= relayed.queue)[-1])
+    x = solution.shares
+    receives, sends = (1.0, 1.0) if x is None else (x, 1 - x)
+    loss = np.where(
+        np.arange(len(flown.w)) < emptied,
+        receives * (solution.I_U - flown.I_U),
+        sends * (solution.I_G - flown.I_G),
+    )
+    loss[emptied] = 0.0
     lost = np.concatenate([[0.0], np.cumsum(loss)]) / len(loss)
     # The sum from slot i to slot j - 1 is lost[j] - lost[i], the greatest over the least before.
     least = np.minimum.accumulate(lost)

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 RULES = Rules()
 
 LEAST_SHARE = 0.95
-"""The share of the planned rate below which the mission does not do its job. Chosen."""
+"""The share of the planned delivered rate below which the mission does not do its job. Chosen."""
 
 GOOD_SHARE = 0.995
-"""The share of the planned rate below which something can be won back. Chosen."""
+"""The share of the planned delivered rate below which something can be won back. Chosen."""
 
 LATE, LATE_SHARE = 3.0, 0.05
 """By how many seconds, and by which share of the planned duration, a flight ends late that does not
@@ -36,7 +36,7 @@ _SOURCE = "the plan, and the rate along the predicted flight"
 class Stretch:
     """A part of the flight, from `start` to `end` s of the plan, that loses `rate_lost`.
 
-    `rate_lost` is what the average over the whole flight loses there, bit/s/Hz.
+    `rate_lost` is what the delivered rate of the whole flight loses there, bit/s/Hz.
     """
 
     start: float
@@ -48,7 +48,9 @@ class Stretch:
 class LinkCheck:
     """A plan and how the mission is predicted to carry it out.
 
-    Rates in bit/s/Hz, averaged over the flight; durations in s; `rms_position_error` and
+    Rates in bit/s/Hz, averaged over the flight: `planned_rate` and `predicted_rate` are R_avg,
+    `planned_delivered` and `predicted_delivered` what the relay delivers, by which the mission is
+    judged, and `predicted_mbytes` 10^6 bytes of it, None without a bandwidth. Durations in s; `rms_position_error` and
     `max_position_error` m between planned and predicted position at equal times; `path_error` m
     between planned and predicted path, `path_tolerance` m what the plan allows of it;
     `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
@@ -57,6 +59,8 @@ class LinkCheck:
 
     planned_rate: float
     predicted_rate: float
+    planned_delivered: float
+    predicted_delivered: float
     planned_duration: float
     predicted_duration: float
     rms_position_error: float
@@ -65,16 +69,18 @@ class LinkCheck:
     path_tolerance: float
     altitude_error: float = 0.0
     worst: Stretch | None = None
+    predicted_mbytes: float | None = None
 
     @property
     def share(self) -> float:
-        """The part of the planned rate that is predicted to be delivered."""
-        return self.predicted_rate / self.planned_rate if self.planned_rate > 0 else 1.0
+        """The part of the planned delivered rate that is predicted to be delivered."""
+        planned = self.planned_delivered
+        return self.predicted_delivered / planned if planned > 0 else 1.0
 
 
 @RULES.error(
     "link-rate-lost",
-    f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of the planned rate",
+    f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of what is planned",
     _SOURCE,
 )
 def _lost(context: "ValidationContext") -> Iterator[Issue]:
@@ -84,7 +90,7 @@ def _lost(context: "ValidationContext") -> Iterator[Issue]:
 
 @RULES.warning(
     "link-rate-reduced",
-    f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of the planned rate",
+    f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of what is planned",
     _SOURCE,
 )
 def _reduced(context: "ValidationContext") -> Iterator[Issue]:
@@ -101,8 +107,9 @@ def _rate_issue(link: LinkCheck) -> Issue:
         )
     return Issue(
         None,
-        f"predicted {link.predicted_rate:.4f} bit/s/Hz of the planned {link.planned_rate:.4f}: "
-        f"{100 * link.share:.1f} %{where}",
+        f"predicted to deliver {link.predicted_delivered:.4f} bit/s/Hz of the planned "
+        f"{link.planned_delivered:.4f}: {100 * link.share:.1f} %{where} (R_avg "
+        f"{link.predicted_rate:.4f} of {link.planned_rate:.4f})",
         "make the mission anew for the parameters of this vehicle, or plan with a lower "
         "vehicle.max_speed or vehicle.max_acceleration",
     )
@@ -174,6 +181,6 @@ def _timing(context: "ValidationContext") -> Iterator[Issue]:
             None,
             f"predicted {link.predicted_duration:.1f} s of flight ({late:+.1f} s against the "
             f"plan); position at equal times {link.rms_position_error:.1f} m rms, at most "
-            f"{link.max_position_error:.1f} m; rate {100 * link.share:.1f} % of the plan",
+            f"{link.max_position_error:.1f} m; delivers {100 * link.share:.1f} % of the plan",
             "nothing, if the rate is good enough",
         )

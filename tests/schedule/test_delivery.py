@@ -15,7 +15,7 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.rate import cutoff_rate
 from faao_mav.schedule.precoder_table import precoder_table
-from faao_mav.schedule.prediction import delivered, nearest_slots
+from faao_mav.schedule.prediction import nearest_slots, rates_along
 
 FADINGS: list[dict[str, Any]] = [
     {"radio.fading": "none"},
@@ -31,14 +31,14 @@ def solution(request: pytest.FixtureRequest, small_plan: MakePlan) -> Solution:
 
 
 def test_the_planned_flight_delivers_the_planned_rate(solution: Solution) -> None:
-    I_U, I_G = delivered(solution, solution.w)
+    I_U, I_G = rates_along(solution, solution.w)
     assert pytest.approx(solution.I_U, abs=1e-12) == I_U
     assert pytest.approx(solution.I_G, abs=1e-12) == I_G
 
 
 def test_a_displaced_flight_is_priced_slot_by_slot(solution: Solution) -> None:
     w = solution.w + np.random.default_rng(1).normal(size=solution.w.shape) * 5
-    I_U, _ = delivered(solution, w)
+    I_U, _ = rates_along(solution, w)
     link = build_problem(solution.plan).bs_uav
     for n in (0, 7, len(w) - 1):
         d2 = np.sum((w[n] - link.station) ** 2) + link.altitude**2
@@ -55,9 +55,9 @@ def test_by_position_an_aircraft_that_is_late_still_has_the_right_precoders(
     late = np.vstack([solution.w[:1]] * 3 + [solution.w[:-3]])
     slots = nearest_slots(solution, late)
     assert np.abs(solution.w[slots] - late).max() < 1e-9
-    assert np.isfinite(delivered(solution, late, slots)[0]).all()
+    assert np.isfinite(rates_along(solution, late, slots)[0]).all()
     with pytest.raises(InputError, match="one per slot"):
-        delivered(solution, late[:-1])
+        rates_along(solution, late[:-1])
 
 
 def test_the_table_holds_every_slot(small_plan: MakePlan) -> None:

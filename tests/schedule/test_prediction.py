@@ -8,7 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule import convert
-from faao_mav.schedule.prediction import delivered, predict_delivery, price_flight
+from faao_mav.schedule.prediction import predict_delivery, price_flight, rates_along
 
 GENTLE = {
     "vehicle.max_speed": 8,
@@ -44,7 +44,7 @@ def test_a_mission_delivers_nearly_the_plan(solution: Solution) -> None:
     assert found.rates.R_avg == pytest.approx(solution.rates.R_avg, rel=0.02)
     assert found.duration == pytest.approx(30, abs=1)
     assert found.w == pytest.approx(conversion.schedule.positions(solution.t))
-    I_U, I_G = delivered(solution, found.w)
+    I_U, I_G = rates_along(solution, found.w)
     assert found.I_U == pytest.approx(I_U)
     assert found.rates.R_G == pytest.approx(I_G.mean())
     assert found.rms_position_error == pytest.approx(conversion.schedule.deviation.rms)

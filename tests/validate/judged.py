@@ -156,6 +156,8 @@ def track(
 LINK = LinkCheck(
     planned_rate=2.0,
     predicted_rate=2.0,
+    planned_delivered=2.0,
+    predicted_delivered=2.0,
     planned_duration=120.0,
     predicted_duration=120.0,
     rms_position_error=1.0,

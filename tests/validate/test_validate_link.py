@@ -11,21 +11,21 @@ from faao_mav.validate import Stretch
 CASES = [
     (
         "link-rate-lost",
-        Given(flown(), link=replace(LINK, predicted_rate=1.899)),
+        Given(flown(), link=replace(LINK, predicted_delivered=1.899)),
         None,
-        Given(flown(), link=replace(LINK, predicted_rate=1.901)),
+        Given(flown(), link=replace(LINK, predicted_delivered=1.901)),
     ),
     (
         "link-rate-reduced",
-        Given(flown(), link=replace(LINK, predicted_rate=1.989)),
+        Given(flown(), link=replace(LINK, predicted_delivered=1.989)),
         None,
-        Given(flown(), link=replace(LINK, predicted_rate=1.991)),
+        Given(flown(), link=replace(LINK, predicted_delivered=1.991)),
     ),
     (
         "link-rate-reduced",
-        Given(flown(), link=replace(LINK, predicted_rate=1.901, worst=Stretch(30, 41, 0.05))),
+        Given(flown(), link=replace(LINK, predicted_delivered=1.901, worst=Stretch(30, 41, 0.05))),
         None,
-        Given(flown(), link=replace(LINK, predicted_rate=1.899)),
+        Given(flown(), link=replace(LINK, predicted_delivered=1.899)),
     ),
     (
         "link-path",
