@@ -185,7 +185,6 @@ def test_required_keys(key: str) -> None:
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("radio.causal", True),
         ("fence", {"inclusion": [[0, 0], [9, 0], [9, 9]]}),
     ],
 )

@@ -30,8 +30,6 @@ def problems(plan: Plan) -> Iterator[str]:
 
 def _not_yet(plan: Plan) -> Iterator[str]:
     """Values that the keys accept and the program cannot make anything of."""
-    if plan.radio.causal:
-        yield "radio.causal: true does not work yet; leave it false"
     if plan.fence is not None:
         yield "fence: does not work yet; leave it out"
 

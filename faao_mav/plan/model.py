@@ -36,6 +36,7 @@ Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
 Fading: TypeAlias = Literal["ergodic", "realization", "none"]
 ChannelKnowledge: TypeAlias = Literal["statistical", "instantaneous"]
+Duplex: TypeAlias = Literal["full", "half"]
 Method: TypeAlias = Literal["direct", "algorithm1"]
 PrecoderScheme: TypeAlias = Literal["faao", "mmse", "mrt", "zf", "waterfilling"]
 Inputs: TypeAlias = Literal["alphabet", "gaussian"]
@@ -174,6 +175,9 @@ class Relay(_Section):
     antennas: Annotated[Antennas, key("Antennas N_u.")] = 2
     power: Annotated[Power, key("Transmit power W_U.", "dBm", name="power_dbm")] = _POWER
     noise: Annotated[Noise, key("Noise power sigma_U^2.", "dBm", name="noise_dbm")] = _NOISE
+    buffer_mbytes: Annotated[
+        Number | None, key("What the relay can hold; null: any amount.", "MB", gt=0, le=1e9)
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,6 +225,12 @@ class Radio(_Section):
     causal: Annotated[
         Flag, key("Whether the relay forwards only what it has received; the paper: false.")
     ] = False
+    duplex: Annotated[
+        Duplex, key("full: each hop has a band of its own; half: both hops share one.")
+    ] = "full"
+    bandwidth_mhz: Annotated[
+        Number | None, key("Bandwidth of a hop; null: not told.", "MHz", gt=0, le=1e6)
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
