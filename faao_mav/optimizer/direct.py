@@ -15,7 +15,7 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design, design
-from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximize_all
+from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximize_all, objectives
 from faao_mav.optimizer.interior.search import COLD_START, WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem
@@ -49,6 +49,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     scheme = design(problem.plan)
+    relay = problem.relay if problem.plan.radio.causal else None
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
@@ -60,12 +61,19 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     routes = starts(kin, options.starts, stations)
     tell(1, "the starts", 0.0)
     rough = improve_starts(
-        kin, field, routes, tolerance=_ROUGH, max_iterations=options.max_iterations
+        kin,
+        field,
+        routes,
+        tolerance=_ROUGH,
+        max_iterations=options.max_iterations,
+        relay=relay,
     )
     flights = [*routes.values(), *rough.flights.values()]
-    means = field.value(np.stack([flight.w.T for flight in flights], axis=1)).mean(axis=-1)
-    values = means.min(axis=0)
-    reported = [_R_avg(scheme, field, f.w) for f in flights] if scheme.gaussian else values.tolist()
+    rates = field.value(np.stack([flight.w.T for flight in flights], axis=1))
+    values = objectives(rates, kin, relay)
+    if scheme.gaussian:
+        rates = np.stack([_rates(scheme, field, flight.w) for flight in flights], axis=1)
+    reported = objectives(rates, kin, relay).tolist() if scheme.gaussian else values.tolist()
     history = np.maximum.accumulate([reported[0], *reported[len(routes) :]]).tolist()
     tell(2, "the best start", history[-1])
 
@@ -79,6 +87,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             tolerance=options.tolerance,
             max_iterations=options.max_iterations,
             strategy=COLD_START if cold else WARM_START,
+            relay=relay,
         )
 
     optima = optimized([rough.flights[name] for name in rough.promising])
@@ -112,17 +121,18 @@ def _at_exact_rates(
         optimum.trajectory,
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=_EXACT_ITERATIONS,
+        relay=problem.relay if problem.plan.radio.causal else None,
     )
     return replace(optimum, trajectory=further.trajectory, value=further.value)
 
 
-def _R_avg(scheme: Design, field: RateField, w: Real) -> float:
-    """Return R_avg of (9) at positions w with precoders that are made for Gaussian inputs."""
-    means = []
+def _rates(scheme: Design, field: RateField, w: Real) -> Real:
+    """Return the rates (2, n) at positions w with precoders that are made for Gaussian inputs."""
+    rates = []
     for link in field.links:
         H_r = link.small_scale(w)
-        means.append(link.rates(w, H_r, scheme.precoders(link, link.channel(w, H_r))).mean())
-    return float(min(means))
+        rates.append(link.rates(w, H_r, scheme.precoders(link, link.channel(w, H_r))))
+    return np.stack(rates)
 
 
 def _solution(
@@ -154,7 +164,7 @@ def _solution(
         starts=by_start,
     )
     # Rates read off a table on the way are a little off; the last is not.
-    reached = solution.rates.R_avg
+    reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
     exact = history if scheme.gaussian else np.minimum(history, reached).tolist()
     return replace(solution, history=np.array([*exact, reached]))
 

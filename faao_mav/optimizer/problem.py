@@ -24,6 +24,7 @@ from faao_mav.radio.constellation import (
     difference_vector_count,
 )
 from faao_mav.radio.rate import cutoff_rate
+from faao_mav.radio.relay import RelayQueue
 
 MAX_DIFFERENCE_VECTORS = 5_000_000
 MAX_CHANNELS = 5_000_000
@@ -118,12 +119,20 @@ class Link:
 
 @dataclass(frozen=True)
 class Problem:
-    """Problem (13) of `plan`: the feasible flights and the two links."""
+    """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue."""
 
     plan: Plan
     kinematics: Kinematics
     bs_uav: Link
     uav_user: Link
+
+    @property
+    def relay(self) -> RelayQueue:
+        """How the relay forwards; its buffer is unlimited where the plan has no bandwidth."""
+        radio = self.plan.radio
+        room, bandwidth = radio.relay.buffer_mbytes, radio.bandwidth_mhz
+        buffer = math.inf if room is None or bandwidth is None else 8 * room / bandwidth
+        return RelayQueue(half=radio.duplex == "half", buffer=buffer)
 
     @property
     def links(self) -> tuple[Link, Link]:

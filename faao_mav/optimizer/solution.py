@@ -6,6 +6,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from faao_mav.files import write_whole
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.radio.relay import Relayed
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,8 @@ class Solution:
     Fading that is averaged over has a leading axis of draws, and so have precoders that know it.
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
-    those that were not followed to the end.
+    those that were not followed to the end. `shares` (n,) of each slot are those in which a
+    half-duplex relay receives; it sends in the rest.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -90,11 +93,23 @@ class Solution:
     converged: bool
     ending: str
     starts: Mapping[str, float] = field(default_factory=dict)
+    shares: Real | None = None
 
     @property
     def rates(self) -> Rates:
         """R_U, R_G and R_avg: with T = (N + 2) delta_t, (10) is the mean over the slots."""
         return Rates(float(self.I_U.mean()), float(self.I_G.mean()))
+
+    @cached_property
+    def relayed(self) -> Relayed:
+        """What the relay receives, forwards and holds, by the plan's duplex and buffer."""
+        problem, step = build_problem(self.plan), self.plan.flight.time_step
+        return problem.relay.relayed(self.I_U, self.I_G, step, self.shares)
+
+    @property
+    def delivered_rate(self) -> float:
+        """The delivered rate R_del, the mean of what is forwarded, bit/s/Hz; at most R_avg."""
+        return self.relayed.rate
 
     @property
     def iterations(self) -> int:
@@ -190,10 +205,12 @@ def make_solution(
         converged=converged,
         ending=ending,
         starts=starts or {},
+        shares=problem.relay.best_shares(I_U, I_G, problem.kinematics.time_step),
     )
 
 
 _ARRAYS = ("t", "w", "v", "a", "P_B", "P_U", "H_rB", "H_rU", "I_U", "I_G", "history")
+_RELAYED = ("received", "forwarded", "queue")
 
 
 def save_solution(
@@ -201,13 +218,17 @@ def save_solution(
 ) -> None:
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
-    Keys: the arrays of `Solution` by name, `R_avg`, `R_U`, `R_G`, `converged`, `ending`,
-    `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`, which
+    Keys: the arrays of `Solution` by name, those of its `relayed`, `R_avg`, `R_U`, `R_G`, `R_del`,
+    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`, which
     `load_solution` leaves alone. The same solution gives the same bytes.
     """
     rates = solution.rates
     values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}
     values |= {"R_avg": rates.R_avg, "R_U": rates.R_U, "R_G": rates.R_G}
+    values |= {name: getattr(solution.relayed, name) for name in _RELAYED}
+    values["R_del"] = solution.delivered_rate
+    if solution.shares is not None:
+        values["shares"] = solution.shares
     values |= {"converged": solution.converged, "ending": solution.ending}
     values["starts"] = json.dumps(dict(solution.starts))
     values["plan"] = solution.plan.text
@@ -250,6 +271,7 @@ def load_solution(path: str | Path) -> Solution:
     try:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in _ARRAYS}
+            shares = archive["shares"] if "shares" in archive.files else None
             text, ending = str(archive["plan"]), str(archive["ending"])
             converged = bool(archive["converged"])
             starts = json.loads(str(archive["starts"]))
@@ -259,4 +281,11 @@ def load_solution(path: str | Path) -> Solution:
         raise InputError(f"{path}: not a result of faao-mission --save{_lack(error)}") from None
     plan = parse_plan(text, f"{path} (plan)")
     _check_arrays(arrays, plan, str(path))
-    return Solution(plan=plan, converged=converged, ending=ending, starts=starts, **arrays)
+    if shares is not None and (
+        shares.dtype.kind != "f"
+        or shares.shape != arrays["t"].shape
+        or not ((shares >= 0) & (shares <= 1)).all()
+    ):
+        raise InputError(f"{path}: shares: expected a number of 0 to 1 per slot")
+    told = {"converged": converged, "ending": ending, "starts": starts, "shares": shares}
+    return Solution(plan=plan, **told, **arrays)

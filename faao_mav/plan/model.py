@@ -178,7 +178,7 @@ class Relay(_Section):
     buffer_mbytes: Annotated[
         Number | None,
         key(
-            "What the relay can hold, 10^6 bytes each, with radio.bandwidth_mhz; without: no limit.",
+            "What the relay can hold (needs radio.bandwidth_mhz); null: any amount.",
             "megabytes",
             gt=0,
             le=1e9,
@@ -242,7 +242,7 @@ class Radio(_Section):
     bandwidth_mhz: Annotated[
         Number | None,
         key(
-            "Bandwidth of a hop: rates are told in Mbit/s too, and flights in megabytes.",
+            "Bandwidth of a hop, to tell rates in Mbit/s and flights in megabytes; null: not told.",
             "MHz",
             gt=0,
             le=1e5,

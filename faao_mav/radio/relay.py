@@ -49,12 +49,20 @@ class RelayQueue:
     half: bool = False
     buffer: float = math.inf
 
-    def rate(self, I_U: Real, I_G: Real, time_step: float) -> float:
-        """Return the largest delivered rate at the rates `I_U`, `I_G` (n,), bit/s/Hz."""
+    def best_shares(self, I_U: Real, I_G: Real, time_step: float) -> Real | None:
+        """Return the best shares of receiving (n,) at rates (n,), None in full duplex."""
+        return best_shares(I_U, I_G, self.buffer / time_step) if self.half else None
+
+    def relayed(
+        self, I_U: Real, I_G: Real, time_step: float, shares: Real | None = None
+    ) -> Relayed:
+        """Return what is delivered at rates (n,): greedily, with given or else the best shares."""
         room = self.buffer / time_step
-        if self.half:
-            return forward_by_shares(I_U, I_G, best_shares(I_U, I_G, room), room).rate
-        return forward_greedily(I_U, I_G, room).rate
+        if not self.half:
+            return forward_greedily(I_U, I_G, room)
+        if shares is None:
+            shares = best_shares(I_U, I_G, room)
+        return forward_by_shares(I_U, I_G, shares, room)
 
 
 def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:

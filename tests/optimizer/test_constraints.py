@@ -138,6 +138,7 @@ class Budget(Constraint):
 
     normal: tuple[float, float]
     most: float
+
     @property
     def unknowns(self) -> int:
         return 2

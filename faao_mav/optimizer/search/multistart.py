@@ -12,6 +12,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.maximize import feasible, maximize_all
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.radio.relay import RelayQueue
 
 COARSE_SLOTS = 60
 """Slots of the coarse copy: enough for the shape of a route. Chosen."""
@@ -68,6 +69,7 @@ def improve_starts(
     *,
     tolerance: float,
     max_iterations: int,
+    relay: RelayQueue | None = None,
 ) -> ImprovedStarts:
     """Improve the feasible `flights` to `tolerance` and compare them.
 
@@ -81,13 +83,16 @@ def improve_starts(
         flights: the starts by name.
         tolerance: relative tolerance of the search, at least 3e-3 on a coarse copy.
         max_iterations: steps of each search at most.
+        relay: the queue whose delivered rate is maximised instead of the smaller mean.
     """
     copy, reward, on_copy = kin, stage, list(flights.values())
     if len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
         copy, reward = _coarse(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
         tolerance = max(tolerance, _COARSE_TOLERANCE)
         on_copy = [copy.follow(_resampled(kin, flight, copy)) for flight in on_copy]
-    solved = maximize_all(copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations)
+    solved = maximize_all(
+        copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations, relay=relay
+    )
     optima = dict(zip(flights, solved, strict=True))
     ranked = sorted(optima, key=lambda name: -optima[name].value)
     least = optima[ranked[0]].value * (1 - (0.0 if copy is kin else _COARSE_ERROR))
