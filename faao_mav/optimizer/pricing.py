@@ -154,7 +154,9 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     # each chosen slot stands for those about it
     nearest = np.minimum(np.arange(slots) // step, len(chosen) - 1)
     delivered = [
-        solution.relay(I_U[nearest], I_G[nearest], solution.shares).rate
+        problem.relay.relayed(
+            I_U[nearest], I_G[nearest], problem.kinematics.time_step, solution.shares
+        ).rate
         for I_U, I_G in zip(*rates, strict=True)
     ]
     error = np.std(delivered, ddof=1) / np.sqrt(draws) if draws > 1 else max(first, second)
@@ -183,15 +185,15 @@ class Saturation:
 
 def saturation(solution: Solution) -> Saturation:
     """Return how far into saturation `solution` is, with its own route, precoders and shares."""
-    causal, slots = solution.plan.radio.causal, len(solution.w)
-    bits = [np.full(slots, link.classes.bits) for link in build_problem(solution.plan).links]
+    problem = build_problem(solution.plan)
+    full = [np.full(len(solution.w), float(link.classes.bits)) for link in problem.links]
 
     def maximised(I_U: Real, I_G: Real, shares: Real | None) -> float:
-        if causal:
-            return solution.relay(I_U, I_G, shares).rate
+        if solution.plan.radio.causal:
+            return problem.relay.relayed(I_U, I_G, problem.kinematics.time_step, shares).rate
         return float(min(I_U.mean(), I_G.mean()))
 
-    ceiling = maximised(bits[0], bits[1], None)
+    ceiling = maximised(full[0], full[1], None)
 
     def enough(db: float) -> bool:
         rates = solution.recomputed_slots(10 ** (-db / 10))

@@ -103,8 +103,12 @@ class Solution:
     @cached_property
     def relayed(self) -> Relayed:
         """What the relay receives, forwards and holds, by the plan's duplex and buffer."""
-        problem, step = build_problem(self.plan), self.plan.flight.time_step
-        return problem.relay.relayed(self.I_U, self.I_G, step, self.shares)
+        return self.relay(self.I_U, self.I_G, self.shares)
+
+    def relay(self, I_U: Real, I_G: Real, shares: Real | None = None) -> Relayed:
+        """Return what the plan's relay makes of rates (n,), bits, with these or the best shares."""
+        queue, step = build_problem(self.plan).relay, self.plan.flight.time_step
+        return queue.relayed(I_U, I_G, step, shares)
 
     @property
     def delivered_rate(self) -> float:
@@ -121,13 +125,18 @@ class Solution:
         """w, v and a."""
         return Trajectory(self.w, self.v, self.a)
 
-    def recomputed(self, power: float = 1.0) -> Rates:
-        """Return the rates from w, the fading and the precoders alone, all powers times `power`."""
+    def recomputed_slots(self, power: float = 1.0) -> tuple[Real, Real]:
+        """Return I_U, I_G from w, the fading and the precoders alone, all powers times `power`."""
         problem, scale = build_problem(self.plan), np.sqrt(power)
-        return Rates(
-            float(problem.bs_uav.rates(self.w, self.H_rB, scale * self.P_B).mean()),
-            float(problem.uav_user.rates(self.w, self.H_rU, scale * self.P_U).mean()),
+        return (
+            problem.bs_uav.rates(self.w, self.H_rB, scale * self.P_B),
+            problem.uav_user.rates(self.w, self.H_rU, scale * self.P_U),
         )
+
+    def recomputed(self, power: float = 1.0) -> Rates:
+        """Return the means of `recomputed_slots`."""
+        I_U, I_G = self.recomputed_slots(power)
+        return Rates(float(I_U.mean()), float(I_G.mean()))
 
     def residuals(self) -> dict[str, float]:
         """Return by how much each constraint of (13) is missed, computed from the arrays alone.
