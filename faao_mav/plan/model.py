@@ -250,6 +250,12 @@ class Radio(_Section):
     ] = None
 
 
+    @property
+    def maximised(self) -> str:
+        """The name of the rate that is maximised."""
+        return "R_del" if self.causal else "R_avg"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Optimizer(_Section):
     """How the plan is optimised."""

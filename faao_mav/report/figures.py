@@ -76,6 +76,27 @@ def rates(solution: Solution, prediction: Prediction | None = None) -> "Figure":
     return figure
 
 
+def queue(solution: Solution, prediction: Prediction | None = None) -> "Figure":
+    """Return what waits in the relay over time: planned, and where the flight is predicted.
+
+    Bits per hertz of bandwidth, or megabytes where the plan has a bandwidth.
+    """
+    plan = solution.plan
+    megabytes = plan.radio.bandwidth_mhz
+    bits, unit = (1.0, "bit/Hz") if megabytes is None else (megabytes / 8, "megabytes")
+    held = plan.flight.time_step * bits  # of a bit/s/Hz for a slot
+    with drawing(_WIDTH, 2.6) as figure:
+        plot = figure.subplots()
+        flown = (solution.t, held * prediction.relayed.queue) if prediction is not None else None
+        if plan.radio.relay.buffer_mbytes is not None:
+            _limit(plot, plan.radio.relay.buffer_mbytes, "buffer")
+        _curves(plot, (solution.t, held * solution.relayed.queue), flown)
+        plot.set_ylim(bottom=0)
+        label(plot, "", "time, s", f"waiting, {unit}")
+        legend_above(plot)
+    return figure
+
+
 def precoder_power(solution: Solution) -> "Figure":
     """Return the power on each stream, the squared norm of each column of P_B and P_U, over time.
 
@@ -110,7 +131,7 @@ def precoder_power(solution: Solution) -> "Figure":
 
 
 def convergence(solution: Solution) -> "Figure":
-    """Return R_avg after each iteration of the method."""
+    """Return the rate that the plan maximises, R_avg or R_del, after each iteration."""
     from matplotlib.ticker import MaxNLocator
 
     with drawing(_WIDTH, 2.6) as figure:
@@ -119,7 +140,7 @@ def convergence(solution: Solution) -> "Figure":
         plot.plot(steps, solution.history, color=SERIES[0], marker="o", markersize=3.5)
         plot.xaxis.set_major_locator(MaxNLocator(integer=True))
         plot.ticklabel_format(axis="y", useOffset=False)
-        label(plot, "", "iteration", "rate R_avg, bit/s/Hz")
+        label(plot, "", "iteration", f"rate {solution.plan.radio.maximised}, bit/s/Hz")
     return figure
 
 

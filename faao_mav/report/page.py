@@ -139,12 +139,20 @@ def _plan_figures(result: Result) -> Iterator[str]:
         "Rates of both links over time, planned"
         + (" and along the predicted flight" if prediction else ""),
     )
+    half = solution.plan.radio.duplex == "half"
+    yield _figure(
+        "queue",
+        "Queue",
+        figures.queue(solution, prediction),
+        "What the relay has received and not yet forwarded, over time"
+        + (", both hops sharing each slot" if half else ""),
+    )
     yield _figure(
         "convergence",
         "Convergence",
         figures.convergence(solution),
-        f"Rate after each iteration, from {solution.history[0]:.4f} to {solution.history[-1]:.4f} "
-        f"bit/s/Hz; ended: {solution.ending}",
+        f"{solution.plan.radio.maximised} after each iteration, from {solution.history[0]:.4f} to "
+        f"{solution.history[-1]:.4f} bit/s/Hz; ended: {solution.ending}",
     )
     yield _figure(
         "power",
@@ -155,7 +163,7 @@ def _plan_figures(result: Result) -> Iterator[str]:
     if len(solution.starts) > 1:
         ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
         rows = [(name, f"{rate:.4f}") for name, rate in ranked]
-        yield _section("Starts", _table(("start", "R_avg, bit/s/Hz"), rows))
+        yield _section("Starts", _table(("start", f"{solution.plan.radio.maximised}, bit/s/Hz"), rows))
 
 
 def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:

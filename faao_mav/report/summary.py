@@ -100,32 +100,32 @@ def _rate(result: Result) -> Iterator[Line]:
 def _delivered(result: Result) -> Iterator[Line]:
     solution, plan, fresh = result.solution, result.solution.plan, result.fresh
     delivered, R_avg, causal = solution.delivered_rate, solution.rates.R_avg, plan.radio.causal
+    half = plan.radio.duplex == "half"
+    share = delivered / R_avg if R_avg else 1.0
     limit = result.saturation if causal else None
     most = f" of at most {limit.ceiling:.5g}" if limit else ""
-    megabytes = plan.megabytes(delivered)
-    share = delivered / R_avg if R_avg else 1.0
     yield (
         "delivered",
-        f"{told_rate(plan, delivered)}{most}"
-        + ("" if megabytes is None else f", {megabytes:.4g} megabytes")
-        + f"; {100 * share:.2f} % of the rate below" * causal
-        + f"; {100 * share:.2f} % of the rate" * (not causal)
-        + " in half duplex" * (plan.radio.duplex == "half"),
+        f"{told_rate(plan, delivered)}{most}{_carried(plan, delivered)}; "
+        f"{'in half duplex ' if half else ''}{100 * share:.2f} % of the rate",
     )
     if causal:
         yield "", f"{solution.history[0]:.4f} on the straight start"
     elif share < 1 - _LOSS_TOLD:
+        why = "both hops share the time, and " if half else ""
         yield (
             "",
-            f"warning: {100 * (1 - share):.0f} % of the rate does not arrive, since the relay has "
-            "nothing to forward yet; radio.causal: true plans for what arrives",
+            f"warning: {100 * (1 - share):.2g} % of the rate does not arrive: {why}the relay "
+            "forwards only what it has received; radio.causal: true plans for what arrives",
         )
     if fresh:
-        yield (
-            "",
-            f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} on fading that was not planned "
-            "on",
-        )
+        unseen = "on fading that was not planned on"
+        yield "", f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} {unseen}"
+
+
+def _carried(plan: Plan, rate: float) -> str:
+    megabytes = plan.megabytes(rate)
+    return "" if megabytes is None else f", {megabytes:.4g} megabytes"
 
 
 def _flown(result: Result) -> Iterator[Line]:
@@ -137,22 +137,25 @@ def _flown(result: Result) -> Iterator[Line]:
     distance = conversion.schedule.route.distance
     items = _count(len(conversion.mission.items), "item")
     yield "mission", f"{items}; relay route of {distance:.0f} m"
-    told = (
-        ("delivered", flown.delivered_rate, solution.delivered_rate),
-        ("R_avg", flown.rates.R_avg, solution.rates.R_avg),
-    )
-    parts = [
-        f"{name} {rate:.4f} bit/s/Hz, {100 * rate / planned if planned else 100:.2f} % of the plan"
-        for name, rate, planned in told
-    ]
-    planned = f"(planned: {solution.plan.flight.duration:g} s)"
-    megabytes = solution.plan.megabytes(flown.delivered_rate)
-    carried = "" if megabytes is None else f", {megabytes:.4g} megabytes"
-    yield "predicted", f"{parts[0]}, in {flown.duration:.1f} s {planned}{carried}"
-    yield "", parts[1]
+    plan = solution.plan
+    lasting = f", in {flown.duration:.1f} s (planned: {plan.flight.duration:g} s)"
+    delivers = f"delivers {_of_plan(flown.delivered_rate, solution.delivered_rate)}"
+    delivers += _carried(plan, flown.delivered_rate)
+    average = _of_plan(flown.rates.R_avg, solution.rates.R_avg)
+    if plan.radio.causal:
+        yield "predicted", delivers + lasting
+        yield "", f"R_avg {average}"
+    else:
+        yield "predicted", average + lasting
+        yield "", delivers
     yield "", _apart(flown.rms_position_error, flown.max_position_error, flown.max_path_error)
     if doubt := conversion.vehicle.type.caveat:
         yield "", doubt
+
+
+def _of_plan(rate: float, planned: float) -> str:
+    share = 100 * rate / planned if planned else 100.0
+    return f"{rate:.4f} bit/s/Hz, {share:.2f} % of the plan"
 
 
 def check_lines(check: Check) -> Iterator[Line]:

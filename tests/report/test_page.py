@@ -21,7 +21,7 @@ from faao_mav.validate.check import Check
 from faao_mav.workflow import Result
 
 VOID = {"meta", "br", "link", "img", "input", "hr"}
-FIGURES = ("Route", "Motion", "Link", "Precoders", "Convergence")
+FIGURES = ("Route", "Motion", "Link", "Queue", "Precoders", "Convergence")
 
 
 class Page(HTMLParser):
@@ -71,6 +71,7 @@ def test_every_section_is_there(full: str) -> None:
             "Route",
             "Motion",
             "Link",
+            "Queue",
             "Convergence",
             "Precoders",
         ),
@@ -85,7 +86,7 @@ def test_every_section_is_there(full: str) -> None:
     assert f"{flown().solution.rates.R_avg:.4f} bit/s/Hz" in shown
     assert f"{prediction().duration:.1f} s" in shown
     assert "v_max" in shown
-    assert page.of("text").count("predicted") == 4  # map, speed, and both rates
+    assert page.of("text").count("predicted") == 5  # map, speed, both rates and the queue
     wanted = conversion().parameters
     assert wanted
     cells = page.of("td")
@@ -120,7 +121,7 @@ def test_what_the_plan_is_worth_by_other_measures() -> None:
     assert "3.2 dB less power at both stations would do" in told["saturated"][0]
     assert "1.9500 bit/s/Hz (numerical)" in told["bound"][0]
     exact = facts(Result(solution, saturation=Saturation(2.0, 0.0), bound=Bound(2.0, True)))
-    assert exact.keys() == {"rate", "bound", "starts", "optimiser"}
+    assert exact.keys() == {"rate", "delivered", "bound", "starts", "optimiser"}
     assert exact["bound"][0].endswith("2.0000 bit/s/Hz")
 
 
