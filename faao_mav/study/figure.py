@@ -1,7 +1,7 @@
 """The figures of a study: rates along what is varied, and routes on a map."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
@@ -22,7 +22,15 @@ _AXES = {
 }
 """The label of the axis along which a key is varied; other keys are their own labels."""
 
-_SHORT = {"power_dbm": ("W", " dBm"), "flight.duration": ("T", " s"), "radio.modulation": ("", "")}
+_CAUSAL = "radio.causal"
+"""The key whose values are lines of one plot: what causality costs, and what planning wins back."""
+
+_SHORT = {
+    "power_dbm": ("W", " dBm"),
+    "flight.duration": ("T", " s"),
+    "radio.modulation": ("", ""),
+    "radio.duplex": ("", " duplex"),
+}
 """The symbol and the unit of a varied key in legends; an empty symbol leaves the value alone."""
 
 _SCHEMES = {
@@ -57,13 +65,13 @@ def can_draw(rows: Sequence[StudyRow], kind: str) -> bool:
 
 
 def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
-    """Return the figure `kind` of `rows`, `rate` or `trajectories`.
+    """Return the figure `kind` of `rows`: `delivered`, `rate` (R_avg) or `trajectories`.
 
     Raises `InputError` where `can_draw` says no.
     """
     if not can_draw(rows, kind):
         raise InputError("nothing to draw: no result, or no key varied over two numbers or more")
-    return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan)
+    return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan, kind)
 
 
 def _axis(rows: Sequence[StudyRow]) -> str | None:
@@ -77,11 +85,18 @@ def _axis(rows: Sequence[StudyRow]) -> str | None:
     return best if best is not None and counts[best] > 1 else None
 
 
-def _rates(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
-    """Draw R_avg over the axis: a line for each scheme, a panel for each of the other values."""
+_DRAWN = {"rate": ("R_avg", "rate R_avg"), "delivered": ("delivered", "delivered rate R_del")}
+"""The field of a row that a kind of figure draws, and the label of its axis."""
+
+
+def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
+    """Draw a rate over the axis: a line for each scheme, a panel for each of the other values."""
+    measure, unit = _DRAWN[kind]
+    if _CAUSAL in rows[0].values:
+        unit = "rate"
     axis = _axis(rows)
     assert axis is not None
-    others = [key for key in rows[0].values if key != axis]
+    others = [key for key in rows[0].values if key not in (axis, _CAUSAL)]
     panels: dict[str, list[StudyRow]] = {}
     for row in rows:
         panels.setdefault(_named({key: row.values[key] for key in others}), []).append(row)
@@ -93,9 +108,9 @@ def _rates(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
         grid = figure.subplots(down, across, squeeze=False, sharex=True)
         plots = list(grid.flat)
         for plot, (name, inside) in zip(plots, panels.items(), strict=False):
-            _lines(plot, inside, axis)
+            _lines(plot, inside, axis, measure)
             title = name or plan.name or "rate by scheme"
-            label(plot, title, _AXES.get(axis, axis), "rate R_avg, bit/s/Hz")
+            label(plot, title, _AXES.get(axis, axis), f"{unit}, bit/s/Hz")
             plot.tick_params(labelbottom=True)  # the plot beneath may be none
         for plot in plots[len(panels) :]:
             plot.remove()
@@ -104,24 +119,45 @@ def _rates(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
     return figure
 
 
-def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str) -> None:
+def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str, measure: str) -> None:
     """Draw mean and spread over seeds."""
     at = list(rows[0].values).index(axis)
-    found = spreads(rows)
-    for scheme in dict.fromkeys(row.scheme for row in rows):
+    for name, inside, shown, k in _series(rows, measure):
+        found = spreads(inside, shown)
         points = sorted(
-            (values[at], spread)
-            for (values, name), spread in found.items()
-            if name == scheme and spread is not None
+            (values[at], spread) for (values, _), spread in found.items() if spread is not None
         )
         x = [float(value) for value, _ in points]
         mean = [spread.mean for _, spread in points]
         low = [spread.mean - spread.deviation for _, spread in points]
         high = [spread.mean + spread.deviation for _, spread in points]
-        k = _LOOKS.get(scheme, len(_LOOKS) + list(OVERRIDES).index(scheme)) % len(SERIES)
-        plot.plot(x, mean, marker=MARKERS[k], markersize=4, color=SERIES[k], label=_SCHEMES[scheme])
+        k %= len(SERIES)
+        plot.plot(x, mean, marker=MARKERS[k], markersize=4, color=SERIES[k], label=name)
         plot.fill_between(x, low, high, color=SERIES[k], alpha=0.2, linewidth=0)
     plot.set_ylim(bottom=0)
+
+
+def _series(
+    rows: Sequence[StudyRow], measure: str
+) -> Iterator[tuple[str, Sequence[StudyRow], str, int]]:
+    """Yield name, rows, measure and look of each line: of the schemes, and of `radio.causal`."""
+    schemes = list(dict.fromkeys(row.scheme for row in rows))
+    for scheme in schemes:
+        of_scheme = [row for row in rows if row.scheme == scheme]
+        k = _LOOKS.get(scheme, len(_LOOKS) + list(OVERRIDES).index(scheme))
+        if _CAUSAL not in rows[0].values:
+            yield _SCHEMES[scheme], of_scheme, measure, k
+            continue
+        whose = f"{_SCHEMES[scheme]}: " if len(schemes) > 1 else ""
+        for causal, shown, name in (
+            (False, "R_avg", "R_avg, planned for it"),
+            (True, "delivered", "delivered, planned for it"),
+            (False, "delivered", "delivered, planned for R_avg"),
+        ):
+            inside = [row for row in of_scheme if row.values[_CAUSAL] is causal]
+            if inside:
+                yield whose + name, inside, shown, k
+                k += 1
 
 
 def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
@@ -167,5 +203,5 @@ def _named(values: Mapping[str, Value]) -> str:
         if key == "radio.modulation":
             text = _ALPHABETS.get(text, text)
         name, unit = _SHORT.get(key, (key.rsplit(".", 1)[-1], ""))
-        parts.append(f"{name} = {text}{unit}" if name else text)
+        parts.append(f"{name} = {text}{unit}" if name else text + unit)
     return ", ".join(parts)

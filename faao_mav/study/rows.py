@@ -22,7 +22,8 @@ _BEGINNING = b'{"key": "'
 class StudyRow:
     """What one case of a study led to.
 
-    Rates and mutual information are bit/s/Hz, `seconds` is the time of the optimiser. Where there
+    Rates and mutual information are bit/s/Hz; `delivered` is the delivered rate, `delivered_mbytes`
+    10^6 bytes of a flight, None without a bandwidth. `seconds` is the time of the optimiser. Where there
     is no result `error` says why and the numbers are None. `route` is w (n, 2), m, one pair for
     each slot.
     """
@@ -34,6 +35,8 @@ class StudyRow:
     R_avg: float | None = None
     R_U: float | None = None
     R_G: float | None = None
+    delivered: float | None = None
+    delivered_mbytes: float | None = None
     mutual_information: float | None = None
     seconds: float | None = None
     iterations: int | None = None
@@ -43,8 +46,8 @@ class StudyRow:
 
 
 _RESULTS = (
-    *("scheme", "seed", "R_avg", "R_U", "R_G", "mutual_information"),
-    *("seconds", "iterations", "converged", "error"),
+    *("scheme", "seed", "R_avg", "R_U", "R_G", "delivered", "delivered_mbytes"),
+    *("mutual_information", "seconds", "iterations", "converged", "error"),
 )
 """The fields of a row that are columns of the table."""
 
@@ -117,23 +120,33 @@ def in_order(cases: Sequence[StudyCase], rows: Mapping[str, StudyRow]) -> tuple[
     return tuple(rows[case.key] for case in cases if case.key in rows)
 
 
+MEASURES = ("R_avg", "delivered")
+"""The fields of a row that are compared."""
+
+
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Mean and standard deviation (0 of a single seed) of R_avg, bit/s/Hz, over `count` seeds."""
+    """Mean and standard deviation (0 of a single seed) of a rate, bit/s/Hz, over `count` seeds."""
 
     mean: float
     deviation: float
     count: int
 
 
-def spreads(rows: Sequence[StudyRow]) -> dict[tuple[tuple[Value, ...], str], Spread | None]:
-    """Return the spread of R_avg over seeds by values and scheme, in order; None: all failed."""
+def spreads(
+    rows: Sequence[StudyRow], measure: str
+) -> dict[tuple[tuple[Value, ...], str], Spread | None]:
+    """Return the spread of `measure`, one of `MEASURES`, over seeds by values and scheme, in order.
+
+    None: all failed.
+    """
     groups: dict[str, tuple[tuple[tuple[Value, ...], str], list[float]]] = {}
     for row in rows:
         place = (tuple(row.values.values()), row.scheme)
         _, rates = groups.setdefault(json.dumps(place), (_hashable(place), []))
-        if row.R_avg is not None:
-            rates.append(row.R_avg)
+        rate = getattr(row, measure)
+        if rate is not None:
+            rates.append(rate)
     return {
         place: Spread(fmean(rates), stdev(rates) if len(rates) > 1 else 0.0, len(rates))
         if rates
@@ -149,20 +162,11 @@ def _hashable(place: tuple[tuple[Value, ...], str]) -> tuple[tuple[Value, ...], 
 
 
 def comparison(rows: Sequence[StudyRow]) -> str:
-    """Return a table for people: values down, schemes across, mean and spread of R_avg."""
-    varied = list(dict.fromkeys(key for row in rows for key in row.values))
-    schemes = list(dict.fromkeys(row.scheme for row in rows))
-    found = spreads(rows)
-    lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
-    for values in dict.fromkeys(values for values, _ in found):
-        cells = (_cell(found.get((values, scheme))) for scheme in schemes)
-        lines.append([*(json.dumps(v).strip('"') for v in values), *cells])
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    text = ["R_avg, bit/s/Hz"]
-    text += [
-        "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
-        for line in lines
-    ]
+    """Return tables for people, of R_avg and of what is delivered, and what failed.
+
+    Values are down, schemes across, each cell has mean and spread.
+    """
+    text = [line for measure in MEASURES for line in _compared(rows, measure)]
     failed = [row for row in rows if row.error]
     if failed:
         text.append(f"{len(failed)} of {len(rows)} rows failed, first: {failed[0].error}")
@@ -170,6 +174,24 @@ def comparison(rows: Sequence[StudyRow]) -> str:
     if loose:
         text.append(f"{loose} of {len(rows)} rows did not converge")
     return "\n".join(text)
+
+
+def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
+    varied = list(dict.fromkeys(key for row in rows for key in row.values))
+    schemes = list(dict.fromkeys(row.scheme for row in rows))
+    found = spreads(rows, measure)
+    lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
+    for values in dict.fromkeys(values for values, _ in found):
+        cells = (_cell(found.get((values, scheme))) for scheme in schemes)
+        lines.append([*(json.dumps(v).strip('"') for v in values), *cells])
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return [
+        f"{measure}, bit/s/Hz",
+        *(
+            "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
+            for line in lines
+        ),
+    ]
 
 
 def _cell(spread: Spread | None) -> str:

@@ -39,6 +39,8 @@ def _filled(row: StudyRow, case: StudyCase) -> StudyRow:
         R_avg=rates.R_avg,
         R_U=rates.R_U,
         R_G=rates.R_G,
+        delivered=solution.delivered_rate,
+        delivered_mbytes=solution.plan.megabytes(solution.delivered_rate),
         mutual_information=information.average if information else None,
         seconds=round(result.seconds_optimize, 3),
         iterations=solution.iterations,

@@ -219,7 +219,7 @@ def test_figures_are_written_and_labelled(plan: Path, tmp_path: Path) -> None:
     arguments = (plan, "--power", "0,10", "--schemes", "faao,mrt", "--out", out)
     assert run(*arguments, "--jobs", 1).exit_code == 0
     drawn = (out / "figure.svg").read_text()
-    for text in ("power W of both stations, dBm", "rate R_avg, bit/s/Hz", "FAAO", "MRT"):
+    for text in ("power W of both stations, dBm", "delivered rate R_del, bit/s/Hz", "FAAO", "MRT"):
         assert text in drawn
     assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
     again = (out / "figure.svg").read_bytes()
