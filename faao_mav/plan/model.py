@@ -249,7 +249,6 @@ class Radio(_Section):
         ),
     ] = None
 
-
     @property
     def maximised(self) -> str:
         """The name of the rate that is maximised."""

@@ -163,7 +163,9 @@ def _plan_figures(result: Result) -> Iterator[str]:
     if len(solution.starts) > 1:
         ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
         rows = [(name, f"{rate:.4f}") for name, rate in ranked]
-        yield _section("Starts", _table(("start", f"{solution.plan.radio.maximised}, bit/s/Hz"), rows))
+        yield _section(
+            "Starts", _table(("start", f"{solution.plan.radio.maximised}, bit/s/Hz"), rows)
+        )
 
 
 def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:
