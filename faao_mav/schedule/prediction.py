@@ -19,10 +19,10 @@ class Prediction:
     """The relay flight as it is predicted, on the plan's clock.
 
     `w` (n, 2), m, is where the aircraft is in each of the plan's slots. `I_U` and `I_G` (n,) of
-    (7), (8), bits, are what it gets there with the slot's precoders, and `relayed` is what becomes of
-    it: forwarded as fast as it can be, in half duplex within the slot's planned share. `by_position`
-    are R_U and R_G, and `delivered_by_position` the delivered rate, bit/s/Hz, if the radio takes
-    precoders and share of the slot planned nearest to where it is instead.
+    (7), (8), bits, are what it gets there with the slot's precoders. `relayed` is what the relay
+    makes of them, forwarding as fast as it can, in half duplex within the slot's planned share.
+    `by_position` are R_U and R_G, and `delivered_by_position` the delivered rate, bit/s/Hz, if the
+    radio takes precoders and share of the slot planned nearest to where it is instead.
     `duration`, s, is T plus by how much later than planned the aircraft comes to w_F, within
     the path tolerance and for good. Errors are metres, at equal times and of the path.
     """

@@ -22,10 +22,10 @@ _BEGINNING = b'{"key": "'
 class StudyRow:
     """What one case of a study led to.
 
-    Rates and mutual information are bit/s/Hz; `delivered` is the delivered rate, `delivered_mbytes`
-    10^6 bytes of a flight, None without a bandwidth. `seconds` is the time of the optimiser. Where there
-    is no result `error` says why and the numbers are None. `route` is w (n, 2), m, one pair for
-    each slot.
+    Rates and mutual information are bit/s/Hz; `delivered` is the delivered rate and
+    `delivered_mbytes` what a flight carries, 10^6 bytes, None without a bandwidth. `seconds` is the
+    time of the optimiser. Where there is no result `error` says why and the numbers are None.
+    `route` is w (n, 2), m, one pair for each slot.
     """
 
     key: str

@@ -50,11 +50,11 @@ class LinkCheck:
 
     Rates in bit/s/Hz, averaged over the flight: `planned_rate` and `predicted_rate` are R_avg,
     `planned_delivered` and `predicted_delivered` what the relay delivers, by which the mission is
-    judged, and `predicted_mbytes` 10^6 bytes of it, None without a bandwidth. Durations in s; `rms_position_error` and
-    `max_position_error` m between planned and predicted position at equal times; `path_error` m
-    between planned and predicted path, `path_tolerance` m what the plan allows of it;
-    `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
-    None if none does.
+    judged; `predicted_mbytes` is the latter in 10^6 bytes, None without a bandwidth. Durations in
+    s; `rms_position_error` and `max_position_error` m between planned and predicted position at
+    equal times; `path_error` m between planned and predicted path, `path_tolerance` m what the plan
+    allows of it; `altitude_error` m between planned and predicted height; `worst` the stretch that
+    loses most, None if none does.
     """
 
     planned_rate: float
