@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from faao_mav.mission.rows import as_received, as_sent
+from faao_mav.mission.item import as_received, as_sent
 from hypothesis import given
 from hypothesis import strategies as st
 
