@@ -169,10 +169,9 @@ def check_lines(check: Check) -> Iterator[Line]:
     if link := check.link:
         yield (
             "predicted link",
-            f"delivers {link.predicted_delivered:.4f} bit/s/Hz, {100 * link.share:.2f} % of the "
-            f"plan's {link.planned_delivered:.4f}"
-            + (f": {link.predicted_mbytes:.4g} megabytes" if link.predicted_mbytes else "")
-            + f"; R_avg {link.predicted_rate:.4f} of {link.planned_rate:.4f}",
+            f"delivers {_of_plan(link.predicted_delivered, link.planned_delivered)}"
+            + (f", {link.predicted_mbytes:.4g} megabytes" if link.predicted_mbytes else "")
+            + f"; R_avg {_of_plan(link.predicted_rate, link.planned_rate)}",
         )
         yield "", _apart(link.rms_position_error, link.max_position_error, link.path_error)
 

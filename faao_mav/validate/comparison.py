@@ -13,7 +13,7 @@ from faao_mav.schedule.initial_route import begins_at_speed, set_out
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
-from faao_mav.validate.link import LinkCheck, Stretch
+from faao_mav.validate.demands import LinkCheck, Stretch
 from faao_mav.vector import lengths
 from faao_mav.vehicle import Track
 
@@ -46,6 +46,7 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
         predicted_rate=flown.rates.R_avg,
         planned_delivered=solution.delivered_rate,
         predicted_delivered=flown.delivered_rate,
+        causal=plan.radio.causal,
         predicted_mbytes=plan.megabytes(flown.delivered_rate),
         planned_duration=plan.flight.duration,
         predicted_duration=flown.duration,
@@ -89,21 +90,8 @@ def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> flo
 
 
 def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
-    """Return the stretch of slots that costs most of what is delivered.
-
-    Until the queue is emptied for the last time, more could be delivered only of more that comes
-    in; from then on only by a better second hop.
-    """
-    relayed = flown.relayed
-    emptied = int(np.flatnonzero(relayed.forwarded >= relayed.queue)[-1])
-    x = solution.shares
-    receives, sends = (1.0, 1.0) if x is None else (x, 1 - x)
-    loss = np.where(
-        np.arange(len(flown.w)) < emptied,
-        receives * (solution.I_U - flown.I_U),
-        sends * (solution.I_G - flown.I_G),
-    )
-    loss[emptied] = 0.0
+    """Return the stretch of slots that costs most of the rate that is planned for."""
+    loss = _lost_in_slots(solution, flown)
     lost = np.concatenate([[0.0], np.cumsum(loss)]) / len(loss)
     # The sum from slot i to slot j - 1 is lost[j] - lost[i], the greatest over the least before.
     least = np.minimum.accumulate(lost)
@@ -115,3 +103,20 @@ def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
     return Stretch(
         float(solution.t[begin]), float(solution.t[end - 1]) + step, float(lost[end] - lost[begin])
     )
+
+
+def _lost_in_slots(solution: Solution, flown: Prediction) -> Real:
+    """Return by how much the hop that limits the planned rate is worse than planned, bits (n,).
+
+    R_avg is limited by one hop. What is delivered is limited by what comes in until the queue is
+    emptied for the last time, and from then on by the second hop.
+    """
+    in_first, in_second = solution.I_U - flown.I_U, solution.I_G - flown.I_G
+    if not solution.plan.radio.causal:
+        return in_first if flown.rates.R_U <= flown.rates.R_G else in_second
+    if solution.shares is not None:
+        in_first, in_second = solution.shares * in_first, (1 - solution.shares) * in_second
+    emptied = int(np.flatnonzero(flown.relayed.forwarded >= flown.relayed.queue)[-1])
+    loss = np.where(np.arange(len(in_first)) < emptied, in_first, in_second)
+    loss[emptied] = 0.0
+    return np.asarray(loss)

@@ -1,21 +1,18 @@
 """Whether the mission delivers the link that was planned."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.demands import LinkCheck
 from faao_mav.validate.rule import Issue, Rules
-
-if TYPE_CHECKING:
-    from faao_mav.validate.context import ValidationContext
 
 RULES = Rules()
 
 LEAST_SHARE = 0.95
-"""The share of the planned delivered rate below which the mission does not do its job. Chosen."""
+"""The share of what is planned below which the mission does not do its job. Chosen."""
 
 GOOD_SHARE = 0.995
-"""The share of the planned delivered rate below which something can be won back. Chosen."""
+"""The share of what is planned below which something can be won back. Chosen."""
 
 LATE, LATE_SHARE = 3.0, 0.05
 """By how many seconds, and by which share of the planned duration, a flight ends late that does not
@@ -32,58 +29,12 @@ decibel."""
 _SOURCE = "the plan, and the rate along the predicted flight"
 
 
-@dataclass(frozen=True, slots=True)
-class Stretch:
-    """A part of the flight, from `start` to `end` s of the plan, that loses `rate_lost`.
-
-    `rate_lost` is what the delivered rate of the whole flight loses there, bit/s/Hz.
-    """
-
-    start: float
-    end: float
-    rate_lost: float
-
-
-@dataclass(frozen=True, slots=True)
-class LinkCheck:
-    """A plan and how the mission is predicted to carry it out.
-
-    Rates in bit/s/Hz, averaged over the flight: `planned_rate` and `predicted_rate` are R_avg,
-    `planned_delivered` and `predicted_delivered` what the relay delivers, by which the mission is
-    judged; `predicted_mbytes` is the latter in 10^6 bytes, None without a bandwidth. Durations in
-    s; `rms_position_error` and `max_position_error` m between planned and predicted position at
-    equal times; `path_error` m between planned and predicted path, `path_tolerance` m what the plan
-    allows of it; `altitude_error` m between planned and predicted height; `worst` the stretch that
-    loses most, None if none does.
-    """
-
-    planned_rate: float
-    predicted_rate: float
-    planned_delivered: float
-    predicted_delivered: float
-    planned_duration: float
-    predicted_duration: float
-    rms_position_error: float
-    max_position_error: float
-    path_error: float
-    path_tolerance: float
-    altitude_error: float = 0.0
-    worst: Stretch | None = None
-    predicted_mbytes: float | None = None
-
-    @property
-    def share(self) -> float:
-        """The part of the planned delivered rate that is predicted to be delivered."""
-        planned = self.planned_delivered
-        return self.predicted_delivered / planned if planned > 0 else 1.0
-
-
 @RULES.error(
     "link-rate-lost",
     f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of what is planned",
     _SOURCE,
 )
-def _lost(context: "ValidationContext") -> Iterator[Issue]:
+def _lost(context: ValidationContext) -> Iterator[Issue]:
     if context.link is not None and context.link.share < LEAST_SHARE:
         yield _rate_issue(context.link)
 
@@ -93,7 +44,7 @@ def _lost(context: "ValidationContext") -> Iterator[Issue]:
     f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of what is planned",
     _SOURCE,
 )
-def _reduced(context: "ValidationContext") -> Iterator[Issue]:
+def _reduced(context: ValidationContext) -> Iterator[Issue]:
     if context.link is not None and LEAST_SHARE <= context.link.share < GOOD_SHARE:
         yield _rate_issue(context.link)
 
@@ -108,8 +59,8 @@ def _rate_issue(link: LinkCheck) -> Issue:
     return Issue(
         None,
         f"predicted to deliver {link.predicted_delivered:.4f} bit/s/Hz of the planned "
-        f"{link.planned_delivered:.4f}: {100 * link.share:.1f} %{where} (R_avg "
-        f"{link.predicted_rate:.4f} of {link.planned_rate:.4f})",
+        f"{link.planned_delivered:.4f} (R_avg {link.predicted_rate:.4f} of "
+        f"{link.planned_rate:.4f}): {100 * link.share:.1f} %{where}",
         "make the mission anew for the parameters of this vehicle, or plan with a lower "
         "vehicle.max_speed or vehicle.max_acceleration",
     )
@@ -120,7 +71,7 @@ def _rate_issue(link: LinkCheck) -> Issue:
     "the predicted path leaves the planned one by more than the plan's path_tolerance",
     _SOURCE,
 )
-def _path(context: "ValidationContext") -> Iterator[Issue]:
+def _path(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None and link.path_error > link.path_tolerance + PATH_ALLOWANCE:
         yield Issue(
@@ -138,7 +89,7 @@ def _path(context: "ValidationContext") -> Iterator[Issue]:
     f"{LATE:g} s: what the plan has at its end is not done in its time",
     _SOURCE,
 )
-def _late(context: "ValidationContext") -> Iterator[Issue]:
+def _late(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None:
         late = link.predicted_duration - link.planned_duration
@@ -157,7 +108,7 @@ def _late(context: "ValidationContext") -> Iterator[Issue]:
     f"the predicted flight is more than {ALTITUDE_ERROR:g} m above or below the planned altitude",
     _SOURCE,
 )
-def _altitude(context: "ValidationContext") -> Iterator[Issue]:
+def _altitude(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None and link.altitude_error > ALTITUDE_ERROR:
         yield Issue(
@@ -173,7 +124,7 @@ def _altitude(context: "ValidationContext") -> Iterator[Issue]:
     "where the aircraft is predicted to be, beside where the plan has it at the same time",
     _SOURCE,
 )
-def _timing(context: "ValidationContext") -> Iterator[Issue]:
+def _timing(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None:
         late = link.predicted_duration - link.planned_duration
@@ -181,6 +132,6 @@ def _timing(context: "ValidationContext") -> Iterator[Issue]:
             None,
             f"predicted {link.predicted_duration:.1f} s of flight ({late:+.1f} s against the "
             f"plan); position at equal times {link.rms_position_error:.1f} m rms, at most "
-            f"{link.max_position_error:.1f} m; delivers {100 * link.share:.1f} % of the plan",
+            f"{link.max_position_error:.1f} m; rate {100 * link.share:.1f} % of the plan",
             "nothing, if the rate is good enough",
         )

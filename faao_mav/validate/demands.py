@@ -1,0 +1,83 @@
+"""What a flight is asked to keep: limits that are given, and the plan that it is to carry out."""
+
+import math
+from dataclasses import dataclass
+
+from faao_mav.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a flight must stay within; None: no limit.
+
+    `max_duration`, s, of the whole flight; `max_distance`, m, from home over ground;
+    `max_altitude`, m above home; `max_speed`, m/s, over ground; `max_acceleration`, m/s², over
+    ground. Raises `InputError` for one that is not a finite number above 0.
+    """
+
+    max_duration: float | None = None
+    max_distance: float | None = None
+    max_altitude: float | None = None
+    max_speed: float | None = None
+    max_acceleration: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name}: {value}; expected a number above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A part of the flight, from `start` to `end` s of the plan, that loses `rate_lost`.
+
+    `rate_lost` is what the planned rate of the whole flight, R_del or R_avg, loses there, bit/s/Hz.
+    """
+
+    start: float
+    end: float
+    rate_lost: float
+
+
+@dataclass(frozen=True, slots=True)
+class LinkCheck:
+    """A plan and how the mission is predicted to carry it out.
+
+    Rates in bit/s/Hz, averaged over the flight: `planned_rate` and `predicted_rate` are R_avg,
+    `planned_delivered` and `predicted_delivered` what the relay delivers, and `predicted_mbytes`
+    the latter in 10^6 bytes, None without a bandwidth. `causal` tells whether it is the delivered
+    rate that was planned for. Durations in s; `rms_position_error` and `max_position_error` m
+    between planned and predicted position at equal times; `path_error` m between planned and
+    predicted path, `path_tolerance` m what the plan allows of it; `altitude_error` m between
+    planned and predicted height; `worst` the stretch that loses most, None if none does.
+    """
+
+    planned_rate: float
+    predicted_rate: float
+    planned_delivered: float
+    predicted_delivered: float
+    planned_duration: float
+    predicted_duration: float
+    rms_position_error: float
+    max_position_error: float
+    path_error: float
+    path_tolerance: float
+    altitude_error: float = 0.0
+    worst: Stretch | None = None
+    causal: bool = True
+    predicted_mbytes: float | None = None
+
+    @property
+    def share(self) -> float:
+        """The part of the planned rate that is predicted, by which the mission is judged.
+
+        It is the delivered rate. A plan for R_avg promises that as well: the smaller part counts.
+        """
+        delivered = _part(self.predicted_delivered, self.planned_delivered)
+        average = _part(self.predicted_rate, self.planned_rate)
+        return delivered if self.causal else min(delivered, average)
+
+
+def _part(predicted: float, planned: float) -> float:
+    return predicted / planned if planned > 0 else 1.0
