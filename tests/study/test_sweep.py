@@ -134,7 +134,7 @@ def test_the_study_of_a_plan() -> None:
     study = parse_plan(text).study
     assert study is not None
     assert study.vary == {"flight.duration": (10, 12)}
-    assert (study.schemes, study.seeds, study.figure) == (("faao", "zf"), 2, "rate")
+    assert (study.schemes, study.seeds, study.figure) == (("faao", "zf"), 2, "delivered")
     assert parse_plan(SMALL).study is None
 
 
