@@ -219,8 +219,8 @@ def save_solution(
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
     Keys: the arrays of `Solution` by name, those of its `relayed`, `R_avg`, `R_U`, `R_G`, `R_del`,
-    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`, which
-    `load_solution` leaves alone. The same solution gives the same bytes.
+    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`,
+    which `load_solution` leaves alone. The same solution gives the same bytes.
     """
     rates = solution.rates
     values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}

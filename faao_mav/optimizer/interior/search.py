@@ -270,7 +270,8 @@ class Search:
         Return also the predictor, the direction for mu = 0.
         """
         control = self.control
-        cut = control.cut_left > 0
+        # the signs that tell a minimum by are those of the border: without one, do not try
+        cut = (control.cut_left > 0) | (len(self.at.total) == 0)
         control.cut_left = np.maximum(0, control.cut_left - 1)
         while True:
             newton = Newton.factored(
