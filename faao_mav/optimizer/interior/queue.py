@@ -56,7 +56,6 @@ class QueueRewards(ScaledRewards):
         return self.scaled(StageValues(np.zeros((0, *w.shape[1:])), w, w))
 
 
-CROSS = 0.0
 @dataclass(frozen=True)
 class Queue(Constraint):
     """The queue of a relay that shares its band if `half`; `buffer` is in the unit of the rates."""
@@ -171,7 +170,6 @@ class QueueState(Slacks):
             self.on[1] / both,
             self.on[0] / np.where(self.on[0] > 0, k[0], 1.0),
             self.shares * self.gradients,
-            np.asarray(self.z[1] * self.gradients[:, 1] - self.z[0] * self.gradients[:, 0]),
         )
 
     def violation(self) -> Real:
@@ -233,10 +231,7 @@ class QueueState(Slacks):
                 Entry(q, x, slot.series * I_G),
                 Entry(p, x, -outer * (I_U + slot.by_G * I_G)),
             ]
-            entries += [
-                Entry(x, W.start + axis, CROSS * slot.cross[axis] - slot.series * I_G * g_G[axis])
-                for axis in (0, 1)
-            ]
+            entries += [Entry(x, W.start + axis, -slot.series * I_G * g_G[axis]) for axis in (0, 1)]
         weighted = self.shares * self.z[:2]
         return Stiffness(
             w=slot.series * np.stack([g_G[0] * g_G[0], g_G[0] * g_G[1], g_G[1] * g_G[1]]),
@@ -342,7 +337,6 @@ class Slot:
     loose_f: Real
     loose_r: Real
     gradients: Real
-    cross: Real
 
 
 def _scaled(values: StageValues, unit: Real) -> tuple[Real, Real, Real]:
