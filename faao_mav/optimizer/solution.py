@@ -152,7 +152,9 @@ class Solution:
         return max(self.residuals().values()) < tolerance
 
     def kkt_residual(self, reach: float = 1.0) -> float:
-        """Return how much R_avg can still gain per metre, to first order, bit/s/Hz/m.
+        """Return how much the objective can still gain per metre, to first order, bit/s/Hz/m.
+
+        The objective is R_avg, or with `radio.causal` the delivered rate.
 
         The gain is that of the best feasible move by at most `reach` metres in x and in y of every
         slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
@@ -165,7 +167,8 @@ class Solution:
 
         problem = build_problem(self.plan)
         rates = rate_field(problem, design(self.plan))
-        return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach)
+        relay = problem.relay if self.plan.radio.causal else None
+        return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach, relay=relay)
 
 
 def _excess(P: Complex, power: float) -> float:
