@@ -15,6 +15,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+from faao_mav.radio.relay import RelayQueue
 
 _INSIDE = 1e-7  # by which the least speed is raised, for what the solver leaves open
 
@@ -115,13 +116,53 @@ def solve(problem: cp.Problem) -> str:
     raise SolverError("Clarabel made no progress on a convex problem")
 
 
+def _forwarded(
+    relay: RelayQueue, rates: Real, time_step: float, unit: float, moved: list[Any]
+) -> tuple[cp.Variable, list[Any]]:
+    """Return the changes of what `relay` forwards, in `unit`, and what they have to keep.
+
+    `rates` (2, n) are those now and `moved` (2, n) their changes in `unit`, to first order.
+    """
+    (I_U, I_G), n = rates, rates.shape[1]
+    shares = relay.best_shares(I_U, I_G, time_step)
+    now = relay.relayed(I_U, I_G, time_step, shares)
+    received, forwarded, queue, turned = (cp.Variable(n) for _ in range(4))
+    x = np.ones((2, n)) if shares is None else np.stack([shares, 1 - shares])
+    spare_U, spare_G = x * rates - np.stack([now.received, now.forwarded])
+    limits = [
+        received <= spare_U / unit + cp.multiply(x[0], moved[0]) + cp.multiply(I_U, turned),
+        forwarded <= spare_G / unit + cp.multiply(x[1], moved[1]) - cp.multiply(I_G, turned),
+        forwarded - queue <= (now.queue - now.forwarded) / unit,
+        received >= -now.received / unit,
+        forwarded >= -now.forwarded / unit,
+        queue[0] == 0,
+        queue[1:] == (queue + received - forwarded)[:-1],
+    ]
+    if shares is None:
+        limits.append(turned == 0)
+    else:
+        limits += [turned <= x[1] / unit, turned >= -x[0] / unit]
+    if np.isfinite(relay.buffer):
+        limits.append(queue <= (relay.buffer / time_step - now.queue) / unit)
+    return forwarded, limits
+
+
 def kkt_residual(
-    kin: Kinematics, stage: Stage, trajectory: Trajectory, *, reach: float = 1.0
+    kin: Kinematics,
+    stage: Stage,
+    trajectory: Trajectory,
+    *,
+    reach: float = 1.0,
+    relay: RelayQueue | None = None,
 ) -> float:
     """Return the best first-order gain of min_j F_j per metre, in rewards per metre.
 
         max  (min_j (F_j + G_j . d) - min_j F_j) / reach  over the feasible flights w + d
              with |d_n| <= `reach` metres in x and in y, G_j the gradient of F_j
+
+    With `relay` it is the gain of the rate that it delivers of both rewards: with whatever is
+    received, forwarded and held best after the move, and with other shares, whose product with the
+    change of a rate is of second order and left out.
 
     The feasible set is convex, so that this is zero exactly where the conditions of Karush, Kuhn
     and Tucker hold. It is a convex problem: its optimum is that of Clarabel, to about 1e-8 of
@@ -135,17 +176,19 @@ def kkt_residual(
         return 0.0
     flight = flight_variables(kin, about=trajectory.v)
     shift = (flight.w - trajectory.w / LENGTH) * (LENGTH / reach)
-    gains = [
-        (above / (unit * reach)) + cp.sum(cp.multiply(gradient.T / (unit * slots), shift))
-        for above, gradient in zip(
-            total - total.min(), np.moveaxis(values.gradient, 1, 0), strict=True
-        )
+    moved = [
+        cp.sum(cp.multiply(gradient.T / unit, shift), axis=1)
+        for gradient in np.moveaxis(values.gradient, 1, 0)
     ]
     gain = cp.Variable()
-    problem = cp.Problem(
-        cp.Maximize(gain),
-        [*flight.constraints, cp.abs(shift) <= 1, *(gain <= each for each in gains)],
-    )
+    limits = [*flight.constraints, cp.abs(shift) <= 1]
+    if relay is None:
+        above = (total - total.min()) / (unit * reach)
+        limits += [gain <= a + cp.sum(m) / slots for a, m in zip(above, moved, strict=True)]
+    else:
+        forwarded, queue = _forwarded(relay, values.value, kin.time_step, unit * reach, moved)
+        limits += [*queue, gain == cp.sum(forwarded) / slots]
+    problem = cp.Problem(cp.Maximize(gain), limits)
     if solve(problem) == cp.INFEASIBLE:
         raise SolverError("the flight given breaks its limits")
     return max(0.0, float(problem.value)) * unit

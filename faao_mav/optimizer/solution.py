@@ -161,7 +161,9 @@ class Solution:
         return max(self.residuals().values()) < tolerance
 
     def kkt_residual(self, reach: float = 1.0) -> float:
-        """Return how much R_avg can still gain per metre, to first order, bit/s/Hz/m.
+        """Return how much the objective can still gain per metre, to first order, bit/s/Hz/m.
+
+        The objective is R_avg, or with `radio.causal` the delivered rate.
 
         The gain is that of the best feasible move by at most `reach` metres in x and in y of every
         slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
@@ -174,7 +176,8 @@ class Solution:
 
         problem = build_problem(self.plan)
         rates = rate_field(problem, design(self.plan))
-        return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach)
+        relay = problem.relay if self.plan.radio.causal else None
+        return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach, relay=relay)
 
 
 def _excess(P: Complex, power: float) -> float:
@@ -228,8 +231,8 @@ def save_solution(
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
     Keys: the arrays of `Solution` by name, those of its `relayed`, `R_avg`, `R_U`, `R_G`, `R_del`,
-    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`, which
-    `load_solution` leaves alone. The same solution gives the same bytes.
+    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`,
+    which `load_solution` leaves alone. The same solution gives the same bytes.
     """
     rates = solution.rates
     values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}

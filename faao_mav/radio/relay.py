@@ -15,6 +15,7 @@ Mobile Relaying Systems", IEEE Transactions on Communications, 2016.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -112,6 +113,8 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
     from scipy import sparse
     from scipy.optimize import linprog
 
+    solve: Any = linprog  # whose stubs know no sparse arrays
+
     _check(I_U, I_G, buffer)
     n = len(I_U)
     one, none = sparse.eye_array(n, format="csr"), sparse.csr_array((n, n))
@@ -121,7 +124,7 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
     shared = sparse.hstack([one, one, none])
     held = sparse.hstack([none, leaving, -one])
     queue = sparse.hstack([-(before @ arriving), before @ leaving, one - before])
-    found = linprog(
+    found = solve(
         np.concatenate([np.zeros(n), -I_G, np.zeros(n)]),
         A_ub=sparse.vstack([shared, held]),
         b_ub=np.concatenate([np.ones(n), np.zeros(n)]),
@@ -132,7 +135,7 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
     )
     if found.x is None:
         raise InputError(f"no shares of {n} slots: {found.message}")
-    return np.clip(1 - found.x[n : 2 * n], 0.0, 1.0)
+    return np.asarray(np.clip(1 - found.x[n : 2 * n], 0.0, 1.0))
 
 
 def _check(I_U: Real, I_G: Real, buffer: float) -> None:

@@ -48,22 +48,22 @@ def maximize(
 ) -> LocalOptimum:
     """Return a local optimum that is never worse than the feasible `start`.
 
-        `constraints` are kept beside those of `kin`, by `start` too. Where no gain is to be had, as in
-        saturation, or none was found, the optimum is the start itself. `stage` is called once for the
-        start, once per trial step and once for the result.
+    `constraints` are kept beside those of `kin`, by `start` too; with `relay`, what it delivers is
+    maximised instead. Where no gain is to be had, as in
+    saturation, or none was found, the optimum is the start itself. `stage` is called once for the
+    start, once per trial step and once for the result.
 
-        >>> from faao_mav.optimizer.interior.queue import Queue, QueueRewards
-    from faao_mav.optimizer.interior.rewards import StageValues
-        >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
-        >>> def near(w):  # the reward falls with the squared distance from (50, 40), as 1 / km^2
-        ...     away = (w - np.array([50.0, 40.0]).reshape(2, *[1] * (w.ndim - 1)))[:, None]
-        ...     packed = np.array([-2e-6, 0, -2e-6]).reshape(3, *[1] * w.ndim)
-        ...     value = -1e-6 * (away * away).sum(axis=0)
-        ...     return StageValues(value, -2e-6 * away, np.broadcast_to(packed, (3, *value.shape)))
-        >>> start = kin.follow(np.full((41, 2), [5.0, 0.0]))
-        >>> best = maximize(kin, near, start)
-        >>> best.converged, best.trajectory.w[20].round().tolist()
-        (True, [50.0, 40.0])
+    >>> from faao_mav.optimizer.interior.rewards import StageValues
+    >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
+    >>> def near(w):  # the reward falls with the squared distance from (50, 40), as 1 / km^2
+    ...     away = (w - np.array([50.0, 40.0]).reshape(2, *[1] * (w.ndim - 1)))[:, None]
+    ...     packed = np.array([-2e-6, 0, -2e-6]).reshape(3, *[1] * w.ndim)
+    ...     value = -1e-6 * (away * away).sum(axis=0)
+    ...     return StageValues(value, -2e-6 * away, np.broadcast_to(packed, (3, *value.shape)))
+    >>> start = kin.follow(np.full((41, 2), [5.0, 0.0]))
+    >>> best = maximize(kin, near, start)
+    >>> best.converged, best.trajectory.w[20].round().tolist()
+    (True, [50.0, 40.0])
     """
     (optimum,) = maximize_all(
         kin,
@@ -126,7 +126,8 @@ def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
     """Return min_j F_j, or what `relay` delivers of both rates `values` (J, flights, n)."""
     if relay is None:
         return np.asarray(values.mean(axis=-1).min(axis=0))
-    return np.array([relay.relayed(*each, kin.time_step).rate for each in values.swapaxes(0, 1)])
+    flights = values.swapaxes(0, 1)
+    return np.array([relay.relayed(I_U, I_G, kin.time_step).rate for I_U, I_G in flights])
 
 
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:

@@ -169,7 +169,7 @@ class Newton:
         return quadratic(self.curvature, direction.move.w)
 
     def decrease(self, direction: Direction, bend: Real) -> Real:
-        """Return the curvature of the whole model along a `direction` of this `bend`, (flights, 1)."""
+        """Return the curvature of the whole model along a `direction` of `bend`, (flights, 1)."""
         at = self.at
         kink = at.weights / (at.total - at.floor) * (direction.total - direction.floor) ** 2
         of_constraints = [

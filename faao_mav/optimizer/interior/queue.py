@@ -42,9 +42,6 @@ from faao_mav.optimizer.interior.rewards import ScaledRewards, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import forward_greedily
 
-BARRIER_SHARE = 0.1
-"""The weight of the barrier of the queue's inequalities, in those of a slot's limits."""
-
 
 class QueueRewards(ScaledRewards):
     """The unit of the rates; the objective is the queue's own."""
@@ -107,12 +104,13 @@ class Queue(Constraint):
             on += [np.ones(I_U.shape)] * 2
         if math.isfinite(self.buffer):
             on.append(inner)
+        ones = np.stack(on)
+        scaled = _scaled(values, unit)
         state = QueueState(
-            *[np.stack(on)] * 4, self, start.own, unit, most, *_scaled(values, unit),
-            r, f, q, 0.5 * outer, x,
-        )  # fmt: skip
+            ones, ones, ones, ones, self, start.own, unit, most, *scaled, r, f, q, 0.5 * outer, x
+        )
         functions = state.functions()
-        s = np.where(state.on > 0, functions + 2 * BARRIER_SHARE * start.mu, 1.0)
+        s = np.where(state.on > 0, functions + 2 * start.mu, 1.0)
         state = replace(state, s=s, margin=np.where(state.on > 0, s - functions, 0.0))
         return state.centred(start.mu)
 
@@ -173,10 +171,6 @@ class QueueState(Slacks):
             self.on[0] / np.where(self.on[0] > 0, k[0], 1.0),
             self.shares * self.gradients,
         )
-
-    def count(self) -> Real:
-        """Return how many inequalities, by the weight of their barrier."""
-        return BARRIER_SHARE * super().count()
 
     def violation(self) -> Real:
         """Return the largest margin, or by how much an equation of the queue is missed."""
@@ -268,8 +262,8 @@ class QueueState(Slacks):
         return Forces(w=slot.gradients[:, 1] * z_G, own=np.stack(own, axis=-1))
 
     def target(self, mu: Real, ahead: Any, share: Real) -> Real:
-        """Return (mu c - ds dz) / s at `share` of the step `ahead`."""
-        return super().target(BARRIER_SHARE * mu, ahead[:2], share)
+        """Return (mu - ds dz) / s at `share` of the step `ahead`."""
+        return super().target(mu, ahead[:2], share)
 
     def solved(self, move: Move, target: Real | None, rest: Forces) -> tuple[Any, Forces]:  # noqa: ARG002
         """Return the changes of slacks, multipliers, r, f, q, p and x along `move`."""
@@ -323,8 +317,8 @@ class QueueState(Slacks):
         return replace(then, margin=np.where(self.on > 0, then.s - then.functions(), 0.0))
 
     def centred(self, mu: Real) -> "QueueState":
-        """Return the same slacks with z = mu c / s."""
-        return replace(self, z=BARRIER_SHARE * mu * self.on / self.s)
+        """Return the same slacks with z = mu / s."""
+        return replace(self, z=mu * self.on / self.s)
 
 
 @dataclass(frozen=True, slots=True)

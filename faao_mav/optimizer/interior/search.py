@@ -69,6 +69,13 @@ _FIRST_PROXIMAL = 1e-3
 _STEPS_CUT = 2
 """The steps for which the curvature stays cut once it had to be; 1 loses 0.1 % of the value."""
 
+_QUEUE_FALL = 0.3
+"""The least share of mu that a step leaves where a queue is to be emptied.
+
+Measured on 16 flights of up to 400 slots, from 68 starts: 1,283 iterations, 1 start that does not
+converge; in half duplex 3,322 and 4. With 0.01 to 0.1 as elsewhere: 1,749 and 4; 4,942 and 23.
+"""
+
 _MU_PER_TOLERANCE = 1 / 20
 """The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
 
@@ -242,7 +249,8 @@ class Search:
         newton, ahead = self._newton()
         share = np.minimum(1, ahead.reach(at))
         now, left = at.mean_gap(), at.mean_gap(share, ahead)
-        keep = np.maximum((left / now) ** 3, np.where(slope < 1, 0.01, 0.1))
+        slowest = np.where(slope < 1, 0.01, 0.1) if len(at.total) else _QUEUE_FALL
+        keep = np.maximum((left / now) ** 3, slowest)
         least = self.tolerance * _MU_PER_TOLERANCE * control.steepness
         control.mu = np.fmax(np.fmin(control.mu, keep * now), least)
         direction = newton.corrector(control.mu, ahead, share)
@@ -270,7 +278,8 @@ class Search:
         Return also the predictor, the direction for mu = 0.
         """
         control = self.control
-        cut = control.cut_left > 0
+        # the signs that tell a minimum by are those of the border: without one, do not try
+        cut = (control.cut_left > 0) | (len(self.at.total) == 0)
         control.cut_left = np.maximum(0, control.cut_left - 1)
         while True:
             newton = Newton.factored(
