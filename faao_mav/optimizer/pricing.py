@@ -103,7 +103,7 @@ def _mean_information(
 
 @dataclass(frozen=True, slots=True)
 class FreshRates:
-    """R_U, R_G of (10) and R_del on draws that the plan does not know; standard errors; bit/s/Hz."""
+    """R_U, R_G and R_del on draws that the plan does not know, and standard errors, bit/s/Hz."""
 
     bs_uav: float
     uav_user: float

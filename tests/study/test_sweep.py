@@ -151,7 +151,7 @@ def test_the_study_of_a_plan() -> None:
         ({"vary": {"flight.duration": 5}}, "study.vary.flight.duration: 5 is not accepted"),
         ({"schemes": ["rzf"]}, "'rzf' is not accepted; give a list of faao"),
         ({"seeds": 0}, "study.seeds: 0 is not accepted; give a whole number, 1 to 10000"),
-        ({"figure": "pie"}, "study.figure: 'pie' is not accepted; give delivered, rate or trajectories"),
+        ({"figure": "pie"}, "figure: 'pie' is not accepted; give delivered, rate or trajectories"),
     ],
 )
 def test_errors_in_the_study_are_named(study: dict[str, object], part: str) -> None:
