@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from conftest import MISSIONS, edited
-from faao_mav.vehicle.parameter_file import autopilot_of, parameter_path, render_parameters
 
 from faao_mav.arrays import Real
 from faao_mav.errors import PlanError
 from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.mission.item import MissionItem
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
@@ -27,6 +27,7 @@ from faao_mav.vehicle import (
     vehicle_type_by_numbers,
 )
 from faao_mav.vehicle.dialect import Dialect, Limit, SpeedChange
+from faao_mav.vehicle.files import autopilot_of, parameter_path
 from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import Parameter, ParameterValues, table
 from faao_mav.vehicle.px4.model import Px4
@@ -167,7 +168,7 @@ def test_its_rules_are_its_dialect_and_its_table() -> None:
 def test_its_files_and_numbers_are_known() -> None:
     assert parameter_path(MISSIONS / "x.plan", "toy").name == "x.toy"
     assert autopilot_of({"TOY_SPEED": 1.0}) == "toy"
-    assert render_parameters({"TOY_SPEED": 8.0}, "toy") == "TOY_SPEED,8\n"
+    assert render_parameters({"TOY_SPEED": 8.0}, TOY.parameter_style) == "TOY_SPEED,8\n"
     assert vehicle_type_by_numbers(99, 2) is COPTER
     assert Vehicle("toy", "copter", {"TOY_SPEED_KMH": 36}).value("cruise_speed") == 10
 

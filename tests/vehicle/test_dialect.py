@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from faao_mav.mission.rows import as_received, as_sent
 from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.item import as_received, as_sent
 from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.dialect import Limit, SpeedChange
 
