@@ -13,9 +13,9 @@ from faao_mav.validate import (
     speeds,
     upload,
 )
-from faao_mav.validate.context import Limits, ValidationContext
+from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.demands import Limits, LinkCheck, Stretch
 from faao_mav.validate.finding import Finding, Level
-from faao_mav.validate.link import LinkCheck, Stretch
 from faao_mav.validate.rule import Rule
 from faao_mav.vehicle import Track, Vehicle
 

@@ -13,7 +13,7 @@ from faao_mav.schedule.initial_route import begins_at_speed, set_out
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
-from faao_mav.validate.link import LinkCheck, Stretch
+from faao_mav.validate.demands import LinkCheck, Stretch
 from faao_mav.vector import lengths
 from faao_mav.vehicle import Track
 

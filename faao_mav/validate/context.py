@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.validate.demands import Limits, LinkCheck
 from faao_mav.validate.fence_map import FenceMap, fence_map
-from faao_mav.validate.link import LinkCheck
+from faao_mav.validate.straight import HOME, PlacedItem, Straight
 from faao_mav.vehicle import Track, Vehicle
 
 NAV_LAST = 95
@@ -21,76 +21,6 @@ NAV_LAST = 95
 
 LARGEST = float(np.finfo(np.float32).max)
 """The largest number of single precision, which messages have."""
-
-HOME = -1
-"""The index of home, which is no item."""
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What a flight must stay within; None: no limit.
-
-    `max_duration`, s, of the whole flight; `max_distance`, m, from home over ground;
-    `max_altitude`, m above home; `max_speed`, m/s, over ground; `max_acceleration`, m/s², over
-    ground. Raises `InputError` for one that is not a finite number above 0.
-    """
-
-    max_duration: float | None = None
-    max_distance: float | None = None
-    max_altitude: float | None = None
-    max_speed: float | None = None
-    max_acceleration: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name}: {value}; expected a number above 0")
-
-
-@dataclass(frozen=True, slots=True)
-class PlacedItem:
-    """Where an item flies to: metres east and north of `ValidationContext.frame`, and above home.
-
-    `index` is the item's, `HOME` for home. `up` is NaN where nothing tells it: heights above
-    terrain, or above the sea without a home.
-    """
-
-    index: int
-    east: float
-    north: float
-    up: float
-
-    @property
-    def from_origin(self) -> float:
-        """Metres over ground from the origin of the frame, which is home if there is one."""
-        return math.hypot(self.east, self.north)
-
-
-@dataclass(frozen=True, slots=True)
-class Straight:
-    """A straight from one place to the next, ordered by the item at `index`.
-
-    `speed` is what is commanded, m/s; `spline`: the aircraft curves to its end; `jump`: the item
-    is a DO_JUMP.
-    """
-
-    index: int
-    start: PlacedItem
-    end: PlacedItem
-    speed: float
-    spline: bool = False
-    jump: bool = False
-
-    @property
-    def length(self) -> float:
-        """Metres over ground."""
-        return math.hypot(self.end.east - self.start.east, self.end.north - self.start.north)
-
-    @property
-    def rise(self) -> float:
-        """Metres upwards; NaN if a height is unknown."""
-        return self.end.up - self.start.up
 
 
 @dataclass(frozen=True)
@@ -237,7 +167,9 @@ class ValidationContext:
     @cached_property
     def fence(self) -> FenceMap | None:
         """The fence in the local frame, None without one."""
-        return fence_map(self)
+        any_inclusion = self.vehicle.type.fence_needs_one_inclusion(self.vehicle)
+        flown = (self.track_positions, self.track.item if self.track is not None else None)
+        return fence_map(self.mission.fence, self.frame, any_inclusion, self.legs, *flown)
 
     @cached_property
     def track_positions(self) -> Real | None:

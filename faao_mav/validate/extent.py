@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from faao_mav.mission.command import ABOVE_HOME, Command
-from faao_mav.validate.context import HOME, Straight, ValidationContext, number
+from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.straight import HOME, Straight
 
 RULES = Rules()
 

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Integers, Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
+from faao_mav.validate.straight import Straight
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
-
-    from faao_mav.validate.context import ValidationContext
 
 _SEGMENTS = 64
 """Straights to a quarter of a circle: 0.075 mm of error a metre of radius."""
@@ -112,22 +111,26 @@ class Broken:
 
 @dataclass(frozen=True)
 class FenceMap:
-    """The fence of a context in the plane.
+    """A fence in the plane, with the mission's way: `straights` and the predicted flight.
 
-    `free` is where the inclusions let the aircraft be, None if there are none. `any_inclusion`:
-    one inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else all have to hold.
+    The flight is at `positions` (n, 3), m, on the way to the items at the indices `heading_for`
+    (n,); both are None where it is not predicted. `free` is where the inclusions let the aircraft
+    be, None if there are none. `any_inclusion`: one inclusion is enough, as PX4 and ArduPilot's
+    FENCE_OPTIONS 2 have it; else all have to hold.
     """
 
-    context: "ValidationContext"
     frame: LocalFrame
     areas: tuple[Area, ...]
     free: "BaseGeometry | None"
     any_inclusion: bool
+    straights: tuple[Straight, ...]
+    positions: Real | None
+    heading_for: Integers | None
 
     @cached_property
     def legs(self) -> NDArray[np.object_]:
-        """The legs of the context, in order, as geometries."""
-        legs = self.context.legs
+        """The straights, in order, as geometries."""
+        legs = self.straights
         starts = np.array([[leg.start.east, leg.start.north] for leg in legs]).reshape(-1, 2)
         ends = np.array([[leg.end.east, leg.end.north] for leg in legs]).reshape(-1, 2)
         return lines(starts, ends)
@@ -135,7 +138,7 @@ class FenceMap:
     @cached_property
     def flight(self) -> NDArray[np.object_]:
         """The predicted flight from sample to sample, as geometries; none without a track."""
-        positions = self.context.track_positions
+        positions = self.positions
         if positions is None or len(positions) < 2:
             return np.empty(0, dtype=object)
         return lines(positions[:-1, :2], positions[1:, :2])
@@ -143,8 +146,9 @@ class FenceMap:
     @cached_property
     def flight_items(self) -> NDArray[np.int_]:
         """The index of the item of each part of `flight`."""
-        track = self.context.track
-        return track.item[1:] if track is not None and len(self.flight) else np.empty(0, dtype=int)
+        if self.heading_for is None or not len(self.flight):
+            return np.empty(0, dtype=int)
+        return self.heading_for[1:]
 
     @cached_property
     def broken_legs(self) -> Broken:
@@ -182,7 +186,7 @@ class FenceMap:
         if not len(self.legs) or self.broken_legs.any.any() or self.broken_flight.any.any():
             return None
         margins = self._margins(np.concatenate([self.legs, self.flight]))
-        items = [*(leg.index for leg in self.context.legs), *self.flight_items.tolist()]
+        items = [*(leg.index for leg in self.straights), *self.flight_items.tolist()]
         nearest = int(np.argmin(margins))
         return float(margins[nearest]), items[nearest]
 
@@ -198,18 +202,26 @@ class FenceMap:
         return margin
 
 
-def fence_map(context: "ValidationContext") -> FenceMap | None:
-    """Return the fence of `context` in the plane, None without a fence."""
-    fence = context.mission.fence
+def fence_map(
+    fence: Fence,
+    frame: LocalFrame | None,
+    any_inclusion: bool,
+    straights: tuple[Straight, ...],
+    positions: Real | None,
+    heading_for: Integers | None,
+) -> FenceMap | None:
+    """Return `fence` in the plane of `frame`, else of its own first place; None without a fence.
+
+    The other arguments are those of `FenceMap`.
+    """
     if not fence:
         return None
     import shapely
 
     first = fence.polygons[0].vertices[0] if fence.polygons else fence.circles[0].center
-    frame = context.frame or LocalFrame(*first)
+    frame = frame or LocalFrame(*first)
     areas = areas_of(fence, frame)
-    any_inclusion = context.vehicle.type.fence_needs_one_inclusion(context.vehicle)
     free = free_area(areas, any_inclusion=any_inclusion)
     shapely.prepare([area.shape for area in areas])
     shapely.prepare(free)
-    return FenceMap(context, frame, areas, free, any_inclusion)
+    return FenceMap(frame, areas, free, any_inclusion, straights, positions, heading_for)

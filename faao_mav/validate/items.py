@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command
-from faao_mav.validate.context import HOME, NAV_LAST, ValidationContext, number
+from faao_mav.validate.context import NAV_LAST, ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.straight import HOME
 
 RULES = Rules()
 

@@ -1,13 +1,10 @@
 """Whether the mission delivers the link that was planned."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.demands import LinkCheck
 from faao_mav.validate.rule import Issue, Rules
-
-if TYPE_CHECKING:
-    from faao_mav.validate.context import ValidationContext
 
 RULES = Rules()
 
@@ -32,52 +29,12 @@ decibel."""
 _SOURCE = "the plan, and the rate along the predicted flight"
 
 
-@dataclass(frozen=True, slots=True)
-class Stretch:
-    """A part of the flight, from `start` to `end` s of the plan, that loses `rate_lost`.
-
-    `rate_lost` is what the average over the whole flight loses there, bit/s/Hz.
-    """
-
-    start: float
-    end: float
-    rate_lost: float
-
-
-@dataclass(frozen=True, slots=True)
-class LinkCheck:
-    """A plan and how the mission is predicted to carry it out.
-
-    Rates in bit/s/Hz, averaged over the flight; durations in s; `rms_position_error` and
-    `max_position_error` m between planned and predicted position at equal times; `path_error` m
-    between planned and predicted path, `path_tolerance` m what the plan allows of it;
-    `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
-    None if none does.
-    """
-
-    planned_rate: float
-    predicted_rate: float
-    planned_duration: float
-    predicted_duration: float
-    rms_position_error: float
-    max_position_error: float
-    path_error: float
-    path_tolerance: float
-    altitude_error: float = 0.0
-    worst: Stretch | None = None
-
-    @property
-    def share(self) -> float:
-        """The part of the planned rate that is predicted to be delivered."""
-        return self.predicted_rate / self.planned_rate if self.planned_rate > 0 else 1.0
-
-
 @RULES.error(
     "link-rate-lost",
     f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of the planned rate",
     _SOURCE,
 )
-def _lost(context: "ValidationContext") -> Iterator[Issue]:
+def _lost(context: ValidationContext) -> Iterator[Issue]:
     if context.link is not None and context.link.share < LEAST_SHARE:
         yield _rate_issue(context.link)
 
@@ -87,7 +44,7 @@ def _lost(context: "ValidationContext") -> Iterator[Issue]:
     f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of the planned rate",
     _SOURCE,
 )
-def _reduced(context: "ValidationContext") -> Iterator[Issue]:
+def _reduced(context: ValidationContext) -> Iterator[Issue]:
     if context.link is not None and LEAST_SHARE <= context.link.share < GOOD_SHARE:
         yield _rate_issue(context.link)
 
@@ -113,7 +70,7 @@ def _rate_issue(link: LinkCheck) -> Issue:
     "the predicted path leaves the planned one by more than the plan's path_tolerance",
     _SOURCE,
 )
-def _path(context: "ValidationContext") -> Iterator[Issue]:
+def _path(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None and link.path_error > link.path_tolerance + PATH_ALLOWANCE:
         yield Issue(
@@ -131,7 +88,7 @@ def _path(context: "ValidationContext") -> Iterator[Issue]:
     f"{LATE:g} s: what the plan has at its end is not done in its time",
     _SOURCE,
 )
-def _late(context: "ValidationContext") -> Iterator[Issue]:
+def _late(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None:
         late = link.predicted_duration - link.planned_duration
@@ -150,7 +107,7 @@ def _late(context: "ValidationContext") -> Iterator[Issue]:
     f"the predicted flight is more than {ALTITUDE_ERROR:g} m above or below the planned altitude",
     _SOURCE,
 )
-def _altitude(context: "ValidationContext") -> Iterator[Issue]:
+def _altitude(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None and link.altitude_error > ALTITUDE_ERROR:
         yield Issue(
@@ -166,7 +123,7 @@ def _altitude(context: "ValidationContext") -> Iterator[Issue]:
     "where the aircraft is predicted to be, beside where the plan has it at the same time",
     _SOURCE,
 )
-def _timing(context: "ValidationContext") -> Iterator[Issue]:
+def _timing(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
     if link is not None:
         late = link.predicted_duration - link.planned_duration

@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
-from faao_mav.validate.context import HOME, ValidationContext, at_zero
+from faao_mav.validate.context import ValidationContext, at_zero
 from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.straight import HOME
 from faao_mav.vehicle import PX4_COPTER
 
 RULES = Rules(PX4_COPTER.family)

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from faao_mav.mission.command import Command
-from faao_mav.validate.context import HOME, Straight, ValidationContext
+from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.straight import HOME, Straight
 
 RULES = Rules()
 

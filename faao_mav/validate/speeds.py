@@ -7,8 +7,9 @@ from itertools import groupby
 import numpy as np
 
 from faao_mav.mission.command import Command
-from faao_mav.validate.context import HOME, Straight, ValidationContext, number
+from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.straight import HOME, Straight
 from faao_mav.vehicle.vehicle_type import OVERSPEED
 
 RULES = Rules()
