@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import json
 import os
 import re
 import shlex
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import free_port
 from pages import PAGES, ROOT, blocks, difference
@@ -151,6 +153,15 @@ def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
     solution = optimize(plan)
     assert solution.rates.R_avg == pytest.approx(float(best.split()[0]), abs=1e-4)
     assert solution.history[0] == pytest.approx(float(start), abs=1e-4)
+
+
+def test_the_keys_of_json_and_save_are_listed(folder: Path) -> None:
+    run = "missions/paper_active.yaml --method direct --save flight.npz --json"
+    done = CliRunner().invoke(app, run.split())
+    first = re.findall(r"^\| (`.*?) \|", PAGES["docs/commands.md"], re.MULTILINE)
+    listed = set(re.findall(r"`(\w+)`", " ".join(first)))
+    with np.load(folder / "flight.npz") as archive:
+        assert sorted({*json.loads(done.stdout), *archive} - listed) == []
 
 
 def test_the_house_that_is_shown_has_the_floors_of_the_house() -> None:
