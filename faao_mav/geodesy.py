@@ -22,7 +22,7 @@ class LocalFrame:
     Distance and azimuth from the origin are exact (geodesic); elsewhere lengths across the
     line of sight are off by about (r / 6371 km)² / 6: 1e-6 at 16 km. Computed by PROJ
     (projection `aeqd`, Snyder 1987, section 25), which takes what is within 1 mm of the origin
-    for the origin.
+    for the origin, and an origin within 0.7 mm of the equator for one on it.
 
     `latitude` and `longitude` are the origin, degrees. Raises `InputError` for an origin that
     is not finite or has a latitude beyond ±90.

@@ -195,12 +195,11 @@ def plan_mission(
     result without a mission: see `Result.no_mission`. Raises `PlanError` when the plan asks for
     more than the method can handle, `InfeasibleError` when no flight satisfies it.
 
-    With `plan` a `Plan`, as `read_plan` returns it:
-
-    >>> result = plan_mission(plan)
+    >>> from faao_mav import read_plan
+    >>> result = plan_mission(read_plan("missions/copter_relay.yaml"))
     >>> result.flyable
     True
-    >>> result.prediction.rates.R_avg > 0.9 * result.solution.rates.R_avg
+    >>> result.prediction.rates.R_avg > 0.99 * result.solution.rates.R_avg
     True
     >>> sorted(result.conversion.parameters)[:2]
     ['WPNAV_ACCEL', 'WPNAV_JERK']

@@ -39,7 +39,9 @@ def test_distance_and_azimuth_from_the_origin_are_geodesic(
     east, north = distance * np.sin(azimuth), distance * np.cos(azimuth)
     lat, lon = LocalFrame(latitude, longitude).to_geodetic([east, north])
     forward, _, length = GEOD.inv(longitude, latitude, lon, lat)
-    assert length == pytest.approx(distance, abs=1e-5)
+    # PROJ takes an origin within 1e-10 rad of the equator for one on it
+    moved = 0 < abs(latitude) < np.degrees(1e-10)
+    assert length == pytest.approx(distance, abs=1e-3 if moved else 1e-5)
     turn = (np.radians(forward) - azimuth + np.pi) % (2 * np.pi) - np.pi
     assert abs(turn) * distance < 1e-4
 
