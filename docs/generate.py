@@ -48,10 +48,17 @@ def plan() -> str:
         inside = [key for key in reference().values() if key.path.rpartition(".")[0] == section]
         rows = [_row(key) for key in inside if not key.inside]
         if rows:
-            about = reference()[section].description if section else ""
-            lines += [f"### {section or 'At the top'}", "", _escaped(about), ""]
+            lines += [f"### {section or 'At the top'}", "", _about(section), ""]
             lines += ["| key | meaning | accepted | default |", "|---|---|---|---|", *rows, ""]
     return "\n".join(lines)
+
+
+def _about(section: str) -> str:
+    if not section:
+        return ""
+    key = reference()[section]
+    listed = f" Give {key.accepted}." if not key.accepted.startswith("a mapping") else ""
+    return _escaped(key.description + listed)
 
 
 def _row(key: PlanKey) -> str:
@@ -106,4 +113,5 @@ _WRITERS: dict[str, Callable[..., str]] = {
 
 
 def _escaped(text: str) -> str:
-    return text.replace("|", "\\|").replace("<", "&lt;")
+    # In braces at the end of a cell the site's Markdown looks for attributes.
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("{", "&#123;")
