@@ -7,9 +7,14 @@ from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+
+# Hypothesis tries numbers that it reads in the project's modules loaded so far. Which are loaded
+# depends on how the tests are shared out among processes: without them, examples are the same.
+setattr(providers, "is_local_module_file", lambda _: False)  # noqa: B010
 
 settings.register_profile(
     "deterministic",

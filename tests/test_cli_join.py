@@ -14,7 +14,7 @@ from faao_mav.cli.main import app
 from faao_mav.mavlink.messages import ParamRequestRead, ParamValue
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import running
-from faao_mav.mavlink.protocol import Address, Result
+from faao_mav.mavlink.protocol import Address, MavResult
 from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
@@ -150,7 +150,7 @@ def test_options_of_an_upload_without_one(plan: Path, out: Path, option: tuple[s
 def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: bool) -> None:
     port = free_port()
     mock = MockAutopilot(
-        behaviour_of("ardupilot", refusals={(0, 2): Result.UNSUPPORTED}), home=HOME, beat=0.1
+        behaviour_of("ardupilot", refusals={(0, 2): MavResult.UNSUPPORTED}), home=HOME, beat=0.1
     )
     with running(mock, f"udpin:127.0.0.1:{port}"):
         options = ["--json"] if as_json else []

@@ -51,7 +51,7 @@ def study(
     from faao_mav.cli.progress import study_progress
     from faao_mav.plan import read_plan
     from faao_mav.plan.keys import POWER
-    from faao_mav.plan.model import Study
+    from faao_mav.plan.sections import Study
     from faao_mav.study import make_cases, parse_vary, run_study
     from faao_mav.study.sweep import join_grid, parse_schemes, parse_values
 

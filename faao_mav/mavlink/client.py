@@ -9,9 +9,9 @@ from typing import TypedDict, TypeVar, Unpack
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink.codec import read_key
 from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
-from faao_mav.mavlink.link import Link, Observe
+from faao_mav.mavlink.link import Observe, WireLink
 from faao_mav.mavlink.machine import Machine, Script
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.mavlink.transfer.session import (
@@ -27,7 +27,7 @@ from faao_mav.mission.item import Mission
 
 T = TypeVar("T")
 
-_ABSENT = (Result.UNSUPPORTED, Result.INVALID)
+_ABSENT = (MavResult.UNSUPPORTED, MavResult.INVALID)
 """What a vehicle answers that has no such list at all."""
 
 
@@ -149,7 +149,7 @@ class _Session:
         self.timeouts = options.get("timeouts") or Timeouts()
         self.started = time.monotonic()
         key = None if key_file is None else read_key(key_file)
-        self.link = Link(connection, key=key, log=options.get("log"))
+        self.link = WireLink(connection, key=key, log=options.get("log"))
         try:
             names = options.get("system"), options.get("component")
             wait = options.get("wait", 10.0)

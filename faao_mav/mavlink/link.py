@@ -55,7 +55,7 @@ class Tlog:
         self._file.close()
 
 
-class Link:
+class WireLink:
     """A ground station's end of a link: runs machines, and says once a second that it is there.
 
     `log` is a file for the exchange. Use it in a `with` statement.
@@ -82,7 +82,7 @@ class Link:
                 self._log.close()
             raise
 
-    def __enter__(self) -> "Link":
+    def __enter__(self) -> "WireLink":
         return self
 
     def __exit__(self, *_: object) -> None:

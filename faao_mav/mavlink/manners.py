@@ -8,24 +8,24 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from faao_mav.mavlink.protocol import Result
+from faao_mav.mavlink.protocol import MavResult
 from faao_mav.vehicle import AutopilotFamily, VehicleType
 from faao_mav.vehicle.ardupilot import ARDUPILOT
 from faao_mav.vehicle.px4 import PX4
 
 _GENERAL = {
-    Result.UNSUPPORTED_FRAME: "the frame of an item is not supported",
-    Result.UNSUPPORTED: "a command, or this kind of list, is not supported",
-    Result.INVALID: "an item, or this kind of list, is invalid",
-    Result.INVALID_PARAM1: "param1 of an item is invalid",
-    Result.INVALID_PARAM2: "param2 of an item is invalid",
-    Result.INVALID_PARAM3: "param3 of an item is invalid",
-    Result.INVALID_PARAM4: "param4 of an item is invalid",
-    Result.INVALID_PARAM5_X: "the latitude (param5) of an item is out of range",
-    Result.INVALID_PARAM6_Y: "the longitude (param6) of an item is out of range",
-    Result.INVALID_PARAM7: "the altitude (param7) of an item is invalid",
-    Result.INVALID_SEQUENCE: "an item came out of turn",
-    Result.OPERATION_CANCELLED: "the vehicle gave the transfer up",
+    MavResult.UNSUPPORTED_FRAME: "the frame of an item is not supported",
+    MavResult.UNSUPPORTED: "a command, or this kind of list, is not supported",
+    MavResult.INVALID: "an item, or this kind of list, is invalid",
+    MavResult.INVALID_PARAM1: "param1 of an item is invalid",
+    MavResult.INVALID_PARAM2: "param2 of an item is invalid",
+    MavResult.INVALID_PARAM3: "param3 of an item is invalid",
+    MavResult.INVALID_PARAM4: "param4 of an item is invalid",
+    MavResult.INVALID_PARAM5_X: "the latitude (param5) of an item is out of range",
+    MavResult.INVALID_PARAM6_Y: "the longitude (param6) of an item is out of range",
+    MavResult.INVALID_PARAM7: "the altitude (param7) of an item is invalid",
+    MavResult.INVALID_SEQUENCE: "an item came out of turn",
+    MavResult.OPERATION_CANCELLED: "the vehicle gave the transfer up",
 }
 
 
@@ -54,7 +54,7 @@ class Manners:
     unset_is_zero: bool = False
     any_request_order: bool = False
     final_acks: int = 1
-    meanings: Mapping[Result, str] = field(default_factory=dict)
+    meanings: Mapping[MavResult, str] = field(default_factory=dict)
 
     def meaning(self, result: int) -> str:
         """Return `result` by name, and what it says when this autopilot sends it.
@@ -63,7 +63,7 @@ class Manners:
         'INVALID_SEQUENCE (an item came out of turn)'
         """
         try:
-            known = Result(result)
+            known = MavResult(result)
         except ValueError:
             return f"result {result}"
         text = self.meanings.get(known) or _GENERAL.get(known)
@@ -79,16 +79,16 @@ _MANNERS: dict[AutopilotFamily, Manners] = {
         unset_is_zero=True,
         any_request_order=True,
         meanings={
-            Result.ERROR: (
+            MavResult.ERROR: (
                 "no transfer under way, an item beyond the list, or a change of the mission that "
                 "it is flying"
             ),
-            Result.INVALID: "command 0 or 1",
-            Result.UNSUPPORTED: (
+            MavResult.INVALID: "command 0 or 1",
+            MavResult.UNSUPPORTED: (
                 "a command that this vehicle does not know, or fence and rally points over "
                 "MAVLink 1"
             ),
-            Result.DENIED: "another ground station is uploading",
+            MavResult.DENIED: "another ground station is uploading",
         },
     ),
     PX4: Manners(
@@ -98,11 +98,11 @@ _MANNERS: dict[AutopilotFamily, Manners] = {
         reminder=-1,
         final_acks=2,  # until it hears one, nobody else can begin a transfer for 5 s
         meanings={
-            Result.ERROR: (
+            MavResult.ERROR: (
                 "busy with another transfer, storage failed, a fence polygon of fewer than 3 "
                 "vertices, or fence items in a mission"
             ),
-            Result.INVALID: "this kind of list is unknown to it",
+            MavResult.INVALID: "this kind of list is unknown to it",
         },
     ),
 }

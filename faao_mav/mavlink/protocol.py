@@ -24,7 +24,7 @@ ALL_TYPES = 255
 """MAV_MISSION_TYPE_ALL: valid in MISSION_CLEAR_ALL only."""
 
 
-class Result(IntEnum):
+class MavResult(IntEnum):
     """MAV_MISSION_RESULT: how a transfer went."""
 
     ACCEPTED = 0

@@ -5,7 +5,8 @@
 
 from faao_mav.plan.fields import Vector
 from faao_mav.plan.keys import PlanKey, reference
-from faao_mav.plan.model import (
+from faao_mav.plan.reader import parse_plan, read_plan
+from faao_mav.plan.sections import (
     BaseStation,
     Flight,
     GroundUser,
@@ -18,7 +19,6 @@ from faao_mav.plan.model import (
     Site,
     VehicleOptions,
 )
-from faao_mav.plan.reader import parse_plan, read_plan
 
 __all__ = [
     "BaseStation",

@@ -9,7 +9,7 @@ from faao_mav.errors import quote
 from faao_mav.plan.autopilots import VEHICLES
 from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
-from faao_mav.plan.model import Flight, Plan, VehicleOptions
+from faao_mav.plan.sections import Flight, Plan, VehicleOptions
 
 MAX_SLOTS = 100_000
 """Most time slots; chosen: the direct method solves 10,000 in 0.6 s; more is not measured."""

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from faao_mav.plan.fields import Written, listed
-from faao_mav.plan.model import PlanFile
+from faao_mav.plan.sections import PlanFile
 
 POWER = "power_dbm"
 """The key of a study that stands for the powers of the base station and of the relay."""

@@ -12,7 +12,7 @@ from faao_mav.errors import PlanError, quote
 from faao_mav.files import read_text
 from faao_mav.plan.checks import problems
 from faao_mav.plan.keys import PlanKey, reference
-from faao_mav.plan.model import Plan, PlanFile
+from faao_mav.plan.sections import Plan, PlanFile
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
 
 _MAX_LINES = 6

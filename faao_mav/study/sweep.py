@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, get_args
 
 from faao_mav.errors import InputError, PlanError
 from faao_mav.plan.keys import ALIASES, unknown_key, varied_twice
-from faao_mav.plan.model import StudyScheme
+from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 Value: TypeAlias = Any

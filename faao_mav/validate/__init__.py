@@ -3,15 +3,15 @@
 from faao_mav.mission.item import Mission
 from faao_mav.validate import (
     ardupilot,
+    delivery,
     extent,
     fences,
     items,
-    link,
     px4_checks,
     px4_flight,
+    refusals,
     shape,
     speeds,
-    upload,
 )
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.demands import Limits, LinkCheck, Stretch
@@ -34,8 +34,8 @@ __all__ = [
 RULES: tuple[Rule, ...] = tuple(
     rule
     for module in (
-        *(items, upload, ardupilot, px4_checks, px4_flight),
-        *(speeds, shape, extent, fences, link),
+        *(items, refusals, ardupilot, px4_checks, px4_flight),
+        *(speeds, shape, extent, fences, delivery),
     )
     for rule in module.RULES
 )

@@ -90,7 +90,7 @@ class ParameterValues(Protocol):
         ...
 
 
-class Limits:
+class ParameterRecord:
     """Values of some parameters of a `table`: base of dataclasses whose fields are its keys."""
 
     __slots__ = ()

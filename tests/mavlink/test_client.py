@@ -17,11 +17,11 @@ from stations import FENCE, HOME, RALLY, a_mission, places, signing_key, vehicle
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink import Timeouts, clear, download, upload
 from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.link import Link
+from faao_mav.mavlink.link import WireLink
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.mock import COUNT, Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import running
-from faao_mav.mavlink.protocol import Address, MissionType, Result
+from faao_mav.mavlink.protocol import Address, MavResult, MissionType
 from faao_mav.mavlink.transport import open_transport, parse_connection
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
@@ -102,10 +102,10 @@ def test_what_storage_drops_is_in_the_report(port: int) -> None:
     ("refusals", "told"),
     [
         (
-            {(0, 2): Result.UNSUPPORTED},
+            {(0, 2): MavResult.UNSUPPORTED},
             r"refused: UNSUPPORTED \(a command .*\), at item 1 \(command",
         ),
-        ({(0, COUNT): Result.DENIED}, "another ground station is uploading"),
+        ({(0, COUNT): MavResult.DENIED}, "another ground station is uploading"),
     ],
 )
 def test_a_refusal_says_what_is_wrong_and_where(refusals: Any, told: str, port: int) -> None:
@@ -361,7 +361,7 @@ def test_a_serial_line() -> None:
 
 def test_a_link_in_use_is_let_go_of(port: int) -> None:
     for _ in range(2):
-        with Link(f"udpin:127.0.0.1:{port}"):
+        with WireLink(f"udpin:127.0.0.1:{port}"):
             pass
 
 

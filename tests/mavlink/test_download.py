@@ -13,7 +13,7 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
 )
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.transfer.download import Download
 from faao_mav.mavlink.transfer.exchange import Clear
 from faao_mav.mavlink.transfer.pace import Timeouts
@@ -43,20 +43,20 @@ def test_a_whole_download() -> None:
     assert desk.tell(MissionCount(ME, 0, 3, 99)) == [wants(0)]
     assert desk.tell(item(0)) == [wants(1)]
     assert desk.tell(item(1)) == [wants(2)]
-    assert desk.tell(item(2)) == [MissionAck(VEHICLE, 0, Result.ACCEPTED)]
+    assert desk.tell(item(2)) == [MissionAck(VEHICLE, 0, MavResult.ACCEPTED)]
     assert desk.machine.outcome.items == ROWS
     assert desk.machine.outcome.opaque_id == 99
 
 
 def test_an_empty_list_is_acknowledged_too() -> None:
     desk = desk_for()
-    assert desk.tell(MissionCount(ME, 0, 0)) == [MissionAck(VEHICLE, 0, Result.ACCEPTED)]
+    assert desk.tell(MissionCount(ME, 0, 0)) == [MissionAck(VEHICLE, 0, MavResult.ACCEPTED)]
     assert (desk.machine.outcome.status, desk.machine.outcome.items) == ("accepted", ())
 
 
 def test_px4_is_told_of_the_end_twice() -> None:
     desk = desk_for("px4")
-    assert desk.tell(MissionCount(ME, 0, 0)) == [MissionAck(VEHICLE, 0, Result.ACCEPTED)] * 2
+    assert desk.tell(MissionCount(ME, 0, 0)) == [MissionAck(VEHICLE, 0, MavResult.ACCEPTED)] * 2
 
 
 def test_the_list_is_asked_for_again_and_given_up() -> None:
@@ -149,7 +149,7 @@ def test_ardupilot_is_asked_for_five_rows_at_once() -> None:
         assert desk.tell(row(seq)) == [wants(seq + 5)]
     for seq in range(7, 11):
         assert desk.tell(row(seq)) == []
-    assert desk.tell(row(11)) == [MissionAck(VEHICLE, 0, Result.ACCEPTED)]
+    assert desk.tell(row(11)) == [MissionAck(VEHICLE, 0, MavResult.ACCEPTED)]
     assert desk.machine.outcome.items == MANY
 
 
@@ -202,19 +202,19 @@ def test_a_link_that_is_not_known_is_asked_for_one_row() -> None:
 def test_one_refusal_of_five_requests_is_one() -> None:
     desk = wide_desk()
     for _ in range(5):
-        assert desk.tell(MissionAck(ME, 0, Result.DENIED)) == []
+        assert desk.tell(MissionAck(ME, 0, MavResult.DENIED)) == []
     assert desk.wait(0.3) == [MissionRequestList(VEHICLE, 0)]
 
 
 def test_unsupported_changes_to_the_old_request() -> None:
     desk = desk_for()
     desk.tell(MissionCount(ME, 0, 3))
-    assert desk.tell(MissionAck(ME, 0, Result.UNSUPPORTED)) == [wants(0, legacy=True)]
+    assert desk.tell(MissionAck(ME, 0, MavResult.UNSUPPORTED)) == [wants(0, legacy=True)]
     assert desk.tell(item(0)) == [wants(1, legacy=True)]
 
 
-@pytest.mark.parametrize("result", [Result.DENIED, Result.ERROR, Result.UNSUPPORTED])
-def test_a_refusal_that_is_repeated_is_final(result: Result) -> None:
+@pytest.mark.parametrize("result", [MavResult.DENIED, MavResult.ERROR, MavResult.UNSUPPORTED])
+def test_a_refusal_that_is_repeated_is_final(result: MavResult) -> None:
     desk = desk_for()
     for _ in range(Timeouts().attempts):
         assert not desk.machine.outcome
@@ -225,7 +225,7 @@ def test_a_refusal_that_is_repeated_is_final(result: Result) -> None:
 
 def test_one_stray_refusal_is_survived() -> None:
     desk = desk_for()
-    desk.tell(MissionAck(ME, 0, Result.ERROR))
+    desk.tell(MissionAck(ME, 0, MavResult.ERROR))
     assert desk.wait(0.3) == [MissionRequestList(VEHICLE, 0)]
     desk.tell(MissionCount(ME, 0, 3))
     for seq in range(3):
@@ -243,7 +243,7 @@ def test_a_vehicle_that_falls_silent_is_asked_from_the_beginning() -> None:
 def test_who_gives_up_tells_the_vehicle() -> None:
     desk = desk_for()
     desk.tell(MissionCount(ME, 0, 3))
-    assert desk.machine.cancel(desk.now) == [MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)]
+    assert desk.machine.cancel(desk.now) == [MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)]
     assert desk.machine.outcome.status == "cancelled"
 
 
@@ -256,9 +256,9 @@ def clearing(part: MissionType = MissionType.FENCE) -> Desk:
 def test_clearing() -> None:
     desk = clearing()
     assert desk.sent == [MissionClearAll(VEHICLE, 1)]
-    desk.tell(MissionAck(ME, 0, Result.ACCEPTED))
+    desk.tell(MissionAck(ME, 0, MavResult.ACCEPTED))
     assert not desk.machine.outcome
-    desk.tell(MissionAck(ME, 1, Result.ACCEPTED))
+    desk.tell(MissionAck(ME, 1, MavResult.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
 
@@ -271,11 +271,11 @@ def test_clearing_is_repeated_then_given_up() -> None:
 
 def test_clearing_may_be_refused() -> None:
     desk = clearing()
-    desk.tell(MissionAck(ME, 1, Result.DENIED))
+    desk.tell(MissionAck(ME, 1, MavResult.DENIED))
     assert desk.machine.outcome.status == "refused"
     desk = clearing()
-    desk.tell(MissionAck(ME, 1, Result.ERROR))
+    desk.tell(MissionAck(ME, 1, MavResult.ERROR))
     assert not desk.machine.outcome
     desk.wait(1.6)
-    desk.tell(MissionAck(ME, 1, Result.ERROR))
+    desk.tell(MissionAck(ME, 1, MavResult.ERROR))
     assert desk.machine.outcome.status == "refused"

@@ -36,7 +36,7 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.firmware import StoredLists
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.session import clear_lists, download_lists, upload_parts
 from faao_mav.mavlink.transfer.upload import Upload
@@ -139,7 +139,7 @@ def test_any_one_packet_may_be_lost(kind: MockKind, lost: Lost) -> None:
 
 
 def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way() -> None:
-    for kind, answer in (("px4", Result.ACCEPTED), ("ardupilot", Result.ERROR)):
+    for kind, answer in (("px4", MavResult.ACCEPTED), ("ardupilot", MavResult.ERROR)):
         mock, rows = mock_of(kind), rows_for(kind, 4)
         upload: Any = Upload(rows, peer_of(kind))
         client = Station(upload, GROUND_STATION)
@@ -166,9 +166,11 @@ def test_what_was_asked_about_a_lost_answer_is_no_refusal(kind: MockKind) -> Non
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-@pytest.mark.parametrize("result", sorted(set(Result) - {Result.ACCEPTED, Result.INVALID_SEQUENCE}))
+@pytest.mark.parametrize(
+    "result", sorted(set(MavResult) - {MavResult.ACCEPTED, MavResult.INVALID_SEQUENCE})
+)
 @pytest.mark.parametrize("seq", [COUNT, 0, 3, 5])
-def test_refusals_of_every_kind_are_reported(kind: MockKind, result: Result, seq: int) -> None:
+def test_refusals_of_every_kind_are_reported(kind: MockKind, result: MavResult, seq: int) -> None:
     if kind == "ardupilot" and seq == 0:
         seq = 1
     mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): result}))
@@ -176,14 +178,14 @@ def test_refusals_of_every_kind_are_reported(kind: MockKind, result: Result, seq
     report, _ = upload_to(mock, rows)
     assert not report.verified
     assert report.result == result
-    assert report.verdict == ("cancelled" if result == Result.OPERATION_CANCELLED else "refused")
-    if result not in (Result.ERROR, Result.OPERATION_CANCELLED):
+    assert report.verdict == ("cancelled" if result == MavResult.OPERATION_CANCELLED else "refused")
+    if result not in (MavResult.ERROR, MavResult.OPERATION_CANCELLED):
         assert report.attempts == 1
         assert report.item == (None if seq == COUNT else seq)
 
 
 def test_a_refused_mission_leaves_px4_as_it_was() -> None:
-    mock = mock_of(behaviour_of("px4", refusals={(MISSION, 3): Result.INVALID_PARAM1}))
+    mock = mock_of(behaviour_of("px4", refusals={(MISSION, 3): MavResult.INVALID_PARAM1}))
     old = rows_for("px4", 7, shift=0.1)
     mock.lists.replace(MISSION, old)
     upload_to(mock, rows_for("px4", 6))
@@ -246,7 +248,7 @@ def test_all_three_lists_of_a_mission() -> None:
 
 
 def test_an_upload_stops_at_the_list_that_fails() -> None:
-    mock = mock_of(behaviour_of("px4", refusals={(MissionType.FENCE, COUNT): Result.NO_SPACE}))
+    mock = mock_of(behaviour_of("px4", refusals={(MissionType.FENCE, COUNT): MavResult.NO_SPACE}))
     mission = a_mission(6, fence=FENCE, rally=RALLY)
     parts = [(part, wire_items(mission, part, vehicle_of("px4"))) for part in MissionType]
     script: Any = Script(upload_parts(parts, peer_of("px4")))
@@ -288,7 +290,7 @@ def test_who_is_interrupted_frees_the_vehicle() -> None:
 
     simulate(client, Station(mock, VEHICLE), Faults(latency=0.01), events=[(0.1, interrupt)])
     assert script.outcome[0].verdict == "cancelled"
-    assert out == [MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)]
+    assert out == [MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)]
 
 
 def test_clearing_over_a_bad_link() -> None:

@@ -5,7 +5,7 @@ from stations import mock_of, rows_for, there_and_back, upload_to
 
 from faao_mav.mavlink.faults import Faults, Lost
 from faao_mav.mavlink.mock import MockKind, behaviour_of
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.protocol import MavResult, MissionType
 
 MISSION = MissionType.MISSION
 KINDS = ["ardupilot", "px4"]
@@ -85,9 +85,9 @@ def test_a_request_that_px4_lost_is_not_waited_for() -> None:
 def test_the_item_that_is_refused_is_named_whatever_is_lost(kind: MockKind, seq: int) -> None:
     for loss in (0.0, 0.2, 0.4):
         for seed in range(10):
-            mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): Result.INVALID_PARAM2}))
+            mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): MavResult.INVALID_PARAM2}))
             rows = rows_for(mock.vehicle.family.key, 12)[:12]
             report, _ = upload_to(mock, rows, Faults(loss=loss, seed=seed))
             assert not report.verified
-            if report.result == Result.INVALID_PARAM2:
+            if report.result == MavResult.INVALID_PARAM2:
                 assert report.item == seq

@@ -19,7 +19,7 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.mock import Behaviour, MockKind, behaviour_of
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 
 MISSION, FENCE, RALLY = MissionType
 T = TypeVar("T", bound=Message)
@@ -84,13 +84,13 @@ def test_who_asks_with_which_message(kind: MockKind, legacy: bool) -> None:
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 def test_what_is_uploaded_can_be_downloaded(kind: MockKind) -> None:
     desk, rows = desk_for(kind), rows_for(kind, 4)
-    assert upload(desk, rows) == [Result.ACCEPTED]
+    assert upload(desk, rows) == [MavResult.ACCEPTED]
     (found,) = desk.tell(MissionRequestList(TO, 0))
     assert found.count == len(rows)
     for seq, row in enumerate(rows):
         (answer,) = desk.tell(MissionRequestInt(TO, 0, seq))
         assert places([answer.item]) == places([row])
-    desk.tell(MissionAck(TO, 0, Result.ACCEPTED))
+    desk.tell(MissionAck(TO, 0, MavResult.ACCEPTED))
 
 
 def test_ardupilot_keeps_its_own_home_in_row_0() -> None:
@@ -121,10 +121,10 @@ def test_ardupilot_asks_again_after_1_s_and_gives_up_after_8() -> None:
     assert asked(desk.wait(0.99)) == []
     assert asked(desk.wait(0.02)) == [0]
     out = desk.wait(7.5)
-    assert results(out) == [Result.OPERATION_CANCELLED]
+    assert results(out) == [MavResult.OPERATION_CANCELLED]
     assert "Mission upload timeout" in [text.text for text in answers(out, Statustext)]
-    assert results(desk.tell(item(0, rows_for("ardupilot")[0]))) == [Result.ERROR]
-    assert upload(desk, rows_for("ardupilot")) == [Result.ACCEPTED]
+    assert results(desk.tell(item(0, rows_for("ardupilot")[0]))) == [MavResult.ERROR]
+    assert upload(desk, rows_for("ardupilot")) == [MavResult.ACCEPTED]
 
 
 def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5() -> None:
@@ -140,7 +140,7 @@ def test_px4_asks_again_after_a_quarter_and_gives_up_in_silence_after_5() -> Non
 def test_ardupilot_says_so_of_a_wrong_item_and_goes_on() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     desk.tell(count(4))
-    assert results(desk.tell(item(2, rows[2]))) == [Result.INVALID_SEQUENCE]
+    assert results(desk.tell(item(2, rows[2]))) == [MavResult.INVALID_SEQUENCE]
     for seq in range(3):
         assert asked(desk.tell(item(seq, rows[seq]))) == [seq + 1]
 
@@ -155,14 +155,14 @@ def test_px4_passes_over_a_wrong_item() -> None:
 def test_the_last_item_again_is_an_error_for_ardupilot() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 3)
     upload(desk, rows)
-    assert results(desk.tell(item(len(rows) - 1, rows[-1]))) == [Result.ERROR]
+    assert results(desk.tell(item(len(rows) - 1, rows[-1]))) == [MavResult.ERROR]
 
 
 def test_the_last_item_again_is_accepted_by_px4_any_other_is_an_error() -> None:
     desk, rows = desk_for("px4"), rows_for("px4", 3)
     upload(desk, rows)
-    assert results(desk.tell(item(2, rows[2]))) == [Result.ACCEPTED]
-    assert results(desk.tell(item(1, rows[1]))) == [Result.ERROR]
+    assert results(desk.tell(item(2, rows[2]))) == [MavResult.ACCEPTED]
+    assert results(desk.tell(item(1, rows[1]))) == [MavResult.ERROR]
 
 
 @pytest.mark.parametrize("complete_only", [True, False])
@@ -171,7 +171,7 @@ def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only: bool) -> None:
     desk.tell(count(3))
     desk.tell(item(0, rows[0]))
     desk.wait(6)
-    late = Result.ERROR if complete_only else Result.ACCEPTED
+    late = MavResult.ERROR if complete_only else MavResult.ACCEPTED
     assert results(desk.tell(item(0, rows[0]))) == [late]
     assert stored(desk) == []
 
@@ -190,12 +190,12 @@ def test_ardupilot_is_left_with_old_and_new_items_px4_is_not() -> None:
 
 
 def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4() -> None:
-    for kind, refusal in (("ardupilot", Result.DENIED), ("px4", Result.ERROR)):
+    for kind, refusal in (("ardupilot", MavResult.DENIED), ("px4", MavResult.ERROR)):
         desk, rows = desk_for(kind), rows_for(kind, 3)
         desk.tell(count(len(rows)))
         assert results(desk.tell(count(3), FOREIGN)) == [refusal]
         out = desk.tell(item(0, rows[0]), FOREIGN)
-        assert results(out) == ([Result.DENIED] if kind == "ardupilot" else [])
+        assert results(out) == ([MavResult.DENIED] if kind == "ardupilot" else [])
         out = desk.tell(item(0, rows[0]))
         assert asked(out) == [1]
 
@@ -212,14 +212,14 @@ def test_a_count_again_is_an_error_for_px4_once_it_has_an_item() -> None:
     desk.tell(count(3))
     assert asked(desk.tell(count(3))) == [0]
     desk.tell(item(0, rows[0]))
-    assert results(desk.tell(count(3))) == [Result.ERROR]
+    assert results(desk.tell(count(3))) == [MavResult.ERROR]
     assert asked(desk.tell(item(1, rows[1]))) == [2]
 
 
 def test_downloading_during_an_upload() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
-    assert results(desk.tell(MissionRequestList(TO, 0))) == [Result.DENIED]
+    assert results(desk.tell(MissionRequestList(TO, 0))) == [MavResult.DENIED]
     desk = desk_for("px4")
     desk.tell(count(3))
     out = desk.tell(MissionRequestList(TO, 0))
@@ -231,32 +231,32 @@ def test_ardupilot_takes_two_lists_at_once_px4_does_not() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
     assert asked(desk.tell(count(1, RALLY))) == [0]
-    assert results(desk.tell(item(0, RALLY_ROW, RALLY))) == [Result.ACCEPTED]
+    assert results(desk.tell(item(0, RALLY_ROW, RALLY))) == [MavResult.ACCEPTED]
     desk = desk_for("px4")
     desk.tell(count(3))
     # Before the first item it takes any count for a repetition of the one that it knows.
     (request,) = desk.tell(count(1, RALLY))
     assert request.mission_type == MISSION
     desk.tell(item(0, rows_for("px4")[0]))
-    assert results(desk.tell(count(1, RALLY))) == [Result.ERROR]
+    assert results(desk.tell(count(1, RALLY))) == [MavResult.ERROR]
 
 
 def test_too_many_items() -> None:
     for kind, limit in (("ardupilot", 655), ("px4", 1000)):
         desk = desk_for(kind)
-        assert results(desk.tell(count(16_000))) == [Result.NO_SPACE]
-        assert results(desk.tell(count(limit + 1))) == [Result.NO_SPACE]
+        assert results(desk.tell(count(16_000))) == [MavResult.NO_SPACE]
+        assert results(desk.tell(count(limit + 1))) == [MavResult.NO_SPACE]
         assert asked(desk.tell(count(limit))) == [0]
 
 
 def test_an_unknown_list() -> None:
-    assert results(desk_for("ardupilot").tell(count(1, 230))) == [Result.UNSUPPORTED]
-    assert results(desk_for("px4").tell(count(1, 230))) == [Result.INVALID]
+    assert results(desk_for("ardupilot").tell(count(1, 230))) == [MavResult.UNSUPPORTED]
+    assert results(desk_for("px4").tell(count(1, 230))) == [MavResult.INVALID]
 
 
 def test_ardupilot_has_no_space_while_it_boots() -> None:
     desk = desk_for("ardupilot", boot=5.0)
-    assert results(desk.tell(count(3))) == [Result.NO_SPACE]
+    assert results(desk.tell(count(3))) == [MavResult.NO_SPACE]
     desk.wait(5.1)
     assert asked(desk.tell(count(3))) == [0]
 
@@ -265,11 +265,11 @@ def test_partial_lists() -> None:
     desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 4)
     upload(desk, rows)
     wrong = MissionWritePartialList(TO, 0, 2, 99)
-    assert results(desk.tell(wrong)) == [Result.ERROR]
+    assert results(desk.tell(wrong)) == [MavResult.ERROR]
     assert asked(desk.tell(MissionWritePartialList(TO, 0, 2, 3))) == [2]
     other = rows_for("ardupilot", 4, shift=0.1)
     desk.tell(item(2, other[2]))
-    assert results(desk.tell(item(3, other[3]))) == [Result.ACCEPTED]
+    assert results(desk.tell(item(3, other[3]))) == [MavResult.ACCEPTED]
     assert stored(desk) == places((*rows[:2], *other[2:4], *rows[4:]))
 
 
@@ -278,17 +278,17 @@ def test_clearing_one_list_leaves_the_others() -> None:
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
         upload(desk, (RALLY_ROW,), RALLY)
-        assert results(desk.tell(MissionClearAll(TO, 0))) == [Result.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(TO, 0))) == [MavResult.ACCEPTED]
         assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
         assert len(stored(desk, RALLY)) == 1
-        assert results(desk.tell(MissionClearAll(TO, 255))) == [Result.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(TO, 255))) == [MavResult.ACCEPTED]
         assert stored(desk, RALLY) == []
 
 
 def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothing() -> None:
     desk = desk_for("ardupilot")
     desk.tell(count(3))
-    assert results(desk.tell(MissionClearAll(TO, 0))) == [Result.ERROR]
+    assert results(desk.tell(MissionClearAll(TO, 0))) == [MavResult.ERROR]
     desk = desk_for("px4")
     desk.tell(count(3))
     assert results(desk.tell(MissionClearAll(TO, 0))) == []
@@ -298,14 +298,14 @@ def test_a_count_of_none_clears() -> None:
     for kind in ("ardupilot", "px4"):
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
-        assert results(desk.tell(count(0))) == [Result.ACCEPTED]
+        assert results(desk.tell(count(0))) == [MavResult.ACCEPTED]
         assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
 
 
 def test_px4_changes_its_request_when_told_unsupported() -> None:
     desk = desk_for("px4-legacy-first")
     (request,) = desk.tell(count(3))
-    (other,) = desk.tell(MissionAck(TO, 0, Result.UNSUPPORTED))
+    (other,) = desk.tell(MissionAck(TO, 0, MavResult.UNSUPPORTED))
     assert (request.legacy, other.legacy) == (True, False)
     assert other.seq == 0
 
@@ -313,7 +313,7 @@ def test_px4_changes_its_request_when_told_unsupported() -> None:
 def test_px4_is_freed_by_a_cancellation() -> None:
     desk = desk_for("px4")
     desk.tell(count(3))
-    desk.tell(MissionAck(TO, 0, Result.OPERATION_CANCELLED))
+    desk.tell(MissionAck(TO, 0, MavResult.OPERATION_CANCELLED))
     assert asked(desk.wait(3)) == []
     assert asked(desk.tell(count(3), FOREIGN)) == [0]
 
@@ -326,7 +326,7 @@ def test_px4_downloads_in_order_only() -> None:
     for seq in (0, 0, 1):
         (answer,) = desk.tell(MissionRequestInt(TO, 0, seq))
         assert answer.seq == seq
-    assert results(desk.tell(MissionRequestInt(TO, 0, 3))) == [Result.ERROR]
+    assert results(desk.tell(MissionRequestInt(TO, 0, 3))) == [MavResult.ERROR]
     assert desk.tell(MissionRequestInt(TO, 0, 1)) == []
 
 
@@ -336,8 +336,8 @@ def test_ardupilot_downloads_in_any_order() -> None:
     for seq in (3, 0, 2):
         (answer,) = desk.tell(MissionRequestInt(TO, 0, seq, legacy=True))
         assert (answer.seq, answer.legacy) == (seq, True)
-    assert results(desk.tell(MissionRequestInt(TO, 0, 9))) == [Result.ERROR]
-    assert results(desk.tell(MissionRequestInt(TO, 2, 9))) == [Result.INVALID_SEQUENCE]
+    assert results(desk.tell(MissionRequestInt(TO, 0, 9))) == [MavResult.ERROR]
+    assert results(desk.tell(MissionRequestInt(TO, 2, 9))) == [MavResult.INVALID_SEQUENCE]
 
 
 NAN = float("nan")
@@ -346,26 +346,38 @@ NAN = float("nan")
 @pytest.mark.parametrize(
     ("kind", "row", "result"),
     [
-        ("ardupilot", WireItem(16, 1, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
-        ("ardupilot", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("ardupilot", WireItem(1, 3, (0.0,) * 4, *PLACE, 9.0), Result.INVALID),
-        ("ardupilot", WireItem(16, 3, (0.0, NAN, 0.0, 0.0), *PLACE, 9.0), Result.INVALID_PARAM2),
-        ("ardupilot", WireItem(16, 3, (0.0,) * 4, 910_000_000, 0, 9.0), Result.INVALID_PARAM5_X),
-        ("ardupilot", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("ardupilot", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
-        ("px4", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
-        ("px4", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED),
-        ("px4", WireItem(178, 2, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.ACCEPTED),
-        ("px4", WireItem(178, 10, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), Result.UNSUPPORTED_FRAME),
-        ("px4", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED_FRAME),
-        ("px4", WireItem(16, 2, (0.0,) * 4, *PLACE, 9.0), Result.UNSUPPORTED),
-        ("px4", WireItem(16, 3, (NAN,) * 4, *PLACE, 9.0), Result.ACCEPTED),
-        ("px4", WireItem(20, 3, (0.0,) * 4, 0, 0, 0.0), Result.UNSUPPORTED),
-        ("px4", WireItem(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0), Result.ERROR),
-        ("px4", WireItem(16, 3, (0.0,) * 4, 0, 1_810_000_000, 9.0), Result.INVALID_PARAM6_Y),
+        ("ardupilot", WireItem(16, 1, (0.0,) * 4, *PLACE, 9.0), MavResult.UNSUPPORTED_FRAME),
+        ("ardupilot", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), MavResult.ACCEPTED),
+        ("ardupilot", WireItem(1, 3, (0.0,) * 4, *PLACE, 9.0), MavResult.INVALID),
+        (
+            "ardupilot",
+            WireItem(16, 3, (0.0, NAN, 0.0, 0.0), *PLACE, 9.0),
+            MavResult.INVALID_PARAM2,
+        ),
+        (
+            "ardupilot",
+            WireItem(16, 3, (0.0,) * 4, 910_000_000, 0, 9.0),
+            MavResult.INVALID_PARAM5_X,
+        ),
+        ("ardupilot", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), MavResult.ACCEPTED),
+        ("ardupilot", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), MavResult.ACCEPTED),
+        ("px4", WireItem(82, 3, (0.0,) * 4, *PLACE, 9.0), MavResult.UNSUPPORTED),
+        ("px4", WireItem(178, 3, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), MavResult.UNSUPPORTED),
+        ("px4", WireItem(178, 2, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0), MavResult.ACCEPTED),
+        (
+            "px4",
+            WireItem(178, 10, (1.0, 5.0, -1.0, 0.0), 0, 0, 0.0),
+            MavResult.UNSUPPORTED_FRAME,
+        ),
+        ("px4", WireItem(16, 10, (0.0,) * 4, *PLACE, 9.0), MavResult.UNSUPPORTED_FRAME),
+        ("px4", WireItem(16, 2, (0.0,) * 4, *PLACE, 9.0), MavResult.UNSUPPORTED),
+        ("px4", WireItem(16, 3, (NAN,) * 4, *PLACE, 9.0), MavResult.ACCEPTED),
+        ("px4", WireItem(20, 3, (0.0,) * 4, 0, 0, 0.0), MavResult.UNSUPPORTED),
+        ("px4", WireItem(5001, 0, (3.0, 0.0, 0.0, 0.0), *PLACE, 0.0), MavResult.ERROR),
+        ("px4", WireItem(16, 3, (0.0,) * 4, 0, 1_810_000_000, 9.0), MavResult.INVALID_PARAM6_Y),
     ],
 )
-def test_which_items_are_refused(kind: MockKind, row: WireItem, result: Result) -> None:
+def test_which_items_are_refused(kind: MockKind, row: WireItem, result: MavResult) -> None:
     desk = desk_for(kind)
     first = rows_for(kind, 2)[:1]
     assert upload(desk, (*first, row)) == [result]
@@ -380,15 +392,15 @@ def test_a_fence_is_checked_and_replaced_as_a_whole() -> None:
     desk.wait(10)
     assert stored(desk, FENCE) == places((corner,) * 3)
     thin = WireItem(5001, 0, (2.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
-    for kind, result in (("ardupilot", Result.INVALID_PARAM1), ("px4", Result.ERROR)):
+    for kind, result in (("ardupilot", MavResult.INVALID_PARAM1), ("px4", MavResult.ERROR)):
         assert upload(desk_for(kind), (thin,), FENCE) == [result]
 
 
 def test_refusals_can_be_prescribed() -> None:
-    manners = behaviour_of("ardupilot", refusals={(MISSION, 1): Result.INVALID_PARAM3})
+    manners = behaviour_of("ardupilot", refusals={(MISSION, 1): MavResult.INVALID_PARAM3})
     desk = desk_for(manners)
     rows = rows_for("ardupilot", 2)
-    assert upload(desk, rows[:2]) == [Result.INVALID_PARAM3]
+    assert upload(desk, rows[:2]) == [MavResult.INVALID_PARAM3]
 
 
 def test_numbers_tell_px4_lists_apart() -> None:
@@ -397,6 +409,6 @@ def test_numbers_tell_px4_lists_apart() -> None:
     for shift in (0.0, 0.1, 0.0):
         upload(desk, rows_for("px4", 3, shift))
         (found,) = desk.tell(MissionRequestList(TO, 0))
-        desk.tell(MissionAck(TO, 0, Result.ACCEPTED))
+        desk.tell(MissionAck(TO, 0, MavResult.ACCEPTED))
         numbers.append(found.opaque_id)
     assert numbers[0] == numbers[2] != numbers[1]

@@ -28,7 +28,7 @@ from faao_mav.mavlink.messages import (
     SetMode,
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, MissionType, Result
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
@@ -178,7 +178,7 @@ def test_ardupilot_does_not_clear_what_it_flies() -> None:
     desk = desk_for("ardupilot", a_mission(5))
     take_off(desk, "ardupilot")
     (ack,) = desk.tell(MissionClearAll(TO, 0))
-    assert ack.type == Result.ERROR
+    assert ack.type == MavResult.ERROR
 
 
 @BOTH

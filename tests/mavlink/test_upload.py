@@ -19,8 +19,8 @@ from faao_mav.mavlink.messages import (
 from faao_mav.mavlink.protocol import (
     GROUND_STATION,
     Address,
+    MavResult,
     MissionType,
-    Result,
 )
 from faao_mav.mavlink.transfer.upload import Upload
 
@@ -36,7 +36,7 @@ def request(
 
 
 def ack(
-    result: Result, *, target: Address = ME, mission_type: int = 0, opaque_id: int = 0
+    result: MavResult, *, target: Address = ME, mission_type: int = 0, opaque_id: int = 0
 ) -> MissionAck:
     return MissionAck(target, mission_type, result, opaque_id)
 
@@ -62,7 +62,7 @@ def test_a_whole_upload(firmware: str) -> None:
     assert desk.sent == [MissionCount(VEHICLE, 0, 3)]
     for seq in range(3):
         assert desk.tell(request(seq)) == [MissionItemInt(VEHICLE, 0, seq, ROWS[seq])]
-    desk.tell(ack(Result.ACCEPTED, opaque_id=77))
+    desk.tell(ack(MavResult.ACCEPTED, opaque_id=77))
     assert desk.machine.outcome.status == "accepted"
     assert desk.machine.outcome.opaque_id == 77
     assert desk.machine.deadline is None
@@ -105,7 +105,7 @@ def test_a_slow_vehicle_is_no_silent_one() -> None:
         desk.wait(0.8 * 1.5)
         desk.tell(request(seq))
     desk.wait(0.8 * 1.5)
-    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(ack(MavResult.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
     assert desk.sent.count(MissionCount(VEHICLE, 0, 3)) == 1
 
@@ -117,7 +117,7 @@ def test_a_vehicle_that_stops_asking_is_silent_and_is_told(firmware: str) -> Non
     desk.wait(8.9)
     assert not desk.machine.outcome
     sent = desk.wait(2.0)
-    assert sent[-1] == MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)
+    assert sent[-1] == MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
     assert desk.machine.outcome.status == "silent"
     assert desk.machine.outcome.last_requested == 0
 
@@ -142,7 +142,7 @@ def test_px4_is_never_sent_the_last_item_before_it_asks() -> None:
     assert seqs(desk.wait(0.8)) == [2, 1, 2, 1]
     desk.tell(request(2))
     assert seqs(desk.wait(1.1)) == [2]
-    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(ack(MavResult.ACCEPTED))
     assert not desk.machine.outcome
 
 
@@ -152,7 +152,7 @@ def test_what_px4_has_taken_unasked_is_sent() -> None:
     desk.wait(0.3)
     for seq in (2, 3, 4):  # the request for item 1 was lost
         desk.tell(request(seq))
-    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(ack(MavResult.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
     assert desk.machine.progress == ("uploading mission", 5, 5)
 
@@ -164,8 +164,8 @@ def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
         assert desk.wait(8.0) == []
 
 
-@pytest.mark.parametrize("result", [Result.INVALID_PARAM1, Result.ERROR])
-def test_which_item_px4_refuses_is_found_out(result: Result) -> None:
+@pytest.mark.parametrize("result", [MavResult.INVALID_PARAM1, MavResult.ERROR])
+def test_which_item_px4_refuses_is_found_out(result: MavResult) -> None:
     desk = desk_for("px4", rows_for("px4", 9))
     desk.tell(request(0))
     desk.wait(0.3)
@@ -185,10 +185,10 @@ def test_ardupilot_is_sent_an_item_again_and_the_next_when_it_has_that() -> None
     desk.tell(request(0))
     again = desk.wait(0.3)
     assert [message.seq for message in again] == [0]
-    (following,) = desk.tell(ack(Result.INVALID_SEQUENCE))
+    (following,) = desk.tell(ack(MavResult.INVALID_SEQUENCE))
     assert following.seq == 1
     # Said again, of the same repetition, it is no news.
-    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []
+    assert desk.tell(ack(MavResult.INVALID_SEQUENCE)) == []
 
 
 @pytest.mark.parametrize(("count", "ahead"), [(9, [2, 3, 4]), (4, [2])])
@@ -200,23 +200,23 @@ def test_ardupilot_is_sent_three_items_ahead_and_not_the_last_one(
     sent: list[int] = []
     for _ in range(5):
         desk.wait(1.6)
-        sent += seqs(desk.tell(ack(Result.INVALID_SEQUENCE)))
+        sent += seqs(desk.tell(ack(MavResult.INVALID_SEQUENCE)))
     assert sent == ahead
     assert set(seqs(desk.wait(1.6))) == {ahead[-1]}
 
 
 def test_invalid_sequence_from_ardupilot_ends_nothing() -> None:
     desk = asked_for_all("ardupilot")
-    desk.tell(ack(Result.INVALID_SEQUENCE))
+    desk.tell(ack(MavResult.INVALID_SEQUENCE))
     assert not desk.machine.outcome
-    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(ack(MavResult.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
 
 def test_a_lost_last_answer_of_px4_is_asked_for_by_the_last_item() -> None:
     desk = asked_for_all("px4")
     assert desk.wait(0.3) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])]
-    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(ack(MavResult.ACCEPTED))
     assert desk.machine.outcome.status == "accepted"
 
 
@@ -234,14 +234,14 @@ def test_ardupilot_is_never_sent_the_last_item_unasked() -> None:
 
 def test_ardupilot_tells_by_the_item_before_whether_it_waits_for_the_last() -> None:
     desk = asked_for_all("ardupilot")
-    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == []  # of something earlier
+    assert desk.tell(ack(MavResult.INVALID_SEQUENCE)) == []  # of something earlier
     assert desk.wait(0.3) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])]
-    assert desk.tell(ack(Result.INVALID_SEQUENCE)) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])]
+    assert desk.tell(ack(MavResult.INVALID_SEQUENCE)) == [MissionItemInt(VEHICLE, 0, 2, ROWS[2])]
     assert desk.wait(0.6) == [MissionItemInt(VEHICLE, 0, 1, ROWS[1])]
-    desk.tell(ack(Result.ERROR))
+    desk.tell(ack(MavResult.ERROR))
     desk.wait(0.6)
     outcome = desk.machine.outcome
-    assert (outcome.status, outcome.result) == ("unknown", Result.ERROR)
+    assert (outcome.status, outcome.result) == ("unknown", MavResult.ERROR)
 
 
 def test_of_a_single_item_there_is_none_before() -> None:
@@ -254,30 +254,35 @@ def test_of_a_single_item_there_is_none_before() -> None:
 def test_an_error_after_everything_was_sent_leaves_it_to_reading_back() -> None:
     # ArduPilot says it of a duplicate of the last item; ACCEPTED may have been lost before.
     desk = asked_for_all("ardupilot")
-    desk.tell(ack(Result.ERROR))
+    desk.tell(ack(MavResult.ERROR))
     desk.wait(3)
     assert desk.machine.outcome.status == "unknown"
-    assert desk.machine.outcome.result == Result.ERROR
+    assert desk.machine.outcome.result == MavResult.ERROR
 
 
 def test_an_early_acceptance_is_about_something_else() -> None:
     desk = desk_for("px4")
-    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(ack(MavResult.ACCEPTED))
     desk.tell(request(0))
-    desk.tell(ack(Result.ACCEPTED))
+    desk.tell(ack(MavResult.ACCEPTED))
     assert not desk.machine.outcome
 
 
 FINAL = sorted(
-    set(Result)
-    - {Result.ACCEPTED, Result.ERROR, Result.INVALID_SEQUENCE, Result.OPERATION_CANCELLED}
+    set(MavResult)
+    - {
+        MavResult.ACCEPTED,
+        MavResult.ERROR,
+        MavResult.INVALID_SEQUENCE,
+        MavResult.OPERATION_CANCELLED,
+    }
 )
 
 
 @BOTH
 @pytest.mark.parametrize("result", FINAL)
 @pytest.mark.parametrize("requests", [0, 1, 3])
-def test_a_refusal_is_final_at_any_moment(firmware: str, result: Result, requests: int) -> None:
+def test_a_refusal_is_final_at_any_moment(firmware: str, result: MavResult, requests: int) -> None:
     desk = desk_for(firmware)
     for seq in range(requests):
         desk.tell(request(seq))
@@ -294,7 +299,7 @@ def test_a_refusal_is_final_at_any_moment(firmware: str, result: Result, request
 def test_an_error_is_final_when_nothing_more_is_asked_for() -> None:
     desk = desk_for("px4")
     desk.tell(request(0))
-    desk.tell(ack(Result.ERROR))
+    desk.tell(ack(MavResult.ERROR))
     desk.wait(1.6)
     assert desk.machine.outcome.status == "refused"
 
@@ -302,7 +307,7 @@ def test_an_error_is_final_when_nothing_more_is_asked_for() -> None:
 def test_an_error_about_a_duplicate_count_does_not_end_the_transfer() -> None:
     desk = desk_for("px4")
     desk.tell(request(0))
-    desk.tell(ack(Result.ERROR))
+    desk.tell(ack(MavResult.ERROR))
     desk.wait(0.2)
     desk.tell(request(1))
     desk.wait(5)
@@ -312,39 +317,42 @@ def test_an_error_about_a_duplicate_count_does_not_end_the_transfer() -> None:
 def test_a_busy_px4_is_asked_again_until_it_is_free() -> None:
     desk = desk_for("px4")
     for _ in range(3):
-        desk.tell(ack(Result.ERROR))
+        desk.tell(ack(MavResult.ERROR))
         assert desk.wait(1.5) == [MissionCount(VEHICLE, 0, 3)]
     assert desk.tell(request(0)) == [MissionItemInt(VEHICLE, 0, 0, ROWS[0])]
 
 
 def test_a_px4_that_stays_busy_has_refused() -> None:
     desk = desk_for("px4")
-    desk.tell(ack(Result.ERROR))
+    desk.tell(ack(MavResult.ERROR))
     desk.wait(60)
-    assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", Result.ERROR)
+    assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
+        "refused",
+        MavResult.ERROR,
+    )
 
 
 def test_no_space_while_booting_means_not_yet() -> None:
     desk = desk_for("ardupilot")
     desk.tell(Heartbeat(2, 3, 0, 0, 2))
-    desk.tell(ack(Result.NO_SPACE))
+    desk.tell(ack(MavResult.NO_SPACE))
     assert desk.wait(20) == []
     desk.tell(Heartbeat(2, 3, 0, 0, 2))
     assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(VEHICLE, 0, 3)]
-    desk.tell(ack(Result.NO_SPACE))
+    desk.tell(ack(MavResult.NO_SPACE))
     desk.wait(0.5)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
         "refused",
-        Result.NO_SPACE,
+        MavResult.NO_SPACE,
     )
 
 
 def test_booting_for_ever_ends_too() -> None:
     desk = desk_for("ardupilot")
     desk.tell(Heartbeat(2, 3, 0, 0, 1))
-    desk.tell(ack(Result.NO_SPACE))
+    desk.tell(ack(MavResult.NO_SPACE))
     desk.wait(120)
-    assert desk.machine.outcome.result == Result.NO_SPACE
+    assert desk.machine.outcome.result == MavResult.NO_SPACE
 
 
 @pytest.mark.parametrize(
@@ -356,9 +364,9 @@ def test_booting_for_ever_ends_too() -> None:
         (request(0, target=FOREIGN), VEHICLE),
         (request(0, target=Address(255, 1)), VEHICLE),
         (request(0, mission_type=1), VEHICLE),
-        (ack(Result.DENIED), FOREIGN),
-        (ack(Result.DENIED, target=FOREIGN), VEHICLE),
-        (ack(Result.DENIED, mission_type=2), VEHICLE),
+        (ack(MavResult.DENIED), FOREIGN),
+        (ack(MavResult.DENIED, target=FOREIGN), VEHICLE),
+        (ack(MavResult.DENIED, mission_type=2), VEHICLE),
         (MissionCount(ME, 0, 3), VEHICLE),
         (Heartbeat(2, 3, 128, 0, 4), VEHICLE),
     ],
@@ -375,16 +383,16 @@ def test_what_is_said_to_others_or_about_other_lists_is_ignored(
 @BOTH
 def test_acceptance_by_another_vehicle_is_none(firmware: str) -> None:
     desk = asked_for_all(firmware)
-    desk.tell(ack(Result.ACCEPTED), Address(2, 1))
-    desk.tell(ack(Result.ACCEPTED, target=FOREIGN))
-    desk.tell(ack(Result.ACCEPTED, mission_type=1))
+    desk.tell(ack(MavResult.ACCEPTED), Address(2, 1))
+    desk.tell(ack(MavResult.ACCEPTED, target=FOREIGN))
+    desk.tell(ack(MavResult.ACCEPTED, mission_type=1))
     assert not desk.machine.outcome
 
 
 def test_who_gives_up_tells_the_vehicle() -> None:
     desk = desk_for("px4")
     desk.tell(request(0))
-    assert desk.machine.cancel(desk.now) == [MissionAck(VEHICLE, 0, Result.OPERATION_CANCELLED)]
+    assert desk.machine.cancel(desk.now) == [MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)]
     assert desk.machine.outcome.status == "cancelled"
     assert desk.machine.cancel(desk.now) == ()
 
@@ -392,9 +400,9 @@ def test_who_gives_up_tells_the_vehicle() -> None:
 def test_the_vehicle_may_give_up_as_well() -> None:
     desk = desk_for("ardupilot")
     desk.tell(request(0))
-    desk.tell(ack(Result.OPERATION_CANCELLED))
+    desk.tell(ack(MavResult.OPERATION_CANCELLED))
     outcome = desk.machine.outcome
-    assert (outcome.status, outcome.result) == ("cancelled", Result.OPERATION_CANCELLED)
+    assert (outcome.status, outcome.result) == ("cancelled", MavResult.OPERATION_CANCELLED)
 
 
 def test_progress_counts_rows() -> None:

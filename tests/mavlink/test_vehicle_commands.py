@@ -19,8 +19,7 @@ from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
 from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import running
-from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mavlink.protocol import Result as MissionResult
+from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import read_mission, write_wpl
@@ -120,7 +119,7 @@ def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path, port: int)
 
 
 def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
-    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): MissionResult.INVALID_PARAM7}))
+    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): MavResult.INVALID_PARAM7}))
     with running(mock, f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
     assert result.exit_code == 1

@@ -30,7 +30,7 @@ from faao_mav.vehicle.dialect import Dialect, Limit, SpeedChange
 from faao_mav.vehicle.files import autopilot_of, parameter_path
 from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import Parameter, ParameterValues, table
-from faao_mav.vehicle.px4.model import Px4
+from faao_mav.vehicle.px4.flight_model import Px4
 
 TOY = AutopilotFamily(
     key="toy",

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 from faao_mav.errors import InputError
 from faao_mav.vehicle import ARDUPLANE, Vehicle
-from faao_mav.vehicle.ardupilot.plane.model import ArduPlane
+from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane
 from faao_mav.vehicle.flight_path import FlightPath
 
 PLANE = ArduPlane()

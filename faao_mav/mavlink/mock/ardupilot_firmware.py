@@ -18,7 +18,7 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.mock.firmware import MockFirmware
-from faao_mav.mavlink.protocol import ALL_TYPES, Address, MavSeverity, MissionType, Result
+from faao_mav.mavlink.protocol import ALL_TYPES, Address, MavResult, MavSeverity, MissionType
 from faao_mav.vehicle.ardupilot import ARDUPILOT
 
 
@@ -44,9 +44,9 @@ class ArduPilotFirmware(MockFirmware):
     mission_limit = 655  # as in its simulator
     modes = MappingProxyType({"copter": (0, 3), "plane": (2, 10)})  # COPTER_MODE, PLANE_MODE
     parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
-    misplaced = Result.UNSUPPORTED
-    thin_polygon = Result.INVALID_PARAM1
-    nonsense = Result.INVALID
+    misplaced = MavResult.UNSUPPORTED
+    thin_polygon = MavResult.INVALID_PARAM1
+    nonsense = MavResult.INVALID
 
     @property
     def deadline(self) -> float | None:
@@ -67,7 +67,7 @@ class ArduPilotFirmware(MockFirmware):
             return self._on_clear(sender, mission_type, tuple(MissionType))
         if mission_type not in tuple(MissionType):
             known = isinstance(message, MissionAck)
-            return [] if known else [MissionAck(sender, mission_type, Result.UNSUPPORTED)]
+            return [] if known else [MissionAck(sender, mission_type, MavResult.UNSUPPORTED)]
         part = MissionType(mission_type)
         match message:
             case MissionCount(count=count):
@@ -91,7 +91,7 @@ class ArduPilotFirmware(MockFirmware):
             if now >= upload.last_item_time + self._manners.upload_patience:
                 del self._uploads[part]
                 out.append(Statustext(MavSeverity.WARNING, "Mission upload timeout"))
-                out.append(MissionAck(upload.partner, part, Result.OPERATION_CANCELLED))
+                out.append(MissionAck(upload.partner, part, MavResult.OPERATION_CANCELLED))
             elif now >= upload.last_request_time + self._manners.request_period:
                 out.append(self._ask(part, upload, now))
         return out
@@ -107,15 +107,15 @@ class ArduPilotFirmware(MockFirmware):
     ) -> list[Message]:
         upload = self._uploads.get(part)
         if upload is not None and upload.partner != sender:
-            return [MissionAck(sender, part, Result.DENIED)]
+            return [MissionAck(sender, part, MavResult.DENIED)]
         result, limit = self.check_count(part, count), self.size_limit(part)
-        if result != Result.ACCEPTED:
+        if result != MavResult.ACCEPTED:
             text = Statustext(MavSeverity.WARNING, f"Only {limit} items are supported")
             return [MissionAck(sender, part, result), *([text] if count > limit else [])]
         if count == 0:
             self._lists.clear(part)
             self._uploads.pop(part, None)
-            return [MissionAck(sender, part, Result.ACCEPTED)]
+            return [MissionAck(sender, part, MavResult.ACCEPTED)]
         if part is not MissionType.FENCE:
             self._lists.truncate(part, count)
         return self._begin(sender, part, 0, count - 1, now)
@@ -125,7 +125,7 @@ class ArduPilotFirmware(MockFirmware):
     ) -> list[Message]:
         count = len(self._lists.items(part))
         if not 0 <= first <= last <= count:
-            return [MissionAck(sender, part, Result.ERROR)]
+            return [MissionAck(sender, part, MavResult.ERROR)]
         return self._begin(sender, part, first, last, now)
 
     def _begin(
@@ -144,13 +144,13 @@ class ArduPilotFirmware(MockFirmware):
     ) -> list[Message]:
         upload = self._uploads.get(part)
         if upload is None:
-            return [MissionAck(sender, part, Result.ERROR)]
+            return [MissionAck(sender, part, MavResult.ERROR)]
         if seq != upload.next_sequence:
-            return [MissionAck(sender, part, Result.INVALID_SEQUENCE)]
+            return [MissionAck(sender, part, MavResult.INVALID_SEQUENCE)]
         if sender != upload.partner:
-            return [MissionAck(sender, part, Result.DENIED)]
+            return [MissionAck(sender, part, MavResult.DENIED)]
         result = self.check_item(part, seq, item)
-        if result != Result.ACCEPTED:
+        if result != MavResult.ACCEPTED:
             del self._uploads[part]
             return [MissionAck(sender, part, result)]
         if part is MissionType.FENCE:
@@ -163,11 +163,11 @@ class ArduPilotFirmware(MockFirmware):
         if part is MissionType.FENCE:
             self._lists.replace(part, upload.fence)
         del self._uploads[part]
-        return [MissionAck(sender, part, Result.ACCEPTED)]
+        return [MissionAck(sender, part, MavResult.ACCEPTED)]
 
     def _on_list(self, sender: Address, part: MissionType) -> list[Message]:
         if part in self._uploads:
-            return [MissionAck(sender, part, Result.DENIED)]
+            return [MissionAck(sender, part, MavResult.DENIED)]
         count = len(self._lists.items(part))
         return [MissionCount(sender, part, count)]
 
@@ -176,9 +176,9 @@ class ArduPilotFirmware(MockFirmware):
     ) -> list[Message]:
         items = self._lists.items(part)
         if part in self._uploads and not request.legacy:
-            return [MissionAck(sender, part, Result.DENIED)]
+            return [MissionAck(sender, part, MavResult.DENIED)]
         if request.seq >= len(items):
-            wrong = Result.ERROR if part is MissionType.MISSION else Result.INVALID_SEQUENCE
+            wrong = MavResult.ERROR if part is MissionType.MISSION else MavResult.INVALID_SEQUENCE
             return [MissionAck(sender, part, wrong)]
         return [MissionItemInt(sender, part, request.seq, items[request.seq], request.legacy)]
 
@@ -187,7 +187,7 @@ class ArduPilotFirmware(MockFirmware):
     ) -> list[Message]:
         flown = MissionType.MISSION in parts and self._flying()
         if flown or any(part in self._uploads for part in parts):
-            return [MissionAck(sender, mission_type, Result.ERROR)]
+            return [MissionAck(sender, mission_type, MavResult.ERROR)]
         for part in parts:
             self._lists.clear(part)
-        return [MissionAck(sender, mission_type, Result.ACCEPTED)]
+        return [MissionAck(sender, mission_type, MavResult.ACCEPTED)]

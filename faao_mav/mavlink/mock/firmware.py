@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from faao_mav.mavlink.manners import manners_of
 from faao_mav.mavlink.messages import CommandLong, Envelope, Message, WireItem
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.wire_items import home_items, mission_item, wire_item
 from faao_mav.mission.command import POLYGON, RALLY_POINT, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
@@ -20,7 +20,7 @@ from faao_mav.vehicle.dialect import FENCE_ROWS, ROWS_BESIDE
 COUNT = -1
 """In `Behaviour.refusals`: instead of an item, the announcement of the list."""
 
-_FIELDS = range(Result.INVALID_PARAM1, Result.INVALID_PARAM7 + 1)
+_FIELDS = range(MavResult.INVALID_PARAM1, MavResult.INVALID_PARAM7 + 1)
 """What is wrong if param1 to param4, x, y or z is."""
 
 
@@ -84,7 +84,7 @@ class Behaviour:
     """
 
     firmware: "type[MockFirmware]"
-    refusals: Mapping[tuple[int, int], Result] = field(default_factory=dict)
+    refusals: Mapping[tuple[int, int], MavResult] = field(default_factory=dict)
     legacy_first: bool = False
     complete_only: bool = True
 
@@ -115,9 +115,9 @@ class MockFirmware(ABC):
     mission_limit: ClassVar[int]
     modes: ClassVar[Mapping[str, tuple[int, int]]]
     parameters: ClassVar[Mapping[str, float]] = {}
-    misplaced: ClassVar[Result]
-    thin_polygon: ClassVar[Result]
-    nonsense: ClassVar[Result]
+    misplaced: ClassVar[MavResult]
+    thin_polygon: ClassVar[MavResult]
+    nonsense: ClassVar[MavResult]
     silent_at_boot: ClassVar[bool] = False
 
     def __init__(
@@ -158,19 +158,19 @@ class MockFirmware(ABC):
         """Return why `mission` is not flown though it was taken, None if it is."""
         return None
 
-    def check_count(self, part: MissionType, count: int) -> Result:
+    def check_count(self, part: MissionType, count: int) -> MavResult:
         """Return what it answers to the announcement of `count` items."""
         if (refusal := self._behaviour.refusals.get((part, COUNT))) is not None:
             return refusal
         fits = self._ready() and count <= self.size_limit(part)
-        return Result.ACCEPTED if fits else Result.NO_SPACE
+        return MavResult.ACCEPTED if fits else MavResult.NO_SPACE
 
     def size_limit(self, part: MissionType) -> int:
         """Return how many items of that list it holds."""
         dialect = self._lists.vehicle.dialect
         return (self.mission_limit, dialect.fence_rows, dialect.rally_rows)[part]
 
-    def check_item(self, part: MissionType, seq: int, item: WireItem) -> Result:
+    def check_item(self, part: MissionType, seq: int, item: WireItem) -> MavResult:
         """Return what it answers to `item`, number `seq` of that list."""
         if (refusal := self._behaviour.refusals.get((part, seq))) is not None:
             return refusal
@@ -181,30 +181,30 @@ class MockFirmware(ABC):
                 return self.nonsense
             return _check_mission_item(mission_item(item), self._lists.vehicle)
         if item.command not in (FENCE_ROWS if part is MissionType.FENCE else {RALLY_POINT}):
-            return Result.UNSUPPORTED
+            return MavResult.UNSUPPORTED
         if item.command in POLYGON.values() and item.params[0] < 3:
             return self.thin_polygon
         if item.command == RALLY_POINT and math.isnan(item.z):
-            return Result.INVALID_PARAM7
+            return MavResult.INVALID_PARAM7
         if abs(item.x) > 900_000_000:
-            return Result.INVALID_PARAM5_X
-        return Result.INVALID_PARAM6_Y if abs(item.y) > 1_800_000_000 else Result.ACCEPTED
+            return MavResult.INVALID_PARAM5_X
+        return MavResult.INVALID_PARAM6_Y if abs(item.y) > 1_800_000_000 else MavResult.ACCEPTED
 
 
-def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> Result:
+def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> MavResult:
     """Return what is wrong with `item`: the first field that `vehicle` does not take.
 
     Fields are tried in the order of the message, those behind the one tried set to 0.
     """
     refusal = vehicle.dialect.refusal
     if item.frame != Frame.MISSION and refusal(MissionItem(16, item.frame)) is not None:
-        return Result.UNSUPPORTED_FRAME
+        return MavResult.UNSUPPORTED_FRAME
     values = (*item.params, item.x, item.y, item.z)
     for tried in range(len(values) + 1):
         one, two, three, four, x, y, z = (*values[:tried], *[0.0] * (len(values) - tried))
         if refusal(replace(item, params=(one, two, three, four), x=x, y=y, z=z)) is not None:
-            return Result.UNSUPPORTED if tried == 0 else Result(_FIELDS[tried - 1])
-    return Result.ACCEPTED
+            return MavResult.UNSUPPORTED if tried == 0 else MavResult(_FIELDS[tried - 1])
+    return MavResult.ACCEPTED
 
 
 def whole(param: float) -> int:

@@ -30,7 +30,7 @@ class Posture:
     item: int
 
 
-class Flight:
+class MockFlight:
     """One flight along `track`, begun at `started`, flown `speedup` times as fast as predicted."""
 
     def __init__(

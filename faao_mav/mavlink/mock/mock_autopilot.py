@@ -24,8 +24,8 @@ from faao_mav.mavlink.messages import (
     Statustext,
 )
 from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
-from faao_mav.mavlink.mock.flight import Flight, Posture, telemetry
-from faao_mav.mavlink.mock.parameters import ParameterServer
+from faao_mav.mavlink.mock.flight import MockFlight, Posture, telemetry
+from faao_mav.mavlink.mock.parameter_protocol import ParameterServer
 from faao_mav.mavlink.protocol import (
     ARMED,
     GROUND_STATION,
@@ -100,7 +100,7 @@ class MockAutopilot(Machine[None]):
         self._next_beat = self._next_report = 0.0
         self.armed = False
         self._current = 0
-        self._flight: Flight | None = None
+        self._flight: MockFlight | None = None
 
     @property
     def deadline(self) -> float | None:
@@ -250,10 +250,10 @@ class MockAutopilot(Machine[None]):
         if self.armed and self._flight is None:
             mission = self.mission()
             track = self._fly(Mission(mission.items, self.home, mission.fence, mission.rally))
-            self._flight = Flight(track, mission.items, now, self._speedup)
+            self._flight = MockFlight(track, mission.items, now, self._speedup)
         return ACCEPTED
 
-    def _follow(self, flight: Flight, now: float) -> list[Message]:
+    def _follow(self, flight: MockFlight, now: float) -> list[Message]:
         out = flight.reached(now, self._first_number())
         current = flight.at(now).item + self._first_number()
         if current != self._current:

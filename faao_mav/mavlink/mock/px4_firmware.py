@@ -17,7 +17,14 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.mock.firmware import MockFirmware, whole
-from faao_mav.mavlink.protocol import ALL_TYPES, NOBODY, Address, MavSeverity, MissionType, Result
+from faao_mav.mavlink.protocol import (
+    ALL_TYPES,
+    NOBODY,
+    Address,
+    MavResult,
+    MavSeverity,
+    MissionType,
+)
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import Mission
 from faao_mav.vehicle.px4 import PX4
@@ -54,9 +61,9 @@ class Px4Firmware(MockFirmware):
     family = PX4
     mission_limit = 1000
     modes = dict.fromkeys(("copter", "plane"), (_packed_mode(4, 3), _packed_mode(4, 4)))
-    misplaced = Result.ERROR
-    thin_polygon = Result.ERROR
-    nonsense = Result.UNSUPPORTED
+    misplaced = MavResult.ERROR
+    thin_polygon = MavResult.ERROR
+    nonsense = MavResult.UNSUPPORTED
     silent_at_boot = True
 
     def requested_mode(self, command: CommandLong) -> int:
@@ -130,17 +137,17 @@ class Px4Firmware(MockFirmware):
                 return [self._ask(now)]
         if transfer.state != "idle":
             return [
-                MissionAck(sender, mission_type, Result.ERROR),
+                MissionAck(sender, mission_type, MavResult.ERROR),
                 _said("WPM: IGN MISSION_COUNT: Busy"),
             ]
         if mission_type not in tuple(MissionType):
-            return [MissionAck(sender, mission_type, Result.INVALID)]
+            return [MissionAck(sender, mission_type, MavResult.INVALID)]
         part = MissionType(mission_type)
-        if (result := self.check_count(part, count)) != Result.ACCEPTED:
+        if (result := self.check_count(part, count)) != MavResult.ACCEPTED:
             return [MissionAck(sender, part, result)]
         if count == 0:
             self._lists.clear(part)
-            return [MissionAck(sender, part, Result.ACCEPTED)]
+            return [MissionAck(sender, part, MavResult.ACCEPTED)]
         self._transfer = _Transfer("receiving", sender, part, 0, count, 0, now)
         return [self._ask(now)]
 
@@ -157,7 +164,7 @@ class Px4Firmware(MockFirmware):
             return [_said("REJ. MIS ITEM: partner id mismatch")]
         self._legacy = item.legacy
         if item.mission_type != transfer.part or transfer.state == "sending":
-            return [MissionAck(sender, item.mission_type, Result.ERROR)]
+            return [MissionAck(sender, item.mission_type, MavResult.ERROR)]
         if transfer.state == "idle":
             return self._on_late_item(sender, item)
         transfer.last_message_time = now
@@ -169,14 +176,14 @@ class Px4Firmware(MockFirmware):
         transfer = self._transfer
         complete = transfer.next_sequence == transfer.count or not self._behaviour.complete_only
         if item.seq + 1 == transfer.next_sequence and complete:
-            return [MissionAck(sender, transfer.part, Result.ACCEPTED, transfer.number)]
+            return [MissionAck(sender, transfer.part, MavResult.ACCEPTED, transfer.number)]
         text = _said("IGN MISSION_ITEM: No transfer")
-        return [MissionAck(sender, transfer.part, Result.ERROR), text]
+        return [MissionAck(sender, transfer.part, MavResult.ERROR), text]
 
     def _take(self, item: MissionItemInt, now: float) -> list[Message]:
         transfer, part = self._transfer, self._transfer.part
         result = self.check_item(part, item.seq, item.item)
-        if result != Result.ACCEPTED:
+        if result != MavResult.ACCEPTED:
             transfer.state = "idle"
             text = _said("IGN MISSION_ITEM: Invalid item")
             return [MissionAck(transfer.partner, part, result), text]
@@ -187,7 +194,7 @@ class Px4Firmware(MockFirmware):
         transfer.state = "idle"
         self._lists.replace(part, transfer.items)
         transfer.number = self._lists.number(part)
-        return [MissionAck(transfer.partner, part, Result.ACCEPTED, transfer.number)]
+        return [MissionAck(transfer.partner, part, MavResult.ACCEPTED, transfer.number)]
 
     def _on_ack(self, sender: Address, ack: MissionAck, now: float) -> list[Message]:
         transfer = self._transfer
@@ -196,10 +203,10 @@ class Px4Firmware(MockFirmware):
         if transfer.state == "sending" and ack.mission_type == transfer.part:
             transfer.state = "idle"
         elif transfer.state == "receiving":
-            if ack.type == Result.UNSUPPORTED:
+            if ack.type == MavResult.UNSUPPORTED:
                 self._legacy = not self._legacy
                 return [self._ask(now)]
-            if ack.type == Result.OPERATION_CANCELLED:
+            if ack.type == MavResult.OPERATION_CANCELLED:
                 transfer.state = "idle"
         return []
 
@@ -230,7 +237,7 @@ class Px4Firmware(MockFirmware):
         elif request.seq != transfer.next_sequence - 1:
             transfer.state = "idle"
             text = _said("WPM: REJ. CMD: Req. WP was unexpected")
-            return [MissionAck(sender, transfer.part, Result.ERROR), text]
+            return [MissionAck(sender, transfer.part, MavResult.ERROR), text]
         item = transfer.items[request.seq]
         return [MissionItemInt(sender, transfer.part, request.seq, item, request.legacy)]
 
@@ -242,7 +249,7 @@ class Px4Firmware(MockFirmware):
         for part in MissionType:
             if mission_type in (part, ALL_TYPES):
                 self._lists.clear(part)
-        return [MissionAck(sender, mission_type, Result.ACCEPTED)]
+        return [MissionAck(sender, mission_type, MavResult.ACCEPTED)]
 
 
 def _said(text: str) -> Statustext:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from faao_mav.mavlink.faults import Faults, FaultyTransport
-from faao_mav.mavlink.link import Link
+from faao_mav.mavlink.link import WireLink
 from faao_mav.mavlink.mock.mock_autopilot import Fly, MockAutopilot
 from faao_mav.mavlink.transport import Transport, open_transport
 from faao_mav.mission.item import Mission
@@ -32,7 +32,7 @@ def serve(
     transport = open_transport(connection) if isinstance(connection, str) else connection
     if faults is not None:
         transport = FaultyTransport(transport, faults)
-    with Link(transport, key=key, address=mock.address) as link:
+    with WireLink(transport, key=key, address=mock.address) as link:
         link.begin(mock)
         while not stop():
             link.step(mock, time.monotonic() + _PATIENCE)

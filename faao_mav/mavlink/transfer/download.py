@@ -14,7 +14,7 @@ from faao_mav.mavlink.messages import (
     MissionRequestList,
     WireItem,
 )
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.transfer.exchange import Exchange, Peer, Status
 from faao_mav.mavlink.transfer.pace import Pace, Question, Timeouts
 
@@ -96,7 +96,7 @@ class Download(Exchange):
         if self._attempts_done < self._timeouts.attempts:
             return self.start(now)
         self._finish()
-        return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
+        return [self._peer.ack(MavResult.OPERATION_CANCELLED, self._type)]
 
     def _on_count(self, count: int, opaque_id: int, now: float) -> Sequence[Message]:
         if self._phase == "items":
@@ -119,9 +119,9 @@ class Download(Exchange):
         return [*(self._send_again(lost, now) for lost in earlier), *self._proceed(now)]
 
     def _on_ack(self, result: int, now: float) -> Sequence[Message]:
-        if result == Result.ACCEPTED:
+        if result == MavResult.ACCEPTED:
             return ()
-        if result == Result.UNSUPPORTED and self._phase == "items" and not self._legacy:
+        if result == MavResult.UNSUPPORTED and self._phase == "items" and not self._legacy:
             self._legacy = True
             return [self._send_again(seq, now) for seq in list(self._requests)]
         self._result = result
@@ -137,7 +137,7 @@ class Download(Exchange):
         self._last_progress = now
         if len(self._items) == self._count:
             self._finish()
-            return [self._peer.ack(Result.ACCEPTED, self._type)] * self._peer.manners.final_acks
+            return [self._peer.ack(MavResult.ACCEPTED, self._type)] * self._peer.manners.final_acks
         wide = self._peer.manners.any_request_order and not self._pace.is_doubtful
         out = []
         while self._next_sequence < self._count and len(self._requests) < (_WINDOW if wide else 1):

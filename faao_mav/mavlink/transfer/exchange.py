@@ -16,7 +16,7 @@ from faao_mav.mavlink.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.mavlink.protocol import Address, MissionType, Result
+from faao_mav.mavlink.protocol import Address, MavResult, MissionType
 from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.vehicle import VehicleType
 
@@ -39,7 +39,7 @@ class Peer:
         """How the other end behaves in transfers."""
         return manners_of(self.vehicle)
 
-    def ack(self, result: Result, mission_type: MissionType) -> MissionAck:
+    def ack(self, result: MavResult, mission_type: MissionType) -> MissionAck:
         """Return the acknowledgement to send to the vehicle."""
         return MissionAck(self.address, mission_type, result)
 
@@ -106,7 +106,7 @@ class Exchange(AskingMachine[Outcome]):
         if self.outcome is not None:
             return ()
         self._end("cancelled")
-        return [self._peer.ack(Result.OPERATION_CANCELLED, self._type)]
+        return [self._peer.ack(MavResult.OPERATION_CANCELLED, self._type)]
 
     def _end(
         self,
@@ -131,7 +131,7 @@ class Clear(Exchange):
     [MissionClearAll(target=Address(system=1, component=1), mission_type=<MissionType.RALLY: 2>)]
     >>> clearing.deadline  # when the question is put again, s
     1.5
-    >>> accepted = MissionAck(Address(255, 190), MissionType.RALLY, Result.ACCEPTED)
+    >>> accepted = MissionAck(Address(255, 190), MissionType.RALLY, MavResult.ACCEPTED)
     >>> clearing.on(Envelope(vehicle, accepted), now=0.1)
     ()
     >>> clearing.outcome.status
@@ -149,9 +149,9 @@ class Clear(Exchange):
     def _take(self, message: ListMessage, now: float) -> Sequence[Message]:  # noqa: ARG002
         if not isinstance(message, MissionAck):
             return ()
-        if message.type == Result.ACCEPTED:
+        if message.type == MavResult.ACCEPTED:
             self._end("accepted", message.type)
-        elif message.type == Result.ERROR and self._result is None:
+        elif message.type == MavResult.ERROR and self._result is None:
             self._result = message.type
         else:
             self._end("refused", message.type)

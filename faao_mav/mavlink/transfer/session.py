@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias, TypeVar
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.manners import autopilot_name
 from faao_mav.mavlink.messages import WireItem
-from faao_mav.mavlink.protocol import MissionType, Result
+from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.transfer.download import Download
 from faao_mav.mavlink.transfer.exchange import Clear, Outcome, Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
@@ -139,7 +139,7 @@ def _upload_part(
                     differences=differences,
                     opaque_id=sent.opaque_id or read.opaque_id,
                 )
-                if sent.result == Result.ERROR:
+                if sent.result == MavResult.ERROR:
                     # Of a reminder or a duplicate if the list is right, else of an item.
                     told = replace(report, verdict="refused")
                     report = told if wrong else replace(report, result=None)
@@ -148,7 +148,7 @@ def _upload_part(
             elif sent.status == "accepted":
                 report = replace(report, verdict="unread", said=read.said)
         # PX4 says ERROR when busy, and of packets that come late or twice: that may pass.
-        refused = report.verdict == "refused" and report.result != Result.ERROR
+        refused = report.verdict == "refused" and report.result != MavResult.ERROR
         if report.verified or refused or _by_us(sent) or _alike(report, last):
             return report
         last = report
@@ -204,7 +204,7 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
         case _:
             assert report.result is not None
             text += f"refused: {peer.manners.meaning(report.result)}"
-            if report.result == Result.NO_SPACE:
+            if report.result == MavResult.NO_SPACE:
                 text += f": {report.items + home} rows"
                 text += " with home" if home else ""
                 text += f", and a vehicle like this holds about {limit}"

@@ -17,7 +17,7 @@ from faao_mav.mavlink.messages import (
     MissionRequestInt,
     WireItem,
 )
-from faao_mav.mavlink.protocol import MavState, MissionType, Result
+from faao_mav.mavlink.protocol import MavResult, MavState, MissionType
 from faao_mav.mavlink.transfer.exchange import Exchange, Peer, Status
 from faao_mav.mavlink.transfer.pace import Pace, Question, Timeouts
 
@@ -147,21 +147,21 @@ class Upload(Exchange):
 
     def _on_ack(self, ack: MissionAck, now: float) -> Sequence[Message]:
         result = ack.type
-        if result == Result.ACCEPTED:
+        if result == MavResult.ACCEPTED:
             # Before the last item was asked for it can only be about something else.
             if self._all_sent():
                 self._end("accepted", result, self._last_sent(), opaque_id=ack.opaque_id)
-        elif result == Result.INVALID_SEQUENCE and not self._manners.ignores_other_items:
+        elif result == MavResult.INVALID_SEQUENCE and not self._manners.ignores_other_items:
             return self._on_invalid_sequence(now)
-        elif result == Result.ERROR:
+        elif result == MavResult.ERROR:
             self._result = result
             if self._phase == "items":
                 soon = 2 * self._timeouts.item
                 self._due = now + (soon if self._all_sent() else self._timeouts.response)
-        elif result == Result.NO_SPACE and self._booting:
+        elif result == MavResult.NO_SPACE and self._booting:
             self._phase, self._result = "booting", result
             self._due = now + self._timeouts.boot
-        elif result == Result.OPERATION_CANCELLED:
+        elif result == MavResult.OPERATION_CANCELLED:
             self._end("cancelled", result, self._last_sent())
         else:
             self._phase, self._result = "refused", result
@@ -189,7 +189,7 @@ class Upload(Exchange):
                 self._pace.repeat(self._unanswered, now)
                 self._due = now + self._pace.wait
                 return self._repetition()
-            cancel = self._peer.ack(Result.OPERATION_CANCELLED, self._type)
+            cancel = self._peer.ack(MavResult.OPERATION_CANCELLED, self._type)
             return [cancel, *self._give_up(now)]
         reminder, retries = self._reminder(), self._timeouts.retries
         if reminder is not None and self._retries_done < retries and self._result is None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import inf, radians
 
-from faao_mav.vehicle.parameter import Limits, Parameter, table
+from faao_mav.vehicle.parameter import Parameter, ParameterRecord, table
 
 _SOURCE = "PX4 1.16: parameter reference"
 
@@ -66,7 +66,7 @@ MPC_Z_VEL_MAX_UP (mc_pos_control, parameters_update); likewise down, and over th
 
 
 @dataclass(frozen=True, slots=True)
-class Px4Limits(Limits, table=COPTER_TABLE):
+class Px4Limits(ParameterRecord, table=COPTER_TABLE):
     """What bounds a multicopter's flight, in SI units: keys and defaults of `COPTER_TABLE`."""
 
     cruise_speed: float = COPTER_TABLE["cruise_speed"].default

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 
 from faao_mav.vehicle.ardupilot import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
-from faao_mav.vehicle.ardupilot.copter.model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.vehicle.flight_path import VerticalProfile

@@ -6,7 +6,7 @@ from math import radians
 from typing import Self
 
 from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
-from faao_mav.vehicle.parameter import Limits, Parameter, ParameterValues, table
+from faao_mav.vehicle.parameter import Parameter, ParameterRecord, ParameterValues, table
 
 
 def _parameter(
@@ -65,7 +65,7 @@ _DEGREE = 111_318.845
 
 
 @dataclass(frozen=True, slots=True)
-class ArduCopterLimits(Limits, table=TABLE):
+class ArduCopterLimits(ParameterRecord, table=TABLE):
     """What bounds a flight of ArduCopter, in SI units: keys and defaults of `TABLE`.
 
     `east_metre` and `north_metre` are the autopilot's metres per metre: it takes the Earth for a

@@ -2,7 +2,7 @@
 
 from faao_mav.vehicle.ardupilot import ARDUPILOT, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
-from faao_mav.vehicle.ardupilot.plane.model import ArduPlane, ArduPlaneLegs
+from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane, ArduPlaneLegs
 from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import pi, radians
 
 from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
-from faao_mav.vehicle.parameter import Limits, Parameter, table
+from faao_mav.vehicle.parameter import Parameter, ParameterRecord, table
 
 
 def _parameter(
@@ -44,7 +44,7 @@ with an idling engine; a `return_height` below 0 keeps the height at which the r
 
 
 @dataclass(frozen=True, slots=True)
-class ArduPlaneLimits(Limits, table=TABLE):
+class ArduPlaneLimits(ParameterRecord, table=TABLE):
     """What bounds a flight of ArduPlane, in SI units: keys and defaults of `TABLE`."""
 
     cruise_speed: float = TABLE["cruise_speed"].default
