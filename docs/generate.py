@@ -11,17 +11,15 @@ A page holds lines `<!-- generated: WHAT -->`; the hook replaces them by Markdow
 
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-from faao_mav.plan.schema import PlanSection
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 from typer.testing import CliRunner
 
 import faao_mav
 from faao_mav.cli.main import app
+from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.validate import RULES
 
 _DOCS = Path(__file__).parent
@@ -45,7 +43,28 @@ def file(name: str) -> str:
 
 def plan() -> str:
     """Return the keys of plan.yaml: a heading and a table for each section."""
-    return "\n".join(_section(PlanSection, ""))
+    lines = []
+    for section in ("", *(key.path for key in reference().values() if key.inside)):
+        inside = [key for key in reference().values() if key.path.rpartition(".")[0] == section]
+        rows = [_row(key) for key in inside if not key.inside]
+        if rows:
+            lines += [f"### {section or 'At the top'}", "", _about(section), ""]
+            lines += ["| key | meaning | accepted | default |", "|---|---|---|---|", *rows, ""]
+    return "\n".join(lines)
+
+
+def _about(section: str) -> str:
+    if not section:
+        return ""
+    key = reference()[section]
+    listed = f" Give {key.accepted}." if not key.accepted.startswith("a mapping") else ""
+    return _escaped(key.description + listed)
+
+
+def _row(key: PlanKey) -> str:
+    default = "required" if key.required else f"`{key.default}`" if key.default else "none"
+    name, accepted = key.path.rpartition(".")[2], _escaped(key.accepted)
+    return f"| `{name}` | {_escaped(key.description)} | {accepted} | {default} |"
 
 
 def command(name: str) -> str:
@@ -94,40 +113,5 @@ _WRITERS: dict[str, Callable[..., str]] = {
 
 
 def _escaped(text: str) -> str:
-    return text.replace("|", "\\|").replace("<", "&lt;")
-
-
-def _section(section: type[BaseModel], path: str) -> Iterator[str]:
-    rows, inner = [], []
-    for key, field in section.model_fields.items():
-        below = _sections_of(field)
-        if below:
-            inner.append((below[0], f"{path}{key}"))
-        else:
-            description = _escaped(_description(field))
-            rows.append(f"| `{path}{key}` | {description} | {_default(field)} |")
-    if rows:
-        yield from (f"### {path.rstrip('.') or 'top level'}", "")
-        yield from ("| key | accepted | default |", "|---|---|---|", *rows, "")
-    for each, name in inner:
-        yield from _section(each, f"{name}.")
-
-
-def _sections_of(field: FieldInfo) -> list[type[BaseModel]]:
-    options = [field.annotation, *get_args(field.annotation)]
-    return [each for each in options if inspect.isclass(each) and issubclass(each, BaseModel)]
-
-
-def _description(field: FieldInfo) -> str:
-    return field.description or ""
-
-
-def _default(field: FieldInfo) -> str:
-    if field.is_required():
-        return "required"
-    value = field.get_default(call_default_factory=True)
-    if isinstance(value, bool):
-        return f"`{str(value).lower()}`"
-    if isinstance(value, list):
-        return f"`[{', '.join(map(str, value))}]`"
-    return "none" if value is None or value == "" else f"`{value}`"
+    # In braces at the end of a cell the site's Markdown looks for attributes.
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("{", "&#123;")

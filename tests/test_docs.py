@@ -1,7 +1,9 @@
 """What README and the pages of docs/ show is true, and the site builds without a warning."""
 
 import contextlib
+import html
 import io
+import json
 import os
 import re
 import shlex
@@ -11,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import free_port
 from pages import PAGES, ROOT, blocks, difference
@@ -19,7 +22,7 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.plan import parse_plan, read_plan
+from faao_mav.plan import parse_plan, read_plan, reference
 
 COMMAND = Path(sys.executable).with_name("faao-mission")
 
@@ -153,6 +156,15 @@ def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
     assert solution.history[0] == pytest.approx(float(start), abs=1e-4)
 
 
+def test_the_keys_of_json_and_save_are_listed(folder: Path) -> None:
+    run = "missions/paper_active.yaml --method direct --save flight.npz --json"
+    done = CliRunner().invoke(app, run.split())
+    first = re.findall(r"^\| (`.*?) \|", PAGES["docs/commands.md"], re.MULTILINE)
+    listed = set(re.findall(r"`(\w+)`", " ".join(first)))
+    with np.load(folder / "flight.npz") as archive:
+        assert sorted({*json.loads(done.stdout), *archive} - listed) == []
+
+
 def test_the_house_that_is_shown_has_the_floors_of_the_house() -> None:
     rows = re.findall(r"^\| (\d+) \| (`.*?`) \|", PAGES["docs/house.md"], re.MULTILINE)
     shown = {int(floor): set(re.findall(r"`(\w+)`", rooms)) for floor, rooms in rows}
@@ -174,7 +186,10 @@ def test_the_site_builds_without_a_warning_and_fetches_nothing(tmp_path: Path) -
     )
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
-    assert "generated:" not in (tmp_path / "site" / "plan.html").read_text()
+    reference_page = html.unescape((tmp_path / "site" / "plan.html").read_text())
+    assert "generated:" not in reference_page
+    lost = [key.path for key in reference().values() if key.accepted not in reference_page]
+    assert [path for path in lost if not reference()[path].inside] == []
     for page in (tmp_path / "site").rglob("*.html"):
         fetched = re.findall(r'(?:src|<link[^>]* href)="(https?://[^"]*)"', page.read_text())
         assert fetched == [], page
