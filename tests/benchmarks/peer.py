@@ -1,11 +1,13 @@
 """The peer: CasADi + IPOPT (MUMPS, exact Hessian) on the problem of the direct method.
 
-maximise t, t <= mean of each link's rates, under (11), (12), (13d)-(13f) as `Kinematics` has them.
+maximise t, t <= mean of each link's rates, under (11), (12), (13d)-(13f) as `Kinematics` has them;
+or with a relay's queue t = mean of what is forwarded, with r, f, q and the shares as variables.
 Lengths in 100 m. The precoders enter through numbers c of every slot alone: with H = sqrt(g) H_r
 every exponent of (7), (8) is D_k = g(w) c_k, so that one model with c as its parameter serves all
 starts and all precoders.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +17,8 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link
+from faao_mav.optimizer.rates.rate_model import CurveRate
+from faao_mav.radio.relay import RelayQueue
 
 LENGTH = 100.0
 TOLERANCE = 1e-7
@@ -43,6 +47,23 @@ class ClassRate:
         return self.link.reference_gain / self.link.altitude**2
 
 
+@dataclass(frozen=True)
+class Curve:
+    """A rate that depends on the distance alone: a cubic B-spline through values of our own."""
+
+    link: Link
+    value: Any
+    c: Real
+    gain: float = 1.0
+
+
+def curve(link: Link, rate: CurveRate, number: int) -> Curve:
+    """The curve of `rate` over the logarithm of the path gain."""
+    grid = rate.gain_log
+    spline = ca.interpolant(f"rate{number}", "bspline", [grid], rate.value(grid, 0 * grid))
+    return Curve(link, spline, np.zeros((1, 1)))
+
+
 def at_precoders(link: Link, w: Real, P: Complex) -> ClassRate:
     """The rate at fixed precoders P that are best, or were chosen, at the positions w.
 
@@ -65,10 +86,13 @@ def at_best(link: Link, w: Real) -> ClassRate:
     return ClassRate(link, 2.0, 2.0, 1.0, np.ones(1), x[None, :])
 
 
-def _rate(rate: ClassRate, w: Any, c: Any) -> Any:
+def _rate(rate: ClassRate | Curve, w: Any, c: Any) -> Any:
     """The rate (1, n) at scaled positions w (2, n), c (k, n) in units of 1 / `gain`."""
     p, H = rate.link.station / LENGTH, rate.link.altitude / LENGTH
     away = (ca.DM(w) if isinstance(w, np.ndarray) else w) - p
+    if isinstance(rate, Curve):
+        unit = np.log(rate.link.reference_gain / LENGTH**2)
+        return rate.value(unit - ca.log(ca.sum1(away**2) + H**2))
     g = H**2 / (ca.sum1(away**2) + H**2)
     D = ca.repmat(g, c.shape[0], 1) * c
     total = rate.base + ca.mtimes(ca.DM(rate.multiplicity).T, ca.exp(-D))
@@ -78,32 +102,49 @@ def _rate(rate: ClassRate, w: Any, c: Any) -> Any:
 class Model:
     """The nonlinear program for given kinematics and kinds of rates, built once."""
 
-    def __init__(self, kin: Kinematics, rates: list[ClassRate], max_seconds: float) -> None:
+    def __init__(
+        self,
+        kin: Kinematics,
+        rates: Sequence[ClassRate | Curve],
+        max_seconds: float,
+        relay: RelayQueue | None = None,
+    ) -> None:
         self.kin, n = kin, kin.slots
+        self.relay = relay
         dt, speed = kin.time_step, kin.max_speed
         # v in v_max, a in a_max, w in LENGTH
         step = dt * speed / LENGTH
         bend = dt**2 * kin.max_acceleration / LENGTH
         turn = dt * kin.max_acceleration / speed
-        cls = ca.SX
+        cls = ca.MX if any(isinstance(rate, Curve) for rate in rates) else ca.SX
         w, v, a = cls.sym("w", 2, n), cls.sym("v", 2, n), cls.sym("a", 2, n - 1)
         t = cls.sym("t")
         position = w[:, 1:] - w[:, :-1] - step * v[:, :-1] - bend / 2 * a
         velocity = v[:, 1:] - v[:, :-1] - turn * a
         speeds = ca.sum1(v**2)
         bounded = ca.sum1(a[:, kin.first_bounded_acceleration :] ** 2)
-        parameters, below = [], []
+        parameters, each = [], []
         for number, rate in enumerate(rates):
             c = cls.sym(f"c{number}", *rate.c.shape)
             parameters.append(ca.vec(c))
-            below.append(t - ca.sum2(_rate(rate, w, c)) / n)
+            each.append(_rate(rate, w, c))
+        variables = [ca.vec(w), ca.vec(v), ca.vec(a), t]
+        if relay is None:
+            below = [t - ca.sum2(rate) / n for rate in each]
+        else:
+            r, f, q, x = (cls.sym(name, 1, n) for name in "rfqx")
+            variables += [ca.vec(part) for part in (r, f, q, x)]
+            share = 1 - x if relay.half else x
+            moved = q[1:] - q[:-1] - r[:-1] + f[:-1]
+            parts = [t - ca.sum2(f) / n, r - x * each[0], f - share * each[1], f - q, moved, -moved]
+            below = [ca.vec(part) for part in parts]
         g = [ca.vec(position), ca.vec(velocity), ca.vec(speeds), ca.vec(bounded), *below]
         sizes = [int(part.numel()) for part in g]
         self.lower_g = np.concatenate(
             [np.zeros(sizes[0] + sizes[1]), np.full(sum(sizes[2:]), -np.inf)]
         )
         self.upper_g = np.concatenate(
-            [np.zeros(sizes[0] + sizes[1]), np.ones(sizes[2] + sizes[3]), np.zeros(len(below))]
+            [np.zeros(sizes[0] + sizes[1]), np.ones(sizes[2] + sizes[3]), np.zeros(sum(sizes[4:]))]
         )
         lower_w, upper_w = np.full((n, 2), -np.inf), np.full((n, 2), np.inf)
         lower_v, upper_v = lower_w.copy(), upper_w.copy()
@@ -118,6 +159,12 @@ class Model:
         free = np.full(2 * (n - 1) + 1, np.inf)
         self.lower = np.concatenate([lower_w.ravel(), lower_v.ravel(), -free])
         self.upper = np.concatenate([upper_w.ravel(), upper_v.ravel(), free])
+        if relay is not None:
+            room = np.full(n, relay.buffer / kin.time_step)
+            room[0] = 0
+            least = np.concatenate([np.zeros(3 * n), np.full(n, 0.0 if relay.half else 1.0)])
+            self.lower = np.concatenate([self.lower, least])
+            self.upper = np.concatenate([self.upper, np.full(2 * n, np.inf), room, np.ones(n)])
         options: dict[str, Any] = {
             "print_time": False,
             "ipopt": {
@@ -129,27 +176,32 @@ class Model:
                 "linear_solver": "mumps",
             },
         }
-        x = ca.vertcat(ca.vec(w), ca.vec(v), ca.vec(a), t)
         program: dict[str, Any] = {
-            "x": x,
+            "x": ca.vertcat(*variables),
             "p": ca.vertcat(*parameters),
             "f": -t,
             "g": ca.vertcat(*g),
         }
         self.solver: Any = ca.nlpsol("peer", "ipopt", program, options)
 
-    def solve(self, rates: list[ClassRate], start: Trajectory) -> Trajectory:
+    def solve(self, rates: Sequence[ClassRate | Curve], start: Trajectory) -> Trajectory:
         """Return where IPOPT ends from `start`."""
         kin, n = self.kin, self.kin.slots
-        least = min(
-            float(np.mean(ca.DM(_rate(r, start.w.T / LENGTH, r.c * r.gain)).full())) for r in rates
-        )
+        now = [np.ravel(ca.DM(_rate(r, start.w.T / LENGTH, r.c * r.gain)).full()) for r in rates]
+        least, more = min(float(np.mean(each)) for each in now), []
+        if self.relay is not None:
+            shares = self.relay.best_shares(now[0], now[1], kin.time_step)
+            relayed = self.relay.relayed(now[0], now[1], kin.time_step, shares)
+            least = relayed.rate
+            more = [relayed.received, relayed.forwarded, relayed.queue]
+            more.append(np.ones(n) if shares is None else shares)
         x0 = np.concatenate(
             [
                 (start.w / LENGTH).ravel(),
                 (start.v / kin.max_speed).ravel(),
                 (start.a[:-1] / kin.max_acceleration).ravel(),
                 [least],
+                *more,
             ]
         )
         found = self.solver(
@@ -162,7 +214,7 @@ class Model:
         )
         x = np.asarray(found["x"]).ravel()
         w, v = (part.reshape(n, 2) for part in np.split(x[: 4 * n], 2))
-        a = x[4 * n : -1].reshape(n - 1, 2)
+        a = x[4 * n : 6 * n - 2].reshape(n - 1, 2)
         return Trajectory(
             w * LENGTH,
             v * kin.max_speed,

@@ -1,0 +1,129 @@
+"""What is delivered: the direct method beside CasADi + IPOPT with the same queue, in one run.
+
+    pip install -e '.[bench]'
+    python tests/benchmarks/delivered_against_ipopt.py [--quick]
+
+Both start from the same five routes. Rates are delivered rates in bit/s/Hz, computed for both by
+the same function from the positions alone; times are seconds, with the building of the model.
+Everything printed is measured in the run.
+"""
+
+import argparse
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
+
+import numpy as np
+import yaml
+from peer import Model, at_best, curve
+
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import RateField, rate_field
+from faao_mav.optimizer.rates.rate_model import CurveRate
+from faao_mav.optimizer.search.starts import starts
+from faao_mav.plan import Plan, parse_plan
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+PATIENCE = 60.0
+"""Seconds that the peer may take for one start."""
+
+PLANS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("copter_relay", {}),
+    ("copter_relay", {"radio.duplex": "half"}),
+    ("copter_relay", {"flight.duration": 70}),
+    ("copter_relay", {"flight.duration": 70, "radio.duplex": "half"}),
+    ("copter_relay", {"flight.duration": 200, "power": 0}),
+    ("copter_relay", {"flight.duration": 300, "power": 5, "flight.time_step": 1}),
+    ("copter_relay", {"radio.modulation": "16qam", "power": 17}),
+    (
+        "copter_relay",
+        {"flight.duration": 90, "radio.modulation": "16qam", "power": 17, "radio.duplex": "half"},
+    ),
+    (
+        "copter_relay",
+        {"flight.duration": 150, "flight.start_velocity": "free", "flight.end_velocity": "free"},
+    ),
+    ("copter_relay", {"radio.bandwidth_mhz": 20, "radio.relay.buffer_mbytes": 100}),
+    ("paper_active", {"flight.duration": 40}),
+    ("paper_active", {"flight.duration": 50, "power": 10}),
+    ("paper_active", {"flight.duration": 100, "power": 10}),
+)
+
+
+def plan(name: str, changes: dict[str, Any]) -> Plan:
+    """Read a sample plan for the direct method and the queue, with some keys replaced."""
+    data = yaml.safe_load((MISSIONS / f"{name}.yaml").read_text())
+    data.setdefault("optimizer", {})["method"] = "direct"
+    data["radio"]["causal"] = True
+    for key, value in changes.items():
+        if key == "power":
+            data["radio"]["base_station"]["power_dbm"] = value
+            data["radio"]["relay"]["power_dbm"] = value
+            continue
+        *parents, last = key.split(".")
+        section = data
+        for parent in parents:
+            section = section[parent]
+        section[last] = value
+    return parse_plan(yaml.safe_dump(data))
+
+
+def by_ipopt(problem: Problem, field: RateField) -> tuple[float, list[float]]:
+    """Return the best that IPOPT delivers over the starts, and the seconds of each."""
+    kin, relay = problem.kinematics, problem.relay
+    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    flights = starts(kin, problem.plan.optimizer.starts, stations)
+    model, best, seconds = None, 0.0, []
+    for flight in flights.values():
+        began = time.perf_counter()
+        rates = [
+            curve(link, rate, k) if isinstance(rate, CurveRate) else at_best(link, flight.w)
+            for k, (link, rate) in enumerate(zip(field.links, field.rates, strict=True))
+        ]
+        model = model or Model(kin, rates, PATIENCE, relay)
+        found = model.solve(rates, flight)
+        seconds.append(time.perf_counter() - began)
+        values = field.value(found.w.T[:, None])
+        if max(kin.residuals(found).values()) < 1e-4:
+            best = max(best, float(objectives(values, kin, relay)[0]))
+    return best, seconds
+
+
+def main() -> None:
+    """Print the table, then which claims hold."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="the first three rows")
+    rows = PLANS[:3] if parser.parse_args().quick else PLANS
+    print(f"{'plan':68}{'direct':>9}{'s':>7}{'IPOPT':>9}{'s':>8}{'ratio':>7}")
+    above, ratios = np.inf, []
+    for name, changes in rows:
+        read = plan(name, changes)
+        problem = build_problem(read)
+        optimize(read)  # fills the tables that are kept
+        began = time.perf_counter()
+        ours = optimize(read).delivered_rate
+        took = time.perf_counter() - began
+        peer, seconds = by_ipopt(problem, rate_field(problem, design(read)))
+        above = min(above, ours - peer)
+        ratios.append(sum(seconds) / took)
+        told = ", ".join(f"{key.split('.')[-1]} {value}" for key, value in changes.items())
+        print(
+            f"{f'{name}: {told}':68}{ours:9.4f}{took:7.2f}{peer:9.4f}{sum(seconds):8.1f}"
+            f"{ratios[-1]:7.1f}",
+            flush=True,
+        )
+    for claim, met, figure in (
+        ("never below IPOPT's best by 1e-4", above >= -1e-4, f"least gain {above:.1e}"),
+        ("ten times quicker than the starts", min(ratios) >= 10, f"least ratio {min(ratios):.1f}"),
+    ):
+        print(f"{'met' if met else 'MISSED':8}{claim}: {figure}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,181 @@
+"""What a relay delivers, maximised: against convex programs, KKT conditions and known optima."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import cvxpy as cp
+import numpy as np
+import pytest
+from conftest import MakePlan, edited
+from test_interior import ACTIVE, HEIGHT, STATIONS, bpsk, copter, links, plane, worst
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.optimizer.interior.maximize import maximize, maximize_all, objectives
+from faao_mav.optimizer.interior.rewards import Stage
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.scaled import flight_variables, kkt_residual
+from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.solution import load_solution, save_solution
+from faao_mav.plan import parse_plan
+from faao_mav.radio.relay import RelayQueue
+
+FULL, HALF = RelayQueue(), RelayQueue(half=True)
+SAMPLE = (Path(__file__).parents[2] / "missions" / "copter_relay.yaml").read_text()
+
+
+def hill(q: Real, c: float) -> tuple[Real, Real, Real]:
+    """3 - c q: concave, and above 0 where the flights are."""
+    return 3 - c * q, np.full_like(q, -c), np.zeros_like(q)
+
+
+@pytest.mark.parametrize("buffer", [math.inf, 8.0])
+def test_the_global_optimum_of_concave_rates(buffer: float) -> None:
+    """The interior-point method finds the optimum that Clarabel finds of the convex problem."""
+    kin = copter(80, time_step=1.0, max_speed=10.0)
+    stage = links(hill, 1e-5, 1.5e-5)
+    relay = RelayQueue(buffer=buffer)
+    best = maximize(kin, stage, straight_flight(kin), relay=relay, tolerance=1e-7)
+    flight, n = flight_variables(kin), kin.slots
+    received, forwarded, queue = (cp.Variable(n) for _ in range(3))
+    rates = [
+        3 - c * (HEIGHT**2 + LENGTH**2 * cp.sum(cp.square(flight.w - p[None] / LENGTH), axis=1))
+        for c, p in zip((1e-5, 1.5e-5), STATIONS, strict=False)
+    ]
+    program = cp.Problem(
+        cp.Maximize(cp.sum(forwarded) / n),
+        [
+            *flight.constraints,
+            received <= rates[0],
+            forwarded <= rates[1],
+            forwarded <= queue,
+            queue[0] == 0,
+            queue[1:] == (queue + received - forwarded)[:-1],
+            *([queue <= buffer] if math.isfinite(buffer) else []),
+        ],
+    )
+    program.solve(solver=cp.CLARABEL)
+    assert best.converged
+    assert best.value == pytest.approx(program.value, rel=1e-5)
+    assert worst(kin, best.trajectory) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "relay", [FULL, HALF, RelayQueue(buffer=20.0), RelayQueue(half=True, buffer=20.0)]
+)
+@pytest.mark.parametrize(
+    ("kin", "stage"),
+    [
+        (copter(100, time_step=0.5), ACTIVE),
+        (copter(70, time_step=0.5), links(bpsk, 4e3, 4e3)),
+        (plane(15), ACTIVE),
+        (plane(20, min_speed=12.0, max_speed=25.0, start=np.array([0.0, 100.0])), ACTIVE),
+    ],
+)
+def test_a_local_optimum_of_what_is_delivered(
+    relay: RelayQueue, kin: Kinematics, stage: Stage
+) -> None:
+    start = straight_flight(kin)
+    best = maximize(kin, stage, start, relay=relay, max_iterations=200)
+    assert worst(kin, best.trajectory) < 1e-6
+    reached = objectives(stage(best.trajectory.w.T[:, None]).value, kin, relay)
+    assert best.value == pytest.approx(reached[0])
+    gain = kkt_residual(kin, stage, best.trajectory, relay=relay)
+    assert gain < 0.02 * kkt_residual(kin, stage, start, relay=relay)
+
+
+def test_the_residual_is_a_gain_that_can_be_had() -> None:
+    """Where a flight is no optimum, a better one is found; at the optimum there is none."""
+    kin, start = copter(100, time_step=0.5), straight_flight(copter(100, time_step=0.5))
+    for relay in (FULL, HALF):
+        early = maximize(kin, ACTIVE, start, relay=relay, max_iterations=4)
+        best = maximize(kin, ACTIVE, start, relay=relay, max_iterations=200)
+        assert best.value > early.value
+        assert kkt_residual(kin, ACTIVE, early.trajectory, relay=relay) > 1e-4
+        assert kkt_residual(kin, ACTIVE, best.trajectory, relay=relay) < 2e-5
+
+
+def test_searches_side_by_side_are_each_its_own() -> None:
+    kin = copter(100, time_step=0.5)
+    begun = [straight_flight(kin), maximize(kin, ACTIVE, straight_flight(kin)).trajectory]
+    for relay in (FULL, HALF):
+        together = maximize_all(kin, ACTIVE, begun, relay=relay, max_iterations=10)
+        for flight, both in zip(begun, together, strict=True):
+            alone = maximize(kin, ACTIVE, flight, relay=relay, max_iterations=10)
+            assert both.value == pytest.approx(alone.value, rel=1e-9)
+            assert both.value >= objectives(ACTIVE(flight.w.T[:, None]).value, kin, relay)[0]
+
+
+def test_flat_rates_leave_the_start_as_it_is() -> None:
+    kin = plane(50)
+    start = straight_flight(kin)
+    best = maximize(kin, links(bpsk, 1e9, 1e9), start, relay=FULL)
+    assert best.trajectory is start
+    assert best.value == pytest.approx(2 * (1 - 1 / kin.slots))
+
+
+@dataclass(frozen=True)
+class Known:
+    """What CasADi + IPOPT delivers on the copter's sample (tests/benchmarks)."""
+
+    duration: float
+    duplex: str
+    rate: float
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        Known(120, "full", 2.243),
+        Known(120, "half", 1.4117),
+        Known(70, "full", 2.0358),
+        Known(70, "half", 1.0851),
+    ],
+)
+def test_the_sample_delivers_what_is_known_to_be_possible(known: Known) -> None:
+    changes = {
+        "flight.duration": known.duration,
+        "radio.causal": True,
+        "radio.duplex": known.duplex,
+        "optimizer.max_iterations": 100,
+    }
+    solution = optimize(parse_plan(edited(SAMPLE, changes)))
+    assert solution.delivered_rate >= known.rate
+    assert solution.delivered_rate <= solution.rates.R_avg
+    assert solution.history[-1] == solution.delivered_rate
+    assert solution.is_feasible()
+    assert solution.kkt_residual() < 1e-4
+
+
+@pytest.mark.parametrize("fading", ["none", "realization"])
+def test_planning_for_what_arrives_delivers_more(small_plan: MakePlan, fading: str) -> None:
+    for duplex in ("full", "half"):
+        changes = {
+            "radio.fading": fading,
+            "radio.duplex": duplex,
+            "radio.bandwidth_mhz": 1,
+            "radio.relay.buffer_mbytes": 1,
+        }
+        with_it, without = (
+            optimize(small_plan(changes | {"radio.causal": causal})) for causal in (True, False)
+        )
+        assert with_it.delivered_rate >= without.delivered_rate - 1e-4
+        assert with_it.relayed.queue.max() <= 8 / with_it.plan.flight.time_step
+
+
+def test_shares_are_saved_and_read(small_plan: MakePlan, tmp_path: Path) -> None:
+    path = tmp_path / "result.npz"
+    solution = optimize(small_plan({"radio.causal": True, "radio.duplex": "half"}))
+    save_solution(solution, path)
+    loaded = load_solution(path)
+    assert solution.shares is not None
+    assert loaded.shares is not None
+    assert loaded.shares.tobytes() == solution.shares.tobytes()
+    assert loaded.delivered_rate == solution.delivered_rate
+    with np.load(path) as archive:
+        assert archive["forwarded"].mean() == solution.delivered_rate == archive["R_del"]
+        np.savez(tmp_path / "other.npz", **{**archive, "shares": archive["shares"] + 0.5})
+    with pytest.raises(InputError, match=r"shares: expected a number of 0 to 1"):
+        load_solution(tmp_path / "other.npz")
