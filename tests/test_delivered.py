@@ -160,11 +160,11 @@ def test_saturation_is_of_the_rate_that_is_planned_for(small_plan: MakePlan) -> 
 
 def test_a_study_varies_causality_and_draws_what_it_costs() -> None:
     text = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
-    vary = {"flight.duration": (8, 10), "radio.causal": (True, False)}
+    vary = {"flight.duration": (10, 12), "radio.causal": (True, False)}
     rows = run_study(make_cases(text, vary=vary), jobs=1)
     assert not any(row.error for row in rows)
     by = {(row.values["flight.duration"], row.values["radio.causal"]): row for row in rows}
-    for duration in (8, 10):
+    for duration in (10, 12):
         planned, paper = by[duration, True], by[duration, False]
         assert planned.delivered is not None
         assert paper.delivered is not None
