@@ -106,7 +106,7 @@ def main() -> None:
             f"{name:28} {seconds:6.2f} {len(conversion.mission.items) + 1:6d} "
             f"{found.rms_position_error:5.2f} {found.max_position_error:6.2f} "
             f"{found.max_path_error:6.2f} {found.duration - plan.flight.duration:+7.2f} "
-            f"{100 * found.rates.R_avg / solution.rates.R_avg:6.2f} %",
+            f"{100 * found.delivered_rate / solution.delivered_rate:6.2f} %",
             flush=True,
         )
 
