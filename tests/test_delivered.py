@@ -16,6 +16,7 @@ from faao_mav.cli.main import app
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import fresh_rates, saturation
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import parse_plan
 from faao_mav.radio.relay import forward_greedily
 from faao_mav.report import render_report, summary
 from faao_mav.report.figures import queue
@@ -170,8 +171,6 @@ def test_a_study_varies_causality_and_draws_what_it_costs() -> None:
         assert paper.delivered is not None
         assert planned.delivered >= paper.delivered - 1e-4
         assert planned.delivered_mbytes is None
-    from faao_mav.plan import parse_plan
-
     figure = study_figure(rows, parse_plan(SMALL), "delivered")
     (plot,) = figure.axes
     assert [line.get_label() for line in plot.lines] == [

@@ -42,6 +42,9 @@ def as_dict(checked: CheckedFile) -> dict[str, Any]:
     predicted = None
     if check.track is not None:
         predicted = {"duration": float(check.track.t[-1]), "calibrated": not vehicle.type.caveat}
+    link = None
+    if (found := check.link) is not None:
+        link = asdict(found) | {"share": found.share, "predicted_mbytes": found.predicted_mbytes}
     return {
         "mission": str(checked.source),
         "items": len(check.mission.items),
@@ -49,7 +52,7 @@ def as_dict(checked: CheckedFile) -> dict[str, Any]:
         "type": vehicle.kind,
         "parameters": vehicle.source if vehicle.parameters else None,
         "predicted": predicted,
-        "link": asdict(check.link) | {"share": check.link.share} if check.link else None,
+        "link": link,
         "errors": len(check.of(Level.ERROR)),
         "warnings": len(check.of(Level.WARNING)),
         "notes": len(check.of(Level.NOTE)),

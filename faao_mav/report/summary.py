@@ -1,11 +1,11 @@
 """A result, a validation and its findings in words: the lines of the terminal and of the page."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TypeAlias
 
-from faao_mav.plan import Plan
 from faao_mav.validate.check import Check
 from faao_mav.validate.finding import Finding, Level
 from faao_mav.workflow import Result
@@ -50,7 +50,8 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
         yield (
             "bound",
             f"within {short:.2g} % of the best that any route can do: at most "
-            f"{told_rate(plan, bound.value)}{'' if bound.exact else ' (numerical)'}",
+            f"{_told_rate(bound.value, plan.radio.bandwidth_mhz)}"
+            f"{'' if bound.exact else ' (numerical)'}",
         )
         if causal:
             yield "", "it is a bound of R_avg, and no relay delivers more than that"
@@ -71,10 +72,14 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     yield from _flown(result)
 
 
-def told_rate(plan: Plan, rate: float) -> str:
+def _told_rate(rate: float, bandwidth_mhz: float | None) -> str:
     """Return `rate`, bit/s/Hz, as text, with a bandwidth in Mbit/s too."""
-    megabits = plan.megabits(rate)
-    return f"{rate:.4f} bit/s/Hz" + ("" if megabits is None else f" ({megabits:.4g} Mbit/s)")
+    megabits = "" if bandwidth_mhz is None else f" ({rate * bandwidth_mhz:.4g} Mbit/s)"
+    return f"{rate:.4f} bit/s/Hz{megabits}"
+
+
+def _carried(megabytes: float | None) -> str:
+    return "" if megabytes is None else f", {megabytes:.4g} megabytes"
 
 
 def _rate(result: Result) -> Iterator[Line]:
@@ -84,7 +89,7 @@ def _rate(result: Result) -> Iterator[Line]:
     most = f" of at most {limit.ceiling:g}" if limit else ""
     yield (
         "rate",
-        f"{told_rate(plan, rates.R_avg)}{most} "
+        f"{_told_rate(rates.R_avg, plan.radio.bandwidth_mhz)}{most} "
         f"(base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f})",
     )
     start = "" if plan.radio.causal else f"{solution.history[0]:.4f} on the straight start"
@@ -106,7 +111,8 @@ def _delivered(result: Result) -> Iterator[Line]:
     most = f" of at most {limit.ceiling:.5g}" if limit else ""
     yield (
         "delivered",
-        f"{told_rate(plan, delivered)}{most}{_carried(plan, delivered)}; "
+        f"{_told_rate(delivered, plan.radio.bandwidth_mhz)}{most}"
+        f"{_carried(plan.megabytes(delivered))}; "
         f"{'in half duplex ' if half else ''}{100 * share:.2f} % of the rate",
     )
     if causal:
@@ -123,11 +129,6 @@ def _delivered(result: Result) -> Iterator[Line]:
         yield "", f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} {unseen}"
 
 
-def _carried(plan: Plan, rate: float) -> str:
-    megabytes = plan.megabytes(rate)
-    return "" if megabytes is None else f", {megabytes:.4g} megabytes"
-
-
 def _flown(result: Result) -> Iterator[Line]:
     conversion, flown, solution = result.conversion, result.prediction, result.solution
     if result.no_mission is not None:
@@ -139,9 +140,10 @@ def _flown(result: Result) -> Iterator[Line]:
     yield "mission", f"{items}; relay route of {distance:.0f} m"
     plan = solution.plan
     lasting = f", in {flown.duration:.1f} s (planned: {plan.flight.duration:g} s)"
-    delivers = f"delivers {_of_plan(flown.delivered_rate, solution.delivered_rate)}"
-    delivers += _carried(plan, flown.delivered_rate)
-    average = _of_plan(flown.rates.R_avg, solution.rates.R_avg)
+    bandwidth = plan.radio.bandwidth_mhz
+    delivers = f"delivers {_of_plan(flown.delivered_rate, solution.delivered_rate, bandwidth)}"
+    delivers += _carried(plan.megabytes(flown.delivered_rate))
+    average = _of_plan(flown.rates.R_avg, solution.rates.R_avg, bandwidth)
     if plan.radio.causal:
         yield "predicted", delivers + lasting
         yield "", f"R_avg {average}"
@@ -153,9 +155,9 @@ def _flown(result: Result) -> Iterator[Line]:
         yield "", doubt
 
 
-def _of_plan(rate: float, planned: float) -> str:
+def _of_plan(rate: float, planned: float, bandwidth_mhz: float | None) -> str:
     share = 100 * rate / planned if planned else 100.0
-    return f"{rate:.4f} bit/s/Hz, {share:.2f} % of the plan"
+    return f"{_told_rate(rate, bandwidth_mhz)}, {share:.2f} % of the plan"
 
 
 def check_lines(check: Check) -> Iterator[Line]:
@@ -167,11 +169,12 @@ def check_lines(check: Check) -> Iterator[Line]:
         lasting = f"{check.track.t[-1]:.0f} s"
         yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
     if link := check.link:
+        of_plan = partial(_of_plan, bandwidth_mhz=link.bandwidth_mhz)
         yield (
             "predicted link",
-            f"delivers {_of_plan(link.predicted_delivered, link.planned_delivered)}"
-            + (f", {link.predicted_mbytes:.4g} megabytes" if link.predicted_mbytes else "")
-            + f"; R_avg {_of_plan(link.predicted_rate, link.planned_rate)}",
+            f"delivers {of_plan(link.predicted_delivered, link.planned_delivered)}"
+            f"{_carried(link.predicted_mbytes)}; "
+            f"R_avg {of_plan(link.predicted_rate, link.planned_rate)}",
         )
         yield "", _apart(link.rms_position_error, link.max_position_error, link.path_error)
 

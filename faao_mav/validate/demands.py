@@ -45,12 +45,12 @@ class LinkCheck:
     """A plan and how the mission is predicted to carry it out.
 
     Rates in bit/s/Hz, averaged over the flight: `planned_rate` and `predicted_rate` are R_avg,
-    `planned_delivered` and `predicted_delivered` what the relay delivers, and `predicted_mbytes`
-    the latter in 10^6 bytes, None without a bandwidth. `causal` tells whether it is the delivered
-    rate that was planned for. Durations in s; `rms_position_error` and `max_position_error` m
-    between planned and predicted position at equal times; `path_error` m between planned and
-    predicted path, `path_tolerance` m what the plan allows of it; `altitude_error` m between
-    planned and predicted height; `worst` the stretch that loses most, None if none does.
+    `planned_delivered` and `predicted_delivered` what the relay delivers. `causal` tells whether it
+    is the delivered rate that was planned for. Durations in s; `rms_position_error` and
+    `max_position_error` m between planned and predicted position at equal times; `path_error` m
+    between planned and predicted path, `path_tolerance` m what the plan allows of it;
+    `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
+    None if none does; `bandwidth_mhz` is None where the plan has none.
     """
 
     planned_rate: float
@@ -66,7 +66,14 @@ class LinkCheck:
     altitude_error: float = 0.0
     worst: Stretch | None = None
     causal: bool = True
-    predicted_mbytes: float | None = None
+    bandwidth_mhz: float | None = None
+
+    @property
+    def predicted_mbytes(self) -> float | None:
+        """What is predicted to be delivered in all, 10^6 bytes; None without a bandwidth."""
+        if self.bandwidth_mhz is None:
+            return None
+        return self.predicted_delivered * self.bandwidth_mhz * self.planned_duration / 8
 
     @property
     def share(self) -> float:
