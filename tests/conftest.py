@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import os
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -85,3 +86,12 @@ def paper_plan(small_plan: MakePlan) -> MakePlan:
         return small_plan(paper | (changes or {}))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def autopilots() -> Path:
+    """The folder with the real autopilots, their simulators and runners; skips without one."""
+    named = os.environ.get("FAAO_AUTOPILOTS")
+    if named is None:
+        pytest.skip("FAAO_AUTOPILOTS does not name a folder with the real autopilots")
+    return Path(named)

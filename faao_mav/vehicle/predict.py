@@ -276,7 +276,11 @@ class _Walk:
             up = np.array([self.place[0], self.place[1], level])
             self._go(index, up, self.vertical.climb(level - float(self.place[2])))
         self.speed = self._own_speed()
-        self._towards(index, np.array([self.home[0], self.home[1], level]), 0.0)
+        rise, circling = level - float(self.place[2]), 0.0
+        if not self.vertical.lands_on_return:  # until it is at its height, on the way or over home
+            speed = self.flying.value("climb_speed" if rise > 0 else "descent_speed")
+            circling = abs(rise) / speed
+        self._towards(index, np.array([self.home[0], self.home[1], level]), circling)
         if self.vertical.lands_on_return:
             self._descend(index)
         self.over = True

@@ -32,15 +32,14 @@ def switch(key: str, default: float, name: str, unit: str = "") -> Parameter:
 SHARED = (
     switch("arming_items", 0, "ARMING_MIS_ITEMS"),
     switch("fence_enable", 0, "FENCE_ENABLE"),
-    switch("fence_options", 0, "FENCE_OPTIONS"),
     switch("fence_ceiling", 100.0, "FENCE_ALT_MAX", "m"),
     switch("fence_floor", -10.0, "FENCE_ALT_MIN", "m"),
     switch("fence_radius", 300.0, "FENCE_RADIUS", "m"),
     switch("sd_storage", 0, "BRD_SD_MISSION"),
     switch("terrain_enable", 1, "TERRAIN_ENABLE"),
 )
-"""Arming, fence, storage and terrain. The bits of FENCE_TYPE, whose default is each vehicle's own,
-are 1 ceiling, 2 circle, 4 areas, 8 floor."""
+"""Arming, fence, storage and terrain. Each vehicle has defaults of its own for FENCE_OPTIONS and
+FENCE_TYPE, whose bits are 1 ceiling, 2 circle, 4 areas, 8 floor."""
 
 
 def rally_limit(default: float) -> Parameter:

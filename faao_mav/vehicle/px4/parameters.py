@@ -88,7 +88,7 @@ PLANE_TABLE = table(
     _parameter("min_speed", "m/s", 10.0, "FW_AIRSPD_MIN", 1.0),
     _parameter("max_speed", "m/s", 20.0, "FW_AIRSPD_MAX", 1.0),
     _parameter("roll_limit", "rad", radians(50), "FW_R_LIM", radians(5), radians(85), radians(1)),
-    _parameter("climb_speed", "m/s", 8.0, "FW_T_CLMB_MAX", 0.1),
+    _parameter("climb_speed", "m/s", 5.0, "FW_T_CLMB_MAX", 0.1),
     _parameter("descent_speed", "m/s", 5.0, "FW_T_SINK_MAX", 0.1),
     _parameter("landing_angle", "rad", radians(5), "FW_LND_ANG", 0.0, radians(85), radians(1)),
     _parameter("acceptance_radius", "m", 10.0, "NAV_ACC_RAD", 0.05),

@@ -48,6 +48,7 @@ TABLE = table(
     _parameter("landing_speed", "m/s", 0.5, "LAND_SPD_MS", "LAND_SPEED", least=0.05),
     _parameter("return_height", "m", 15.0, "RTL_ALT_M", "RTL_ALT", least=0.0),
     *SHARED,
+    switch("fence_options", 0, "FENCE_OPTIONS"),
     switch("fence_type", 7, "FENCE_TYPE"),
     rally_limit(300.0),
 )

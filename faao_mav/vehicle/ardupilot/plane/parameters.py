@@ -36,6 +36,7 @@ TABLE = table(
     _parameter("damping", "", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1),
     _parameter("return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0),
     *SHARED,
+    switch("fence_options", 1, "FENCE_OPTIONS"),
     switch("fence_type", 4, "FENCE_TYPE"),
     rally_limit(5000.0),
 )

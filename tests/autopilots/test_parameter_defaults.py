@@ -1,0 +1,98 @@
+"""The defaults in the vehicles' tables are those of the real autopilots."""
+
+import json
+import lzma
+import socket
+import subprocess
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from pymavlink import mavutil
+
+from faao_mav.vehicle import ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE, VehicleType
+
+BY_AIRFRAME = {"NAV_ACC_RAD"}
+"""PX4's airframes set these: a multicopter 2 m, a plane 10 m."""
+
+PATIENCE = 60.0
+"""Seconds that a simulated autopilot has to start, and to list its parameters."""
+
+
+@contextmanager
+def ardupilot(built: Path, model: str, where: Path) -> Iterator[str]:
+    """Run a simulated ArduPilot and yield where it listens, on the loopback interface."""
+    for instance in range(40, 90):
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", 5760 + 10 * instance)):
+                break
+    home = "-35.363262,149.165237,584,0"
+    command = [str(built), "-w", "--model", model, "--home", home, "-I", str(instance)]
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(command, cwd=where, stdout=quiet, stderr=quiet)
+    try:
+        yield f"tcp:127.0.0.1:{5760 + 10 * instance}"
+    finally:
+        process.kill()
+        process.wait()
+
+
+def listed(connection: str) -> Mapping[str, float]:
+    """Return the parameters of the vehicle at `connection`."""
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            link = mavutil.mavlink_connection(connection, retries=1)
+            break
+        except OSError:
+            assert time.monotonic() < end, "it does not start"
+            time.sleep(0.2)
+    link.wait_heartbeat(timeout=PATIENCE)
+    link.mav.param_request_list_send(link.target_system, link.target_component)
+    found: dict[str, float] = {}
+    count = None
+    while count is None or len(found) < count:
+        message = link.recv_match(type="PARAM_VALUE", blocking=True, timeout=5)
+        assert message is not None or time.monotonic() < end, "it does not list its parameters"
+        if message is None:  # a lost one: the list again
+            link.mav.param_request_list_send(link.target_system, link.target_component)
+        else:
+            found[message.param_id], count = message.param_value, message.param_count
+    link.close()
+    return found
+
+
+def differences(vehicle_type: VehicleType, real: Mapping[str, float]) -> list[str]:
+    """Return where the table's defaults are not the `real` ones; aliases of others are left out."""
+    return [
+        f"{name}: {parameter.default / unit:g} in the table, {real[name]:g} on the vehicle"
+        for parameter in vehicle_type.parameters.values()
+        for name, unit in parameter.names.items()
+        if name in real
+        and name not in BY_AIRFRAME
+        and real[name] * unit != pytest.approx(parameter.default, rel=1e-5)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("program", "model", "vehicle_type"),
+    [("arducopter", "+", ARDUCOPTER), ("arduplane", "plane", ARDUPLANE)],
+)
+def test_of_ardupilot(
+    program: str, model: str, vehicle_type: VehicleType, autopilots: Path, tmp_path: Path
+) -> None:
+    with ardupilot(autopilots / "ardupilot" / program, model, tmp_path) as connection:
+        real = listed(connection)
+    assert differences(vehicle_type, real) == []
+    for parameter in vehicle_type.parameters.values():
+        assert set(parameter.names) & set(real), parameter.key
+
+
+@pytest.mark.parametrize("vehicle_type", [PX4_COPTER, PX4_PLANE])
+def test_of_px4(vehicle_type: VehicleType, autopilots: Path) -> None:
+    packed = (autopilots / "px4/etc/extras/parameters.json.xz").read_bytes()
+    listing = json.loads(lzma.decompress(packed))["parameters"]
+    real = {each["name"]: float(each["default"]) for each in listing}
+    assert differences(vehicle_type, real) == []
