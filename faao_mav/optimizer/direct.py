@@ -1,6 +1,8 @@
 """The direct method: one loop over trajectory and precoders on the true rate.
 
-maximise min(R_U, R_G) of (9), (10) under (11)-(13f). For given positions the best precoders of
+maximise min(R_U, R_G) of (9), (10) under (11)-(13f), or with `radio.causal` what the relay delivers
+of both rates: see `interior.queue`. More rate in a slot never delivers less, so that the best
+precoders are the same. For given positions the best precoders of
 every slot are a problem of their own, so that the rates become functions of the trajectory alone;
 by the envelope theorem their gradients are those at the best precoders. What is left is a flight
 through two fields of rates, which `interior` solves in time linear in the number of slots.
@@ -50,6 +52,8 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     options, kin = problem.plan.optimizer, problem.kinematics
     scheme = design(problem.plan)
     relay = problem.relay if problem.plan.radio.causal else None
+    # shares that jump between 0 and 1 take about twice the steps
+    steps = options.max_iterations * (2 if relay is not None and relay.half else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
@@ -65,7 +69,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         field,
         routes,
         tolerance=_ROUGH,
-        max_iterations=options.max_iterations,
+        max_iterations=steps,
         relay=relay,
     )
     flights = [*routes.values(), *rough.flights.values()]
@@ -85,7 +89,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             field,
             flights,
             tolerance=options.tolerance,
-            max_iterations=options.max_iterations,
+            max_iterations=steps,
             strategy=COLD_START if cold else WARM_START,
             relay=relay,
         )

@@ -116,7 +116,7 @@ class Model:
         step = dt * speed / LENGTH
         bend = dt**2 * kin.max_acceleration / LENGTH
         turn = dt * kin.max_acceleration / speed
-        cls = ca.MX if any(isinstance(rate, Curve) for rate in rates) else ca.SX
+        cls: Any = ca.MX if any(isinstance(rate, Curve) for rate in rates) else ca.SX
         w, v, a = cls.sym("w", 2, n), cls.sym("v", 2, n), cls.sym("a", 2, n - 1)
         t = cls.sym("t")
         position = w[:, 1:] - w[:, :-1] - step * v[:, :-1] - bend / 2 * a
