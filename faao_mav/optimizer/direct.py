@@ -82,8 +82,10 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     tell(2, "the best start", history[-1])
 
     def optimized(flights: list[Trajectory]) -> list[LocalOptimum]:
-        # the half-planes of a least speed turn too fast for the short steps of a warm start
-        cold = kin.min_speed > 0 or any(flight in routes.values() for flight in flights)
+        # the half-planes of a least speed turn too fast for the short steps of a warm start, and
+        # the shares of half duplex are sought anew
+        anew = kin.min_speed > 0 or (relay is not None and relay.half)
+        cold = anew or any(flight in routes.values() for flight in flights)
         return maximize_all(
             kin,
             field,

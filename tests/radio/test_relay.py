@@ -46,7 +46,9 @@ def most(I_U: Real, I_G: Real, buffer: float, *, half: bool) -> float:
                 rows.append(np.eye(2 * n)[k] / I_U[k] + np.eye(2 * n)[n + k] / I_G[k])
                 bounds.append(1.0)
     limits = [(0.0, float(x)) for x in np.concatenate([I_U, I_G])]
-    return -float(linprog(cost, A_ub=np.array(rows), b_ub=bounds, bounds=limits).fun)
+    found = linprog(cost, A_ub=np.array(rows), b_ub=bounds, bounds=limits)
+    assert found.fun is not None
+    return -float(found.fun)
 
 
 @given(routes(), BUFFERS)

@@ -2,8 +2,9 @@
 
     maximise  min_j F_j(w),  F_j(w) = (1 / n) sum_n f_jn(w_n)  under (11), (12), (13d)-(13f)
 
-or what a relay's `queue` delivers of two rates f_0n, f_1n, and whatever `Constraint`s are given. f (rates of links, for example) may be non-concave: the
-method finds a local optimum near its start, which it never falls below.
+or what a relay's `queue` delivers of two rates f_0n, f_1n, and whatever `Constraint`s are given.
+f (rates of links, for example) may be non-concave: the method finds a local optimum near its
+start, which it never falls below.
 
 Method. Primal-dual, with a predictor and a corrector (Mehrotra). The limits on ||v_n|| and ||a_n||
 are second-order cones with Nesterov-Todd scaling; t <= F_j is the barrier -mu c sum_j log(F_j - t)
