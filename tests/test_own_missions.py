@@ -61,7 +61,12 @@ def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
 
 def test_the_sample_plane() -> None:
     text = (MISSIONS / "plane_relay.yaml").read_text()
-    changes = {"flight.duration": 70, "flight.time_step": 0.5, "radio.fading": "none"}
+    changes = {
+        "flight.duration": 70,
+        "flight.time_step": 0.5,
+        "radio.fading": "none",
+        "radio.causal": False,  # the causal flight begins with a turn that is too tight, as told
+    }
     conversion, found = checked(text, changes)
     assert found.track is not None
     assert [each for each in complaints(found) if not each.startswith("link-")] == []

@@ -54,8 +54,8 @@ class Solution:
 
     `t` (n,) s; `w`, `v`, `a` (n, 2); `P_B` (n, N_t, N_t) and `P_U` (n, N_u, N_u) in sqrt(W);
     the fading `H_rB` (n, N_u, N_t) and `H_rU` (n, N_r, N_u) without path gain; `I_U`, `I_G`
-    (n,) of (7), (8) in bits; `history` the rate that is maximised (R_del, or R_avg
-    where the plan is not causal) of the start and after each iteration.
+    (n,) of (7), (8) in bits; `history` the rate that is maximised (R_del, or R_avg where
+    the plan is not causal) of the start and after each iteration.
     Fading that is averaged over has a leading axis of draws, and so have precoders that know it.
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
