@@ -53,7 +53,10 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     scheme = design(problem.plan)
     relay = problem.relay if problem.plan.radio.causal else None
     # shares that jump between 0 and 1 take about twice the steps
-    steps = options.max_iterations * (2 if relay is not None and relay.half else 1)
+    # the half-planes of a least speed turn too fast for the short steps of a warm start, and the
+    # shares of half duplex are sought anew; with a queue both take about twice as many steps
+    anew = kin.min_speed > 0 or (relay is not None and relay.half)
+    steps = options.max_iterations * (2 if relay is not None and anew else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
@@ -82,9 +85,6 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     tell(2, "the best start", history[-1])
 
     def optimized(flights: list[Trajectory]) -> list[LocalOptimum]:
-        # the half-planes of a least speed turn too fast for the short steps of a warm start, and
-        # the shares of half duplex are sought anew
-        anew = kin.min_speed > 0 or (relay is not None and relay.half)
         cold = anew or any(flight in routes.values() for flight in flights)
         return maximize_all(
             kin,

@@ -279,7 +279,8 @@ class Optimizer(_Section):
     max_iterations: Annotated[
         Whole,
         key(
-            "Iterations of Algorithm 1; Newton steps per start of the direct method.",
+            "Iterations of Algorithm 1; Newton steps per start of the direct method, which takes "
+            "twice as many at most for a relay's queue with half duplex or a least speed.",
             ge=1,
             le=10_000,
         ),
