@@ -26,9 +26,9 @@ def test_it_circles_over_home_at_its_own_height(
     runner = [sys.executable, str(autopilots / "fly_arducopter.py"), str(mission)]
     flight = ["--vehicle", "plane", "--out", str(track), "--speedup", "25"]
     own = ["--params", f"RTL_ALTITUDE={height:g}", "--linger", f"{AFTER:g}"]
-    for _ in range(3):  # status 3: the simulator did not get ready in time
+    for _ in range(4):  # the simulator may not get ready in time on a busy machine
         run = subprocess.run([*runner, *flight, *own], capture_output=True, text=True, timeout=200)
-        if run.returncode != 3:
+        if run.returncode != 3 and "pre-arm checks do not pass" not in run.stderr:
             break
     assert run.returncode == 0, run.stdout
     with track.open() as file:

@@ -18,7 +18,6 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 import numpy as np
-import yaml
 from peer import Model, at_best, curve
 
 from faao_mav.optimizer.design import design
@@ -29,6 +28,7 @@ from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 PATIENCE = 60.0
@@ -59,7 +59,7 @@ PLANS: tuple[tuple[str, dict[str, Any]], ...] = (
 
 def plan(name: str, changes: dict[str, Any]) -> Plan:
     """Read a sample plan for the direct method and the queue, with some keys replaced."""
-    data = yaml.safe_load((MISSIONS / f"{name}.yaml").read_text())
+    data = load_yaml((MISSIONS / f"{name}.yaml").read_text(), name)
     data.setdefault("optimizer", {})["method"] = "direct"
     data["radio"]["causal"] = True
     for key, value in changes.items():
@@ -72,7 +72,7 @@ def plan(name: str, changes: dict[str, Any]) -> Plan:
         for parent in parents:
             section = section[parent]
         section[last] = value
-    return parse_plan(yaml.safe_dump(data))
+    return parse_plan(dump_yaml(data))
 
 
 def by_ipopt(problem: Problem, field: RateField) -> tuple[float, list[float]]:
