@@ -42,6 +42,10 @@ _ROUGH = 1e-3
 Chosen; what a change costs is not measured.
 """
 
+_EQUAL = 1e-6
+"""The difference in bit/s/Hz below which two optima count as equal: which of them is larger is then
+up to the tolerance and to rounding, so that it differs from machine to machine. Chosen."""
+
 
 def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """Optimise trajectory and precoders of `problem` together.
@@ -102,9 +106,23 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         by_start |= {name: end.value for name, end in zip(rough.promising, optima, strict=True)}
     if values.max() > max(optimum.value for optimum in optima):
         optima += optimized([flights[int(values.argmax())]])
-    best = max(optima, key=lambda optimum: optimum.value)
+    best = _best(problem, field, optima)
     final = _at_exact_rates(problem, scheme, field, best)
     return _solution(problem, scheme, field, final, history, by_start)
+
+
+def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> LocalOptimum:
+    """Return the best of `optima`; of equal ones that which delivers most, then the first.
+
+    A route and its mirror image have the same R_avg, and may deliver very different amounts.
+    """
+    most = max(optimum.value for optimum in optima)
+    equal = [optimum for optimum in optima if optimum.value > most - _EQUAL]
+    if len(equal) == 1:
+        return equal[0]
+    rates = field.value(np.stack([optimum.trajectory.w.T for optimum in equal], axis=1))
+    delivered = objectives(rates, problem.kinematics, problem.relay)
+    return equal[int(np.argmax(np.round(delivered / _EQUAL)))]
 
 
 def _at_exact_rates(

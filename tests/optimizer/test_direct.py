@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_forms import bpsk_two_antennas_rate
-from conftest import MISSIONS, MakePlan
+from conftest import MISSIONS, MakePlan, edited
 
 from faao_mav.errors import PlanError
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import fresh_rates, price
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Progress, load_solution, save_solution
-from faao_mav.plan import Plan, read_plan
+from faao_mav.plan import Plan, parse_plan, read_plan
 from faao_mav.radio.best_precoder import best_precoders
 
 KNOWN = {"radio.fading": "realization"}
@@ -260,3 +260,15 @@ def test_algorithm_1_refuses_what_it_cannot_do(faint_plan: MakePlan) -> None:
     changes = KNOWN | {"optimizer.method": "algorithm1", "optimizer.inputs": "gaussian"}
     with pytest.raises(PlanError, match=r"optimizer\.inputs: gaussian is not for algorithm1"):
         optimize(faint_plan(changes))
+
+
+def test_of_routes_with_equal_R_avg_the_one_that_delivers_most_is_taken() -> None:
+    text = (MISSIONS / "copter_relay.yaml").read_text()
+    plan = parse_plan(edited(text, {"radio.causal": False, "flight.time_step": 1}))
+    solution = optimize(plan)
+    by_station, by_user = solution.starts["bs-user"], solution.starts["user-bs"]
+    assert by_station == pytest.approx(by_user, abs=1e-6)
+    mirrored = solution.relay(solution.I_G[::-1], solution.I_U[::-1])
+    towards_user = solution.relay(solution.I_U[::-1], solution.I_G[::-1])
+    assert solution.delivered_rate == pytest.approx(mirrored.rate, abs=1e-3)
+    assert solution.delivered_rate > 1.1 * towards_user.rate
