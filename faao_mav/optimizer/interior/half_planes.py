@@ -15,6 +15,7 @@ A new constraint of this kind is one class with two members, `MinSpeedConstraint
             return x[1] - self.northing / LENGTH, np.array([0.0, 1.0])[:, None, None]
 """
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
@@ -160,9 +161,9 @@ class HalfPlanes(Constraint):
         """The slack that starts are given where they have less. Chosen, as 10 m or v_max / 10."""
         return 0.1
 
+    @abstractmethod
     def slack(self, x: Real) -> tuple[Real, Real]:
         """Return g (flights, n) and its gradient (2, flights, n) at x (2, flights, n)."""
-        raise NotImplementedError
 
     def bounded(self, flight: ScaledFlight, w: Real, v: Real) -> Real:
         """Return x (2, flights, n) at scaled w and v, or its change at changes of them."""
