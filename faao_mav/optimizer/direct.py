@@ -55,7 +55,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     scheme = design(problem.plan)
-    relay = problem.relay if problem.plan.radio.causal else None
+    relay = problem.maximised_queue
     # shares that jump between 0 and 1 take about twice the steps
     # the half-planes of a least speed turn too fast for the short steps of a warm start, and the
     # shares of half duplex are sought anew; with a queue both take about twice as many steps
@@ -145,7 +145,7 @@ def _at_exact_rates(
         optimum.trajectory,
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=_EXACT_ITERATIONS,
-        relay=problem.relay if problem.plan.radio.causal else None,
+        relay=problem.maximised_queue,
     )
     return replace(optimum, trajectory=further.trajectory, value=further.value)
 

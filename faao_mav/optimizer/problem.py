@@ -127,6 +127,11 @@ class Problem:
     uav_user: Link
 
     @property
+    def maximised_queue(self) -> RelayQueue | None:
+        """The queue whose delivered rate is maximised; None with `radio.causal: false`."""
+        return self.relay if self.plan.radio.causal else None
+
+    @property
     def relay(self) -> RelayQueue:
         """How the relay forwards; its buffer is unlimited where the plan has no bandwidth."""
         radio = self.plan.radio

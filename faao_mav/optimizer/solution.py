@@ -177,7 +177,7 @@ class Solution:
 
         problem = build_problem(self.plan)
         rates = rate_field(problem, design(self.plan))
-        relay = problem.relay if self.plan.radio.causal else None
+        relay = problem.maximised_queue
         return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach, relay=relay)
 
 
