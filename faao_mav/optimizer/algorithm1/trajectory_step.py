@@ -36,12 +36,8 @@ class SumOfExponentials:
 
     def value(self, w: Real) -> float:
         """Return the sum over slots and non-zero classes of multiplicity exp(-D) at w."""
-        d2 = _squared_distance(self.link, w)
+        d2 = np.sum((w - self.link.station) ** 2, axis=-1) + self.link.altitude**2
         return float((self.link.classes.multiplicity * np.exp(-self.A / d2[:, None])).sum())
-
-
-def _squared_distance(link: Link, w: Real) -> Real:
-    return np.asarray(np.sum((w - link.station) ** 2, axis=-1) + link.altitude**2)
 
 
 def link_sum(link: Link, H_r: Complex, P: Complex) -> SumOfExponentials:
