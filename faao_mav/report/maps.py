@@ -37,25 +37,16 @@ _Outline: TypeAlias = tuple[Real, bool]
 _WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 """The commands of a relay route, whose items are numbered on its map."""
 
-_PIECES = 240
-"""Pieces of the route with a colour each, at most: more cannot be told apart."""
-_LEVELS = 32
-"""Colours on the scale of speeds; chosen: the steps cannot be seen."""
-_SHADES = (0.85, 0.3)
-"""Slow and fast on the scale of viridis: its ends vanish on white and on black paper."""
-_ROUND = 72
-"""Corners that a circle is drawn with; chosen: 5 degrees each."""
+_PIECES = 240  # pieces of the route with a colour each, at most: more cannot be told apart
+_LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
+_SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
+_ROUND = 72  # corners that a circle is drawn with; chosen: 5 degrees each
 
-_SIZE = 8.0
-"""Height of a number, points."""
-_DIGIT = 0.66
-"""Width of a digit in the widest usual font, of its size."""
-_GAP = 5.0
-"""Points between a waypoint and its number."""
-_CLEAR = 2.5
-"""Points between a number and the middle of a line: half the width that routes are drawn with."""
-_MARK = 4.0
-"""Half of a station's mark, points."""
+_SIZE = 8.0  # height of a number, points
+_DIGIT = 0.66  # width of a digit in the widest usual font, of its size
+_GAP = 5.0  # points between a waypoint and its number
+_CLEAR = 2.5  # points between a number and the middle of a line: half the width of a route's line
+_MARK = 4.0  # half of a station's mark, points
 _SIDES = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0)])
 """Where a number may stand beside its waypoint, right and up of it, the first that is free."""
 
