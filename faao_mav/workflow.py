@@ -201,11 +201,7 @@ def optimize_plan(plan: Plan, *, observe: Observer | None = None) -> Result:
 
 
 def plan_mission(
-    plan: Plan,
-    *,
-    method: str | None = None,
-    bound: bool = False,
-    observe: Observer | None = None,
+    plan: Plan, *, method: str | None = None, bound: bool = False, observe: Observer | None = None
 ) -> Result:
     """Optimise the flight of `plan` and make the mission that flies it.
 

@@ -14,15 +14,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses, difference_classes
-from faao_mav.radio.precoder import (
-    bpsk_two_antennas,
-    check_positive,
-    mmse,
-    mrt,
-    waterfilling,
-    with_power,
-    zf,
-)
+from faao_mav.radio.precoder import SCHEMES, bpsk_two_antennas, check_positive, with_power
 from faao_mav.radio.precoder_search import search
 from faao_mav.radio.rate import cutoff_rate
 
@@ -78,10 +70,9 @@ def _checked(
 
 
 def _known(H: Complex, power: float, noise: float) -> Complex:
-    """Return the identity and the classical schemes, (5, b, N_t, N_t), for H (b, N_r, N_t)."""
-    identity = np.broadcast_to(np.eye(H.shape[-1]), (*H.shape[:-2], H.shape[-1], H.shape[-1]))
-    schemes = (mrt(H, power), zf(H, power), mmse(H, power, noise), waterfilling(H, power, noise))
-    return np.stack([identity, *schemes])
+    """Return the identity and the classical schemes, (k, b, N_t, N_t), for H (b, N_r, N_t)."""
+    schemes = [scheme(H, power, noise) for scheme in SCHEMES.values()]
+    return np.stack([np.broadcast_to(np.eye(H.shape[-1]), schemes[0].shape), *schemes])
 
 
 def best_precoders(

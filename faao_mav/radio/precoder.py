@@ -162,10 +162,11 @@ def bpsk_two_antennas(H: RealOrComplex, power: float) -> Complex:
 
 SCHEMES: Mapping[str, Scheme] = MappingProxyType(
     {
-        "mmse": mmse,
         "mrt": lambda H, power, noise: mrt(H, power),  # noqa: ARG005
         "zf": lambda H, power, noise: zf(H, power),  # noqa: ARG005
+        "mmse": mmse,
         "waterfilling": waterfilling,
     }
 )
-"""The classical schemes by name, each called with (H, power, noise)."""
+"""The classical schemes by name, each called with (H, power, noise); also where the search for the
+best precoder compares its result."""

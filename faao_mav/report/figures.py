@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 
 def flight_figure(
-    solution: Solution,
-    conversion: Conversion | None = None,
-    prediction: Prediction | None = None,
+    solution: Solution, conversion: Conversion | None = None, prediction: Prediction | None = None
 ) -> "Figure":
     """Return the flight in one figure, as `--figure` saves it: map, speed, and both rates."""
     with drawing(9.6, 5.6) as figure:
