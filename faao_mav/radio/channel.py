@@ -25,10 +25,10 @@ def path_gain(w: Real, p: Real, altitude: float, rho_0: float) -> Real:
 def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
     """Return H^LoS of uniform linear arrays half a wavelength apart, both lying along east.
 
-    Entry (l, m) of the (..., receive, transmit), rank one, is exp(-jπ (l - m) u): moving the
-    receiving element east along the wave lengthens its way, moving the transmitting one shortens
-    it. u is the east component of the unit vector along the wave. The phase common to all entries,
-    2π d/λ, changes no rate and is left out.
+    Entry (l, m) of the result, (..., receive, transmit) and of rank one, is exp(-jπ (l - m) u):
+    moving the receiving element east along the wave lengthens its way, moving the transmitting one
+    shortens it. u is the east component of the unit vector along the wave. The phase common to all
+    entries, 2π d/λ, changes no rate and is left out.
 
     `path` (..., 3) is the vector east, north, up from transmitter to receiver, in any unit and far
     longer than the arrays: [w - p_B, H] for BS to UAV, [p_U - w, -H] for UAV to GU. `receive` and
