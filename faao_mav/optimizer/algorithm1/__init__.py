@@ -86,7 +86,7 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
 
 
 def _start(problem: Problem) -> _Iterate:
-    """Return the straight flight with equal-power precoders, sqrt(W / N) I."""
+    """Return the straight flight with equal-power precoders, sqrt(W / N) I, or the scheme's."""
 
     def equal_power(_: int, link: Link, H: Complex) -> Complex:
         N = link.transmit
