@@ -116,6 +116,8 @@ def test_what_is_dumped_is_loaded(data: dict[str, Any]) -> None:
         ({"flight.altitude": -40}, ["flight.altitude", "-40", "above 0"]),
         ({"radio.relay.antennas": 0}, ["radio.relay.antennas", "0", "1 to 64"]),
         ({"radio.relay.antennas": True}, ["radio.relay.antennas", "true is not accepted"]),
+        ({"name": "a\nverified"}, ["name: 'a\\nverified'", "one line of at most 200 printable"]),
+        ({"name": "\x1b[2J"}, ["name: '\\x1b[2J'", "one line"]),
         ({"radio.base_station.antennas": 2.5}, ["radio.base_station.antennas", "2.5"]),
         ({"radio.modulation": "QPSK"}, ["radio.modulation", "'QPSK'", "qpsk"]),
         ({"radio.modulaton": "qpsk"}, ["radio.modulaton", "did you mean modulation?"]),

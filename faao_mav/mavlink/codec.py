@@ -174,10 +174,9 @@ def _arguments(kind: Any, known: dict[str, Any]) -> list[Any]:
 
 def _text_or_number(value: Any) -> Any:
     """Return a field as it is, or its text on one line: what moves a terminal's cursor is blank."""
-    if not isinstance(value, bytes):
+    if not isinstance(value, str):
         return value
-    text = value.split(b"\0", 1)[0].decode("ascii", "replace")
-    return "".join(letter if letter.isprintable() else " " for letter in text)
+    return "".join(letter if letter.isprintable() else " " for letter in value)
 
 
 def _opaque_id(packet: Any) -> int:

@@ -51,10 +51,10 @@ class Framer:
     def feed_datagram(self, data: bytes) -> list[bytes]:
         """Return the packets that the datagram `data` completes.
 
-        One that begins as packets do begins with a packet: what is missing of the packet before it
-        was cut off. Any other may go on with that one, as serial lines behind a bridge do.
+        Where it begins with a whole one, what is missing of the packet before it was cut off. Else
+        it may go on with that one, as what comes from serial lines by a bridge does.
         """
-        if data[:1] in (bytes([_MAVLINK_1]), bytes([_MAVLINK_2])):
+        if data and data[0] in _AROUND and _length(data[:3]) <= len(data):
             self._rest = b""
         return self.feed(data)
 

@@ -135,7 +135,7 @@ def test_what_is_no_key_file_is_refused_at_once(path: str, tmp_path: Path) -> No
         os.mkfifo(tmp_path / path)
     elif path == "FOLDER":
         (tmp_path / path).mkdir()
-    with pytest.raises(InputError, match="is no regular file|cannot be read"):
+    with pytest.raises(InputError, match=r"is no regular file|cannot be read"):
         read_signing(tmp_path / path)
 
 
@@ -229,7 +229,7 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
     monkeypatch.setattr(link, recorded)
     with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
         assert put().verified
-    monkeypatch.setattr(link, lambda text: Playback(recorders[0].tape))
+    monkeypatch.setattr(link, lambda _: Playback(recorders[0].tape))
     if not remembered:
         key_file.with_name("key.last").unlink()
     told = "no vehicle: packets come .* of a recording" if remembered else "a recording of it"
@@ -256,7 +256,9 @@ def test_another_key_or_none_is_told_as_such(
         upload(a_mission(5), connection, signing_key=key_file, wait=0.4)
 
 
-def test_a_heartbeat_is_not_enough_to_be_alive(key_file: Path) -> None:
+def test_a_heartbeat_is_not_enough_to_be_alive(
+    key_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A vehicle that is signed, and says nothing else: what a recording of heartbeats shows."""
     codec = Codec(VEHICLE, Signing(KEY))
 
@@ -271,9 +273,6 @@ def test_a_heartbeat_is_not_enough_to_be_alive(key_file: Path) -> None:
         def close(self) -> None:
             pass
 
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        pytest.raises(LinkError, match="no answer to a question that was never asked before"),
-    ):
-        patch.setattr("faao_mav.mavlink.link.open_transport", lambda text: Beating())
+    monkeypatch.setattr("faao_mav.mavlink.link.open_transport", lambda _: Beating())
+    with pytest.raises(LinkError, match="no answer to a question that was never asked before"):
         upload(a_mission(5), "udpout:127.0.0.1:9", system=1, signing_key=key_file, timeouts=HASTY)

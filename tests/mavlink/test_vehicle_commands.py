@@ -149,6 +149,7 @@ def test_no_vehicle_is_status_1(mission_file: Path, port: int) -> None:
         (["autopilot", "--listen", "nonsense"], "expected udpin:HOST:PORT"),
         (["autopilot", "--home", "1,2"], "expected LAT,LON,ALT"),
         (["autopilot", "--home", "91,2,3"], "latitude"),
+        (["autopilot", "--home", "0,0,1e30"], "an altitude of at most 100000 m"),
     ],
 )
 def test_unusable_input_is_status_2(arguments: list[str], told: str, mission_file: Path) -> None:
