@@ -55,7 +55,7 @@ def quote(value: object) -> str:
         return str(value).lower()
     if isinstance(value, dict | list) and not value:
         return "nothing"
-    return _shortened("null" if value is None else repr(value))
+    return shortened("null" if value is None else repr(value))
 
 
 def place_of(steps: Sequence[str | int]) -> str:
@@ -64,7 +64,7 @@ def place_of(steps: Sequence[str | int]) -> str:
     >>> place_of(["mission", "items", 3, "params"])
     'mission.items[3].params'
     """
-    named = (f"[{s}]" if isinstance(s, int) else f".{_shortened(printable(s))}" for s in steps)
+    named = (f"[{s}]" if isinstance(s, int) else f".{shortened(printable(s))}" for s in steps)
     return "".join(named).removeprefix(".")
 
 
@@ -77,5 +77,10 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def _shortened(text: str) -> str:
-    return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "..."
+def shortened(text: str, most: int = _MAX_SHOWN) -> str:
+    """Return `text`, cut to `most` characters.
+
+    >>> shortened("123456789", 8)
+    '12345...'
+    """
+    return text if len(text) <= most else text[: most - 3] + "..."
