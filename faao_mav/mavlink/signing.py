@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from faao_mav.errors import InputError
-from faao_mav.files import write_whole
+from faao_mav.files import read_bytes, write_whole
 from faao_mav.mavlink.framing import is_signed
 from faao_mav.mavlink.protocol import Address
 
@@ -80,7 +80,10 @@ def read_signing(path: Path) -> Signing:
     The time is in the file of `remember`, if there is one. Raises `InputError`, also for a key that
     others may read; the content is never shown.
     """
-    key, mode = _read(path)
+    expected = "a signing key: 32 bytes, or 64 hexadecimal digits"
+    path = path.absolute()  # whose name is not the one of standard input
+    key = read_bytes(path, _LARGEST_FILE, expected)
+    mode = path.stat().st_mode
     if os.name == "posix" and mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise InputError(
             f"{path}: others than its owner have access (mode {stat.S_IMODE(mode):o}); a signing "
@@ -90,16 +93,14 @@ def read_signing(path: Path) -> Signing:
         with contextlib.suppress(ValueError):
             key = bytes.fromhex(key.decode("ascii").strip())
     if len(key) != _KEY_BYTES:
-        raise InputError(f"{path}: expected a signing key: 32 bytes, or 64 hexadecimal digits")
+        raise InputError(f"{path}: expected {expected}")
     last = _last_of(path)
     if not last.exists():
         return Signing(key)
-    digits, _ = _read(last)
+    expected = f"the time of the last packet signed with the key, a number of at most {_LAST_TICK}"
+    digits = read_bytes(last, _LARGEST_FILE, expected)
     if not digits.strip().isdigit() or int(digits) > _LAST_TICK:
-        raise InputError(
-            f"{last}: expected the time of the last packet signed with {path.name}, a number of at "
-            f"most {_LAST_TICK}"
-        )
+        raise InputError(f"{last}: expected {expected}")
     return Signing(key, int(digits))
 
 
@@ -114,15 +115,3 @@ def remember(path: Path, signing: Signing) -> None:
 
 def _last_of(path: Path) -> Path:
     return path.with_name(path.name + ".last")
-
-
-def _read(path: Path) -> tuple[bytes, int]:
-    """Return what the regular file `path` begins with, and its mode."""
-    try:
-        mode = path.stat().st_mode
-        if not stat.S_ISREG(mode):
-            raise InputError(f"{path}: is no regular file; give the name of one with the key")
-        with path.open("rb") as file:
-            return file.read(_LARGEST_FILE), mode
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None

@@ -75,11 +75,13 @@ def main() -> int:
 
         with atheris.instrument_imports(include=["faao_mav"]):
             from targets import targets
+            from wire_targets import wire_targets
     else:
         from targets import targets
+        from wire_targets import wire_targets
 
     with tempfile.TemporaryDirectory() as directory:
-        found = targets(Path(directory))
+        found = targets(Path(directory)) | wire_targets()
         names = asked.targets or list(found)
         each = -(-asked.cases // len(names))
         if not asked.coverage:
