@@ -201,8 +201,8 @@ class _Session:
 
     def _check_alive(self, connection: str) -> None:
         """Raise `LinkError` where nobody answers what no recording can."""
-        pace = self.timeouts.response, self.timeouts.retries
-        if not self.run(AskAlive(self.found.address, secrets.randbits(62), *pace)):
+        number, patience = secrets.randbits(62), self.timeouts.silence
+        if not self.run(AskAlive(self.found.address, number, patience)):
             raise LinkError(
                 f"{connection}: {self.found}: no answer to a question that was never asked before "
                 "(TIMESYNC): is the vehicle there, or a recording of it?"

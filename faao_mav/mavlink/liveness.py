@@ -1,5 +1,6 @@
 """Whether a vehicle is there now, or only a recording of it."""
 
+import math
 from collections.abc import Sequence
 
 from faao_mav.mavlink.machine import AskingMachine
@@ -10,8 +11,9 @@ from faao_mav.mavlink.protocol import Address
 class AskAlive(AskingMachine[bool]):
     """A machine that asks for the answer to a `number` that nobody could know before.
 
-    Its outcome is whether `vehicle` gave it: on a link that is signed, a recording cannot, and
-    packets recorded before the answer are older than it, so that they are passed over from then on.
+    It asks twice a second for `patience` seconds. Its outcome is whether `vehicle` answered: on a
+    link that is signed a recording cannot, and what was recorded before the answer is older than
+    it, so that it is passed over from then on.
 
     >>> vehicle = Address(1, 1)
     >>> asking = AskAlive(vehicle, number=77)
@@ -25,8 +27,8 @@ class AskAlive(AskingMachine[bool]):
 
     progress = ("asking for a sign of life", 0, 0)
 
-    def __init__(self, vehicle: Address, number: int, wait: float = 1.5, retries: int = 5) -> None:
-        super().__init__(wait, retries)
+    def __init__(self, vehicle: Address, number: int, patience: float = 9.0) -> None:
+        super().__init__(0.5, math.ceil(patience / 0.5) - 1)
         self._vehicle, self._number = vehicle, number
 
     def _question(self) -> Message:

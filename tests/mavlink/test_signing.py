@@ -32,7 +32,7 @@ NOW = 1_800_000_000.0
 """A time after 2015, s since 1970."""
 
 HEARTBEAT = 0
-HASTY = Timeouts(response=0.1, retries=2, attempts=1)
+HASTY = Timeouts(response=0.1, retries=2, attempts=1, silence=0.5)
 
 
 @pytest.fixture
