@@ -50,6 +50,7 @@ def download(
             signing_key=signing_key,
             wait=timeout,
             observe=observe,
+            note=note,
         )
     write_whole(out, render_mission(mission, out).encode())
     for line in losses_in(mission, out):

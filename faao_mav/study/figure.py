@@ -160,12 +160,12 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
         several = len({row.scheme for row in rows}) > 1
         colours: dict[str, str] = {}
         for row in rows:
-            if not row.route:
+            if not len(row.route):
                 continue
             name = _named(row.values)
             if several or not name:
                 name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
-            east, north = zip(*row.route, strict=True)
+            east, north = row.route.T
             new = name not in colours
             colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
             width = max(1.2, 4.0 - 1.4 * list(colours).index(name))

@@ -131,7 +131,7 @@ def whole(least: int, most: int) -> Codec:
     """Stored as a whole number: fractions are cut off, what is out of range ends at its limit."""
 
     def codec(value: float) -> float:
-        return 0.0 if math.isnan(value) else float(min(max(math.trunc(value), least), most))
+        return 0.0 if math.isnan(value) else float(math.trunc(min(max(value, least), most)))
 
     return codec
 

@@ -21,7 +21,7 @@ from faao_mav.errors import InputError
 from faao_mav.plan import parse_plan
 from faao_mav.plan.sections import StudyScheme
 from faao_mav.report.style import save_figure
-from faao_mav.study import StudyRow, load_rows, make_cases, run_study
+from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_study
 from faao_mav.study.figure import study_figure
 from faao_mav.study.rows import append_row
 
@@ -84,7 +84,7 @@ def test_a_resumed_study_is_the_uninterrupted_one(
     again = run_study(CASES, jobs=1, directory=tmp_path)
     assert timeless(again) == timeless(whole[1])
     assert again[:2] == tuple(seen)  # not run again
-    assert len(load_rows(tmp_path)) == len(CASES)
+    assert len(load_rows(tmp_path, CASES)) == len(CASES)
     assert [row["scheme"] for row in table_in(tmp_path)] == (["faao", "mrt"] * 3)
 
 
@@ -304,4 +304,4 @@ def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> 
     assert process.returncode == 130
     assert f"interrupted; finished rows are in {out}; the same command goes on there" in said
     assert "Traceback" not in said
-    assert load_rows(out)
+    assert load_rows(out, make_cases(QUICK, vary=dict([parse_vary("power_dbm=0:20:0.1")])))

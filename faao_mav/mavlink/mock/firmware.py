@@ -182,9 +182,9 @@ class MockFirmware(ABC):
             return _check_mission_item(mission_item(item), self._lists.vehicle)
         if item.command not in (FENCE_ROWS if part is MissionType.FENCE else {RALLY_POINT}):
             return MavResult.UNSUPPORTED
-        if item.command in POLYGON.values() and item.params[0] < 3:
+        if item.command in POLYGON.values() and not item.params[0] >= 3:  # nor NaN
             return self.thin_polygon
-        if item.command == RALLY_POINT and math.isnan(item.z):
+        if item.command == RALLY_POINT and not math.isfinite(item.z):
             return MavResult.INVALID_PARAM7
         if abs(item.x) > 900_000_000:
             return MavResult.INVALID_PARAM5_X

@@ -214,6 +214,15 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
         text += f". The vehicle says: {'; '.join(report.said)}"
     begun = report.item is not None and report.verdict in ("silent", "cancelled", "refused")
     if begun and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
-        text += f". {autopilot_name(peer.vehicle)} may now hold old and new items mixed: upload "
-        text += "again before flying"
+        text += f". {what_is_left(peer)}"
     return text
+
+
+def what_is_left(peer: Peer) -> str:
+    """Return in words what a vehicle may hold when a change of its lists has stopped half-way."""
+    if peer.vehicle is None:
+        return "What the vehicle holds now is not known: upload again, or download it"
+    name = autopilot_name(peer.vehicle)
+    if peer.vehicle.dialect.atomic:
+        return f"{name} holds the old list or the new one, whole: download it to see which"
+    return f"{name} may now hold old and new items mixed: upload again before flying"

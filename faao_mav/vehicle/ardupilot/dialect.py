@@ -171,7 +171,8 @@ def _stored(item: MissionItem, known: dict[int, Codecs]) -> MissionItem:
             frame = Frame.GLOBAL_RELATIVE_ALT
         elif item.frame in ABOVE_TERRAIN:
             frame = Frame.GLOBAL_TERRAIN_ALT
-        centimetres = int(np.float32(item.z) * np.float32(100))
+        within = min(max(item.z, -_HIGHEST), _HIGHEST)
+        centimetres = int(np.float32(within) * np.float32(100))
         altitude = float(np.float32(centimetres) * np.float32(0.01))
         return replace(result, frame=frame, x=degrees(item.x), y=degrees(item.y), z=altitude)
     if codecs is not None or item.frame == Frame.MISSION:
