@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from faao_mav.vehicle.ardupilot import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
@@ -63,6 +63,7 @@ ARDUCOPTER = VehicleType(
     whole_second_holds=True,
     fastest=_FASTEST,
     fence_needs_one_inclusion=needs_one_inclusion,
+    home_outside_fence=HOME_OUTSIDE_FENCE,
     legs=ArduCopterLegs.from_vehicle,
     flight_model=ArduCopter.from_vehicle,
     calibrated=True,
