@@ -18,6 +18,7 @@ class Command(IntEnum):
     NAV_SPLINE_WAYPOINT = 82
     NAV_VTOL_TAKEOFF = 84
     NAV_VTOL_LAND = 85
+    NAV_GUIDED_ENABLE = 92
     NAV_DELAY = 93
     CONDITION_DELAY = 112
     CONDITION_DISTANCE = 114
@@ -36,6 +37,9 @@ FLOWN_TO = frozenset(command for command in Command if command.name.startswith("
     Command.NAV_DELAY,
 }
 """Commands that fly to the place x, y, z of their item."""
+
+LANDINGS = frozenset({Command.NAV_LAND, Command.NAV_VTOL_LAND})
+TAKEOFFS = frozenset({Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF})
 
 FENCE_RETURN_POINT: Final = 5000
 """MAV_CMD_NAV_FENCE_RETURN_POINT."""

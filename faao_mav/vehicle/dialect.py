@@ -72,6 +72,8 @@ class Dialect:
         speed_change: what a DO_CHANGE_SPEED changes, None for one that changes nothing.
         unlimited: whether the vehicle's parameters make room for any number of items, and
             `make_room` how to set them so.
+        endings: the commands behind which nothing is flown.
+        flies_on: whether, by the vehicle's parameters, a take-off behind a landing is flown.
         known: the commands of which it is known what is stored, None: all. Of the others `stored`
             takes everything to be kept.
     """
@@ -90,6 +92,8 @@ class Dialect:
     speed_change: Callable[[MissionItem], SpeedChange | None]
     unlimited: Callable[[ParameterValues], bool] = lambda _: False
     make_room: str = ""
+    endings: frozenset[int] = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
+    flies_on: Callable[[ParameterValues], bool] = lambda _: False
     known: frozenset[int] | None = None
 
     def is_known(self, command: int) -> bool:

@@ -12,6 +12,7 @@ from faao_mav.mission.command import (
     ABOVE_TERRAIN,
     FENCE_RETURN_POINT,
     FLOWN_TO,
+    LANDINGS,
     RALLY_POINT,
     Command,
     Frame,
@@ -38,6 +39,10 @@ from faao_mav.vehicle.dialect import (
 
 _HIGHEST = 83_000.0
 """The altitude from which on items are refused, m. Read in AP_Mission."""
+
+_CONTINUE_AFTER_LAND = 4
+"""The bit of MIS_OPTIONS by which a take-off behind a landing is flown. Measured on ArduCopter 4.7:
+without it the mission ends there, and with it before any other item too."""
 
 _uint8, _uint16, _int8, _int16 = (
     whole(0, 255),
@@ -225,6 +230,8 @@ def _dialect(
         stored=lambda item: _stored(item, known),
         speed_change=speed_change,
         unlimited=lambda values: values.value("sd_storage") > 0,
+        endings=LANDINGS | {Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH},
+        flies_on=lambda values: bool(int(values.value("mission_options")) & _CONTINUE_AFTER_LAND),
         make_room="set BRD_SD_MISSION to store missions on the card",
         known=frozenset(known),
     )

@@ -123,7 +123,7 @@ def _speed_change(item: MissionItem) -> SpeedChange | None:
 
 DIALECT = Dialect(
     home_row=False,
-    items=Limit(1_000, 65_534),
+    items=Limit(1_000, 10_000),  # most boards; the simulator, measured
     jumps=None,
     fence_rows=64,
     rally_rows=8,
