@@ -132,6 +132,8 @@ def _at_exact_rates(
 
     With the precoders held, the rates are exact, and whatever they gain the best ones gain too.
     """
+    if problem.plan.optimizer.rate != "cutoff":
+        return optimum
     if not any(isinstance(rate, ModeRate) and not rate.exact for rate in field.rates):
         return optimum
     w = optimum.trajectory.w
@@ -197,12 +199,17 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex)
     """Return the precoders at positions w (n, 2), searched from the best that `rate` knows."""
     where = link_coordinates(link, w.T)
     at = where.gain_log, where.cosine
-    if isinstance(rate, CurveRate) and scheme.optimal:
-        return scheme.precoders(link, H, start=rate.initial_precoders(*at))
+    if not scheme.optimal or not isinstance(rate, CurveRate | BestRate | ModeRate):
+        return scheme.precoders(link, H)
+    known = rate.initial_precoders(*at)
+    if link.measure != "cutoff":
+        return known
+    carried = scheme.precoders(link, H, start=known)
+    if isinstance(rate, CurveRate):
+        return carried
     afresh = scheme.precoders(link, H)
-    if not isinstance(rate, BestRate | ModeRate) or rate.exact:
+    if rate.exact:
         return afresh
-    carried = scheme.precoders(link, H, start=rate.initial_precoders(*at))
     better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
     return np.asarray(np.where(better[:, None, None], carried, afresh))
 
