@@ -59,10 +59,7 @@ class Design:
 
     def rate(self, link: Link, H: Draws, P: Complex) -> Real:
         """Return the rate that the route is optimised for, bits (n,), its mean where `averaged`."""
-        if self.gaussian:
-            rate = gaussian_rate(H, P, link.noise)
-        else:
-            rate = link.draw_rates(H, P)
+        rate = gaussian_rate(H, P, link.noise) if self.gaussian else link.draw_rates(H, P)
         return np.asarray(rate.mean(axis=0)) if self.averaged else rate
 
 

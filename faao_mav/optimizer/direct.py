@@ -20,7 +20,7 @@ from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximize_all, objectives
 from faao_mav.optimizer.interior.search import COLD_START, WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
@@ -42,6 +42,10 @@ _ROUGH = 1e-3
 Chosen; what a change costs is not measured.
 """
 
+CUTOFF = "cutoff"
+"""The name of the start that a plan for the mutual information has beside `optimizer.starts`: the
+flight of the plan for the cutoff rate."""
+
 _EQUAL = 1e-6
 """The difference in bit/s/Hz below which two optima count as equal: which of them is larger is then
 up to the tolerance and to rounding, so that it differs from machine to machine. Chosen."""
@@ -55,6 +59,8 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     scheme = design(problem.plan)
+    counts_cutoff = options.rate == "cutoff" or scheme.gaussian
+    before = None if counts_cutoff else direct(counted_as_cutoff(problem))
     relay = problem.maximised_queue
     # shares that jump between 0 and 1 take about twice the steps
     # the half-planes of a least speed turn too fast for the short steps of a warm start, and the
@@ -70,6 +76,8 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
+    if before is not None:
+        routes[CUTOFF] = before.trajectory
     tell(1, "the starts", 0.0)
     rough = improve_starts(
         kin,
@@ -108,7 +116,22 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         optima += optimized([flights[int(values.argmax())]])
     best = _best(problem, field, optima)
     final = _at_exact_rates(problem, scheme, field, best)
-    return _solution(problem, scheme, field, final, history, by_start)
+    solution = _solution(problem, scheme, field, final, history, by_start)
+    if before is None:
+        return solution
+    return replace(solution, gain=float(solution.history[-1]) - _worth(problem, before))
+
+
+def _worth(problem: Problem, other: Solution) -> float:
+    """Return what `problem` maximises, bit/s/Hz, of the flight and the precoders of `other`."""
+    rates = [
+        link.rates(other.w, H_r, P)
+        for link, H_r, P in zip(
+            problem.links, (other.H_rB, other.H_rU), (other.P_B, other.P_U), strict=True
+        )
+    ]
+    values = objectives(np.stack(rates)[:, None], problem.kinematics, problem.maximised_queue)
+    return float(values[0])
 
 
 def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> LocalOptimum:

@@ -1,7 +1,7 @@
 """Everything that (13) needs, as arrays."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -172,6 +172,17 @@ class Problem:
     def links(self) -> tuple[Link, Link]:
         """BS to UAV, UAV to user."""
         return self.bs_uav, self.uav_user
+
+
+def counted_as_cutoff(problem: Problem) -> Problem:
+    """Return `problem` with the cutoff rate as the rate that counts."""
+    plan = problem.plan
+    return replace(
+        problem,
+        plan=replace(plan, optimizer=replace(plan.optimizer, rate="cutoff")),
+        bs_uav=replace(problem.bs_uav, measure="cutoff"),
+        uav_user=replace(problem.uav_user, measure="cutoff"),
+    )
 
 
 def build_problem(plan: Plan) -> Problem:

@@ -60,7 +60,9 @@ class Solution:
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end. `shares` (n,) of each slot are those in which a
-    half-duplex relay receives; it sends in the rest.
+    half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
+    `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
+    by how much the rate that it maximises is above that of the plan for the cutoff rate.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -95,6 +97,7 @@ class Solution:
     ending: str
     starts: Mapping[str, float] = field(default_factory=dict)
     shares: Real | None = None
+    gain: float | None = None
 
     @property
     def rates(self) -> Rates:
@@ -232,7 +235,8 @@ def save_solution(
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
     Keys: the arrays of `Solution` by name, those of its `relayed`, `R_avg`, `R_U`, `R_G`, `R_del`,
-    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`,
+    `converged`, `ending`, `starts` (JSON text), `gain` if there is one and `plan`, the YAML text;
+    and the arrays `extra`,
     which `load_solution` leaves alone. The same solution gives the same bytes.
     """
     rates = solution.rates
@@ -240,8 +244,8 @@ def save_solution(
     values |= {"R_avg": rates.R_avg, "R_U": rates.R_U, "R_G": rates.R_G}
     values |= {name: getattr(solution.relayed, name) for name in _RELAYED}
     values["R_del"] = solution.delivered_rate
-    if solution.shares is not None:
-        values["shares"] = solution.shares
+    optional = {"shares": solution.shares, "gain": solution.gain}
+    values |= {name: value for name, value in optional.items() if value is not None}
     values |= {"converged": solution.converged, "ending": solution.ending}
     values["starts"] = json.dumps(dict(solution.starts))
     values["plan"] = solution.plan.text
@@ -285,6 +289,7 @@ def load_solution(path: str | Path) -> Solution:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in _ARRAYS}
             shares = archive["shares"] if "shares" in archive.files else None
+            gain = float(archive["gain"]) if "gain" in archive.files else None
             text, ending = str(archive["plan"]), str(archive["ending"])
             converged = bool(archive["converged"])
             starts = json.loads(str(archive["starts"]))
@@ -300,5 +305,12 @@ def load_solution(path: str | Path) -> Solution:
         or not ((shares >= 0) & (shares <= 1)).all()
     ):
         raise InputError(f"{path}: shares: expected a number of 0 to 1 per slot")
-    told = {"converged": converged, "ending": ending, "starts": starts, "shares": shares}
-    return Solution(plan=plan, **told, **arrays)
+    return Solution(
+        plan=plan,
+        converged=converged,
+        ending=ending,
+        starts=starts,
+        shares=shares,
+        gain=gain,
+        **arrays,
+    )

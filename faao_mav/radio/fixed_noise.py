@@ -93,7 +93,7 @@ def fixed_noise_information(
     >>> fixed_noise_information(one, one, "bpsk", 1.0).round(3)  # exactly 0.721452
     array([0.721])
     """
-    A = np.asarray(H) @ np.asarray(P)
+    A = np.asarray(H, dtype=np.complex128) @ P
     flat = A.reshape(-1, *A.shape[-3:])
     return _averages(flat, modulation, noise, None).reshape(A.shape[:-2])
 
@@ -105,7 +105,7 @@ def information_and_errors(H: Complex, P: Complex, modulation: str, noise: float
     return Information(_averages(A, modulation, noise, errors), errors)
 
 
-def _averages(A: RealOrComplex, modulation: str, noise: float, errors: Complex | None) -> Real:
+def _averages(A: Complex, modulation: str, noise: float, errors: Complex | None) -> Real:
     """Return the information (b, S) at A = H P (b, S, N_r, N_t), and fill `errors` if asked for."""
     b, S, _, N = A.shape
     used, real = noise_set(modulation, N, S), modulation == "bpsk"
@@ -124,7 +124,7 @@ def _averages(A: RealOrComplex, modulation: str, noise: float, errors: Complex |
     return np.asarray(used.inputs.bits - value / _LN2)
 
 
-def _maps(A: RealOrComplex, noise: float, *, real: bool) -> Real:
+def _maps(A: Complex, noise: float, *, real: bool) -> Real:
     """Return the maps (..., D, D) from inputs to received points, for noise N(0, I).
 
     They are the square roots of 2 A^H A / σ², in real coordinates.
@@ -134,5 +134,6 @@ def _maps(A: RealOrComplex, noise: float, *, real: bool) -> Real:
     root = (V * np.sqrt(np.maximum(energy, 0.0))[..., None, :]) @ V.conj().mT
     if real:
         return np.asarray(root)
-    rows = [np.concatenate(part, axis=-1) for part in ((root.real, -root.imag), (root.imag, root.real))]
+    upper, lower = (root.real, -root.imag), (root.imag, root.real)
+    rows = [np.concatenate(parts, axis=-1) for parts in (upper, lower)]
     return np.concatenate(rows, axis=-2).mT

@@ -13,7 +13,7 @@ antennas at ratios of the modes from 0.2 to 0.95 and rates from 0.07 to 2 bit.
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real, RealOrComplex
+from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
 from faao_mav.radio.best_precoder import best_mean_precoders
 from faao_mav.radio.fixed_noise import information_and_errors
 from faao_mav.radio.precoder import _with_power
@@ -92,7 +92,7 @@ def _ascended(
     P = _with_power(start, 1.0)
     gram = (H.conj().mT @ H) * (2 * power / noise / np.log(2.0))
 
-    def at(index: object, P: Complex) -> tuple[Real, Complex]:
+    def at(index: Integers, P: Complex) -> tuple[Real, Complex]:
         """Return the mean information (k,), and its gradient along the sphere (k, N, N)."""
         found = information_and_errors(H[index], np.sqrt(power) * P[:, None], modulation, noise)
         gradient = np.mean(gram[index] @ P[:, None] @ found.errors, axis=1)

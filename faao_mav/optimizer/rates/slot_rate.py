@@ -62,7 +62,8 @@ class BestRate:
         """
         P = self.precoders(gain_log, cosine)
         if self.link.measure != "cutoff":
-            return DifferencedRate(self.link, partial(self.link.draw_rates, P=P)).partials(gain_log, cosine)
+            held = DifferencedRate(self.link, partial(self.link.draw_rates, P=P))
+            return held.partials(gain_log, cosine)
         return FixedRate(self.link, P, rotating=True).partials(gain_log, cosine)
 
 
