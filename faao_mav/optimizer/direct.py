@@ -11,6 +11,7 @@ Measured (tests/benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT 
 starts, and several times quicker.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,10 @@ from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.multistart import improve_starts
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
+
+_LONG_SEARCH = 6
+"""By how many times `optimizer.max_iterations` may be exceeded where a queue has a buffer, shares
+or a least speed. The plans of `_MONOTONE_AFTER` in `interior.search` need up to 290 steps."""
 
 _EXACT_ITERATIONS = 12
 """The largest number of iterations at exact rates, after those in a table.
@@ -62,11 +67,11 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     counts_cutoff = options.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
     relay = problem.maximised_queue
-    # shares that jump between 0 and 1 take about twice the steps
     # the half-planes of a least speed turn too fast for the short steps of a warm start, and the
-    # shares of half duplex are sought anew; with a queue both take about twice as many steps
+    # shares of half duplex are sought anew; with a queue both take more steps, and so does a buffer
     anew = kin.min_speed > 0 or (relay is not None and relay.half)
-    steps = options.max_iterations * (2 if relay is not None and anew else 1)
+    long = relay is not None and (anew or math.isfinite(relay.buffer))
+    steps = options.max_iterations * (_LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:

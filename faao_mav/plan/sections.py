@@ -284,7 +284,7 @@ class Optimizer(_Section):
         Whole,
         key(
             "Iterations of Algorithm 1; Newton steps per start of the direct method, which takes "
-            "twice as many at most for a relay's queue with half duplex or a least speed.",
+            "six times as many at most for a queue with a buffer, half duplex or a least speed.",
             ge=1,
             le=10_000,
         ),
