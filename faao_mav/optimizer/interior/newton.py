@@ -138,24 +138,23 @@ class Newton:
         )
         direction = self.aimed(mu, targets)
         reach = direction.reach(self.at)
+        going = np.ones(reach.shape, dtype=np.bool_)
         for _ in range(_CORRECTIONS):
             aim = np.minimum(1, _LONGER * reach + _MORE)
-            if not (reach < 1).any():
-                break
             others = tuple(
                 state.recentred(target, mu, step, aim)
                 for state, target, step in zip(states, targets, direction.steps, strict=True)
             )
             other = self.aimed(mu, others)
             farther = other.reach(self.at)
-            better = farther > reach + _WORTHWHILE * (aim - reach)
-            if not better.any():
+            going &= (reach < 1) & (farther > reach + _WORTHWHILE * (aim - reach))
+            if not going.any():
                 break
             targets = tuple(
-                np.where(better, new, old) for new, old in zip(others, targets, strict=True)
+                np.where(going, new, old) for new, old in zip(others, targets, strict=True)
             )
-            direction = other if better.all() else self.aimed(mu, targets)
-            reach = np.where(better, farther, reach)
+            direction = other if going.all() else self.aimed(mu, targets)
+            reach = np.where(going, farther, reach)
         return direction, reach
 
     def aimed(self, mu: Real, targets: tuple[Any, ...]) -> Direction:

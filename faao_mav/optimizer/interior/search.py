@@ -79,8 +79,8 @@ converge; in half duplex 3,322 and 4. With 0.01 to 0.1 as elsewhere: 1,749 and 4
 _MONOTONE_AFTER = 2
 _SOLVED = 3.0
 _MONOTONE_FALL = 0.2
-"""The centrings after which mu stays until the scaled gradient is below `_SOLVED` mu, and then
-falls to this share: iterates that hug the limits again and again are led along their centre.
+"""With a queue, the centrings after which mu stays until the scaled gradient is below `_SOLVED` mu,
+and then falls to this share: iterates that hug the limits again and again are led along the centre.
 
 Measured on eight flights of the samples with buffers of 5 to 100 MB or a least speed, to a
 tolerance of 1e-4: 7 converge, 3 with the adaptive rule alone. From the first centring on, flights
@@ -260,13 +260,14 @@ class Search:
         newton, ahead = self._newton()
         share = np.minimum(1, ahead.reach(at))
         now, left = at.mean_gap(), at.mean_gap(share, ahead)
-        slowest = np.where(slope < 1, 0.01, 0.1) if len(at.total) else _QUEUE_FALL
+        queued = not len(at.total)
+        slowest = _QUEUE_FALL if queued else np.where(slope < 1, 0.01, 0.1)
         keep = np.maximum((left / now) ** 3, slowest)
         least = self.tolerance * _MU_PER_TOLERANCE * control.steepness
         adaptive = np.fmin(control.mu, keep * now)
         solved = slope * control.steepness < _SOLVED * control.mu
         monotone = np.where(solved, _MONOTONE_FALL, 1.0) * control.mu
-        hugged = control.centrings >= _MONOTONE_AFTER
+        hugged = queued & (control.centrings >= _MONOTONE_AFTER)
         control.mu = np.fmax(np.where(hugged, monotone, adaptive), least)
         direction, reach = newton.corrector(control.mu, ahead, share)
         share = np.minimum(1, _TO_BOUNDARY * reach)
