@@ -80,11 +80,14 @@ def normal_from_uniform(uniform: Real) -> Real:
     return np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def _log_ratio(points: Real, maps: Real, sent: Integers, z: Real) -> Real:
-    """Return ln Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z, for every slot and noise, (n, q).
+def log_ratio(
+    points: Real, maps: Real, sent: Integers, z: Real, estimates: Real | None = None
+) -> Real:
+    """Compute ln Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z, for every slot and noise.
 
-    ``points`` (M, D) and ``maps`` (n, D, d) make s, ``sent`` (n, q) says m, ``z`` is (n, q, d).
-    With ||y - s_k||² expanded, all sums over k are one product of matrices.
+    ``points`` (M, D) and ``maps`` (n, D, d) make s, ``sent`` (n, q) says m, ``z`` is (n, q, d);
+    the result is (n, q). With ||y - s_k||² expanded, all sums over k are one product of matrices.
+    ``estimates`` (n, q, D), where given, is filled with the means of the points given y.
     """
     result = np.empty(sent.shape)
     # Long rows of noises keep the inner loops long; the rest of the room goes to slots.
@@ -104,7 +107,10 @@ def _log_ratio(points: Real, maps: Real, sent: Integers, z: Real) -> Real:
             logs -= largest[:, None]
             np.exp(logs, out=logs)
             own = np.sum((y - 0.5 * s) * s, axis=-1)
-            result[slots, part] = np.log(logs.sum(axis=1)) + largest - own
+            total = logs.sum(axis=1)
+            result[slots, part] = np.log(total) + largest - own
+            if estimates is not None:
+                estimates[slots, part] = (logs.mT @ points) / total[..., None]
     return result
 
 
@@ -134,7 +140,7 @@ def by_quadrature(maps: Real, inputs: RealInputs, tolerance: float) -> tuple[Rea
         for start in range(0, len(active), step):
             slots = active[start : start + step]
             size = (len(slots), *z.shape[1:])
-            logs = _log_ratio(
+            logs = log_ratio(
                 inputs.points,
                 maps[slots],
                 np.broadcast_to(sent, size[:2]),
@@ -196,10 +202,10 @@ def by_lattice(
         z = normal_from_uniform(u[..., antennas:])[..., :d]
         sent = np.concatenate([sent, sent], axis=-1).reshape(len(slots), -1)
         z = np.concatenate([z, -z], axis=-2).reshape(len(slots), -1, d)
-        logs = _log_ratio(inputs.points, maps[slots], sent, z)
+        logs = log_ratio(inputs.points, maps[slots], sent, z)
         if rare:
             logs *= _mixture_weight(z)
-            wide = _log_ratio(inputs.points, maps[slots], sent, _WIDE * z)
+            wide = log_ratio(inputs.points, maps[slots], sent, _WIDE * z)
             logs = 0.5 * (logs + wide * _mixture_weight(_WIDE * z))
         mean: Real = logs.reshape(len(slots), _SHIFTS, -1).mean(axis=-1)
         return mean

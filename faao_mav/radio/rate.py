@@ -6,7 +6,7 @@ from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses
 
-_CHUNK = 2_000_000  # complex numbers held at once: 32 MB. Chosen
+_CHUNK = 2_000_000  # exponents held at once: 16 MB. Chosen
 
 
 def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:
@@ -17,9 +17,12 @@ def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:
 
 
 def _squared_norms(A: Complex, u: RealOrComplex) -> Real:
-    received = A @ u.T
-    norms: Real = np.sum(received.real**2 + received.imag**2, axis=-2)
-    return norms
+    """Return ||A u||² = u^H (A^H A) u, (..., k): two real products of matrices for all channels."""
+    u = np.asarray(u)
+    gram = (A.conj().mT @ A).reshape(*A.shape[:-2], -1)
+    outer = (u.conj()[:, :, None] * u[:, None, :]).reshape(len(u), -1).T
+    norms: Real = gram.real @ outer.real - gram.imag @ outer.imag
+    return np.maximum(norms, 0.0, out=norms)
 
 
 def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float) -> Real:
@@ -56,7 +59,7 @@ def cutoff_rate(
     A = _received(H, P, noise)
     shape, flat = A.shape[:-2], A.reshape(-1, *A.shape[-2:])
     rate = np.empty(len(flat))
-    step = max(1, _CHUNK // (len(classes.vectors) * A.shape[-2]))
+    step = max(1, _CHUNK // len(classes.vectors))
     for start in range(0, len(flat), step):
         part = slice(start, start + step)
         D = _squared_norms(flat[part], classes.vectors)

@@ -150,6 +150,11 @@ def _check_plan(problem: Problem) -> None:
             f"{plan.source}: optimizer.inputs: gaussian is not for algorithm1, whose sums are "
             "those of an alphabet; use optimizer.method: direct"
         )
+    if plan.optimizer.rate != "cutoff":
+        raise PlanError(
+            f"{plan.source}: optimizer.rate: {plan.optimizer.rate} is not for algorithm1, whose "
+            "sums are those of the cutoff rate; use cutoff, or optimizer.method: direct"
+        )
     cones = problem.kinematics.slots * sum(len(k.classes.multiplicity) for k in problem.links)
     if cones > MAX_CONES:
         raise PlanError(

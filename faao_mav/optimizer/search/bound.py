@@ -205,7 +205,7 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     upper bound: each singular value of H_r is the largest over all directions.
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
-    exact = has_closed_form(link.modulation, link.transmit)
+    exact = has_closed_form(link.modulation, link.transmit) and link.measure == "cutoff"
     gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
     if link.nlos is None or optimal.averaged:
         curve = best_curve(link, optimal, gain_log.min(), gain_log.max())
@@ -225,12 +225,11 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     from scipy.interpolate import CubicSpline
 
     columns = np.linspace(0, r.shape[1] - 1, _SEARCHED).astype(np.intp)
-    rates, start = [], None
+    rates, P = [], None
     for column in columns:
         H = np.exp(gain_log[:, column] / 2)[:, None, None] * H_r
-        best = best_precoders(H, link.power, link.modulation, link.noise, start=start)
-        rates.append(best.rate)
-        start = best.P
+        P = link.best(H[:, None], P)
+        rates.append(link.draw_rates(H, P))
     spline = CubicSpline(columns, np.stack(rates, axis=1), axis=1)
     return np.asarray(spline(np.arange(r.shape[1]))), False
 
