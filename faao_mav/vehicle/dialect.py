@@ -26,12 +26,6 @@ Codec: TypeAlias = Callable[[float], float]
 Codecs: TypeAlias = tuple[Codec, Codec, Codec, Codec]
 """Those of param1 to param4."""
 
-FENCE_ROWS = frozenset({*POLYGON.values(), *CIRCLE.values(), FENCE_RETURN_POINT})
-"""The commands that rows of a fence have."""
-
-ROWS_BESIDE = FENCE_ROWS | {RALLY_POINT}
-"""The commands of what travels beside a mission: fence and rally points."""
-
 SpeedAxis: TypeAlias = Literal["horizontal", "climb", "descent", "airspeed", "least ground speed"]
 
 
@@ -110,6 +104,11 @@ NOTHING: Codecs = (dropped, dropped, dropped, dropped)
 """None of the four parameters is stored."""
 
 
+def first(codec: Codec) -> Codecs:
+    """Return how param1 alone is stored."""
+    return (codec, dropped, dropped, dropped)
+
+
 def through(codecs: Codecs, item: MissionItem) -> MissionItem:
     """Return `item` with what `codecs` leave of its parameters."""
     param1, param2, param3, param4 = (
@@ -138,6 +137,15 @@ def whole(least: int, most: int) -> Codec:
         return 0.0 if math.isnan(value) else float(math.trunc(min(max(value, least), most)))
 
     return codec
+
+
+BESIDE: dict[int, Codecs] = (
+    dict.fromkeys(POLYGON.values(), first(whole(0, 65_535)))
+    | dict.fromkeys(CIRCLE.values(), first(single))
+    | dict.fromkeys((FENCE_RETURN_POINT, RALLY_POINT), NOTHING)
+)
+"""What every autopilot measured keeps of the parameters of fence and rally rows: how many vertices
+a polygon has, and the radius of a circle."""
 
 
 def flag(value: float) -> float:
