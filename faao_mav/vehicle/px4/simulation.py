@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.vehicle.px4.detour import Heading, excess, headed, heading
 from faao_mav.vehicle.px4.guidance import GuidedLeg, legs
 from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.step import FlightState, at_rest, moved
@@ -36,6 +37,9 @@ Variants of a flight take some 20 s to move alike again; ten times less would ta
 _STEADY = 1e-5
 """The deviation of a velocity, m/s, below which it is taken to stay as it is along a leg: a few
 millimetres in minutes."""
+
+_LEAST_SHARE = 0.2
+"""The least share of a step that is taken before what the aircraft heads for is looked at anew."""
 
 _TINY = 1e-9
 """The shortest time, s, and length, m, that count."""
@@ -159,15 +163,26 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
     states: list[FlightState] = []
     time, due, arrival = 0.0, inf, inf
     near = _distances(limits, leg, state)
+    kind, aim = Heading.END, leg
     while due - time >= _TINY:
         before, far = state, near
         if due < inf and _stands(state):
             time = due
         else:
+            if (now := heading(leg, state.level[0])) is not kind or now is Heading.ONTO:
+                kind, aim = now, headed(limits, leg, now, state.level[0])
             dt = min(STEP, due - time)
-            state = moved(limits, leg, state, dt)
+            state = moved(limits, aim, before, dt)
+            share = _same(leg, kind, before, state)
+            if share < 1:
+                dt *= share
+                state = moved(limits, aim, before, dt)
             time += dt
-            if due == inf and (steps := _steady_steps(leg, before, state)) > 0:
+            if (
+                due == inf
+                and kind is Heading.END
+                and (steps := _steady_steps(leg, before, state)) > 0
+            ):
                 times.append(time)
                 states.append(state)
                 state = _carried_on(before, state, steps)
@@ -179,6 +194,17 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
             arrival = time - dt * (1 - _share(leg, before, dt, far, near))
             due = arrival + SWITCH_DELAY + max(leg.hold, 0.0)
     return FlownLeg(arrival, due, np.array(times), _motion(states), state)
+
+
+def _same(leg: GuidedLeg, kind: Heading, before: FlightState, after: FlightState) -> float:
+    """Return the share of a step after which the aircraft heads for something else than `kind`."""
+    place, end = before.level[0], after.level[0]
+    then = heading(leg, end)
+    if then is kind:
+        return 1.0
+    which = then if kind is Heading.END else kind
+    begun, ended = excess(which, leg, place), excess(which, leg, end)
+    return max(begun / (begun - ended), _LEAST_SHARE) if (begun > 0) != (ended > 0) else 1.0
 
 
 def _steady_steps(leg: GuidedLeg, before: FlightState, state: FlightState) -> int:
