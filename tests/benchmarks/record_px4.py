@@ -56,7 +56,9 @@ def legs(
     length: object, turn: object, speed: object, radius: object = 2.0, hold: object = 0.0
 ) -> list[Leg]:
     """Return legs of what may be one value for all or a list."""
-    table = np.broadcast_arrays(*(np.array(each, float) for each in (length, turn, speed, radius, hold)))
+    table = np.broadcast_arrays(
+        *(np.array(each, float) for each in (length, turn, speed, radius, hold))
+    )
     return [tuple(row) for row in np.column_stack([np.atleast_1d(each) for each in table]).tolist()]
 
 
@@ -138,7 +140,9 @@ CONVERTED = {
 def shape(legs: list[Leg]) -> Mission:
     """Return the mission that flies the legs, after a hold over home."""
     turns = np.cumsum(np.radians([leg[1] for leg in legs]))
-    places = np.cumsum([0, *(leg[0] * np.exp(1j * turn) for leg, turn in zip(legs, turns, strict=True))])
+    places = np.cumsum(
+        [0, *(leg[0] * np.exp(1j * turn) for leg, turn in zip(legs, turns, strict=True))]
+    )
     frame = LocalFrame(HOME.latitude, HOME.longitude)
     x, y = frame.to_geodetic(np.column_stack([places.imag, places.real]))
     relative = Frame.GLOBAL_RELATIVE_ALT

@@ -63,6 +63,4 @@ def headed(limits: Px4Limits, leg: GuidedLeg, kind: Heading, place: complex) -> 
         exit_speed = min(ahead, leg.speed) if following >= leg.radius else 0.0
     way = target - place
     towards = way / abs(way) if way else 0j
-    return replace(
-        leg, target=target, along=towards, onward=onward, exit_speed=exit_speed
-    )
+    return replace(leg, target=target, along=towards, onward=onward, exit_speed=exit_speed)

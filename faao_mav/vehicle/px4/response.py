@@ -17,7 +17,7 @@ ATTITUDE_LAG = 0.25
 """The time constant from the acceleration asked for to the thrust's, s. Fitted to recorded
 flights."""
 
-DRAG = 0.1
+DRAG = 0.2
 """The air drag over mass, 1/s. Fitted to recorded flights."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
