@@ -25,11 +25,13 @@ class Heading(Enum):
 
 def heading(leg: GuidedLeg, place: complex) -> Heading:
     """Return what an aircraft at `place`, m, heads for."""
-    if not leg.along:
-        return Heading.END
-    for kind in (Heading.PAST, Heading.BEGINNING, Heading.ONTO):
-        if excess(kind, leg, place) > 0:
-            return kind
+    way = (place - leg.origin) * leg.along.conjugate()
+    if way.real > leg.length:
+        return Heading.PAST
+    if way.real < 0 and abs(way) > leg.radius:
+        return Heading.BEGINNING
+    if abs(way.imag) > leg.radius:
+        return Heading.ONTO
     return Heading.END
 
 
@@ -38,9 +40,9 @@ def excess(kind: Heading, leg: GuidedLeg, place: complex) -> float:
 
     Above 0 it is there, and below outside. `kind` is not the leg's end.
     """
-    if kind is Heading.PAST:
-        return ((place - leg.target) * leg.along.conjugate()).real
     way = (place - leg.origin) * leg.along.conjugate()
+    if kind is Heading.PAST:
+        return way.real - leg.length
     if kind is Heading.BEGINNING:
         return min(-way.real, abs(way) - leg.radius)
     return abs(way.imag) - leg.radius

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import sqrt
+from math import inf, sqrt
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -37,8 +37,9 @@ _Speed = TypeVar("_Speed", float, Real)
 class GuidedLeg:
     """A leg: horizontal places and directions are complex, east + i north.
 
-    `origin` m is where the leg begins, `target` m and `height` m are its end, `along` and `onward`
-    the unit directions of this leg and the next (0 where there is none), `speed` m/s the command, `radius` m the acceptance radius,
+    `origin` m is where the leg begins, `target` m and `height` m are its end, `length` m is between
+    them, infinite for none, `along` and `onward` are the unit directions of this leg and the next
+    (0 where there is none), `speed` m/s the command, `radius` m the acceptance radius,
     `hold` s how long to wait at the end; `exit_speed` and `exit_climb` m/s bound how fast the end
     is passed; farther than `braking` m from it the command holds whatever comes next.
     """
@@ -46,6 +47,7 @@ class GuidedLeg:
     origin: complex
     target: complex
     height: float
+    length: float
     along: complex
     onward: complex
     speed: float
@@ -100,6 +102,7 @@ def legs(
                 origin=places[k],
                 target=places[k + 1],
                 height=heights[k + 1],
+                length=abs(moves[k]) if along[k] else inf,
                 along=along[k],
                 onward=along[k + 1],
                 speed=speed,

@@ -38,7 +38,7 @@ _STEADY = 1e-5
 """The deviation of a velocity, m/s, below which it is taken to stay as it is along a leg: a few
 millimetres in minutes."""
 
-_LEAST_SHARE = 0.2
+_LEAST_SHARE = 0.01
 """The least share of a step that is taken before what the aircraft heads for is looked at anew."""
 
 _TINY = 1e-9
@@ -163,48 +163,47 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
     states: list[FlightState] = []
     time, due, arrival = 0.0, inf, inf
     near = _distances(limits, leg, state)
-    kind, aim = Heading.END, leg
+    kind = heading(leg, state.level[0])
+    aim = headed(limits, leg, kind, state.level[0])
     while due - time >= _TINY:
         before, far = state, near
-        if due < inf and _stands(state):
-            time = due
-        else:
-            if (now := heading(leg, state.level[0])) is not kind or now is Heading.ONTO:
-                kind, aim = now, headed(limits, leg, now, state.level[0])
-            dt = min(STEP, due - time)
+        dt = due - time
+        if due == inf or not _stands(state):
+            dt = min(STEP, dt)
             state = moved(limits, aim, before, dt)
-            share = _same(leg, kind, before, state)
-            if share < 1:
-                dt *= share
-                state = moved(limits, aim, before, dt)
-            time += dt
-            if (
-                due == inf
-                and kind is Heading.END
-                and (steps := _steady_steps(leg, before, state)) > 0
-            ):
-                times.append(time)
-                states.append(state)
-                state = _carried_on(before, state, steps)
-                time += steps * STEP
-        times.append(time)
-        states.append(state)
+        now = heading(leg, state.level[0])
+        if now is not kind:
+            dt *= _share_before(leg, kind, now, before, state)
+            state = moved(limits, aim, before, dt)
         near = _distances(limits, leg, state)
         if due == inf and max(near) <= 0:
-            arrival = time - dt * (1 - _share(leg, before, dt, far, near))
+            arrival = time + dt * _share(leg, before, dt, far, near)
             due = arrival + SWITCH_DELAY + max(leg.hold, 0.0)
+            if due < time + dt:
+                dt = due - time
+                state = moved(limits, aim, before, dt)
+        time += dt
+        times.append(time)
+        states.append(state)
+        if now is not kind or now is Heading.ONTO:
+            kind, aim = now, headed(limits, leg, now, state.level[0])
+        elif due == inf and now is Heading.END and (steps := _steady_steps(leg, before, state)) > 0:
+            state = _carried_on(before, state, steps)
+            time += steps * STEP
+            times.append(time)
+            states.append(state)
+            near = _distances(limits, leg, state)
     return FlownLeg(arrival, due, np.array(times), _motion(states), state)
 
 
-def _same(leg: GuidedLeg, kind: Heading, before: FlightState, after: FlightState) -> float:
-    """Return the share of a step after which the aircraft heads for something else than `kind`."""
-    place, end = before.level[0], after.level[0]
-    then = heading(leg, end)
-    if then is kind:
-        return 1.0
+def _share_before(
+    leg: GuidedLeg, kind: Heading, then: Heading, before: FlightState, after: FlightState
+) -> float:
+    """Return the share of a step after which the aircraft heads for `then` instead of `kind`."""
     which = then if kind is Heading.END else kind
-    begun, ended = excess(which, leg, place), excess(which, leg, end)
-    return max(begun / (begun - ended), _LEAST_SHARE) if (begun > 0) != (ended > 0) else 1.0
+    begun, ended = (excess(which, leg, each.level[0]) for each in (before, after))
+    share = begun / (begun - ended) if begun != ended else 1.0
+    return min(max(share, _LEAST_SHARE), 1.0)
 
 
 def _steady_steps(leg: GuidedLeg, before: FlightState, state: FlightState) -> int:
