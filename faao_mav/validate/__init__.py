@@ -9,6 +9,7 @@ from faao_mav.validate import (
     items,
     px4_checks,
     px4_flight,
+    px4_radius,
     refusals,
     shape,
     speeds,
@@ -34,7 +35,7 @@ __all__ = [
 RULES: tuple[Rule, ...] = tuple(
     rule
     for module in (
-        *(items, refusals, ardupilot, px4_checks, px4_flight),
+        *(items, refusals, ardupilot, px4_checks, px4_flight, px4_radius),
         *(speeds, shape, extent, fences, delivery),
     )
     for rule in module.RULES
