@@ -15,6 +15,26 @@ from faao_mav.vehicle.px4 import Px4
 
 FOLDER = FLIGHTS / "px4"
 
+HELD_OUT = (
+    "bends-10-middle",
+    "brief-80-7",
+    "circle-60m-20m",
+    "corners-40m-gentle",
+    "curved-75-s-8",
+    "holds-60m-suited",
+    "line-10m",
+    "long-300m",
+    "slow-90-s-4",
+    "speeds-40m-suited",
+    "unequal-40m-gentle",
+    "wandering-1",
+    "wandering-4-suited",
+    "wandering-8-gentle",
+    "zigzag-100m-lively",
+    "two-hovers-200-s-9",
+    "free-ends-90-10",
+)
+
 NAMES = sorted(path.stem for path in FOLDER.glob("*.csv"))
 
 
@@ -30,8 +50,6 @@ def row(name: str) -> Row:
     use = "held out" if name in HELD_OUT else "fitted"
     return compared(name, use, recorded, model.fly(recorded.path))
 
-
-HELD_OUT: tuple[str, ...] = ()
 
 if __name__ == "__main__":
     show(rows())

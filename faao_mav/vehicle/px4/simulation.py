@@ -16,11 +16,11 @@ from faao_mav.vehicle.px4.step import FlightState, at_rest, moved
 STEP = 0.1
 """The longest step of the simulation, s: the one that was calibrated."""
 
-SWITCH_DELAY = 0.06
+SWITCH_DELAY = 0.065
 """How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
 next, s. Measured: 0.1 s late after holds."""
 
-START_LAG = 0.1
+START_LAG = 0.05
 """How long after the first leg becomes current the trajectory moves, s. Fitted to recorded
 flights."""
 
