@@ -10,6 +10,7 @@ from faao_mav.validate import (
     items,
     px4_checks,
     px4_flight,
+    px4_radius,
     refusals,
     shape,
     speed_commands,
@@ -36,7 +37,7 @@ __all__ = [
 RULES: tuple[Rule, ...] = tuple(
     rule
     for module in (
-        *(items, refusals, ardupilot, px4_checks, px4_flight, cages, speed_commands),
+        *(items, refusals, ardupilot, px4_checks, px4_flight, px4_radius, cages, speed_commands),
         *(speeds, shape, extent, fences, delivery),
     )
     for rule in module.RULES

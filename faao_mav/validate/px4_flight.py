@@ -7,7 +7,6 @@ from faao_mav.mission.command import FLOWN_TO, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
 from faao_mav.validate.finding import Level
 from faao_mav.validate.rule import Issue, Rules
-from faao_mav.validate.straight import HOME
 from faao_mav.vehicle import PX4_COPTER
 
 RULES = Rules(PX4_COPTER.family)
@@ -85,28 +84,6 @@ def _nothing(context: ValidationContext) -> Iterator[Issue]:
             "no item flies to a place: PX4 ends the mission at once, where it stands",
             "add a take-off and waypoints",
         )
-
-
-@RULES.warning(
-    "px4-radius-covers-leg",
-    "an acceptance radius as long as its leg: the waypoint counts at once",
-    _MEASURED,
-)
-def _radius(context: ValidationContext) -> Iterator[Issue]:
-    default = context.vehicle.value("acceptance_radius")
-    for leg in context.legs:
-        if leg.jump or leg.start.index == HOME:
-            continue
-        item = context.items[leg.index]
-        own = item.params[1]
-        radius = own if own > 0 else default
-        if item.command == Command.NAV_WAYPOINT and 0.05 <= leg.length <= radius:
-            yield Issue(
-                leg.index,
-                f"the leg is {leg.length:.1f} m long, the acceptance radius {radius:g} m: the "
-                "waypoint counts as reached at once",
-                "use a smaller radius (param2, NAV_ACC_RAD) or a longer leg",
-            )
 
 
 @RULES.note(

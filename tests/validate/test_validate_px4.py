@@ -256,6 +256,24 @@ CASES = [
         Given(flown(at(0, 9, 30), at(0, 29, 30, 0, 19.9)), PX4),
     ),
     (
+        "px4-radius-small",
+        Given(flown(at(0, 50, 30, 0, 0.9)), PX4),
+        2,
+        Given(flown(at(0, 50, 30, 0, 1)), PX4),
+    ),
+    (
+        "px4-radius-narrows",
+        Given(flown(at(0, 50, 30, 0, 9.9), at(15, 99, 30, 0, 1.5)), PX4),
+        2,
+        Given(flown(at(0, 50, 30, 0, 9.9), at(15, 99, 30, 0, 9.9)), PX4),
+    ),
+    (
+        "px4-radius-narrows",
+        Given(flown(at(0, 50, 30, 0, 9.9), at(15, 99, 30)), PX4),
+        2,
+        Given(flown(at(0, 50, 30, 3, 9.9), at(15, 99, 30)), PX4),
+    ),
+    (
         "px4-takeoff-elsewhere",
         Given(mission(takeoff(30, east=2.1)), PX4),
         1,
