@@ -58,12 +58,17 @@ class Conversion:
 def check_vehicle(plan: "Plan") -> None:
     """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
 
-    That is one with useless parameters, or a plane that does not fly the plan's least or greatest
-    speed.
+    That is one with useless parameters, one of a speed that no mission commands, or a plane that
+    does not fly the plan's least or greatest speed.
     """
     vehicle = vehicle_of(plan)
     vehicle.legs  # noqa: B018
     vehicle.flight_model()
+    if plan.vehicle.max_speed < SLOWEST:
+        raise InputError(
+            f"{plan.source}: vehicle.max_speed: {plan.vehicle.max_speed:g} m/s; missions command "
+            f"{SLOWEST:g} m/s and more"
+        )
     if vehicle.type.hovers:
         return
     least, most = vehicle.value("min_speed"), vehicle.value("max_speed")

@@ -22,6 +22,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
 from faao_mav.schedule import Conversion
 from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.initial_route import Splines, initial_route
 from faao_mav.vehicle import vehicle_of
@@ -153,6 +154,12 @@ def test_a_vehicle_that_is_slow_to_speed_up_is_later_than_one_with_good_paramete
         converted(*back_and_forth(), plan).schedule.deviation.rms for plan in (sluggish, good)
     )
     assert worse > 1.5 * better
+
+
+def test_a_speed_that_no_mission_commands_is_refused_by_its_key() -> None:
+    plan = plan_with(max_speed=1e-6, recommend=True)
+    with pytest.raises(InputError, match=r"vehicle\.max_speed: 1e-06 m/s; missions command 0\.1"):
+        check_vehicle(plan)
 
 
 def test_useless_parameters_are_refused() -> None:
