@@ -31,7 +31,10 @@ _MAX_LINE = 4_000_000
 
 def _route(pairs: object) -> Real:
     """Return `pairs` of metres as an array (n, 2)."""
-    route = np.array(pairs or np.empty((0, 2)), dtype=np.float64)
+    try:
+        route = np.array(pairs or np.empty((0, 2)), dtype=np.float64)
+    except (TypeError, ValueError):
+        route = np.array(np.nan)
     if route.shape[1:] != (2,) or not np.isfinite(route).all():
         raise ValueError("not pairs of finite numbers")
     return route

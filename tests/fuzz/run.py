@@ -15,7 +15,7 @@ from random import Random
 
 from harness import Finding, Target, fuzz, keep, outcome
 
-_BATCH = 5000
+_BATCH = 10_000
 """Cases between two lines of progress; each batch has a seed of its own."""
 
 
@@ -31,11 +31,11 @@ def _at_random(target: Target, cases: int, seed: int) -> bool:
             print(f"{finding!s:.500}", flush=True)
         else:
             read, refused = read + counts["read"], refused + counts["refused"]
-    print(
-        f"{target.name}: {read} read, {refused} refused, {findings} findings, "
-        f"{time.process_time() - started:.0f} s of processor time",
-        flush=True,
-    )
+        print(
+            f"{target.name}: {read:,} read, {refused:,} refused, {findings} findings, "
+            f"{time.process_time() - started:.0f} s of processor time",
+            flush=True,
+        )
     return not findings
 
 

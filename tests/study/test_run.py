@@ -166,6 +166,50 @@ def test_a_strange_directory_is_left_alone(tmp_path: Path) -> None:
         run_study(CASES, jobs=1, directory=tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"key": 5}, "key: Input should be a valid string"),
+        ({"scheme": None}, "scheme: Input should be a valid string"),
+        ({"seed": "0"}, "seed: Input should be a valid integer"),
+        ({"values": [1]}, "values: Input should be "),
+        ({"R_avg": "1.5"}, "R_avg: Input should be a valid number"),
+        ({"delivered": float("nan")}, "delivered: Input should be a finite number"),
+        ({"converged": 2}, "converged: Input should be a valid boolean"),
+        ({"route": [[1, 2], [3]]}, "route: Value error, not pairs of finite numbers"),
+        ({"route": [[1, "x"]]}, "route: Value error, not pairs of finite numbers"),
+        ({"route": [[1e999, 0]]}, "route: Value error, not pairs of finite numbers"),
+        ({"route": {"0": [1, 2]}}, "route: Value error, not pairs of finite numbers"),
+        ({"more": 1}, "more: Unexpected keyword argument"),
+    ],
+)
+def test_an_edited_row_is_refused_by_its_line(
+    whole: tuple[Path, tuple[StudyRow, ...]], tmp_path: Path, changes: dict[str, Any], said: str
+) -> None:
+    first, second, *_ = (whole[0] / "rows.jsonl").read_text().splitlines()
+    edit = json.dumps(json.loads(second) | changes)
+    (tmp_path / "rows.jsonl").write_text(f"{first}\n{edit}\n")
+    with pytest.raises(InputError, match=rf"rows\.jsonl: line 2: no row of a study: {said}"):
+        run_study(CASES, jobs=1, directory=tmp_path)
+
+
+@pytest.mark.parametrize("line", [b"[" * 100_000, b'{"key": "\xff"}', b"1", b"", b"9" * 5_000_000])
+def test_a_line_that_is_no_row_is_refused(tmp_path: Path, line: bytes) -> None:
+    (tmp_path / "rows.jsonl").write_bytes(line + b"\n")
+    with pytest.raises(InputError, match="line 1: no row of a study"):
+        load_rows(tmp_path, CASES)
+
+
+def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_path: Path) -> None:
+    as_is = make_cases(QUICK, vary={})
+    (first,) = run_study(as_is, jobs=1, directory=tmp_path)
+    varied = make_cases(QUICK, vary={"radio.causal": (False,), "vehicle.max_speed": (20,)})
+    (again,) = run_study(varied, jobs=1, directory=tmp_path)
+    assert (again.key, again.R_avg) == (first.key, first.R_avg)
+    assert (first.values, again.values) == ({}, {"radio.causal": False, "vehicle.max_speed": 20})
+    assert again.route.tolist() == first.route.tolist()
+
+
 def test_text_that_is_no_cut_off_row_is_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
     path.write_text("notes without a line's end")
