@@ -21,6 +21,9 @@ from faao_mav.vehicle import VehicleType, vehicle_type_by_numbers
 _FIXED_WING, _VTOLS = 1, range(19, 26)
 """MAV_TYPEs: VTOLs take missions as planes do."""
 
+_SHOWN = 5
+"""Vehicles that a message lists, at most; chosen."""
+
 _LOOK_AGAIN = 0.2
 """Seconds between two looks at whether all vehicles have booted: chosen, a fifth of a heartbeat's
 period."""
@@ -150,8 +153,11 @@ def choose(
             "connected there, and no other program in between?"
         )
     if len(found) > 1:
-        listed = "; ".join(map(str, found))
-        raise LinkError(f"{connection}: several autopilots: {listed}. Choose one with --system")
+        listed = "; ".join(map(str, found[:_SHOWN]))
+        more = f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+        raise LinkError(
+            f"{connection}: several autopilots: {listed}{more}. Choose one with --system"
+        )
     if not found[0].ready:
         raise LinkError(f"{connection}: {found[0]} does not finish booting")
     return found[0]
