@@ -21,7 +21,7 @@ def result(small_plan: MakePlan) -> Result:
     return replace(
         found,
         solution=replace(found.solution, starts=starts),
-        information=MutualInformation(1.9, 1.8, 0.001),
+        information=MutualInformation(1.9, 1.8, 1.7, 0.001),
         bound=Bound(2 * found.solution.rates.R_avg, exact=False),
         seconds_optimize=1.0,
         seconds_total=2.0,

@@ -112,7 +112,12 @@ def upload(
 
 
 def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
-    """Return the mission, fence and rally points of the vehicle at `connection`.
+    """Return the mission, fence and rally points of the vehicle at `connection`: see `holdings`."""
+    return holdings(connection, **options)[1]
+
+
+def holdings(connection: str, **options: Unpack[LinkOptions]) -> tuple[FoundVehicle, Mission]:
+    """Return the vehicle at `connection`, and the mission, fence and rally points that it holds.
 
     Home is ArduPilot's item 0, or what PX4 says when asked. `options` are those of `LinkOptions`.
     Raises `LinkError` if there is no such vehicle or a list does not come whole; a vehicle that
@@ -137,7 +142,7 @@ def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
             raise LinkError(
                 f"{connection}: what the vehicle holds is no mission: {error}"
             ) from None
-    return mission
+    return session.found, mission
 
 
 def clear(

@@ -59,7 +59,9 @@ class Solution:
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end. `shares` (n,) of each slot are those in which a
-    half-duplex relay receives; it sends in the rest.
+    half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
+    `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
+    by how much the rate that it maximises is above that of the plan for the cutoff rate.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -94,6 +96,7 @@ class Solution:
     ending: str
     starts: Mapping[str, float] = field(default_factory=dict)
     shares: Real | None = None
+    gain: float | None = None
 
     @property
     def rates(self) -> Rates:
@@ -231,7 +234,8 @@ def save_solution(
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
     Keys: the arrays of `Solution` by name, those of its `relayed`, `R_avg`, `R_U`, `R_G`, `R_del`,
-    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`,
+    `converged`, `ending`, `starts` (JSON text), `gain` if there is one and `plan`, the YAML text;
+    and the arrays `extra`,
     which `load_solution` leaves alone. The same solution gives the same bytes.
     """
     rates = solution.rates
@@ -239,8 +243,8 @@ def save_solution(
     values |= {"R_avg": rates.R_avg, "R_U": rates.R_U, "R_G": rates.R_G}
     values |= {name: getattr(solution.relayed, name) for name in _RELAYED}
     values["R_del"] = solution.delivered_rate
-    if solution.shares is not None:
-        values["shares"] = solution.shares
+    optional = {"shares": solution.shares, "gain": solution.gain}
+    values |= {name: value for name, value in optional.items() if value is not None}
     values |= {"converged": solution.converged, "ending": solution.ending}
     values["starts"] = json.dumps(dict(solution.starts))
     values["plan"] = solution.plan.text
@@ -255,7 +259,7 @@ _TOLD = ("plan", "ending", "converged", "starts")
 
 def load_solution(path: str | Path) -> Solution:
     """Read what `save_solution` wrote. Raises `InputError` for anything else."""
-    found = read_archive(path, (*_TOLD, *_ARRAYS, "shares"))
+    found = read_archive(path, (*_TOLD, *_ARRAYS, "shares", "gain"))
     for name in (*_TOLD, *_ARRAYS):
         if name not in found:
             raise InputError(f"{path}: not a result of faao-mission --save: {name} is missing")
@@ -272,6 +276,7 @@ def load_solution(path: str | Path) -> Solution:
         ending=_text(found["ending"], f"{path}: ending"),
         starts=_starts(_text(found["starts"], f"{path}: starts"), f"{path}: starts"),
         shares=shares,
+        gain=float(found["gain"]) if "gain" in found else None,
         **{name: found[name] for name in _ARRAYS},
     )
 
@@ -287,6 +292,7 @@ def _expected(plan: Plan, steps: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     known = draws if radio.csi == "instantaneous" else ()
     found: dict[str, tuple[str, tuple[int, ...]]] = {
         "converged": ("b", ()),
+        "gain": ("f", ()),
         "history": ("f", (max(1, steps),)),
     }
     found |= dict.fromkeys(("t", "I_U", "I_G", "shares"), ("f", (n,)))

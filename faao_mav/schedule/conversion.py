@@ -13,7 +13,6 @@ from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
-from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Vehicle, vehicle_of
 from faao_mav.vehicle.recommend import candidates
 
@@ -111,7 +110,7 @@ def _scheduler(solution: "Solution", vehicle: Vehicle) -> Scheduler:
     plan, limits = solution.plan, solution.plan.vehicle
     if vehicle.type.hovers:
         scheduler: type[Scheduler] = CopterScheduler
-        least, most = SLOWEST, vehicle.type.fastest
+        least, most = vehicle.legs.slowest, vehicle.type.fastest
     else:
         scheduler = PlaneScheduler
         least = max(limits.min_speed, vehicle.value("min_speed"))

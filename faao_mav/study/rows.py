@@ -41,7 +41,8 @@ def _route(pairs: object) -> Real:
 class StudyRow:
     """What one case of a study led to.
 
-    Rates and mutual information are bit/s/Hz; `delivered` is the delivered rate and
+    Rates and mutual information are bit/s/Hz, and `rate` names that which R_avg and all others are
+    of, `optimizer.rate`; `delivered` is the delivered rate and
     `delivered_mbytes` what a flight carries, 10^6 bytes, None without a bandwidth. `seconds` is the
     time of the optimiser. Where there is no result `error` says why and the numbers are None.
     `route` is w (n, 2), m, one pair for each slot.
@@ -59,6 +60,7 @@ class StudyRow:
     delivered: float | None = None
     delivered_mbytes: float | None = None
     mutual_information: float | None = None
+    rate: str = "cutoff"
     seconds: float | None = None
     iterations: int | None = None
     converged: bool | None = None
@@ -70,7 +72,7 @@ class StudyRow:
 
 _RESULTS = (
     *("scheme", "seed", "R_avg", "R_U", "R_G", "delivered", "delivered_mbytes"),
-    *("mutual_information", "seconds", "iterations", "converged", "error"),
+    *("mutual_information", "rate", "seconds", "iterations", "converged", "error"),
 )
 """The fields of a row that are columns of the table."""
 
@@ -226,8 +228,9 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
         cells = (_cell(found.get((values, scheme))) for scheme in schemes)
         lines.append([*(json.dumps(v).strip('"') for v in values), *cells])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
     return [
-        f"{measure}, bit/s/Hz",
+        f"{measure}, bit/s/Hz{of_rate}",
         *(
             "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
             for line in lines

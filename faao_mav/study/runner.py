@@ -42,6 +42,7 @@ def _filled(row: StudyRow, case: StudyCase) -> StudyRow:
         delivered=solution.delivered_rate,
         delivered_mbytes=solution.plan.megabytes(solution.delivered_rate),
         mutual_information=information.average if information else None,
+        rate=solution.plan.optimizer.rate,
         seconds=round(result.seconds_optimize, 3),
         iterations=solution.iterations,
         converged=solution.converged,

@@ -23,7 +23,8 @@ from stations import (
     vehicle_of,
 )
 
-from faao_mav.mavlink.discover import Discovery
+from faao_mav.errors import LinkError
+from faao_mav.mavlink.discover import Discovery, choose
 from faao_mav.mavlink.faults import Channel, Faults, Lost
 from faao_mav.mavlink.machine import Script
 from faao_mav.mavlink.messages import (
@@ -353,6 +354,20 @@ def test_messages_used_here_are_what_the_numbers_say() -> None:
         )
     ]
     assert numbers == [MISSION_ACK, COUNT_ID, 0]
+
+
+@pytest.mark.parametrize(
+    ("mav_type", "autopilot", "name"),
+    [(10, 3, "ArduPilot"), (22, 3, "ArduPilot"), (22, 12, "PX4"), (0, 12, "PX4")],
+)
+def test_a_type_of_vehicle_that_is_not_supported_is_said(
+    mav_type: int, autopilot: int, name: str
+) -> None:
+    search = Discovery(system=1)
+    search.start(0.0)
+    search.on(Envelope(VEHICLE, Heartbeat(mav_type, autopilot, 0, 0, 3)), 0.5)
+    with pytest.raises(LinkError, match=f"{name} vehicle of MAV_TYPE {mav_type} .* not supported"):
+        choose(search.outcome or (), "udpin:0.0.0.0:14550", 1, None, 10.0)
 
 
 def test_an_autopilot_that_is_registered_is_found_and_served_as_the_guide_says() -> None:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from conftest import SMALL, edited
@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.plan import parse_plan
+from faao_mav.plan.sections import StudyScheme
 from faao_mav.report.style import save_figure
 from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_study
 from faao_mav.study.figure import study_figure
@@ -263,6 +264,18 @@ def test_every_panel_has_its_name_and_its_axis(whole: tuple[Path, tuple[StudyRow
     figure.draw_without_rendering()
     for plot in figure.axes:
         assert any(tick.label1.get_visible() for tick in plot.xaxis.get_major_ticks())
+
+
+def test_every_scheme_has_a_look_of_its_own() -> None:
+    rows = tuple(
+        StudyRow("k", {"power_dbm": power}, scheme, 0, R_avg=1.0)
+        for scheme in get_args(StudyScheme)
+        for power in (0, 10)
+    )
+    (axes,) = study_figure(rows, parse_plan(QUICK), "rate").axes
+    looks = {(line.get_color(), line.get_marker()) for line in axes.lines}
+    names = {line.get_label() for line in axes.lines}
+    assert len(looks) == len(names) == len(get_args(StudyScheme))
 
 
 def test_without_results_there_is_nothing_to_draw() -> None:

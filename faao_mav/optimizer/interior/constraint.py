@@ -113,6 +113,13 @@ class State(Protocol):
     def target(self, mu: Real, ahead: Any, share: Real) -> Any:
         """Return mu s^-1 less Mehrotra's correction by the `share` of the step `ahead`."""
 
+    def recentred(self, target: Any, mu: Real, step: Any, share: Real) -> Any:  # noqa: ARG002
+        """Return `target`, changed so that less of the `share` of `step` is lost to bad centring.
+
+        By default nothing is changed.
+        """
+        return target
+
     def solved(self, move: Move, target: Any, rest: Forces) -> tuple[Any, Forces]:
         """Return the constraint's changes along `move`, and the forces of its new multipliers.
 
