@@ -24,6 +24,9 @@ from faao_mav.vehicle import (
     vehicle_type_by_numbers,
 )
 
+_SHOWN = 5
+"""Vehicles that a message lists, at most; chosen."""
+
 _LOOK_AGAIN = 0.2
 """Seconds between two looks at whether all vehicles have booted: chosen, a fifth of a heartbeat's
 period."""
@@ -156,8 +159,11 @@ def choose(
             "connected there, and no other program in between?"
         )
     if len(found) > 1:
-        listed = "; ".join(map(str, found))
-        raise LinkError(f"{connection}: several autopilots: {listed}. Choose one with --system")
+        listed = "; ".join(map(str, found[:_SHOWN]))
+        more = f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+        raise LinkError(
+            f"{connection}: several autopilots: {listed}{more}. Choose one with --system"
+        )
     if not found[0].ready:
         raise LinkError(f"{connection}: {found[0]} does not finish booting")
     if found[0].family is not None and found[0].vehicle is None:

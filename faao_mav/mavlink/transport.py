@@ -160,21 +160,20 @@ class _Udp:
         return found
 
     def write(self, data: bytes) -> None:
-        targets = [self._target] if self._target is not None else self._listeners()
-        for target in targets:
+        for target in self._heard() if self._target is None else [self._target]:
             # Full buffers and absent receivers lose datagrams: that is what retries are for.
-            with contextlib.suppress(BlockingIOError, ConnectionRefusedError, OSError):
+            with contextlib.suppress(OSError):
                 self._socket.sendto(data, target)
 
     def close(self) -> None:
         self._socket.close()
 
-    def _listeners(self) -> list[tuple[str, int]]:
+    def _heard(self) -> list[tuple[str, int]]:
         recent = time.monotonic() - _FORGET
         return [who for who, sender in self._senders.items() if sender.heard > recent]
 
     def _sender(self, address: tuple[str, int]) -> _Sender:
-        """Return who is at `address`, which was heard now; of too many the one heard last goes."""
+        """Return who is at `address` and was heard now; too many forget who is silent longest."""
         sender = self._senders.pop(address, None) or _Sender()
         sender.heard = time.monotonic()
         if len(self._senders) == _MOST_PEERS:

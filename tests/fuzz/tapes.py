@@ -16,7 +16,6 @@ from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.framing import message_id
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.mock import MockAutopilot
-from faao_mav.mavlink.signing import Signing
 
 _HEADER = 10
 """Bytes of a MAVLink 2 packet before its payload."""
@@ -103,10 +102,6 @@ def recorded(
         for packet in heard:
             to_client += answer(mock, vehicle, packet, now)
     return tape_of(tapes[0]), tape_of(tapes[1])
-
-
-def signed_packets(key: bytes, sender: Any, messages: Sequence[Any]) -> list[bytes]:
-    return packed(Codec(sender, Signing(key)), messages)
 
 
 def mutated(tape: bytes, others: Sequence[bytes], random: Random) -> bytes:

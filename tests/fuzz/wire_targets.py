@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from harness import Target
-from tapes import answer, converse, datagrams, mutated, packed, recorded, signed_packets, tape_of
+from tapes import answer, converse, datagrams, mutated, packed, recorded, tape_of
 
 from faao_mav.cli.upload import as_dict, as_text
 from faao_mav.errors import FaaoError
@@ -21,7 +21,13 @@ from faao_mav.mavlink.messages import (
     Heartbeat,
     MissionRequestInt,
     MissionRequestList,
+    MissionSetCurrent,
+    MissionWritePartialList,
+    ParamRequestRead,
+    ParamSet,
+    SetMode,
     Statustext,
+    Timesync,
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted
@@ -49,7 +55,6 @@ from faao_mav.vehicle import Vehicle, vehicle_type
 _VEHICLE = Address(1, 1)
 _KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")
 _HOME = Home(-35.363262, 149.165237, 584.0)
-_KEY = bytes(range(32))
 
 _MISSION = Mission(
     (
@@ -69,18 +74,33 @@ _MISSION = Mission(
 )
 """What is uploaded: some of each list."""
 
+_COMMANDS = (
+    SetMode(1, 1, 0),
+    ParamRequestRead(_VEHICLE, "WPNAV_SPEED", -1),
+    ParamSet(_VEHICLE, "WPNAV_SPEED", 500.0, 9),
+    MissionSetCurrent(_VEHICLE, 1),
+    MissionWritePartialList(_VEHICLE, MissionType.MISSION, 0, 1),
+    CommandLong(_VEHICLE, MavCommand.SET_MODE, 0, 1.0, 4.0, 4.0),
+    CommandLong(_VEHICLE, MavCommand.REQUEST_MESSAGE, 0, 148.0),
+    CommandLong(_VEHICLE, MavCommand.REBOOT, 0, 1.0),
+    Timesync(0, 1),
+)
+"""What ground stations say beside the mission protocol."""
+
 
 def wire_targets() -> dict[str, Target]:
     """Return the targets by name."""
     heard = {kind: _session(kind) for kind in _KINDS}
     found = [Target("client", _hear, [tapes[0] for tapes in heard.values()], mutated)]
-    for kind, (_, tape) in heard.items():
+    station = Codec(GROUND_STATION)
+    for kind, (_, session) in heard.items():
+        tape = session + tape_of(packed(station, _COMMANDS))
 
         def serve(content: bytes, kind: MockKind = kind) -> object:
             return _serve(kind, content)
 
         found.append(Target(f"mock_{kind.replace('-', '_')}", serve, [tape], mutated))
-    genuine = signed_packets(_KEY, _VEHICLE, [_said(number) for number in range(20)])
+    genuine = packed(Codec(_VEHICLE, _signing()), [_said(number) for number in range(20)])
     found.append(Target("signed", lambda tape: _take(tape, genuine), [tape_of(genuine)], mutated))
     return {target.name: target for target in found}
 
@@ -173,13 +193,18 @@ def _serve(kind: MockKind, tape: bytes) -> object:
     return mock.lists
 
 
+def _signing() -> Signing:
+    """Return a key, at a time that stands still: a tape stays what it was."""
+    return Signing(bytes(range(32)), clock=lambda: 1_800_000_000.0)
+
+
 def _said(number: int) -> Heartbeat | Statustext:
     return Heartbeat(2, 12, 0, 0, 3) if number % 3 else Statustext(6, f"number {number}")
 
 
 def _take(tape: bytes, genuine: Sequence[bytes]) -> object:
     """Take what is on `tape` as who holds the key does: each packet of `genuine` once, no other."""
-    codec, framer, taken = Codec(GROUND_STATION, Signing(_KEY)), Framer(), list[bytes]()
+    codec, framer, taken = Codec(GROUND_STATION, _signing()), Framer(), list[bytes]()
     for datagram in datagrams(tape):
         for packet in framer.feed_datagram(datagram):
             taken += [found.raw for found in codec.parse(packet)]

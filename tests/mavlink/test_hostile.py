@@ -17,11 +17,13 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink import download, upload
 from faao_mav.mavlink.codec import Codec
+from faao_mav.mavlink.discover import Discovery, choose
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import (
     CommandAck,
     CommandLong,
     Envelope,
+    Heartbeat,
     HomePosition,
     Message,
     MissionAck,
@@ -32,7 +34,7 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted, running
-from faao_mav.mavlink.protocol import GROUND_STATION, MavCommand, MavResult, MissionType
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavCommand, MavResult, MissionType
 from faao_mav.mavlink.transfer.verify import compare
 from faao_mav.mavlink.wire_items import mission_of
 from faao_mav.mission.formats.wpl import write_wpl
@@ -187,6 +189,19 @@ def test_an_altitude_that_a_vehicle_should_have_refused_is_compared(z: float) ->
     assert compare(sent, sent, MissionType.MISSION, vehicle) == ()
     (difference,) = compare(sent, [row(16), row(16)], MissionType.MISSION, vehicle)
     assert (difference.field, difference.kind) == ("z", "wrong")
+
+
+def test_a_crowd_of_vehicles_is_told_in_a_few_lines() -> None:
+    discovery = Discovery(patience=1.0)
+    discovery.start(0.0)
+    for number in range(20_000):
+        sender = Address(number % 255, number // 255)
+        discovery.on(Envelope(sender, Heartbeat(2, 12, 0, 0, 3)), 0.5)
+    discovery.tick(5.0)
+    assert discovery.outcome is not None
+    with pytest.raises(LinkError, match=r"several .*; and 19995 more") as caught:
+        choose(discovery.outcome, "udpin:0.0.0.0:14550", None, None, 1.0)
+    assert len(str(caught.value)) < 500
 
 
 class _Liar(MockAutopilot):
