@@ -165,12 +165,16 @@ _SPARE_ANGLE = 0.1
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)
 
 
-def _approaches(context: ValidationContext) -> Iterator[tuple[PlacedItem, PlacedItem]]:
-    """Yield the place before each landing, and the landing."""
+def _approaches(context: ValidationContext) -> Iterator[tuple[int, float, float, float]]:
+    """Yield the index of each landing and the item before it: m above, m away, m of its orbit."""
     by_index = {place.index: place for place in context.places}
     for index, _ in context.each(Command.NAV_LAND):
-        if index - 1 in by_index and index in by_index:
-            yield by_index[index - 1], by_index[index]
+        entrance, landing = by_index.get(index - 1), by_index.get(index)
+        if entrance is not None and landing is not None:
+            away = math.hypot(entrance.east - landing.east, entrance.north - landing.north)
+            item = context.items[entrance.index]
+            orbits = item.command == Command.NAV_LOITER_TO_ALT and not math.isnan(item.params[1])
+            yield index, entrance.up - landing.up, away, abs(item.params[1]) if orbits else 0.0
 
 
 @RULES.error(
@@ -197,12 +201,11 @@ def _entrance(context: ValidationContext) -> Iterator[Issue]:
     kind="plane",
 )
 def _below(context: ValidationContext) -> Iterator[Issue]:
-    for entrance, landing in _approaches(context):
-        if entrance.up - landing.up <= 0:
+    for index, above, _, _ in _approaches(context):
+        if above <= 0:
             yield Issue(
-                landing.index,
-                f"the approach starts {entrance.up:g} m above home, the landing is at "
-                f"{landing.up:g} m",
+                index,
+                f"the approach starts {-above:g} m below the landing; it must be above it",
                 "raise the item before the landing",
             )
 
@@ -214,12 +217,11 @@ def _below(context: ValidationContext) -> Iterator[Issue]:
     kind="plane",
 )
 def _orbit(context: ValidationContext) -> Iterator[Issue]:
-    for entrance, landing in _approaches(context):
-        distance, radius = _distance(entrance, landing), _orbit_radius(context, entrance)
-        if radius > 0 and distance <= radius:
+    for index, _, away, radius in _approaches(context):
+        if radius > 0 and away <= radius:
             yield Issue(
-                landing.index,
-                f"the landing is {distance:.0f} m from the centre of an orbit of {radius:g} m",
+                index,
+                f"the landing is {away:.0f} m from the centre of an orbit of {radius:g} m",
                 "move the landing point out of the orbit, or make the orbit smaller",
             )
 
@@ -230,32 +232,18 @@ def _orbit(context: ValidationContext) -> Iterator[Issue]:
 def _steep(context: ValidationContext) -> Iterator[Issue]:
     angle = math.degrees(context.vehicle.value("landing_angle"))
     slope = math.tan(math.radians(angle + _SPARE_ANGLE))
-    for entrance, landing in _approaches(context):
-        if context.items[entrance.index].command not in _ENTRANCES:
+    for index, above, away, radius in _approaches(context):
+        if context.items[index - 1].command not in _ENTRANCES or away <= radius:
             continue
-        height = entrance.up - landing.up
-        square = _distance(entrance, landing) ** 2 - _orbit_radius(context, entrance) ** 2
-        if square > 0 and height > 0 and height / math.sqrt(square) > slope:
-            distance = math.sqrt(square)
+        way = math.sqrt(away**2 - radius**2)
+        if above > 0 and above / way > slope:
             yield Issue(
-                landing.index,
-                f"{height:g} m of descent in {distance:.0f} m are "
-                f"{math.degrees(math.atan2(height, distance)):.1f} degrees, FW_LND_ANG is "
-                f"{angle:g}",
-                f"start the approach at most {slope * distance:.0f} m above the landing, or "
-                f"{math.ceil(height / slope)} m away from it",
+                index,
+                f"{above:g} m of descent in {way:.0f} m are "
+                f"{math.degrees(math.atan2(above, way)):.1f} degrees, FW_LND_ANG is {angle:g}",
+                f"start the approach at most {slope * way:.0f} m above the landing, or "
+                f"{math.ceil(above / slope)} m away from it",
             )
-
-
-def _distance(a: PlacedItem, b: PlacedItem) -> float:
-    return math.hypot(a.east - b.east, a.north - b.north)
-
-
-def _orbit_radius(context: ValidationContext, entrance: PlacedItem) -> float:
-    item = context.items[entrance.index]
-    if item.command != Command.NAV_LOITER_TO_ALT or math.isnan(item.params[1]):
-        return 0.0
-    return abs(item.params[1])
 
 
 @RULES.error(
