@@ -196,6 +196,23 @@ def _spline_last(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
+@RULES.warning(
+    "ardupilot-land-approach",
+    "a plane lands straight from its take-off, without an approach",
+    "measured on ArduPlane 4.7: 102 m from a landing point at home, 3 m from one 700 m ahead",
+    kind="plane",
+)
+def _approach(context: ValidationContext) -> Iterator[Issue]:
+    for (_, first), (index, second) in pairwise(_flying(context)):
+        if (first, second) == (Command.NAV_TAKEOFF, Command.NAV_LAND):
+            yield Issue(
+                index,
+                "the landing follows the take-off: a plane that is not in line with it misses it "
+                "by 100 m",
+                "put waypoints before it from which it can glide to the landing",
+            )
+
+
 @RULES.error(
     "ardupilot-set-home",
     "home is set in flight: heights above home count from there, and the aircraft comes down",

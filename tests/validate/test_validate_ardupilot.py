@@ -93,6 +93,12 @@ CASES = [
         Given(mission(TAKEOFF, do(START), LAND)),
     ),
     (
+        "ardupilot-land-approach",
+        Given(mission(TAKEOFF, LAND), PLANE),
+        2,
+        Given(mission(TAKEOFF, at(0, 300, 9), LAND), PLANE),
+    ),
+    (
         "ardupilot-spline-last",
         Given(mission(TAKEOFF, at(0, 9, 9), spline(0, 40), speed(5))),
         3,
