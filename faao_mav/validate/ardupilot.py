@@ -106,12 +106,25 @@ def _required_rally(context: ValidationContext) -> Iterator[Issue]:
     _TAKEOFF,
 )
 def _no_takeoff(context: ValidationContext) -> Iterator[Issue]:
+    return _without_takeoff(context, airborne=False)
+
+
+@RULES.warning(
+    "ardupilot-begins-in-the-air",
+    "a plan begins in the air: ArduPilot does not start its mission from the ground",
+    _TAKEOFF,
+)
+def _begins_in_the_air(context: ValidationContext) -> Iterator[Issue]:
+    return _without_takeoff(context, airborne=True)
+
+
+def _without_takeoff(context: ValidationContext, *, airborne: bool) -> Iterator[Issue]:
     own = context.vehicle.type
-    if context.items and not context.airborne and not any(context.each(*_TAKEOFFS[own])):
+    if context.items and airborne is context.airborne and not any(context.each(*_TAKEOFFS[own])):
         yield Issue(
             None,
             f"there is no take-off that a {own.kind} flies: from the ground {_ON_GROUND[own]}",
-            "add NAV_TAKEOFF as the first item, or take off before you start the mission",
+            "take off before you start the mission, or add NAV_TAKEOFF as the first item",
         )
 
 
