@@ -106,12 +106,25 @@ def _required_rally(context: ValidationContext) -> Iterator[Issue]:
     _TAKEOFF,
 )
 def _no_takeoff(context: ValidationContext) -> Iterator[Issue]:
+    return _without_takeoff(context, airborne=False)
+
+
+@RULES.warning(
+    "ardupilot-begins-in-the-air",
+    "a plan begins in the air: ArduPilot does not start its mission from the ground",
+    _TAKEOFF,
+)
+def _begins_in_the_air(context: ValidationContext) -> Iterator[Issue]:
+    return _without_takeoff(context, airborne=True)
+
+
+def _without_takeoff(context: ValidationContext, *, airborne: bool) -> Iterator[Issue]:
     own = context.vehicle.type
-    if context.items and not context.airborne and not any(context.each(*_TAKEOFFS[own])):
+    if context.items and airborne is context.airborne and not any(context.each(*_TAKEOFFS[own])):
         yield Issue(
             None,
             f"there is no take-off that a {own.kind} flies: from the ground {_ON_GROUND[own]}",
-            "add NAV_TAKEOFF as the first item, or take off before you start the mission",
+            "take off before you start the mission, or add NAV_TAKEOFF as the first item",
         )
 
 
@@ -194,6 +207,23 @@ def _spline_last(context: ValidationContext) -> Iterator[Issue]:
             "internal error of the autopilot",
             "make it a plain waypoint, or let a return, a landing or another waypoint follow",
         )
+
+
+@RULES.warning(
+    "ardupilot-land-approach",
+    "a plane lands straight from its take-off, without an approach",
+    "measured on ArduPlane 4.7: 102 m from a landing point at home, 3 m from one 700 m ahead",
+    kind="plane",
+)
+def _approach(context: ValidationContext) -> Iterator[Issue]:
+    for (_, first), (index, second) in pairwise(_flying(context)):
+        if (first, second) == (Command.NAV_TAKEOFF, Command.NAV_LAND):
+            yield Issue(
+                index,
+                "the landing follows the take-off: a plane that is not in line with it misses it "
+                "by 100 m",
+                "put waypoints before it from which it can glide to the landing",
+            )
 
 
 @RULES.error(

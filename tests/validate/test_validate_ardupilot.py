@@ -75,6 +75,12 @@ CASES = [
         Given(mission(speed(5), do(DELAY, 3), TAKEOFF)),
     ),
     (
+        "ardupilot-begins-in-the-air",
+        Given(mission(at(0, 9, 9)), airborne=True),
+        None,
+        Given(mission(at(0, 9, 9))),
+    ),
+    (
         "ardupilot-takeoff-first",
         Given(mission(at(0, 9, 9), TAKEOFF), PLANE),
         2,
@@ -91,6 +97,12 @@ CASES = [
         Given(mission(TAKEOFF, do(START), LAND), PLANE),
         2,
         Given(mission(TAKEOFF, do(START), LAND)),
+    ),
+    (
+        "ardupilot-land-approach",
+        Given(mission(TAKEOFF, LAND), PLANE),
+        2,
+        Given(mission(TAKEOFF, at(0, 300, 9), LAND), PLANE),
     ),
     (
         "ardupilot-spline-last",
