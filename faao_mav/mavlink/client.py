@@ -184,6 +184,7 @@ def _change(
                 f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
                 "disarm it, or allow it (--allow-armed)"
             )
+        session.peer = replace(session.peer, may_be_armed=allow_armed)
         reports = session.run(Script(job(session)))
         seconds = time.monotonic() - session.started
         problems = _problems(reports, session.peer, mission, session.link.lacks_key)
