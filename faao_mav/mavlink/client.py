@@ -237,6 +237,7 @@ def _change(
                 f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
                 "disarm it, or allow it (--allow-armed)"
             )
+        session.peer = replace(session.peer, may_be_armed=allow_armed)
         try:
             reports = session.run(Script(job(session)))
         except LinkError as error:

@@ -1,7 +1,7 @@
 """Who is on the link, and whether it is ready for a mission."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.machine import AskingMachine, Machine
@@ -37,7 +37,7 @@ class FoundVehicle:
     """An autopilot that was heard; `vehicle` is None if it is not known here, or not of this type.
 
     `family` is its autopilot, None if that is not known; `kind` its type, "copter" or "plane", or
-    its MAV_TYPE in words.
+    its MAV_TYPE in words. It is `armed` if any heartbeat of its system said so.
     """
 
     address: Address
@@ -82,6 +82,7 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         self._system, self._component = system, component
         self._patience, self._settle, self._boot = patience, settle, boot
         self._found: dict[Address, FoundVehicle] = {}
+        self._armed: set[int] = set()
         self._end = 0.0
 
     def start(self, now: float) -> Sequence[Message]:
@@ -93,6 +94,8 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         message, sender = envelope.message, envelope.sender
         if not isinstance(message, Heartbeat) or message.type == GROUND_STATION_TYPE:
             return ()
+        if message.armed:
+            self._armed.add(sender.system)
         if message.autopilot == NO_AUTOPILOT or self._system not in (None, sender.system):
             return ()
         if self._component not in (None, sender.component):
@@ -104,7 +107,10 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
     def _time_out(self, now: float) -> Sequence[Message]:
         if all(found.ready for found in self._found.values()) or now >= self._end:
-            self.outcome = tuple(self._found[address] for address in sorted(self._found))
+            found = (self._found[address] for address in sorted(self._found))
+            self.outcome = tuple(
+                replace(each, armed=each.address.system in self._armed) for each in found
+            )
         else:
             self._due = min(now + _LOOK_AGAIN, self._end)
         return ()

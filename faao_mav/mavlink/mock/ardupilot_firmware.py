@@ -105,7 +105,7 @@ class ArduPilotFirmware(MockFirmware):
         """Ask again, or give up."""
         out: list[Message] = []
         for part, upload in list(self._uploads.items()):
-            if now >= upload.last_item_time + self._manners.upload_patience:
+            if now >= upload.last_item_time + self._manners.patience:
                 del self._uploads[part]
                 out.append(Statustext(MavSeverity.WARNING, "Mission upload timeout"))
                 out.append(MissionAck(upload.partner, part, MavResult.OPERATION_CANCELLED))
@@ -115,7 +115,7 @@ class ArduPilotFirmware(MockFirmware):
 
     def _due(self, upload: _Receiving) -> float:
         return min(
-            upload.last_item_time + self._manners.upload_patience,
+            upload.last_item_time + self._manners.patience,
             upload.last_request_time + self._manners.request_period,
         )
 

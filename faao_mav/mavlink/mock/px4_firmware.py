@@ -97,7 +97,7 @@ class Px4Firmware(MockFirmware):
         transfer = self._transfer
         if transfer.state == "idle":
             return None
-        end = transfer.last_message_time + self._manners.upload_patience
+        end = transfer.last_message_time + self._manners.patience
         if transfer.state == "receiving":
             return min(end, transfer.last_request_time + self._manners.request_period)
         return end
@@ -129,7 +129,7 @@ class Px4Firmware(MockFirmware):
         transfer = self._transfer
         if transfer.state == "idle":
             return []
-        if now >= transfer.last_message_time + self._manners.upload_patience:
+        if now >= transfer.last_message_time + self._manners.patience:
             transfer.state = "idle"
             return [_said("Operation timeout")]
         request_due = transfer.last_request_time + self._manners.request_period
