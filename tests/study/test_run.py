@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from faao_mav.plan import parse_plan
 from faao_mav.report.style import save_figure
 from faao_mav.study import StudyRow, load_rows, make_cases, run_study
 from faao_mav.study.figure import study_figure
-from faao_mav.study.rows import append_row
+from faao_mav.study.rows import ROWS, append_row, as_dict, comparison
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
@@ -163,6 +163,17 @@ def test_a_strange_directory_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "rows.jsonl").write_text('{"not": "a row"}\n')
     with pytest.raises(InputError, match="line 1: no row of a study"):
         run_study(CASES, jobs=1, directory=tmp_path)
+
+
+def test_rows_that_name_no_rate_are_of_the_cutoff_rate(tmp_path: Path) -> None:
+    row = StudyRow("f" * 20, {}, "faao", 0, R_avg=1.0, delivered=0.5)
+    earlier = {name: value for name, value in asdict(row).items() if name != "rate"}
+    (tmp_path / ROWS).write_text(json.dumps(earlier) + "\n")
+    assert load_rows(tmp_path) == {row.key: row}
+    assert comparison([row]).startswith("R_avg, bit/s/Hz\n")
+    other = replace(row, rate="mutual_information")
+    assert comparison([other]).startswith("R_avg, bit/s/Hz of mutual information\n")
+    assert as_dict(other)["rate"] == "mutual_information"
 
 
 def test_text_that_is_no_cut_off_row_is_left_alone(tmp_path: Path) -> None:

@@ -72,7 +72,8 @@ class Queue(Constraint):
     def entries(self, slots: int, first: int) -> Sequence[Entry]:
         """Return what the equations of the queue have of the next slot, and of the ends."""
         q, p = first + self.half, first + self.half + 1
-        begins, ends = np.eye(slots)[[0, -1]]
+        begins, ends = np.zeros((2, slots))
+        begins[0] = ends[-1] = 1
         return (
             Entry(q, p, np.ones(slots - 1), ahead=1),
             Entry(q, q, begins),
