@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -23,7 +23,7 @@ from faao_mav.plan.sections import StudyScheme
 from faao_mav.report.style import save_figure
 from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_study
 from faao_mav.study.figure import study_figure
-from faao_mav.study.rows import append_row
+from faao_mav.study.rows import ROWS, append_row, as_dict, comparison
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
@@ -208,6 +208,18 @@ def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_pat
     assert (again.key, again.R_avg) == (first.key, first.R_avg)
     assert (first.values, again.values) == ({}, {"radio.causal": False, "vehicle.max_speed": 20})
     assert again.route.tolist() == first.route.tolist()
+
+
+def test_rows_that_name_no_rate_are_of_the_cutoff_rate(tmp_path: Path) -> None:
+    case = CASES[0]
+    row = StudyRow(case.key, case.values, case.scheme, 0, R_avg=1.0, delivered=0.5)
+    earlier = {name: value for name, value in asdict(row).items() if name != "rate"}
+    (tmp_path / ROWS).write_text(json.dumps(earlier) + "\n")
+    assert load_rows(tmp_path, CASES) == (row,)
+    assert comparison([row]).startswith("R_avg, bit/s/Hz\n")
+    other = replace(row, rate="mutual_information")
+    assert comparison([other]).startswith("R_avg, bit/s/Hz of mutual information\n")
+    assert as_dict(other)["rate"] == "mutual_information"
 
 
 def test_text_that_is_no_cut_off_row_is_left_alone(tmp_path: Path) -> None:

@@ -177,6 +177,11 @@ class Constraint(ABC):
         """How many unknowns per slot it brings into the Newton system."""
         return 0
 
+    @property
+    def corrections(self) -> int:
+        """How often a direction of a search with this constraint is corrected at most."""
+        return 0
+
     def entries(self, slots: int, first: int) -> Sequence[Entry]:  # noqa: ARG002
         """Return what never changes of the rows of its own unknowns, which count from `first`."""
         return ()
@@ -200,6 +205,7 @@ class ScaledFlight:
 
     def __init__(self, kin: Kinematics, constraints: Sequence[Constraint]) -> None:
         self.constraints = constraints
+        self.corrections = max(constraint.corrections for constraint in constraints)
         ends = SIZE + np.cumsum([constraint.unknowns for constraint in constraints])
         self.own = [
             slice(int(end) - constraint.unknowns, int(end))

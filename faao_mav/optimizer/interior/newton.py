@@ -34,16 +34,10 @@ from faao_mav.optimizer.interior.iterate import Direction, Iterate
 _UNBOUNDED = np.array([1e20, 0.0, 1e20])[:, None, None]
 """The compliance of an acceleration without a limit: large enough that its force is nothing."""
 
-_CORRECTIONS = 2
 _LONGER, _MORE = 1.1, 0.1
 _WORTHWHILE = 0.1
-"""How often a direction that cannot be followed to the end is corrected, the reach that a
-correction aims at (`_LONGER` times that of the direction, and `_MORE`), and the share of what is
-missing to it that a correction has to win.
-
-Measured on nine plans of tests/benchmarks/delivered_against_ipopt.py: with 2 corrections 5 to 30 %
-fewer iterations than with none, each of which takes a sixth longer.
-"""
+"""The reach that a correction aims at (`_LONGER` times that of the direction, and `_MORE`), and the
+share of what is missing to it that a correction has to win. Gondzio's."""
 
 _MIN_CURVATURE = 1e-8
 """The least curvature along a direction, per squared length, that counts as that of a minimum.
@@ -139,7 +133,7 @@ class Newton:
         direction = self.aimed(mu, targets)
         reach = direction.reach(self.at)
         going = np.ones(reach.shape, dtype=np.bool_)
-        for _ in range(_CORRECTIONS):
+        for _ in range(self.flight.corrections):
             aim = np.minimum(1, _LONGER * reach + _MORE)
             others = tuple(
                 state.recentred(target, mu, step, aim)
