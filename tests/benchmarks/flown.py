@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from missions import PLANS, plan_of
 
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
+from missions import PLANS, plan_of
 
 RUNNERS = {
     "ardupilot": ("fly_arducopter.py", ["--speedup", "20"]),

@@ -15,7 +15,8 @@ from faao_mav.vehicle.px4.parameters import Px4Limits
 
 class Heading(Enum):
     """What an aircraft on a leg heads for: the leg's `END`, the end although it is `PAST` it,
-    the `BEGINNING`, the nearest point of the leg (`ONTO`)."""
+    the `BEGINNING`, the nearest point of the leg (`ONTO`).
+    """
 
     END = auto()
     PAST = auto()
