@@ -40,9 +40,9 @@ def find_hovers(t: Real, w: Real, radius: float, slowest: float = 0.1) -> list[W
     """Return the hovers of the trajectory `t` (n,) s, `w` (n, 2) m, in order.
 
     A hover lasts 3 s at least, in which the aircraft is slower than `slowest` m/s throughout and
-    stays in a box with a half diagonal of at most `radius` (m). Its position is the median, so no sample
-    of a hover is farther than 2 `radius` from it. A creep through several boxes makes several
-    hovers, with 3 s between them to get on.
+    stays in a box with a half diagonal of at most `radius` (m). Its position is the median, so no
+    sample of a hover is farther than 2 `radius` from it. A creep through several boxes makes
+    several hovers, with 3 s between them to get on.
 
     >>> t = np.arange(0.0, 20.0)
     >>> w = np.column_stack([np.clip(t - 10, 0, None), 0 * t])
