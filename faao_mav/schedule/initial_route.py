@@ -18,6 +18,7 @@ from faao_mav.schedule.waypoints import (
     LEG_SHARE,
     Waypoint,
     along_spline,
+    fits,
     hovers_and_ends,
     simplify,
 )
@@ -64,22 +65,22 @@ def initial_route(
     positions at those times, metres. Raises `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
-    slowest = vehicle_of(plan).legs.slowest
+    legs = vehicle_of(plan).legs
     tolerance = share * plan.mission.path_tolerance
-    fixed = hovers_and_ends(times, positions, tolerance, slowest)
+    fixed = hovers_and_ends(times, positions, tolerance, legs.slowest)
     waypoints, curved = [fixed[0]], [False]
     for start, stop in pairwise(fixed):
         stretch = slice(start.last, stop.first + 1)
         path = positions[stretch].copy()
         path[0], path[-1] = start.position, stop.position
-        inner = simplify(path, LEG_SHARE * tolerance)
+        inner = _apart(path, simplify(path, LEG_SHARE * tolerance), legs.least, tolerance)
         marked = [False] * (len(inner) + 1)
         if splines is not None:
             inner, marked = _with_splines(times[stretch], path, inner, splines)
         waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
         curved += marked
-    return _timed(times, waypoints, curved, slowest, plan.vehicle.max_speed)
+    return _timed(times, waypoints, curved, legs.slowest, plan.vehicle.max_speed)
 
 
 def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: float) -> Route:
@@ -130,6 +131,21 @@ def _checked(t: ArrayLike, w: ArrayLike) -> tuple[Real, Real]:
     if not (np.diff(times) > 0).all():
         raise InputError("trajectory: t must increase")
     return times, positions
+
+
+def _apart(path: Real, inner: list[int], least: float, tolerance: float) -> list[int]:
+    """Return `inner`, points of `path` (n, 2), without those that make a leg shorter than `least`.
+
+    Points stay without which a sample of the path were farther than `tolerance` from its leg; m.
+    """
+    ends = [0, *inner, len(path) - 1]
+    for k in inner:
+        at = ends.index(k)
+        before, after = ends[at - 1], ends[at + 1]
+        short = min(lengths(path[[before, after]] - path[k])) < least
+        if short and fits(path, before, after, tolerance):
+            del ends[at]
+    return ends[1:-1]
 
 
 def _with_splines(

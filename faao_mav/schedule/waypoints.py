@@ -39,10 +39,10 @@ class Waypoint:
 def find_hovers(t: Real, w: Real, radius: float, slowest: float = 0.1) -> list[Waypoint]:
     """Return the hovers of the trajectory `t` (n,) s, `w` (n, 2) m, in order.
 
-    A hover lasts 3 s at least, in which the aircraft is slower than `slowest` m/s throughout and stays
-    in a box with a half diagonal of at most `radius` (m). Its position is the median, so no sample
-    of a hover is farther than 2 `radius` from it. A creep through several boxes makes several
-    hovers, with 3 s between them to get on.
+    A hover lasts 3 s at least, in which the aircraft is slower than `slowest` m/s throughout and
+    stays in a box with a half diagonal of at most `radius` (m). Its position is the median, so no
+    sample of a hover is farther than 2 `radius` from it. A creep through several boxes makes
+    several hovers, with 3 s between them to get on.
 
     >>> t = np.arange(0.0, 20.0)
     >>> w = np.column_stack([np.clip(t - 10, 0, None), 0 * t])
@@ -178,14 +178,14 @@ def _longest_legs(w: Real, tolerance: float) -> list[int]:
     first, last = 0, len(w) - 1
     while True:
         step = 1
-        while first + step < last and _fits(w, first, min(first + 2 * step, last), tolerance):
+        while first + step < last and fits(w, first, min(first + 2 * step, last), tolerance):
             step = min(2 * step, last - first)
         if first + step >= last:
             return ends
         low, high = step, min(2 * step, last - first)
         while high - low > 1:
             middle = (low + high) // 2
-            if _fits(w, first, first + middle, tolerance):
+            if fits(w, first, first + middle, tolerance):
                 low = middle
             else:
                 high = middle
@@ -193,7 +193,7 @@ def _longest_legs(w: Real, tolerance: float) -> list[int]:
         ends.append(first)
 
 
-def _fits(w: Real, first: int, last: int, tolerance: float) -> bool:
+def fits(w: Real, first: int, last: int, tolerance: float) -> bool:
     """Tell whether the samples between two stay close to the leg from one to the other."""
     passed = w[first + 1 : last]
     return bool(

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from missions import PLANS, plan_of
 
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
+from missions import PLANS, plan_of
 
 RUNNERS = {
     "ardupilot": ("fly_arducopter.py", ["--speedup", "20"]),
@@ -61,11 +61,14 @@ FLOWN: dict[str, dict[str, Any]] = {
 }
 
 
-def flown(autopilot: str, result: Result, folder: Path) -> Prediction:
-    """Fly the mission of `result` and return what it delivers; again if the simulator fails."""
+def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Prediction:
+    """Fly the mission of `result` and return what it delivers; again if the simulator fails.
+
+    `autopilots` is the folder with the runners; mission and track are written to `folder`.
+    """
     script, options = RUNNERS[autopilot]
     files = result.write(folder / "mission.waypoints")
-    command = [sys.executable, str(Path(os.environ["FAAO_AUTOPILOTS"]) / script), str(files[0])]
+    command = [sys.executable, str(autopilots / script), str(files[0])]
     command += ["--param-file", str(files[1])] if len(files) > 1 else []
     track = folder / "track.csv"
     for _ in range(4):
@@ -96,13 +99,13 @@ def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
     return price_flight(solution, t - begin, w)
 
 
-def row(name: str, autopilot: str) -> str:
+def row(name: str, autopilots: Path, autopilot: str) -> str:
     """Plan, fly and compare."""
     plan = plan_of(FLOWN[name], autopilot, "recommend")
     result = plan_mission(plan)
     assert result.prediction is not None
     with tempfile.TemporaryDirectory() as folder:
-        real = flown(autopilot, result, Path(folder))
+        real = flown(autopilots, autopilot, result, Path(folder))
     cells = [f"{autopilot:<10}{name:<28}"]
     for found in (result.prediction, real):
         late = found.duration - plan.flight.duration
@@ -113,11 +116,11 @@ def row(name: str, autopilot: str) -> str:
 
 def main() -> None:
     """Print the table."""
-    chosen = sys.argv[1:]
+    chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
     print(f"{'':<41}{'predicted: m, s late, rate':<27}flown")
     for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
         for name in [each for each in FLOWN if each in chosen] or FLOWN:
-            print(row(name, autopilot), flush=True)
+            print(row(name, autopilots, autopilot), flush=True)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from missions import PLANS, plan_of
 from recorded import FLIGHTS
 
 from faao_mav.geodesy import LocalFrame
@@ -26,6 +24,7 @@ from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.schedule.conversion import convert
 from faao_mav.vehicle import PX4_COPTER
+from missions import PLANS, plan_of
 
 FOLDER = FLIGHTS / "px4"
 HOME = Home(-35.363262, 149.165237, 584.0)

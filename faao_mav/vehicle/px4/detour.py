@@ -14,8 +14,11 @@ from faao_mav.vehicle.px4.parameters import Px4Limits
 
 
 class Heading(Enum):
-    """What an aircraft on a leg heads for: the leg's `END`, the end although it is `PAST` it,
-    the `BEGINNING`, the nearest point of the leg (`ONTO`)."""
+    """What an aircraft on a leg heads for.
+
+    That is the leg's `END`, the end although it is `PAST` it, the `BEGINNING`, or the nearest point
+    of the leg, to get `ONTO` it.
+    """
 
     END = auto()
     PAST = auto()

@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, sqrt
-from typing import ClassVar, TypeVar
-
-import numpy as np
+from typing import TypeVar
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.px4.parameters import Px4Limits

@@ -34,7 +34,11 @@ _HIGH_JERK = 10.0
 20. Chosen; what a change costs is not measured."""
 
 
-_SLOWEST = 1.0
+_LEAST_LEG = 5.0
+"""The least length of a leg, m: two acceptance radii with which an aircraft half a metre off is in
+time. Chosen; what a change costs is not measured."""
+
+_SLOWEST = 2.0
 """The least speed that is commanded, m/s. Measured: an aircraft that is half a metre off comes half
 a metre sooner or later to its waypoint, a second at 0.5 m/s."""
 
@@ -43,7 +47,7 @@ a metre sooner or later to its waypoint, a second at 0.5 m/s."""
 class Px4Legs(Px4Limits):
     """How PX4 flies a leg between plain waypoints: a in m/s², j in m/s³."""
 
-    least: ClassVar[float] = 3.0  # NAV_ACC_RAD is 2 m
+    least: ClassVar[float] = _LEAST_LEG
     slowest: ClassVar[float] = _SLOWEST
     run_in: ClassVar[float] = 1.2
 
