@@ -16,6 +16,7 @@ from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
+from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Vehicle, vehicle_of
 from faao_mav.vehicle.recommend import candidates
 
@@ -119,7 +120,7 @@ def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     limits = plan.vehicle
     if vehicle.type.hovers:
         scheduler: type[Scheduler] = CopterScheduler
-        least, most = vehicle.legs.slowest, vehicle.type.fastest
+        least, most = min(vehicle.legs.slowest, limits.max_speed), vehicle.type.fastest
     else:
         scheduler = PlaneScheduler
         least = max(limits.min_speed, vehicle.value("min_speed"))

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -212,10 +212,13 @@ def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_pat
 
 def test_rows_that_name_no_rate_are_of_the_cutoff_rate(tmp_path: Path) -> None:
     case = CASES[0]
-    row = StudyRow(case.key, case.values, case.scheme, 0, R_avg=1.0, delivered=0.5)
-    earlier = {name: value for name, value in asdict(row).items() if name != "rate"}
+    row = StudyRow(case.key, dict(case.values), case.scheme, 0, R_avg=1.0, delivered=0.5)
+    append_row(row, tmp_path)
+    earlier = json.loads((tmp_path / ROWS).read_text())
+    del earlier["rate"]
     (tmp_path / ROWS).write_text(json.dumps(earlier) + "\n")
-    assert load_rows(tmp_path, CASES) == (row,)
+    (read,) = load_rows(tmp_path, CASES)
+    assert (read.key, read.rate, read.R_avg) == (row.key, "cutoff", 1.0)
     assert comparison([row]).startswith("R_avg, bit/s/Hz\n")
     other = replace(row, rate="mutual_information")
     assert comparison([other]).startswith("R_avg, bit/s/Hz of mutual information\n")
