@@ -37,8 +37,8 @@ class Manners:
 
     In uploads: `request_period` is how long after its last request it asks again, s. An item that
     it did not ask for it passes over without a word (`ignores_other_items`), or answers
-    INVALID_SEQUENCE and goes on waiting. `reminder` is the item, counted from the end (-1: the last one), to send again
-    when the last acknowledgement is missing, None if none is safe.
+    INVALID_SEQUENCE and goes on waiting. `reminder` is the item, counted from the end (-1: the
+    last one), to send again when the last acknowledgement is missing, None if none is safe.
 
     `unset_is_zero`: a value that is not set is sent as 0, because NaN is refused.
 
