@@ -1,0 +1,60 @@
+"""Verified uploads to the real autopilots, over links that lose, repeat, delay and disorder."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from simulators import KINDS, simulated
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
+from stations import FENCE, RALLY, a_mission
+
+from faao_mav.mavlink import clear, download, link, upload
+from faao_mav.mavlink.faults import Faults, FaultyTransport
+from faao_mav.mavlink.transport import open_transport
+from faao_mav.mission import MissionItem
+
+MISSION = a_mission(12, fence=FENCE, rally=RALLY)
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def vehicle(
+    request: pytest.FixtureRequest, autopilots: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[str]:
+    """Where each of the autopilots is heard."""
+    where = tmp_path_factory.mktemp(request.param)
+    with simulated(autopilots, request.param, where) as connection:
+        yield connection
+
+
+FAULTS = Faults(
+    loss=0.1,
+    duplication=0.05,
+    reordering=0.1,
+    delay=0.3,
+    latency=0.0,
+    outages=((2.0, 3.5),),
+    seed=1,
+)
+"""A link about as bad as `uploads.py` measures: an outage in the middle too."""
+
+
+def test_everything_is_stored_read_back_and_cleared(
+    vehicle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        link, "open_transport", lambda text: FaultyTransport(open_transport(text), FAULTS)
+    )
+    report = upload(MISSION, vehicle, wait=30)
+    assert report.problems == ()
+    assert [part.verdict for part in report.parts] == ["verified"] * 3
+    found = download(vehicle)
+    assert (found.fence, found.rally) == (MISSION.fence, MISSION.rally)
+    assert [places(item) for item in found.items] == [places(item) for item in MISSION.items]
+    assert clear(vehicle).problems == ()
+
+
+def places(item: MissionItem) -> tuple[int, float, float, float]:
+    """Return what no autopilot changes, degrees to what the wire carries."""
+    return item.command, round(item.x, 7), round(item.y, 7), round(item.z, 2)
