@@ -18,11 +18,11 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
@@ -147,7 +147,7 @@ def on_real(kind: str, seeds: range) -> Iterator[str]:
         for seed in seeds:
             drawn, begun = session(seed), time.monotonic()
             try:
-                with through(drawn.faults):
+                with patch.object(link, "open_transport", over(drawn.faults)):
                     report = upload(drawn.mission, connection, wait=30)
             except LinkError as error:
                 yield f"{kind}: no session ({error})"
@@ -162,14 +162,9 @@ def on_real(kind: str, seeds: range) -> Iterator[str]:
                 yield f"{kind}: verified" if right else f"{kind}: wrong"
 
 
-@contextmanager
-def through(faults: Faults) -> Iterator[None]:
-    """Give links that are opened meanwhile these `faults`."""
-    link.open_transport = lambda text: FaultyTransport(open_transport(text), faults)
-    try:
-        yield
-    finally:
-        link.open_transport = open_transport
+def over(faults: Faults) -> Callable[[str], FaultyTransport]:
+    """Return what opens a link with these `faults`."""
+    return lambda text: FaultyTransport(open_transport(text), faults)
 
 
 def read_by_mavsdk(port: int, lists: dict[MissionType, tuple[WireItem, ...]]) -> bool:
