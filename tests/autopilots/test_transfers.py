@@ -15,7 +15,10 @@ from faao_mav.mavlink.faults import Faults, FaultyTransport
 from faao_mav.mavlink.transport import open_transport
 from faao_mav.mission import MissionItem
 
-MISSION = a_mission(12, fence=FENCE, rally=RALLY)
+MISSION = a_mission(6, fence=FENCE, rally=RALLY)
+
+PATIENCE = 40.0
+"""Seconds to wait for a heartbeat: PX4's simulator stands still now and then on a busy machine."""
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -46,13 +49,13 @@ def test_everything_is_stored_read_back_and_cleared(
     monkeypatch.setattr(
         link, "open_transport", lambda text: FaultyTransport(open_transport(text), FAULTS)
     )
-    report = upload(MISSION, vehicle, wait=30)
+    report = upload(MISSION, vehicle, wait=PATIENCE)
     assert report.problems == ()
     assert [part.verdict for part in report.parts] == ["verified"] * 3
-    found = download(vehicle)
+    found = download(vehicle, wait=PATIENCE)
     assert (found.fence, found.rally) == (MISSION.fence, MISSION.rally)
     assert [places(item) for item in found.items] == [places(item) for item in MISSION.items]
-    assert clear(vehicle).problems == ()
+    assert clear(vehicle, wait=PATIENCE).problems == ()
 
 
 def places(item: MissionItem) -> tuple[int, float, float, float]:
