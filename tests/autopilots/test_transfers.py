@@ -1,15 +1,18 @@
 """Verified uploads to the real autopilots, over links that lose, repeat, delay and disorder."""
 
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pymavlink import mavutil
 from simulators import KINDS, simulated
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
-from stations import FENCE, RALLY, a_mission
+from stations import FENCE, RALLY, a_mission, signing_key
 
+from faao_mav.errors import LinkError
 from faao_mav.mavlink import clear, download, link, upload
 from faao_mav.mavlink.faults import Faults, FaultyTransport
 from faao_mav.mavlink.transport import open_transport
@@ -19,6 +22,9 @@ MISSION = a_mission(6, fence=FENCE, rally=RALLY)
 
 PATIENCE = 40.0
 """Seconds to wait for a heartbeat: PX4's simulator stands still now and then on a busy machine."""
+
+SIGNING_EPOCH = 1_420_070_400
+"""Seconds from 1970 to the start of 2015, where the clock of signatures starts."""
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -56,6 +62,24 @@ def test_everything_is_stored_read_back_and_cleared(
     assert (found.fence, found.rally) == (MISSION.fence, MISSION.rally)
     assert [places(item) for item in found.items] == [places(item) for item in MISSION.items]
     assert clear(vehicle, wait=PATIENCE).problems == ()
+
+
+def test_signed(autopilots: Path, tmp_path: Path) -> None:
+    key, right, wrong = signing_key("valley"), tmp_path / "right.key", tmp_path / "wrong.key"
+    for file, content in ((right, key), (wrong, signing_key("hill"))):
+        file.write_bytes(content)
+        file.chmod(0o600)
+    ticks = int((time.time() - SIGNING_EPOCH) * 1e5)
+    with simulated(autopilots, "arducopter", tmp_path) as connection:
+        setup = mavutil.mavlink_connection(connection)
+        setup.wait_heartbeat(timeout=PATIENCE)
+        for _ in range(3):  # there is no answer to it
+            setup.mav.setup_signing_send(1, 1, list(key), ticks)
+        setup.recv_match(type="HEARTBEAT", blocking=True, timeout=PATIENCE)
+        setup.close()
+        assert upload(MISSION, connection, wait=PATIENCE, signing_key=right).problems == ()
+        with pytest.raises(LinkError):
+            upload(MISSION, connection, wait=3, signing_key=wrong)
 
 
 def places(item: MissionItem) -> tuple[int, float, float, float]:
