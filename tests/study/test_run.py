@@ -166,7 +166,7 @@ def test_a_strange_directory_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_rows_that_name_no_rate_are_of_the_cutoff_rate(tmp_path: Path) -> None:
-    row = StudyRow("f" * 20, {}, "faao", 0, R_avg=1.0, delivered=0.5)
+    row = StudyRow("f" * 20, {}, "faao", 0, R_avg=1.0, delivered=0.5, route=[])
     earlier = {name: value for name, value in asdict(row).items() if name != "rate"}
     (tmp_path / ROWS).write_text(json.dumps(earlier) + "\n")
     assert load_rows(tmp_path) == {row.key: row}
