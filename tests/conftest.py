@@ -90,9 +90,11 @@ def paper_plan(small_plan: MakePlan) -> MakePlan:
 
 
 @pytest.fixture(scope="session")
-def autopilots() -> Path:
+def autopilots(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder with the real autopilots, their simulators and runners; skips without one."""
+    from simulators import usable
+
     named = os.environ.get("FAAO_AUTOPILOTS")
     if named is None:
         pytest.skip("FAAO_AUTOPILOTS does not name a folder with the real autopilots")
-    return Path(named)
+    return usable(Path(named), tmp_path_factory.mktemp("autopilots"))

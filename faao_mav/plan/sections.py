@@ -380,7 +380,13 @@ class PlanFile(_Section):
     """What the file of a plan holds."""
 
     name: Annotated[
-        Text, key("Name, for the summary.", "", "text of at most 200 characters", max_length=200)
+        Text,
+        key(
+            "Name, for the summary.",
+            "",
+            "one line of at most 200 printable characters",
+            max_length=200,
+        ),
     ] = ""
     site: Site
     vehicle: VehicleOptions

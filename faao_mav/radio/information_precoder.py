@@ -16,7 +16,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
 from faao_mav.radio.best_precoder import best_mean_precoders
 from faao_mav.radio.fixed_noise import information_and_errors
-from faao_mav.radio.precoder import _with_power
+from faao_mav.radio.precoder import with_power
 
 _STEPS = 15
 """Steps of the conjugate gradients, and as many again for the best of several starts.
@@ -89,7 +89,7 @@ def _ascended(
     H: Complex, start: Complex, power: float, modulation: str, noise: float
 ) -> tuple[Complex, Real]:
     """Return P (b, N, N) and its mean information (b,) after steps from `start`, never worse."""
-    P = _with_power(start, 1.0)
+    P = with_power(start, 1.0)
     gram = (H.conj().mT @ H) * (2 * power / noise / np.log(2.0))
 
     def at(index: Integers, P: Complex) -> tuple[Real, Complex]:
@@ -125,7 +125,7 @@ def _ascended(
         gradient[going] = np.where(better, new, old)
         ahead[going] = np.where(better, turned, old)
         value[going] = np.where(better[:, 0, 0], reached, value[going])
-    return _with_power(P, power), value
+    return with_power(P, power), value
 
 
 def _inner(a: Complex, b: Complex) -> Real:

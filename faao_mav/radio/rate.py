@@ -26,19 +26,11 @@ def _squared_norms(A: Complex, u: RealOrComplex) -> Real:
 
 
 def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float) -> Real:
-    """Return the exponents D = ||H P u||² / (4 σ²) of (7) and (8).
+    """Return the exponents D = ||H P u||² / (4 σ²) of (7) and (8), (..., k), never negative.
 
-    Args:
-        H: (..., N_r, N_t) channels.
-        P: (..., N_t, N_t) precoders; the leading axes of H and P broadcast.
-        u: (k, N_t) differences of input vectors, ``DifferenceClasses.vectors``.
-        noise: σ², W.
-
-    Returns:
-        (..., k), never negative.
-
-    Raises:
-        InputError: the noise is not above 0.
+    `H` (..., N_r, N_t) are channels and `P` (..., N_t, N_t) precoders, whose leading axes
+    broadcast; `u` (k, N_t) are differences of input vectors, ``DifferenceClasses.vectors``; `noise`
+    is σ², W. Raises `InputError` for a noise not above 0.
 
     >>> exponents(np.eye(1), np.eye(1), np.array([[2.0 + 0j]]), 0.5)
     array([2.])
@@ -49,24 +41,16 @@ def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float
 def cutoff_rate(
     H: RealOrComplex, P: RealOrComplex, classes: DifferenceClasses, noise: float
 ) -> Real:
-    """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz.
+    """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz, (...) from 0 to ``classes.bits``.
 
     R_0 = 2 N log2(rho) - log2 Σ_m Σ_k exp(-||H P u_mk||² / (4 σ²)), the double sum taken over the
     classes. In terms of the class probabilities it is -log2(1 + Σ weight (e^-D - 1)), exact where
     the rate is small, and N log2(rho) - log2(1 + Σ multiplicity e^-D / rho^N), exact where it is
     nearly N log2(rho); each is used on its side.
 
-    Args:
-        H: (..., N_r, N_t) channels.
-        P: (..., N_t, N_t) precoders; the leading axes of H and P broadcast.
-        classes: the differences of the alphabet on N_t antennas.
-        noise: σ², W.
-
-    Returns:
-        (...) between 0 and ``classes.bits``.
-
-    Raises:
-        InputError: the noise is not above 0.
+    `H` (..., N_r, N_t) are channels and `P` (..., N_t, N_t) precoders, whose leading axes
+    broadcast; `classes` are the differences of the alphabet on N_t antennas; `noise` is σ², W.
+    Raises `InputError` for a noise not above 0.
 
     >>> from faao_mav.radio.constellation import difference_classes
     >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))

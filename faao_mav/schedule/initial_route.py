@@ -16,14 +16,14 @@ from faao_mav.errors import InputError
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.waypoints import (
     LEG_SHARE,
-    SLOWEST,
     Waypoint,
     along_spline,
+    fits,
     hovers_and_ends,
     simplify,
 )
 from faao_mav.vector import lengths
-from faao_mav.vehicle import LegLimits
+from faao_mav.vehicle import LegLimits, vehicle_of
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
@@ -65,21 +65,22 @@ def initial_route(
     positions at those times, metres. Raises `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
+    legs = vehicle_of(plan).legs
     tolerance = share * plan.mission.path_tolerance
-    fixed = hovers_and_ends(times, positions, tolerance)
+    fixed = hovers_and_ends(times, positions, tolerance, legs.slowest)
     waypoints, curved = [fixed[0]], [False]
     for start, stop in pairwise(fixed):
         stretch = slice(start.last, stop.first + 1)
         path = positions[stretch].copy()
         path[0], path[-1] = start.position, stop.position
-        inner = simplify(path, LEG_SHARE * tolerance)
+        inner = _apart(path, simplify(path, LEG_SHARE * tolerance), legs.least, tolerance)
         marked = [False] * (len(inner) + 1)
         if splines is not None:
             inner, marked = _with_splines(times[stretch], path, inner, splines)
         waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
         curved += marked
-    return _timed(times, waypoints, curved, plan.vehicle.max_speed)
+    return _timed(times, waypoints, curved, legs.slowest, plan.vehicle.max_speed)
 
 
 def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: float) -> Route:
@@ -110,7 +111,8 @@ def set_out(t: Real, w: Real, plan: "Plan") -> float:
 
     `t` (n,) s, `w` (n, 2) m.
     """
-    return float(t[hovers_and_ends(t, w, plan.mission.path_tolerance)[0].last])
+    slowest = vehicle_of(plan).legs.slowest
+    return float(t[hovers_and_ends(t, w, plan.mission.path_tolerance, slowest)[0].last])
 
 
 def begins_at_speed(t: Real, w: Real) -> bool:
@@ -129,6 +131,21 @@ def _checked(t: ArrayLike, w: ArrayLike) -> tuple[Real, Real]:
     if not (np.diff(times) > 0).all():
         raise InputError("trajectory: t must increase")
     return times, positions
+
+
+def _apart(path: Real, inner: list[int], least: float, tolerance: float) -> list[int]:
+    """Return `inner`, points of `path` (n, 2), without those that make a leg shorter than `least`.
+
+    Points stay without which a sample of the path were farther than `tolerance` from its leg; m.
+    """
+    ends = [0, *inner, len(path) - 1]
+    for k in inner:
+        at = ends.index(k)
+        before, after = ends[at - 1], ends[at + 1]
+        short = min(lengths(path[[before, after]] - path[k])) < least
+        if short and fits(path, before, after, tolerance):
+            del ends[at]
+    return ends[1:-1]
 
 
 def _with_splines(
@@ -162,17 +179,19 @@ def _with_splines(
     return points[:-1], marked
 
 
-def _timed(t: Real, waypoints: list[Waypoint], curved: list[bool], max_speed: float) -> Route:
+def _timed(
+    t: Real, waypoints: list[Waypoint], curved: list[bool], slowest: float, max_speed: float
+) -> Route:
     """Return the route with the speeds and waits that keep the plan's times without ramps."""
     positions = np.array([waypoint.position for waypoint in waypoints])
     arrivals = t[[waypoint.first for waypoint in waypoints]]
     departures = t[[waypoint.last for waypoint in waypoints]]
     length = lengths(np.diff(positions, axis=0))
     planned = arrivals[1:] - departures[:-1]
-    speeds = sent_speeds(np.maximum(length / planned, SLOWEST), max_speed)
+    speeds = sent_speeds(np.maximum(length / planned, slowest), max_speed)
     # Where the plan hovers, or creeps slower than is flown, there is time to wait.
     free = departures > arrivals
-    free[1:] |= length < SLOWEST * planned
+    free[1:] |= length < slowest * planned
     waits = np.zeros(len(waypoints))
     clock = arrivals[0]
     for k in range(len(waypoints)):

@@ -59,8 +59,8 @@ class Scheduler(ABC):
         """Return `first` brought closer to the plan, with values as they are sent."""
 
     def flight(self, route: Route) -> Schedule:
-        """Return the predicted flight of `route`."""
-        route = self._with_radii(route)
+        """Return the predicted flight of `route`, which is rounded for it."""
+        route = self._with_radii(route.rounded())
         return Schedule(route, self.model.fly(self._path(route)), self._clock(route))
 
     def fitted(self, route: Route, top_speed: float, groups: Integers | None = None) -> Schedule:
@@ -135,8 +135,9 @@ class Scheduler(ABC):
         stops = route.waits > 0
         stops[[0, -1]] = True
         leg_lengths = np.concatenate([[np.inf], route.leg_lengths, [np.inf]])
-        radii = self.vehicle.legs.radii(np.minimum(leg_lengths[:-1], leg_lengths[1:]), route.turns)
-        return replace(route, radii=np.where(stops, 0.0, np.round(radii, 1)))
+        room = np.minimum(leg_lengths[:-1], leg_lengths[1:])
+        radii = self.vehicle.legs.radii(room, route.turns, stops)
+        return replace(route, radii=np.round(radii, 1))
 
     def _path(self, route: Route) -> FlightPath:
         return route.path(whole_seconds=self.vehicle.type.whole_second_holds)

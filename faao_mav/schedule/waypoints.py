@@ -12,13 +12,12 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.vector import distances_to_segment, lengths
 
-SLOWEST = 0.1  # the least speed that is commanded for a leg, m/s; a slower trajectory hovers
-
 # Shares of the path tolerance that together never exceed it: how far a sample may be from its leg,
 # a hover's radius (its samples are within two radii of its waypoint), and how far apart two hovers
 # may be that become one.
 LEG_SHARE, _HOVER_SHARE, _MERGE_SHARE = 0.9, 0.45, 0.05
 
+SLOWEST = 0.1  # the least speed, m/s, that any autopilot is commanded: a slower trajectory hovers
 _WIDEST_HOVER = 1.0  # the largest radius of a hover, m, however large the path tolerance
 _SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
 _SPEED_WINDOW = 1.0  # s, over which a speed is averaged: it hides a trajectory's chatter
@@ -38,13 +37,13 @@ class Waypoint:
     position: Real
 
 
-def find_hovers(t: Real, w: Real, radius: float) -> list[Waypoint]:
+def find_hovers(t: Real, w: Real, radius: float, slowest: float = SLOWEST) -> list[Waypoint]:
     """Return the hovers of the trajectory `t` (n,) s, `w` (n, 2) m, in order.
 
-    A hover lasts 3 s at least, in which the aircraft is slower than `SLOWEST` throughout and stays
-    in a box with a half diagonal of at most `radius` (m). Its position is the median, so no sample
-    of a hover is farther than 2 `radius` from it. A creep through several boxes makes several
-    hovers, with 3 s between them to get on.
+    A hover lasts 3 s at least, in which the aircraft is slower than `slowest` m/s throughout and
+    stays in a box with a half diagonal of at most `radius` (m). Its position is the median, so no
+    sample of a hover is farther than 2 `radius` from it. A creep through several boxes makes
+    several hovers, with 3 s between them to get on.
 
     >>> t = np.arange(0.0, 20.0)
     >>> w = np.column_stack([np.clip(t - 10, 0, None), 0 * t])
@@ -52,7 +51,7 @@ def find_hovers(t: Real, w: Real, radius: float) -> list[Waypoint]:
     [(0, 9)]
     """
     hovers = []
-    for begin, end in _runs(_speeds(t, w) < SLOWEST):
+    for begin, end in _runs(_speeds(t, w) < slowest):
         first = begin
         while first < end:
             last = _last_within(w[first : end + 1], radius) + first
@@ -64,15 +63,16 @@ def find_hovers(t: Real, w: Real, radius: float) -> list[Waypoint]:
     return hovers
 
 
-def hovers_and_ends(t: Real, w: Real, tolerance: float) -> list[Waypoint]:
+def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[Waypoint]:
     """Return the waypoints between which a trajectory moves: w_I, the hovers, w_F.
 
-    `t` (n,) s, `w` (n, 2) m; `tolerance` is the path tolerance, m. A hover at an end takes the
+    `t` (n,) s, `w` (n, 2) m; `tolerance` is the path tolerance, m; slower than `slowest` m/s it may
+    hover. A hover at an end takes the
     end's exact position. Neighbours in one place with nothing of note between them are one.
     """
     end = len(t) - 1
     closed = math.dist(w[0], w[end]) <= _SAME_POINT
-    hovers = find_hovers(t, w, min(_WIDEST_HOVER, _HOVER_SHARE * tolerance))
+    hovers = find_hovers(t, w, min(_WIDEST_HOVER, _HOVER_SHARE * tolerance), slowest)
     if hovers and hovers[0].first == 0:
         last = hovers[0].last
         if last == end and not closed:
@@ -179,14 +179,14 @@ def _longest_legs(w: Real, tolerance: float) -> list[int]:
     first, last = 0, len(w) - 1
     while True:
         step = 1
-        while first + step < last and _fits(w, first, min(first + 2 * step, last), tolerance):
+        while first + step < last and fits(w, first, min(first + 2 * step, last), tolerance):
             step = min(2 * step, last - first)
         if first + step >= last:
             return ends
         low, high = step, min(2 * step, last - first)
         while high - low > 1:
             middle = (low + high) // 2
-            if _fits(w, first, first + middle, tolerance):
+            if fits(w, first, first + middle, tolerance):
                 low = middle
             else:
                 high = middle
@@ -194,7 +194,7 @@ def _longest_legs(w: Real, tolerance: float) -> list[int]:
         ends.append(first)
 
 
-def _fits(w: Real, first: int, last: int, tolerance: float) -> bool:
+def fits(w: Real, first: int, last: int, tolerance: float) -> bool:
     """Tell whether the samples between two stay close to the leg from one to the other."""
     passed = w[first + 1 : last]
     return bool(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.vehicle.dialect import Dialect
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
@@ -53,11 +53,16 @@ class LegLimits(Protocol):
         """Return the greatest speed reached on legs of `length`, m, in m/s; same shape."""
         ...
 
-    def radii(self, room: Real, turn: Real) -> Real:
+    @property
+    def slowest(self) -> float:
+        """The least speed that is commanded for a leg, m/s: who has more time waits at its end."""
+        ...
+
+    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:
         """Return acceptance radii, m, that suit waypoints; 0 leaves them to the autopilot.
 
         `room` (n,), m, is the shorter of the two legs at each waypoint, `turn` (n,) the angle
-        between them, rad.
+        between them, rad; `stops` (n,) marks the waypoints at which it waits.
         """
         ...
 
@@ -79,6 +84,7 @@ class VehicleType:
         vertical: its take-off, climb, return and landing.
         fence_needs_one_inclusion: being inside one of several inclusion areas is enough; else the
             vehicle has to be inside all.
+        home_outside_fence: what it does with a mission where home lies outside the fence.
         legs: how it flies a leg; None if missions are not made for it.
         flight_model: how it flies a mission, with the latitude in degrees if that is known; None if
             `unmodelled` says why there is no model.
@@ -100,6 +106,7 @@ class VehicleType:
     whole_second_holds: bool = False
     fastest: float = 20.0
     fence_needs_one_inclusion: Callable[[ParameterValues], bool] = lambda _: True
+    home_outside_fence: str = ""
     legs: Callable[[ParameterValues], LegLimits] | None = None
     flight_model: Callable[[ParameterValues, float | None], FlightModel] | None = None
     unmodelled: str = ""

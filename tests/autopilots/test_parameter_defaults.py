@@ -2,15 +2,13 @@
 
 import json
 import lzma
-import socket
-import subprocess
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
+from simulators import simulated
 
 from faao_mav.vehicle import ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE, VehicleType
 
@@ -21,34 +19,10 @@ PATIENCE = 60.0
 """Seconds that a simulated autopilot has to start, and to list its parameters."""
 
 
-@contextmanager
-def ardupilot(built: Path, model: str, where: Path) -> Iterator[str]:
-    """Run a simulated ArduPilot and yield where it listens, on the loopback interface."""
-    for instance in range(40, 90):
-        with socket.socket() as probe:
-            if probe.connect_ex(("127.0.0.1", 5760 + 10 * instance)):
-                break
-    home = "-35.363262,149.165237,584,0"
-    command = [str(built), "-w", "--model", model, "--home", home, "-I", str(instance)]
-    quiet = subprocess.DEVNULL
-    process = subprocess.Popen(command, cwd=where, stdout=quiet, stderr=quiet)
-    try:
-        yield f"tcp:127.0.0.1:{5760 + 10 * instance}"
-    finally:
-        process.kill()
-        process.wait()
-
-
 def listed(connection: str) -> Mapping[str, float]:
     """Return the parameters of the vehicle at `connection`."""
     end = time.monotonic() + PATIENCE
-    while True:
-        try:
-            link = mavutil.mavlink_connection(connection, retries=1)
-            break
-        except OSError:
-            assert time.monotonic() < end, "it does not start"
-            time.sleep(0.2)
+    link = mavutil.mavlink_connection(connection)
     link.wait_heartbeat(timeout=PATIENCE)
     link.mav.param_request_list_send(link.target_system, link.target_component)
     found: dict[str, float] = {}
@@ -77,13 +51,12 @@ def differences(vehicle_type: VehicleType, real: Mapping[str, float]) -> list[st
 
 
 @pytest.mark.parametrize(
-    ("program", "model", "vehicle_type"),
-    [("arducopter", "+", ARDUCOPTER), ("arduplane", "plane", ARDUPLANE)],
+    ("program", "vehicle_type"), [("arducopter", ARDUCOPTER), ("arduplane", ARDUPLANE)]
 )
 def test_of_ardupilot(
-    program: str, model: str, vehicle_type: VehicleType, autopilots: Path, tmp_path: Path
+    program: str, vehicle_type: VehicleType, autopilots: Path, tmp_path: Path
 ) -> None:
-    with ardupilot(autopilots / "ardupilot" / program, model, tmp_path) as connection:
+    with simulated(autopilots, program, tmp_path, bare=True) as connection:
         real = listed(connection)
     assert differences(vehicle_type, real) == []
     for parameter in vehicle_type.parameters.values():

@@ -57,7 +57,7 @@ def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
     mission = read_wpl((folder / f"{name}.waypoints").read_text(), name).mission
     assert mission.home is not None
     frame = LocalFrame(mission.home.latitude, mission.home.longitude)
-    items, points, speeds, holds, splines = [], [], [], [], []
+    items, points, speeds, holds, radii, splines = [], [], [], [], [], []
     speed = math.nan
     for index, item in enumerate(mission.items, start=home_row):
         if item.command == Command.DO_CHANGE_SPEED:
@@ -67,6 +67,7 @@ def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
             points.append([*frame.to_local(item.x, item.y), item.z])
             speeds.append(speed)
             holds.append(item.params[0])
+            radii.append(item.params[1])
             splines.append(item.command == Command.NAV_SPLINE_WAYPOINT)
     with (folder / f"{name}.csv").open() as file:
         table = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
@@ -77,7 +78,7 @@ def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
         speeds=np.array(speeds[1:]),
         holds=np.array(holds),
         splines=np.array(splines),
-        radii=np.zeros(len(points)),
+        radii=np.array(radii),
     )
     horizontal = frame.to_local(column["lat"], column["lon"])
     return Recorded(path, column["t_s"] - left[0], horizontal, left - left[0], speeds[0])

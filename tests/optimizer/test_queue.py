@@ -1,11 +1,8 @@
 """What a relay delivers, maximised: against convex programs, KKT conditions and known optima."""
 
 import math
-import time
 import tracemalloc
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -153,34 +150,6 @@ def test_the_sample_delivers_what_is_known_to_be_possible(known: Known) -> None:
     assert solution.history[-1] == solution.delivered_rate
     assert solution.is_feasible()
     assert solution.kkt_residual() < 1e-4
-
-
-def seconds_of(work: Callable[[], object], times: int) -> float:
-    """The least processor time of several runs, which other processes hardly change."""
-    least = math.inf
-    for _ in range(times):
-        began = time.process_time()
-        work()
-        least = min(least, time.process_time() - began)
-    return least
-
-
-def test_the_queue_costs_little_time() -> None:
-    """The issue allows half as much again; what was measured is next to nothing."""
-    plans = [parse_plan(edited(SAMPLE, {"radio.causal": causal})) for causal in (True, False)]
-    causal, other = (seconds_of(partial(optimize, plan), 3) for plan in plans)
-    assert causal < 1.5 * other
-
-
-def test_the_time_grows_linearly_with_the_slots() -> None:
-    """To 10,000 slots: ten times the slots take ten times as long, give or take a half."""
-
-    def solved(slots: int) -> None:
-        kin = copter(100, time_step=100 / slots)
-        best = maximize(kin, ACTIVE, straight_flight(kin), relay=FULL, tolerance=1e-4)
-        assert best.converged
-
-    assert seconds_of(partial(solved, 10_000), 1) < 15 * seconds_of(partial(solved, 1_000), 2)
 
 
 def test_what_a_queue_adds_to_the_matrix_grows_linearly() -> None:

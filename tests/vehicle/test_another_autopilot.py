@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import MISSIONS, edited
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.errors import PlanError
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.formats.parameter_file import render_parameters
@@ -68,6 +68,7 @@ class ToyLegs:
     acceleration: float
     least = 3.0
     run_in = 1.2
+    slowest = 0.1
 
     def shortest_leg(self, speed: Real) -> Real:
         return speed**2 / self.acceleration
@@ -75,7 +76,7 @@ class ToyLegs:
     def reachable_speed(self, length: Real) -> Real:
         return np.sqrt(self.acceleration * length)
 
-    def radii(self, room: Real, turn: Real) -> Real:
+    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
         return np.minimum(4.0, 0.4 * room) + 0 * turn
 
 

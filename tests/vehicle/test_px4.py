@@ -13,6 +13,7 @@ from faao_mav.errors import InputError
 from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.flight_path import FlightPath
 from faao_mav.vehicle.px4 import PX4_COPTER, Px4
+from faao_mav.vehicle.px4.simulation import SWITCH_DELAY
 
 SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)
 
@@ -123,7 +124,7 @@ def test_arrivals_are_smooth_in_speeds(model: Px4, leg: int) -> None:
     speeds[:, leg] += change
     arrivals = ends(model, path, speeds)
     noise = arrivals - np.polyval(np.polyfit(change, arrivals, 3), change)
-    assert abs(noise).max() < 1e-3
+    assert abs(noise).max() < 4e-3  # a detour of a few steps may begin or end
 
 
 def ends(model: Px4, path: FlightPath, speeds: Real) -> Real:
@@ -151,7 +152,7 @@ def test_fractions_of_holds_count() -> None:
     holds[:, 1] = [0.4, 5.0, 5.3, 12.5]
     many = Px4().fly_many(path, np.tile(path.speeds, (4, 1)), holds)
     waited = [flown.departures[1] - flown.arrivals[1] for flown in many]
-    np.testing.assert_allclose(waited, holds[:, 1] + 0.1, atol=1e-9)
+    np.testing.assert_allclose(waited, holds[:, 1] + SWITCH_DELAY, atol=1e-9)
 
 
 def test_any_hold_makes_it_brake() -> None:
@@ -162,9 +163,9 @@ def test_any_hold_makes_it_brake() -> None:
 
 def test_a_long_hold_ends_over_the_point() -> None:
     flown = Px4().fly(path_of([0, 60, 60 + 60j], holds={0: 30.0, 1: 300.0}))
-    assert flown.departures[0] == pytest.approx(30.1)
+    assert flown.departures[0] == pytest.approx(30 + SWITCH_DELAY)
     waiting = (flown.t > flown.arrivals[1] + 20) & (flown.t < flown.departures[1])
-    np.testing.assert_allclose(flown.position[waiting, 0], 60, atol=0.02)
+    np.testing.assert_allclose(flown.position[waiting, 0], 60, atol=0.1)
 
 
 def test_a_radius_as_long_as_its_leg_counts_at_once() -> None:
@@ -210,7 +211,7 @@ def test_a_vertical_leg() -> None:
 
 def test_one_point_is_only_held() -> None:
     flown = Px4().fly(path_of([3 + 4j], holds={0: 2.5}))
-    assert flown.departures[0] == pytest.approx(2.6)
+    assert flown.departures[0] == pytest.approx(2.5 + SWITCH_DELAY)
     np.testing.assert_array_equal(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
 
 

@@ -55,12 +55,8 @@ class Bound:
 def upper_bound(problem: Problem, known: float = 0.0) -> Bound:
     """Return an upper bound on R_avg over all trajectories and precoders of `problem`.
 
-    Args:
-        problem: the feasible set and the links.
-        known: R_avg of any plan for the problem, bit/s/Hz: the better it is, the tighter the bound.
-
-    Raises:
-        SolverError: Clarabel fails.
+    `known` is R_avg of any plan for it, bit/s/Hz: the better it is, the tighter the bound. Raises
+    `SolverError` where Clarabel fails.
     """
     import cvxpy as cp
 
@@ -193,12 +189,11 @@ def _longest_way(kin: Kinematics, velocity: Real | None, *, free_jump: bool) -> 
 
     `free_jump`: the first acceleration has no limit.
     """
-    n = np.arange(kin.slots, dtype=float)
     speed = np.full(kin.slots, kin.max_speed)
     if velocity is not None:
-        gain = (
-            np.where(n > 0, np.inf, 0.0) if free_jump else kin.max_acceleration * kin.time_step * n
-        )
+        n = np.arange(kin.slots, dtype=float)
+        jump = np.where(n > 0, np.inf, 0.0)
+        gain = jump if free_jump else kin.max_acceleration * kin.time_step * n
         speed = np.minimum(speed, float(np.linalg.norm(velocity)) + gain)
     return np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2)]) * kin.time_step
 

@@ -13,11 +13,11 @@ POSITION_GAIN = 0.95
 VELOCITY_GAINS = (1.8, 0.4, 0.2)
 """MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC."""
 
-ATTITUDE_LAG = 0.25
+ATTITUDE_LAG = 0.26
 """The time constant from the acceleration asked for to the thrust's, s. Fitted to recorded
 flights."""
 
-DRAG = 0.1
+DRAG = 0.2
 """The air drag over mass, 1/s. Fitted to recorded flights."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.vehicle.px4.detour import Heading, excess, headed, heading
 from faao_mav.vehicle.px4.guidance import GuidedLeg, legs
 from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.step import FlightState, at_rest, moved
@@ -15,11 +16,11 @@ from faao_mav.vehicle.px4.step import FlightState, at_rest, moved
 STEP = 0.1
 """The longest step of the simulation, s: the one that was calibrated."""
 
-SWITCH_DELAY = 0.1
+SWITCH_DELAY = 0.065
 """How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
 next, s. Measured: 0.1 s late after holds."""
 
-START_LAG = 0.12
+START_LAG = 0.05
 """How long after the first leg becomes current the trajectory moves, s. Fitted to recorded
 flights."""
 
@@ -36,6 +37,9 @@ Variants of a flight take some 20 s to move alike again; ten times less would ta
 _STEADY = 1e-5
 """The deviation of a velocity, m/s, below which it is taken to stay as it is along a leg: a few
 millimetres in minutes."""
+
+_LEAST_SHARE = 0.01
+"""The least share of a step that is taken before what the aircraft heads for is looked at anew."""
 
 _TINY = 1e-9
 """The shortest time, s, and length, m, that count."""
@@ -159,26 +163,47 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
     states: list[FlightState] = []
     time, due, arrival = 0.0, inf, inf
     near = _distances(limits, leg, state)
+    kind = heading(leg, state.level[0])
+    aim = headed(limits, leg, kind, state.level[0])
     while due - time >= _TINY:
         before, far = state, near
-        if due < inf and _stands(state):
-            time = due
-        else:
-            dt = min(STEP, due - time)
-            state = moved(limits, leg, state, dt)
-            time += dt
-            if due == inf and (steps := _steady_steps(leg, before, state)) > 0:
-                times.append(time)
-                states.append(state)
-                state = _carried_on(before, state, steps)
-                time += steps * STEP
-        times.append(time)
-        states.append(state)
+        dt = due - time
+        if due == inf or not _stands(state):
+            dt = min(STEP, dt)
+            state = moved(limits, aim, before, dt)
+        now = heading(leg, state.level[0])
+        if now is not kind:
+            dt *= _share_before(leg, kind, now, before, state)
+            state = moved(limits, aim, before, dt)
         near = _distances(limits, leg, state)
         if due == inf and max(near) <= 0:
-            arrival = time - dt * (1 - _share(leg, before, dt, far, near))
+            arrival = time + dt * _share(leg, before, dt, far, near)
             due = arrival + SWITCH_DELAY + max(leg.hold, 0.0)
+            if due < time + dt:
+                dt = due - time
+                state = moved(limits, aim, before, dt)
+        time += dt
+        times.append(time)
+        states.append(state)
+        if now is not kind or now is Heading.ONTO:
+            kind, aim = now, headed(limits, leg, now, state.level[0])
+        elif due == inf and now is Heading.END and (steps := _steady_steps(leg, before, state)) > 0:
+            state = _carried_on(before, state, steps)
+            time += steps * STEP
+            times.append(time)
+            states.append(state)
+            near = _distances(limits, leg, state)
     return FlownLeg(arrival, due, np.array(times), _motion(states), state)
+
+
+def _share_before(
+    leg: GuidedLeg, kind: Heading, then: Heading, before: FlightState, after: FlightState
+) -> float:
+    """Return the share of a step after which the aircraft heads for `then` instead of `kind`."""
+    which = then if kind is Heading.END else kind
+    begun, ended = (excess(which, leg, each.level[0]) for each in (before, after))
+    share = begun / (begun - ended) if begun != ended else 1.0
+    return min(max(share, _LEAST_SHARE), 1.0)
 
 
 def _steady_steps(leg: GuidedLeg, before: FlightState, state: FlightState) -> int:

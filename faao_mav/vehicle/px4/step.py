@@ -8,7 +8,7 @@ from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.response import Motion, Number, advance, step_of
 from faao_mav.vehicle.px4.smoothing import Axis, follow, soon_there
 
-WANDER = 0.08
+WANDER = 0.14
 """How far the position estimate strays from the trajectory all the time, m. Fitted to recorded
 flights."""
 

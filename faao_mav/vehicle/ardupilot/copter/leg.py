@@ -10,7 +10,7 @@ from typing import ClassVar, TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.ramp import (
     LegBounds,
@@ -182,6 +182,7 @@ class ArduCopterLegs(ArduCopterLimits):
     """
 
     least: ClassVar[float] = 0.0
+    slowest: ClassVar[float] = 0.1
     run_in: ClassVar[float] = 1.2
 
     def shortest_leg(self, speed: Real) -> Real:
@@ -197,7 +198,7 @@ class ArduCopterLegs(ArduCopterLimits):
         bounds = self._bounds(math.inf)
         return _each(lambda way: ramp_from_rest(bounds, way / 2).high if way > 0 else 0.0, length)
 
-    def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
+    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
         """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
         return np.zeros_like(turn)
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.vehicle.ardupilot.plane.motion import Motion
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.flight_path import FlightPath, Flown
@@ -18,6 +18,7 @@ class ArduPlaneLegs(ArduPlaneLimits):
     """How ArduPlane flies a leg."""
 
     least: ClassVar[float] = 0.0
+    slowest: ClassVar[float] = 0.1
     run_in: ClassVar[float] = 4.0  # chosen: room to come onto a track, whatever its course
 
     def shortest_leg(self, speed: Real) -> Real:
@@ -28,7 +29,7 @@ class ArduPlaneLegs(ArduPlaneLimits):
         """Return the speed at which legs of `length`, m, are not cut short, m/s; same shape."""
         return length / self.look_ahead
 
-    def radii(self, room: Real, turn: Real) -> Real:  # noqa: ARG002
+    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
         """Return acceptance radii, m: 0, ArduPlane's own; the shape of `turn`."""
         return np.zeros_like(turn)
 

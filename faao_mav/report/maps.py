@@ -1,0 +1,231 @@
+"""Maps: of a plan's route with its speeds, and of a mission alone, each with what is about it."""
+
+import itertools
+from collections.abc import Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import FLOWN_TO, Command
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.item import Mission
+from faao_mav.optimizer.solution import Solution
+from faao_mav.report.style import (
+    INK,
+    MUTED,
+    SERIES,
+    WIDTH,
+    drawing,
+    label,
+    legend_above,
+    mark_stations,
+)
+from faao_mav.schedule.conversion import Conversion
+from faao_mav.schedule.schedule import positions_at
+from faao_mav.vector import lengths
+from faao_mav.vehicle import Track
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_Outline: TypeAlias = tuple[Real, bool]
+"""Corners (k, 2), m, closed, and whether the aircraft has to stay inside."""
+
+_WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+"""The commands of a relay route, whose items are numbered on its map."""
+
+_PIECES = 240  # pieces of the route with a colour each, at most: more cannot be told apart
+_LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
+_SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
+_ROUND = 72  # corners that a circle is drawn with; chosen: 5 degrees each
+
+_SIZE = 8.0  # height of a number, points
+_DIGIT = 0.66  # width of a digit in the widest usual font, of its size
+_GAP = 5.0  # points between a waypoint and its number
+_CLEAR = 2.5  # points between a number and the middle of a line: half the width of a route's line
+_MARK = 4.0  # half of a station's mark, points
+_SIDES = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0)])
+"""Where a number may stand beside its waypoint, right and up of it, the first that is free."""
+
+
+def route_map(
+    solution: Solution, conversion: Conversion | None, plot: "Axes", title: str = ""
+) -> None:
+    """Draw the map on `plot`: east and north in metres, speeds as colours with a bar.
+
+    It shows all of the flight and both stations, and of a wider fence what is near them. It is
+    drawn when all else in its figure is, for the waypoints' numbers are fitted in.
+    """
+    radio, origin = solution.plan.radio, solution.plan.origin
+    stations = np.array([radio.base_station.position, radio.ground_user.position])
+    marked = zip(("base station", "user"), stations.tolist(), "s^", strict=True)
+    outlines: list[_Outline] = []
+    lines, places = [solution.w], np.empty((0, 2))
+    numbers: list[int] = []
+    if conversion is not None:
+        frame, mission = LocalFrame(origin.latitude, origin.longitude), conversion.mission
+        outlines = list(_outlines_of(mission.fence, frame))
+        numbers, places = _places_of(mission, frame, _WAYPOINTS)
+        lines.append(conversion.schedule.track()["predicted_w"])
+    _draw_fence(plot, outlines)
+    _coloured(plot, solution)
+    if conversion is not None:
+        plot.plot(*lines[1].T, "--", color=INK, linewidth=0.9, label="predicted")
+        _draw_waypoints(plot, places, "waypoint")
+    mark_stations(plot, list(marked))
+    _show_all(plot, np.concatenate([*lines, stations, places]), outlines, title)
+    _write_numbers(plot, numbers, places, lines, stations)
+
+
+def mission_map(mission: Mission, track: Track) -> "Figure":
+    """Return the map: the predicted flight, the places of the items with numbers, the fence.
+
+    East and north in metres about the origin of the track's frame; items count from 1.
+    """
+    flown = track.position[:, :2]
+    numbers, places = _places_of(mission, track.frame, FLOWN_TO)
+    with drawing(WIDTH, 4.2) as figure:
+        plot = figure.subplots()
+        outlines = list(_outlines_of(mission.fence, track.frame))
+        _draw_fence(plot, outlines)
+        plot.plot(*flown.T, color=SERIES[0], label="predicted")
+        _draw_waypoints(plot, places, "item")
+        _show_all(plot, np.concatenate([flown, places]), outlines)
+        _write_numbers(plot, numbers, places, [flown], np.empty((0, 2)))
+    return figure
+
+
+def _places_of(
+    mission: Mission, frame: LocalFrame, commands: Collection[int]
+) -> tuple[list[int], Real]:
+    """Return numbers, from 1, and places (k, 2), m, of the items with one of `commands`."""
+    found = [
+        (number, item.x, item.y)
+        for number, item in enumerate(mission.items, 1)
+        if item.command in commands and (item.x or item.y)
+    ]
+    numbers, latitudes, longitudes = zip(*found, strict=True) if found else ((), (), ())
+    return list(numbers), frame.to_local(latitudes, longitudes)
+
+
+def _draw_waypoints(plot: "Axes", places: Real, name: str) -> None:
+    """Draw dots at `places` (k, 2), m, and a legend for all that is drawn."""
+    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)
+    legend_above(plot, 2)
+
+
+def _draw_fence(plot: "Axes", outlines: Sequence[_Outline]) -> None:
+    """Draw the fence: dashed where the aircraft has to stay inside, filled where outside."""
+    names = {True: "stay inside", False: "stay out"}
+    for corners, inside in outlines:
+        colour, style = (MUTED, "--") if inside else (SERIES[5], "-")
+        name = names.pop(inside, None)  # once in the legend
+        plot.plot(*corners.T, style, color=colour, linewidth=1.2, label=name)
+        if not inside:
+            plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
+
+
+def _show_all(plot: "Axes", seen: Real, outlines: Sequence[_Outline], title: str = "") -> None:
+    """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it.
+
+    A metre is as long to the east as to the north.
+    """
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    width = float((high - low).max()) or 1.0
+    if outlines:
+        corners = np.concatenate([corners for corners, _ in outlines])
+        corners = np.clip(corners, low - width / 2, high + width / 2)
+        low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+    plot.set_aspect("equal", adjustable="datalim")
+    plot.dataLim.set_points(np.array([low, high]))
+    plot.margins(0.08)
+    label(plot, title, "east, m", "north, m")
+
+
+def _coloured(plot: "Axes", solution: Solution) -> None:
+    """Draw the planned route, light where it is slow."""
+    from matplotlib import colormaps
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap
+
+    step = max(1, -(-(len(solution.w) - 1) // _PIECES))
+    ends = np.unique(np.append(np.arange(0, len(solution.w), step), len(solution.w) - 1))
+    pieces = [solution.w[a : b + 1] for a, b in itertools.pairwise(ends)]
+    speeds = lengths(solution.v)
+    means = np.array([speeds[a : b + 1].mean() for a, b in itertools.pairwise(ends)])
+    colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
+    lines = LineCollection(pieces, cmap=colours, linewidths=5, capstyle="round")
+    lines.set_array(means)
+    lines.set_clim(0, max(round(float(means.max()), 2), 0.01))  # round: labelled at its end
+    plot.add_collection(lines)
+    figure = plot.get_figure()
+    assert figure is not None
+    bar = figure.colorbar(lines, ax=plot, label="planned speed, m/s", shrink=0.7)
+    if bar.solids is not None:
+        bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
+
+
+def _outlines_of(fence: Fence, frame: LocalFrame) -> Iterator[_Outline]:
+    """Yield the areas of `fence` in metres about `frame`'s origin."""
+    for polygon in fence.polygons:
+        corners = np.array([*polygon.vertices, polygon.vertices[0]])
+        yield frame.to_local(corners[:, 0], corners[:, 1]), polygon.inclusion
+    angles = np.linspace(0.0, 2 * np.pi, _ROUND + 1)
+    for circle in fence.circles:
+        center = frame.to_local(*circle.center)
+        ring = np.column_stack([np.cos(angles), np.sin(angles)])
+        yield center + circle.radius * ring, circle.inclusion
+
+
+def _write_numbers(
+    plot: "Axes", numbers: Sequence[int], places: Real, lines: Sequence[Real], marks: Real
+) -> None:
+    """Write `numbers` beside their `places` (k, 2), m, on a map on which all else is drawn.
+
+    A number stands clear of the `lines` (n, 2), m, of the `marks` (j, 2), m, of texts and of other
+    numbers. Where that leaves it no room, it is left out.
+    """
+    figure = plot.get_figure(root=True)
+    if figure is None or not numbers:
+        return
+    from matplotlib.transforms import Bbox
+
+    figure.draw_without_rendering()  # the scale of the map is known only now
+    points = 72.0 / figure.dpi
+
+    def on_paper(at: Real) -> Real:
+        return np.asarray(plot.transData.transform(at) * points)
+
+    paper = Bbox(plot.get_window_extent().get_points() * points)
+    taken = [Bbox(text.get_window_extent().get_points() * points) for text in plot.texts]
+    taken += [Bbox([mark - _MARK, mark + _MARK]) for mark in on_paper(marks)]
+    occupied = np.concatenate([_dense(on_paper(line)) for line in lines])
+    for number, place, at in zip(numbers, places.tolist(), on_paper(places), strict=True):
+        size = np.array([_DIGIT * _SIZE * len(str(number)), _SIZE])
+        for side in _SIDES:
+            shift = side * (size / 2 + (_GAP if 0 in side else 0.6 * _GAP))
+            box = Bbox([at + shift - size / 2, at + shift + size / 2])
+            inside = paper.contains(*box.min) and paper.contains(*box.max)
+            crossed = box.padded(_CLEAR).count_contains(occupied) > 0
+            if inside and not crossed and not any(map(box.overlaps, taken)):
+                taken.append(box)
+                written = plot.annotate(
+                    str(number),
+                    place,
+                    xytext=shift,
+                    textcoords="offset points",
+                    ha="center",
+                    va="center",
+                    fontsize=_SIZE,
+                )
+                written.set_in_layout(False)  # the map stays as it was measured
+                break
+
+
+def _dense(line: Real) -> Real:
+    """Return points of `line` (n, 2) that are at most about a point apart."""
+    along = np.append(0.0, np.cumsum(lengths(np.diff(line, axis=0))))
+    return positions_at(np.linspace(0.0, along[-1], int(along[-1]) + 2), along, line)

@@ -1,0 +1,127 @@
+"""Missions that real autopilots flew in their simulators, beside their plans, without wind.
+
+    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/flown.py [ardupilot | px4] [PLAN ...]
+
+One row for each plan: rms position error at equal times (m), how much later than planned the flight
+is over (s), the delivered rate over the planned one; each as predicted and as flown.
+"""
+
+import csv
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from faao_mav import Result, plan_mission
+from faao_mav.arrays import Real
+from faao_mav.geodesy import LocalFrame
+from faao_mav.optimizer.solution import Solution
+from faao_mav.schedule.prediction import Prediction, price_flight
+from missions import PLANS, plan_of
+
+RUNNERS = {
+    "ardupilot": ("fly_arducopter.py", ["--speedup", "20"]),
+    "px4": ("fly_px4.py", ["--speedup", "10", "--params", "SIH_KDV=0.2"]),
+}
+"""The runner of each autopilot, with its options: little air drag for PX4's aircraft."""
+
+FLOWN: dict[str, dict[str, Any]] = {
+    name: PLANS[name]
+    for name in (
+        "copter_relay, 120 s, 8 m/s",
+        "short, 60 s, 6 m/s",
+        "slow, 90 s, 4 m/s",
+        "two hovers, 200 s, 9 m/s",
+        "curved, 75 s, 8 m/s",
+    )
+} | {
+    "brief, 80 s, 7 m/s": {
+        "flight.duration": 80,
+        "vehicle.max_speed": 7,
+        "radio.ground_user.position": [350, 200],
+    },
+    "free ends, 90 s, 10 m/s": {
+        "flight.duration": 90,
+        "vehicle.max_speed": 10,
+        "vehicle.max_acceleration": 2.5,
+        "flight.start_velocity": "free",
+        "flight.end_velocity": "free",
+    },
+    "16-QAM, 240 s, 5 m/s": {
+        "flight.duration": 240,
+        "vehicle.max_speed": 5,
+        "vehicle.max_acceleration": 1.0,
+        "radio.modulation": "16qam",
+        "radio.ground_user.position": [400, 250],
+    },
+}
+
+
+def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Prediction:
+    """Fly the mission of `result` and return what it delivers; again if the simulator fails.
+
+    `autopilots` is the folder with the runners; mission and track are written to `folder`.
+    """
+    script, options = RUNNERS[autopilot]
+    files = result.write(folder / "mission.waypoints")
+    command = [sys.executable, str(autopilots / script), str(files[0])]
+    command += ["--param-file", str(files[1])] if len(files) > 1 else []
+    track = folder / "track.csv"
+    for _ in range(4):
+        run = subprocess.run(
+            [*command, *options, "--out", str(track)], capture_output=True, text=True, check=False
+        )
+        if run.returncode == 0:
+            break
+    else:
+        raise SystemExit(f"not flown: {run.stdout[-2000:]}{run.stderr[-2000:]}")
+    with track.open() as file:
+        rows = [(row["t_s"], row["lat"], row["lon"]) for row in csv.DictReader(file)]
+    table = np.array(rows, dtype=float)
+    origin = result.solution.plan.origin
+    frame = LocalFrame(origin.latitude, origin.longitude)
+    return on_the_plans_clock(result.solution, table[:, 0], frame.to_local(*table[:, 1:].T))
+
+
+def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
+    """Price a flight whose clock is shifted so that it is nearest to the plan at equal times."""
+
+    def apart(start: float) -> float:
+        at = np.stack([np.interp(solution.t + start, t, x) for x in w.T], axis=-1)
+        return float(((at - solution.w) ** 2).sum(axis=1).mean())
+
+    begin = min(np.arange(t[0], t[-1] - solution.t[-1] + 5, 0.5).tolist(), key=apart)
+    begin = min(np.arange(begin - 0.6, begin + 0.6, 0.02).tolist(), key=apart)
+    return price_flight(solution, t - begin, w)
+
+
+def row(name: str, autopilots: Path, autopilot: str) -> str:
+    """Plan, fly and compare."""
+    plan = plan_of(FLOWN[name], autopilot, "recommend")
+    result = plan_mission(plan)
+    assert result.prediction is not None
+    with tempfile.TemporaryDirectory() as folder:
+        real = flown(autopilots, autopilot, result, Path(folder))
+    cells = [f"{autopilot:<10}{name:<28}"]
+    for found in (result.prediction, real):
+        late = found.duration - plan.flight.duration
+        share = 100 * found.delivered_rate / result.solution.delivered_rate
+        cells.append(f"{found.rms_position_error:6.2f} {late:+6.2f} {share:7.2f} %")
+    return "   ".join(cells)
+
+
+def main() -> None:
+    """Print the table."""
+    chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
+    print(f"{'':<41}{'predicted: m, s late, rate':<27}flown")
+    for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
+        for name in [each for each in FLOWN if each in chosen] or FLOWN:
+            print(row(name, autopilots, autopilot), flush=True)
+
+
+if __name__ == "__main__":
+    main()
