@@ -1,11 +1,20 @@
 """The exceptions that faao-mav raises on purpose, and values as their messages show them."""
 
+from collections.abc import Sequence
+
 _MAX_SHOWN = 60
-"""Characters of a value that a message shows; chosen: a message stays within two lines."""
+"""Characters of a value or a key that a message shows; chosen: a message stays within two lines."""
 
 
 class FaaoError(Exception):
-    """Root of every error that the caller can act on; the message says how."""
+    """Root of every error that the caller can act on; the message says how.
+
+    The message shows characters that a terminal may act on as their codes, but for the ends of
+    its lines.
+    """
+
+    def __str__(self) -> str:
+        return "\n".join(map(printable, super().__str__().split("\n")))
 
 
 class InputError(FaaoError):
@@ -46,5 +55,32 @@ def quote(value: object) -> str:
         return str(value).lower()
     if isinstance(value, dict | list) and not value:
         return "nothing"
-    text = "null" if value is None else repr(value)
-    return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + "..."
+    return shortened("null" if value is None else repr(value))
+
+
+def place_of(steps: Sequence[str | int]) -> str:
+    """Return where a value stands in a file of nested data, as a message names it.
+
+    >>> place_of(["mission", "items", 3, "params"])
+    'mission.items[3].params'
+    """
+    named = (f"[{s}]" if isinstance(s, int) else f".{shortened(printable(s))}" for s in steps)
+    return "".join(named).removeprefix(".")
+
+
+def printable(text: str) -> str:
+    r"""Return `text` in one line, with characters that a terminal may act on as their codes.
+
+    >>> print(printable("80 % \x1b[2J done"))
+    80 % \x1b[2J done
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def shortened(text: str, most: int = _MAX_SHOWN) -> str:
+    """Return `text`, cut to `most` characters.
+
+    >>> shortened("123456789", 8)
+    '12345...'
+    """
+    return text if len(text) <= most else text[: most - 3] + "..."

@@ -1,11 +1,13 @@
-"""Text files read; files written whole or not at all."""
+"""Input files read within limits; files written whole or not at all."""
 
 import contextlib
 import os
 import stat
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 from faao_mav.errors import InputError
 
@@ -15,30 +17,57 @@ _SHOWN = 40
 _NO_FILE = "is a device or a pipe; give the name of a file"
 
 
-def read_text(path: str | Path, most: int, what: str, error: type[InputError]) -> str:
-    """Return the UTF-8 text in the file `path`.
+STANDARD_INPUT = "-"
+"""The name that stands for what is piped in."""
 
-    Raises `error` if it cannot be opened, is no regular file (a pipe may never end), is larger
-    than `most` bytes (`what` says what was expected instead) or is not UTF-8.
+
+@contextlib.contextmanager
+def opened(path: str | Path, error: type[InputError] = InputError) -> Iterator[BinaryIO]:
+    """Open the file `path`, or standard input, for reading.
+
+    Raises `error` if it cannot be opened or read, or is no regular file: a pipe may never end.
     """
     try:
+        if str(path) == STANDARD_INPUT:
+            yield sys.stdin.buffer
+            return
         kind = Path(path).stat().st_mode
         if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
             raise error(f"{path}: {_NO_FILE}")
         with Path(path).open("rb") as file:
-            content = file.read(most + 1)
+            yield file
     except (OSError, ValueError) as failure:  # ValueError: a NUL in the name
         reason = getattr(failure, "strerror", None) or failure
         raise error(f"{path}: cannot be read: {reason}") from failure
+
+
+def read_bytes(
+    path: str | Path, most: int, what: str, error: type[InputError] = InputError
+) -> bytes:
+    """Return the content of the file `path`, or of standard input.
+
+    Raises `error` as `opened` does, and for more than `most` bytes; `what` says what was expected.
+    """
+    with opened(path, error) as file:
+        content = file.read(most + 1)
     if len(content) > most:
-        raise error(f"{path}: more than {most // 1_000_000} MB; expected {what}")
+        raise error(f"{path}: more than {most:,} bytes; expected {what}")
+    return content
+
+
+def read_text(path: str | Path, most: int, what: str, error: type[InputError]) -> str:
+    """Return the UTF-8 text in the file `path`; raise `error` as `read_bytes` does and for others.
+
+    A byte order mark is left out.
+    """
+    content = read_bytes(path, most, what, error)
     try:
-        return content.decode("utf-8")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as failure:
-        line = content.count(b"\n", 0, failure.start) + 1
+        before, rest = failure.object[: failure.start], failure.object[failure.start :]
+        line = before.count(b"\n") + 1
         raise error(
-            f"{path}: line {line}: byte 0x{content[failure.start]:02x} is not UTF-8; "
-            "expected a text file"
+            f"{path}: line {line}: byte 0x{rest[0]:02x} is not UTF-8; expected a text file"
         ) from failure
 
 

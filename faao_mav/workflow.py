@@ -26,6 +26,7 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.autopilots import autopilots
 from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level, Limits
@@ -88,8 +89,10 @@ class Result:
 
         Both are written or neither; the paths of both are returned. The ending of `path` tells
         the mission's format: see `faao_mav.mission.formats`. A mission that needs no parameters
-        has no second file. Raises the error that stood in the way of a mission, if there is none,
-        and `InputError` where a file cannot be written.
+        has no second file. Files of parameters there that an earlier run wrote and that are not
+        this mission's are removed: validation and ground stations would take them for its own.
+        Raises the error that stood in the way of a mission, if there is none, and `InputError`
+        where a file cannot be written or removed.
         """
         if self.conversion is None:
             raise self.no_mission or InputError("there is no mission: the plan was only optimised")
@@ -111,6 +114,9 @@ class Result:
             )
         ).encode()
         write_together(contents)
+        if not drawn:
+            for parameters in {parameter_path(mission, each) for each in autopilots()} - {*beside}:
+                _remove_outdated(parameters)
         return mission, *beside
 
     def as_dict(self) -> dict[str, Any]:
@@ -123,12 +129,15 @@ class Result:
         return {
             "name": plan.name,
             **_rates_as_dict(plan, solution.rates, solution.delivered_rate),
+            "rate": plan.optimizer.rate,
+            "gain_over_cutoff": solution.gain,
             "causal": plan.radio.causal,
             "duplex": plan.radio.duplex,
             "bandwidth_mhz": plan.radio.bandwidth_mhz,
             "mutual_information": information.average if information else None,
             "mutual_information_bs_uav": information.bs_uav if information else None,
             "mutual_information_uav_user": information.uav_user if information else None,
+            "mutual_information_delivered": information.delivered if information else None,
             "mutual_information_error": information.error if information else None,
             "fresh_rate": fresh.average if fresh else None,
             "fresh_rate_error": fresh.error if fresh else None,
@@ -201,11 +210,7 @@ def optimize_plan(plan: Plan, *, observe: Observer | None = None) -> Result:
 
 
 def plan_mission(
-    plan: Plan,
-    *,
-    method: str | None = None,
-    bound: bool = False,
-    observe: Observer | None = None,
+    plan: Plan, *, method: str | None = None, bound: bool = False, observe: Observer | None = None
 ) -> Result:
     """Optimise the flight of `plan` and make the mission that flies it.
 
@@ -277,15 +282,32 @@ def mission_files(path: str | Path, plan: Plan) -> tuple[Path, ...]:
         return (mission,)
     beside = parameter_path(mission, plan.vehicle.autopilot)
     check_writable(beside)
-    if beside.exists():
-        with beside.open("rb") as file:
-            beginning = file.read(len(_HEADER) + 2)
-        if beginning != f"# {_HEADER}".encode():
-            raise InputError(
-                f"{beside}: the mission's parameters are to go there, but it is not of an earlier "
-                "run; rename it, or give the mission another name"
-            )
+    if beside.exists() and not _is_of_a_run(beside):
+        raise InputError(
+            f"{beside}: the mission's parameters are to go there, but it is not of an earlier "
+            "run; rename it, or give the mission another name"
+        )
     return mission, beside
+
+
+def _remove_outdated(parameters: Path) -> None:
+    """Remove `parameters` if an earlier run wrote them: they belong to a mission that is gone."""
+    if _is_of_a_run(parameters):
+        try:
+            parameters.unlink()
+        except OSError as error:
+            raise InputError(
+                f"{parameters}: is of an earlier mission and cannot be removed: {error.strerror}"
+            ) from None
+
+
+def _is_of_a_run(parameters: Path) -> bool:
+    """Tell whether `parameters` is a file that `Result.write` wrote beside a mission."""
+    if not parameters.is_file():
+        return False
+    beginning = f"# {_HEADER}".encode()
+    with parameters.open("rb") as file:
+        return file.read(len(beginning)) == beginning
 
 
 def draw_mission(solution: Solution, conversion: Conversion) -> str:

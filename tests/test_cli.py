@@ -306,3 +306,10 @@ def test_no_output_replaces_the_plan_or_another_output(
     assert said in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["plan.txt"]
     assert Path("plan.txt").read_text() == SMALL
+
+
+def test_a_plan_is_piped_in(tmp_path: Path) -> None:
+    out = tmp_path / "m.waypoints"
+    result = CliRunner().invoke(app, ["-", "--out", str(out), "--quiet"], input=SMALL)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert read_mission(out).items

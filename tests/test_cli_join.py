@@ -118,8 +118,11 @@ def test_a_download_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
     with running(mock, f"udpin:127.0.0.1:{port}"):
         assert upload(sent, f"udpout:127.0.0.1:{port}").verified
         result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out)
+        again = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", tmp_path / "b.plan")
     assert result.exit_code == 0, result.output
     assert f"{out}: QGC WPL holds no fence: 1 area left out" in result.stderr
+    assert "vehicle      PX4 copter (system 1, component 1, disarmed)" in again.stdout
+    assert json.loads((tmp_path / "b.plan").read_text())["mission"]["firmwareType"] == 12
 
 
 def test_a_planes_mission_on_a_plane(out: Path, tmp_path: Path) -> None:
@@ -224,10 +227,29 @@ def test_parameters_say_whose_mission_a_text_file_is(plan: Path, out: Path) -> N
     assert "0 errors, 0 warnings" in told
     assert "for PX4" in run("validate", out, "--parameters", beside).stdout
     out.with_suffix(".param").write_text("WPNAV_ACCEL,50\n")
-    assert "for ArduPilot and a copter (by default" in run("validate", out).stdout
+    both = run("validate", out)
+    assert both.exit_code == 2
+    assert f"{out.with_suffix('.param')} and {beside}: only one of them can" in both.stderr
+    assert "for PX4" in run("validate", out, "--autopilot", "px4").stdout
     other = run("validate", out, "--autopilot", "ardupilot", "--parameters", beside)
     assert other.exit_code == 2
     assert "parameters of PX4, but the mission is for ArduPilot (as asked)" in other.stderr
+    out.with_suffix(".param").write_text(beside.read_text())
+    wrong = run("validate", out, "--autopilot", "ardupilot")
+    assert wrong.exit_code == 2
+    assert f"{out.with_suffix('.param')}: parameters of PX4" in wrong.stderr
+
+
+def test_a_mission_of_another_type_of_vehicle_is_not_judged_unasked(plan: Path, out: Path) -> None:
+    file = out.with_suffix(".plan")
+    run(plan, "--out", file)
+    content = json.loads(file.read_text())
+    content["mission"]["vehicleType"] = 10  # MAV_TYPE_GROUND_ROVER
+    file.write_text(json.dumps(content))
+    refused = run("validate", file)
+    assert refused.exit_code == 2
+    assert f"{file}: vehicleType 10 (a MAV_TYPE) is not supported" in refused.stderr
+    assert "and a plane (as asked)" in run("validate", file, "--type", "plane").stdout
 
 
 def test_the_mock_flies_by_its_parameters(

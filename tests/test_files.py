@@ -1,6 +1,8 @@
 """Files are written whole or not at all."""
 
+import io
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -103,3 +105,17 @@ def test_files_that_belong_together_are_written_all_or_none(tmp_path: Path) -> N
     with pytest.raises(InputError, match="absent/c: cannot be written"):
         write_together({first: b"new", tmp_path / "absent" / "c": b"new"})
     assert [path.read_bytes() for path in sorted(tmp_path.iterdir())] == [b"1", b"2"]
+
+
+def test_standard_input_is_a_file_to_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\xef\xbb\xbfname: x")))
+    assert read_text("-", 100, "a plan", PlanError) == "name: x"
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"x" * 101)))
+    with pytest.raises(PlanError, match="-: more than 100 bytes; expected a plan"):
+        read_text("-", 100, "a plan", PlanError)
+
+
+def test_the_place_of_a_byte_that_is_no_text_counts_the_mark_before_it(tmp_path: Path) -> None:
+    (tmp_path / "plan").write_bytes(b"\xef\xbb\xbfa: 1\nb: \xff\n")
+    with pytest.raises(PlanError, match="plan: line 2: byte 0xff is not UTF-8"):
+        read_text(tmp_path / "plan", 100, "a plan", PlanError)

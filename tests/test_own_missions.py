@@ -89,7 +89,7 @@ def test_all_ways_to_begin_and_end(autopilot: str, takeoff: bool, finish: str) -
     }
     _, found = checked(SMALL, SHORT | changes)
     rules = {each.split(":")[0] for each in complaints(found) if not each.startswith("link-")}
-    assert rules == (set() if takeoff or autopilot == "px4" else {"ardupilot-no-takeoff"})
+    assert rules == (set() if takeoff or autopilot == "px4" else {"ardupilot-begins-in-the-air"})
 
 
 def test_a_fast_px4_is_told_to_fly_so_fast() -> None:

@@ -21,7 +21,7 @@ def result(small_plan: MakePlan) -> Result:
     return replace(
         found,
         solution=replace(found.solution, starts=starts),
-        information=MutualInformation(1.9, 1.8, 0.001),
+        information=MutualInformation(1.9, 1.8, 1.7, 0.001),
         bound=Bound(2 * found.solution.rates.R_avg, exact=False),
         seconds_optimize=1.0,
         seconds_total=2.0,
@@ -50,12 +50,29 @@ def test_it_says_what_was_found(result: Result) -> None:
     assert lines[0] == "over the hill"
     assert f"{result.solution.rates.R_avg:.4f} bit/s/Hz of at most 2" in lines[1]
     text = "\n".join(lines)
-    assert "mutual information 1.800 +- 0.001" in text
+    assert "mutual information 1.800 +- 0.001, 1.700 delivered" in text
+    assert "more than by the plan" not in text
     assert "3, from 1.0000 (user) to 1.5000 (bs-user) bit/s/Hz" in text
     assert "within 50 % of the best that any route can do" in text
     assert "(numerical)" in text
     assert "converged after" in text
     assert "nothing: give --out" in text
+
+
+def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) -> None:
+    plan = result.solution.plan
+    wanted = replace(plan, optimizer=replace(plan.optimizer, rate="mutual_information"))
+    for gain, doubted in ((0.05, False), (0.0005, True)):
+        solution = replace(result.solution, plan=wanted, gain=gain)
+        text = summary(replace(result, solution=solution))
+        assert "of mutual information (base station to UAV" in text
+        assert f"{gain:.4f} bit/s/Hz more than by the plan for the cutoff rate" in text
+        assert ("below the error of averages over the noise, 0.001" in text) is doubted
+        told = replace(result, solution=solution).as_dict()
+        assert told["rate"] == "mutual_information"
+        assert told["gain_over_cutoff"] == gain
+    assert result.as_dict()["rate"] == "cutoff"
+    assert result.as_dict()["gain_over_cutoff"] is None
 
 
 def test_a_vehicle_that_keeps_its_parameters_is_told_of_none(

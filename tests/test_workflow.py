@@ -79,6 +79,23 @@ def test_a_vehicle_that_keeps_its_parameters_gets_a_mission_alone(
     assert kept.write(tmp_path / "m.plan") == (tmp_path / "m.plan",)
 
 
+@pytest.mark.parametrize(
+    "changes", [{"mission.parameters": "keep"}, {"vehicle.autopilot": "px4"}], ids=["keep", "px4"]
+)
+def test_parameters_of_an_earlier_mission_do_not_stay_beside_the_new_one(
+    result: Result, small_plan: MakePlan, tmp_path: Path, changes: dict[str, str]
+) -> None:
+    _, outdated = result.write(tmp_path / "m.waypoints")
+    own = tmp_path / "n.param"
+    own.write_text("WPNAV_SPEED,700\n")
+    anew = plan_mission(small_plan(QUICK | changes))
+    written = anew.write(tmp_path / "m.waypoints")
+    assert outdated not in written
+    assert sorted(tmp_path.iterdir()) == sorted({*written, own})
+    anew.write(tmp_path / "n.waypoints")
+    assert own.read_text() == "WPNAV_SPEED,700\n"  # no run has written it
+
+
 @pytest.mark.parametrize("name", ["m.gpx", "absent/m.plan"])
 def test_a_mission_that_cannot_be_written_leaves_nothing(
     result: Result, tmp_path: Path, name: str

@@ -1,6 +1,5 @@
 """`faao-mission autopilot`: the mock autopilot."""
 
-import math
 import time
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -14,6 +13,9 @@ if TYPE_CHECKING:
     from faao_mav.mavlink.mock import MockAutopilot
     from faao_mav.mavlink.protocol import MissionType
     from faao_mav.mission.item import Home
+
+_HIGHEST = 100_000.0
+"""The greatest altitude of a home, m: chosen, where space begins; the wire carries millimetres."""
 
 _REST = 0.5
 """Seconds without a change after which a list is told; chosen: longer than between two items."""
@@ -58,11 +60,11 @@ def autopilot(
 
     It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
     """
-    from faao_mav.mavlink.codec import read_key
     from faao_mav.mavlink.faults import Faults
     from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
     from faao_mav.mavlink.mock.serve import predicted, serve
     from faao_mav.mavlink.protocol import Address
+    from faao_mav.mavlink.signing import read_signing
     from faao_mav.mavlink.transport import open_transport
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.vehicle import Vehicle
@@ -91,7 +93,7 @@ def autopilot(
         latency=0.0,
         seed=seed,
     )
-    key = None if signing_key is None else read_key(signing_key)
+    key = None if signing_key is None else read_signing(signing_key).key
     transport = open_transport(listen)
     typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
     diary = Diary()
@@ -144,6 +146,6 @@ def read_home(text: str) -> "Home":
         raise InputError(
             f"--home {text}: expected LAT,LON,ALT, as in 47.397742,8.545594,488"
         ) from (None)
-    if not all(map(math.isfinite, (latitude, longitude, altitude))):
-        raise InputError(f"--home {text}: expected finite numbers")
+    if not abs(altitude) <= _HIGHEST:
+        raise InputError(f"--home {text}: expected an altitude of at most {_HIGHEST:g} m")
     return Home(latitude, longitude, altitude)

@@ -32,8 +32,8 @@ def convert(
         read_mission_file,
         render_mission,
     )
-    from faao_mav.vehicle import Vehicle
-    from faao_mav.vehicle.files import kind_in, plan_target, vehicle_in
+    from faao_mav.vehicle import Vehicle, kind_by_number
+    from faao_mav.vehicle.files import plan_target, vehicle_in
 
     check_known(autopilot, None)
     check_readable(mission_file)
@@ -41,7 +41,8 @@ def convert(
     check_writable(out)
     check_apart({"--out": out}, {"MISSION": mission_file})
     read = read_mission_file(mission_file)
-    vehicle = Vehicle(autopilot, kind_in(read) or "copter") if autopilot else vehicle_in(read)
+    kind = kind_by_number(read.vehicle_type) or "copter"
+    vehicle = Vehicle(autopilot, kind) if autopilot else vehicle_in(read)
     target = plan_target(vehicle)
     lost = losses_in(read.mission, out, target)
     write_whole(out, render_mission(read.mission, out, target).encode())

@@ -36,13 +36,15 @@ def download(
     """
     from faao_mav.cli.progress import transfer_progress
     from faao_mav.files import check_writable, write_whole
-    from faao_mav.mavlink.client import download as run
+    from faao_mav.mavlink.client import holdings
     from faao_mav.mission.formats import check_suffix, losses_in, render_mission
+    from faao_mav.vehicle import Vehicle
+    from faao_mav.vehicle.files import plan_target
 
     check_suffix(out)
     check_writable(out)
     with transfer_progress(shown=sys.stderr.isatty()) as observe:
-        mission = run(
+        found, mission = holdings(
             source,
             system=system,
             component=component,
@@ -50,11 +52,14 @@ def download(
             signing_key=signing_key,
             wait=timeout,
             observe=observe,
+            note=note,
         )
-    write_whole(out, render_mission(mission, out).encode())
-    for line in losses_in(mission, out):
+    target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
+    write_whole(out, render_mission(mission, out, target).encode())
+    for line in losses_in(mission, out, target):
         note(f"{out}: {line}")
     fence = len(mission.fence.polygons) + len(mission.fence.circles)
+    typer.echo(f"vehicle      {found}")
     typer.echo(
         f"mission      {len(mission.items)} items, {fence} fence areas, "
         f"{len(mission.rally)} rally points"

@@ -4,6 +4,7 @@ import difflib
 import gc
 import io
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -95,8 +96,12 @@ def run() -> None:
     """Entry point of `faao-mission`.
 
     A character that standard output cannot show is shown as its code. Where nothing can be
-    written there, the exit status is 2, or 1 where the reader has gone.
+    written there, the exit status is 2, or 1 where the reader has gone. SIGTERM, and SIGHUP unless
+    it is ignored, interrupt as the keyboard does: a transfer is cancelled.
     """
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # small matrices: more threads wait and spin
     gc.set_threshold(_ALLOCATIONS)
     for stream in (sys.stdout, sys.stderr):

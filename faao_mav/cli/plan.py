@@ -53,13 +53,25 @@ def plan(
     validation found errors, or it is not known to be on the vehicle; 2 unusable arguments or
     input.
     """
+    from faao_mav.cli.progress import optimizer_progress
+    from faao_mav.workflow import plan_mission
+
     if upload is None and (system is not None or allow_armed):
         given = "--allow-armed" if system is None else f"--system {system}"
         raise InputError(f"{given}: is for an upload; give --upload CONNECTION too")
     files = {"--save": save, "--precoders": precoders, "--report": report, "--figure": figure}
     shown = sys.stderr.isatty() and not quiet
     to_fly = out is not None or upload is not None
-    result, written = _solve(plan_file, (out, files), upload, method, bound, shown)
+    started = time.perf_counter()
+    plan = _checked_plan(plan_file, method, out, files, upload)
+    with optimizer_progress(shown=shown) as observe:
+        result = plan_mission(plan, bound=bound, observe=observe)
+        for name, path in files.items():
+            if path is not None:
+                _write(result, name, path)
+        mission = result.write(out) if out is not None else ()
+    result = replace(result, seconds_total=time.perf_counter() - started)
+    written = [*mission, *filter(None, files.values())]
     if to_fly and result.no_mission is not None:
         raise result.no_mission
     sound = not to_fly or _sound(result)
@@ -77,59 +89,38 @@ def plan(
         raise typer.Exit(1)
 
 
-def _solve(
+def _checked_plan(
     plan_file: Path,
-    targets: tuple[Path | None, dict[str, Path | None]],
-    upload: str | None,
     method: str | None,
-    bound: bool,
-    shown: bool,
-) -> "tuple[Result, list[Path]]":
-    """Return the result of the plan, and the files that are written."""
-    from faao_mav.cli.progress import optimizer_progress
+    out: Path | None,
+    files: dict[str, Path | None],
+    upload: str | None,
+) -> "Plan":
+    """Return the plan; what it asks for and where to is refused before the work if of no use."""
     from faao_mav.plan import read_plan
+    from faao_mav.report.style import FORMATS
     from faao_mav.schedule.conversion import check_vehicle
     from faao_mav.vehicle import vehicle_of
-    from faao_mav.workflow import plan_mission
+    from faao_mav.workflow import mission_files
 
-    started = time.perf_counter()
     plan = read_plan(plan_file, method=method)
-    out, files = targets
     if out is not None or upload is not None:
         check_vehicle(plan)
     else:
         vehicle_of(plan).flight_model()  # what is useless is refused, what is not flown is told
-    _check_files(plan, plan_file, out, files)
-    if upload is not None:
-        from faao_mav.mavlink.transport import parse_connection
-
-        parse_connection(upload)
-    with optimizer_progress(shown=shown) as observe:
-        result = plan_mission(plan, bound=bound, observe=observe)
-        for name, path in files.items():
-            if path is not None:
-                _write(result, name, path)
-        mission = result.write(out) if out is not None else ()
-    result = replace(result, seconds_total=time.perf_counter() - started)
-    return result, [*mission, *filter(None, files.values())]
-
-
-def _check_files(
-    plan: "Plan", plan_file: Path, out: Path | None, files: dict[str, Path | None]
-) -> None:
-    """Raise `InputError` for a file that cannot be written, before the work."""
-    from faao_mav.report.style import FORMATS
-    from faao_mav.workflow import mission_files
-
-    beside = mission_files(out, plan)[1:] if out is not None else ()
+    parameters = next(iter(mission_files(out, plan)[1:]), None) if out is not None else None
     endings = {"--save": (".npz",), "--report": PAGES, "--figure": FORMATS}
     for name, path in files.items():
         if path is not None:
             check_ending(path, name, endings.get(name))
             check_writable(path)
-    parameters = next(iter(beside), None)
-    named = {"--out": out, "the parameters of --out,": parameters, **files}
-    check_apart(named, {"PLAN.yaml": plan_file})
+    outputs = {"--out": out, "the parameters of --out,": parameters, **files}
+    check_apart(outputs, {"PLAN.yaml": plan_file})
+    if upload is not None:
+        from faao_mav.mavlink.transport import parse_connection
+
+        parse_connection(upload)
+    return plan
 
 
 def _write(result: "Result", option: str, path: Path) -> None:

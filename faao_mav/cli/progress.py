@@ -20,7 +20,7 @@ def optimizer_progress(*, shown: bool) -> "Iterator[Observer | None]":
         def observe(now: "Progress") -> None:
             update(
                 description=f"iteration {now.iteration} of at most {now.max_iterations}: "
-                f"{now.stage}, best {now.best_rate:.4f} bit/s/Hz",
+                f"{now.stage}, best {now.best_rate:.4f} bit/s/Hz"
             )
 
         yield observe if shown else None

@@ -105,16 +105,15 @@ def _check_cases(cases: "Sequence[StudyCase]") -> None:
     from faao_mav.errors import PlanError
     from faao_mav.plan import parse_plan
 
-    errors = []
+    first = None
     for case in cases:
         try:
             parse_plan(case.text, case.source)
-        except PlanError as error:
-            errors.append(error)
-        else:
             return
-    if errors:
-        raise errors[0]
+        except PlanError as error:
+            first = first or error
+    if first is not None:
+        raise first
 
 
 def _tell(rows: "Sequence[StudyRow]", written: Sequence[Path], as_json: bool) -> None:

@@ -62,6 +62,7 @@ def upload(
             signing_key=signing_key,
             wait=timeout,
             observe=observe,
+            note=note,
         )
     typer.echo(json.dumps(as_dict(report), allow_nan=False) if as_json else as_text(report))
     if not report.verified:

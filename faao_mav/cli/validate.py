@@ -20,7 +20,7 @@ from faao_mav.cli.shared import (
     note,
     option,
 )
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, printable
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
 if TYPE_CHECKING:
@@ -171,7 +171,7 @@ def _write_report(report: Path, checked: "CheckedFile", solution: "Solution | No
     from faao_mav.workflow import Result
 
     about = Result(solution, check=checked.check) if solution is not None else checked.check
-    write_whole(report, render_report(about, title=checked.source.name).encode())
+    write_whole(report, render_report(about, title=printable(checked.source.name)).encode())
 
 
 def _show(checked: "CheckedFile", as_json: bool) -> None:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
 from faao_mav.mission.formats.parameter_file import read_parameters
-from faao_mav.plan.autopilots import Autopilot, Kind, autopilots
-from faao_mav.vehicle import Vehicle, family, vehicle_of
+from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
+from faao_mav.vehicle import Vehicle, family, kind_by_number, vehicle_of
 from faao_mav.vehicle.files import autopilot_of, parameter_path, vehicle_in
 
 if TYPE_CHECKING:
@@ -25,11 +25,12 @@ def choose_vehicle(
     `asked` are --autopilot, --type and --parameters. What they leave open the plan says, else the
     mission's file, else the names of the parameters. The parameters are those asked for, else
     those beside the mission, over the plan's own. Raises `InputError` for parameters of another
-    autopilot than the mission's.
+    autopilot than the mission's, for files of several autopilots beside a mission that does not
+    say whose it is, and for a mission of a type of vehicle that is unknown here.
     """
     autopilot, kind, parameters = asked
     given = read_parameters(parameters) if parameters is not None else None
-    base, chosen_by = _told(mission_file, file, plan, given)
+    base, chosen_by = _told(mission_file, file, plan, given, asked)
     if autopilot is not None or kind is not None:
         chosen_by = "as asked"
     whose = autopilot or base.autopilot
@@ -38,21 +39,26 @@ def choose_vehicle(
         values = {}
     beside = parameter_path(mission_file, whose)
     if given is not None:
-        theirs = autopilot_of(given)
-        if theirs is not None and theirs != whose:
-            raise InputError(
-                f"{parameters}: parameters of {family(theirs).name}, but the mission is for "
-                f"{family(whose).name} ({chosen_by}): "
-                f"give the vehicle's own, or --autopilot {theirs}"
-            )
         values, source = given, str(parameters)
     elif beside.is_file():
-        values, source = {**values, **read_parameters(beside)}, f"{beside}, beside the mission"
+        given, parameters = read_parameters(beside), beside
+        values, source = {**values, **given}, f"{beside}, beside the mission"
+    theirs = autopilot_of(given) if given is not None else None
+    if theirs is not None and theirs != whose:
+        raise InputError(
+            f"{parameters}: parameters of {family(theirs).name}, but the mission is for "
+            f"{family(whose).name} ({chosen_by}): "
+            f"give the vehicle's own (--parameters), or --autopilot {theirs}"
+        )
     return Vehicle(whose, kind or base.kind, values, source), chosen_by
 
 
 def _told(
-    mission_file: Path, file: "MissionFile", plan: "Plan | None", given: dict[str, float] | None
+    mission_file: Path,
+    file: "MissionFile",
+    plan: "Plan | None",
+    given: dict[str, float] | None,
+    asked: tuple[Autopilot | None, Kind | None, Path | None],
 ) -> tuple[Vehicle, str]:
     """Return what plan, mission and parameters say of the vehicle, and which of them it was."""
     if plan is not None:
@@ -60,10 +66,22 @@ def _told(
     named = vehicle_in(file)
     if named is not None:
         return named, "as the file says"
+    autopilot, kind, _ = asked
+    if file.vehicle_type and kind is None and kind_by_number(file.vehicle_type) is None:
+        raise InputError(
+            f"{mission_file}: vehicleType {file.vehicle_type} (a MAV_TYPE) is not supported; "
+            f"--type {' or --type '.join(types())} says as which the mission is to be judged"
+        )
     if given is not None:
         theirs = autopilot_of(given)
     else:
-        found = [a for a in autopilots() if parameter_path(mission_file, a).is_file()]
+        beside = {a: parameter_path(mission_file, a) for a in autopilots()}
+        found = [a for a, path in beside.items() if path.is_file()]
+        if len(found) > 1 and autopilot is None:
+            raise InputError(
+                f"{' and '.join(str(beside[a]) for a in found)}: only one of them can belong to "
+                f"{mission_file}: remove the other, or give --autopilot"
+            )
         theirs = found[0] if len(found) == 1 else None
     if theirs is not None:
         return Vehicle(theirs), "as its parameters say"

@@ -1,17 +1,20 @@
 """What a ground station does: upload and verify, download, clear."""
 
+import secrets
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from faao_mav.errors import InputError, LinkError
-from faao_mav.mavlink.codec import read_key
 from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.link import Observe, WireLink
+from faao_mav.mavlink.liveness import AskAlive
 from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.protocol import MavResult, MissionType
+from faao_mav.mavlink.signing import Verdict, read_signing, remember
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.mavlink.transfer.session import (
@@ -21,6 +24,7 @@ from faao_mav.mavlink.transfer.session import (
     download_lists,
     explain,
     upload_parts,
+    what_is_left,
 )
 from faao_mav.mavlink.wire_items import mission_of, wire_items
 from faao_mav.mission.item import Mission
@@ -30,13 +34,28 @@ T = TypeVar("T")
 _ABSENT = (MavResult.UNSUPPORTED, MavResult.INVALID)
 """What a vehicle answers that has no such list at all."""
 
+_PASSED_OVER: dict[Verdict, str] = {
+    "forged": "packets come that are signed with another key than the one in {key}",
+    "old": (
+        "packets come that are signed with this key, but not later than those before: of a "
+        "recording, or of a vehicle whose clock is behind and that does not hear this station"
+    ),
+    "unsigned": (
+        "packets come that are not signed: set the vehicle up to sign them with this key, or leave "
+        "out --signing-key"
+    ),
+}
+"""Why no vehicle is heard where packets come that have to be signed."""
+
 
 class LinkOptions(TypedDict, total=False):
     """How to talk to a vehicle: what `upload`, `download` and `clear` have in common.
 
     `system` and `component` choose among several autopilots; the vehicle is found by its heartbeat
     within `wait` seconds (10). `log` is a `.tlog` file to write, `signing_key` a file with the key
-    for signed packets. `observe` is told what is going on, how much of it is done, and of how much.
+    for signed packets, beside which the time of the last one is kept. `observe` is told what is
+    going on, how much of it is done, and of how much; `note`, in words, what goes wrong beside it:
+    a log that ends early. Without `note` that is a Python warning.
     """
 
     system: int | None
@@ -46,6 +65,7 @@ class LinkOptions(TypedDict, total=False):
     wait: float
     timeouts: Timeouts | None
     observe: Observe | None
+    note: Callable[[str], object] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +112,12 @@ def upload(
 
 
 def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
-    """Return the mission, fence and rally points of the vehicle at `connection`.
+    """Return the mission, fence and rally points of the vehicle at `connection`: see `holdings`."""
+    return holdings(connection, **options)[1]
+
+
+def holdings(connection: str, **options: Unpack[LinkOptions]) -> tuple[FoundVehicle, Mission]:
+    """Return the vehicle at `connection`, and the mission, fence and rally points that it holds.
 
     Home is ArduPilot's item 0, or what PX4 says when asked. `options` are those of `LinkOptions`.
     Raises `LinkError` if there is no such vehicle or a list does not come whole; a vehicle that
@@ -110,14 +135,14 @@ def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
                 raise LinkError(f"{connection}: {part.title}: not read: {reason}")
         try:
             mission = mission_of(lists.items, peer.vehicle)
+            if mission.home is None:
+                homes = session.run(AskHome(peer.address))
+                mission = replace(mission, home=homes[0] if homes else None)
         except InputError as error:
             raise LinkError(
                 f"{connection}: what the vehicle holds is no mission: {error}"
             ) from None
-        if mission.home is None:
-            homes = session.run(AskHome(peer.address))
-            mission = replace(mission, home=homes[0] if homes else None)
-    return mission
+    return session.found, mission
 
 
 def clear(
@@ -145,18 +170,23 @@ class _Session:
         if unknown := set(options) - set(LinkOptions.__annotations__):
             known = ", ".join(LinkOptions.__annotations__)
             raise TypeError(f"there is no option {min(unknown)!r}; expected some of {known}")
-        key_file, self._observe = options.get("signing_key"), options.get("observe")
+        self._observe, self._note = options.get("observe"), options.get("note") or warnings.warn
+        self._key_file = options.get("signing_key")
         self.timeouts = options.get("timeouts") or Timeouts()
         self.started = time.monotonic()
-        key = None if key_file is None else read_key(key_file)
-        self.link = WireLink(connection, key=key, log=options.get("log"))
+        self._signing = None if self._key_file is None else read_signing(self._key_file)
+        self.link = WireLink(connection, signing=self._signing, log=options.get("log"))
         try:
             names = options.get("system"), options.get("component")
             wait = options.get("wait", 10.0)
             found = self.run(Discovery(*names, patience=wait, boot=self.timeouts.boot))
+            if self._signing is not None and not found:
+                self._check_heard(connection)
             self.found = choose(found, connection, *names, wait)
+            if self._signing is not None:
+                self._check_alive(connection)
         except BaseException:
-            self.link.close()
+            self.close()
             raise
         self.peer = Peer(self.link.address, self.found.address, self.found.vehicle)
 
@@ -164,7 +194,30 @@ class _Session:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the link; say what became of the log, keep the time of the last packet."""
         self.link.close()
+        if self._signing is not None and self._key_file is not None:
+            remember(self._key_file, self._signing)
+        if self.link.log is not None and self.link.log.failure is not None:
+            self._note(self.link.log.failure)
+
+    def _check_alive(self, connection: str) -> None:
+        """Raise `LinkError` where nobody answers what no recording can."""
+        number, patience = secrets.randbits(62), self.timeouts.silence
+        if not self.run(AskAlive(self.found.address, number, patience)):
+            raise LinkError(
+                f"{connection}: {self.found}: no answer to a question that was never asked before "
+                "(TIMESYNC): is the vehicle there, or a recording of it?"
+            )
+
+    def _check_heard(self, connection: str) -> None:
+        """Raise `LinkError` where packets come that this key does not vouch for."""
+        for verdict, text in _PASSED_OVER.items():
+            if verdict in self.link.heard:
+                raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
 
     def run(self, machine: Machine[T]) -> T:
         return self.link.run(machine, self._observe)
@@ -184,9 +237,14 @@ def _change(
                 f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
                 "disarm it, or allow it (--allow-armed)"
             )
-        reports = session.run(Script(job(session)))
+        session.peer = replace(session.peer, may_be_armed=allow_armed)
+        try:
+            reports = session.run(Script(job(session)))
+        except LinkError as error:
+            raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
         seconds = time.monotonic() - session.started
-        problems = _problems(reports, session.peer, mission, session.link.lacks_key)
+        lacks_key = options.get("signing_key") is None and "signed" in session.link.heard
+        problems = _problems(reports, session.peer, mission, lacks_key)
     return UploadReport(session.found, reports, seconds, problems)
 
 

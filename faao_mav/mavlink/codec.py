@@ -2,14 +2,11 @@
 
 import math
 import re
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
-from faao_mav.errors import InputError
 from faao_mav.mavlink import messages
+from faao_mav.mavlink.framing import Framer, is_signed, payload_of, sender_of
 from faao_mav.mavlink.messages import (
     Envelope,
     Message,
@@ -18,16 +15,8 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.protocol import Address
+from faao_mav.mavlink.signing import Signing, Verdict
 from faao_mav.mavlink.wire_items import coordinate_scale
-
-KEY_BYTES = 32
-"""Length of a signing key (MAVLink 2, "Message Signing")."""
-
-_SIGNING_EPOCH = 1_420_070_400
-"""Seconds from 1970 to the start of 2015, where the clock of signatures starts."""
-
-_SIGNING_TICKS = 100_000
-"""Ticks of the clock of signatures in a second."""
 
 _KINDS: dict[str, type[Message]] = {
     re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).upper(): kind
@@ -55,44 +44,52 @@ class Packet:
 class Codec:
     """One end of a link: writes packets as `address`, reads those of others.
 
-    With `key` (32 bytes) packets are signed, and unsigned or wrongly signed ones are passed over.
-    `clock` gives seconds since 1970, for signatures. `lacks_key` says that others sign, and that
-    there is no key here.
+    With `signing` packets are signed, and those passed over that are not, or that are old. `heard`
+    has what the messages known here were, whether or not they were passed over: without `signing`,
+    "signed" and "unsigned" are about whether there is a signature.
     """
 
-    def __init__(
-        self,
-        address: Address,
-        key: bytes | None = None,
-        clock: Callable[[], float] = time.time,
-    ) -> None:
+    def __init__(self, address: Address, signing: Signing | None = None) -> None:
         from pymavlink.dialects.v20 import common
 
-        self.address, self._clock = address, clock
-        self.lacks_key = False
+        self.address, self._signing = address, signing
+        self.heard: set[Verdict] = set()
         self._dialect: Any = common
+        self._reader: Any = common.MAVLink(None)
         self._mav: Any = common.MAVLink(None, address.system, address.component)
-        self._mav.robust_parsing = True
-        if key is not None:
-            self._mav.signing.secret_key = key
+        if signing is not None:
+            self._mav.signing.secret_key = signing.key
             self._mav.signing.sign_outgoing = True
 
     def pack(self, message: Message) -> bytes:
         """Return the packet that carries `message`."""
-        signing = self._mav.signing
-        if signing.sign_outgoing:
-            ticks = int((self._clock() - _SIGNING_EPOCH) * _SIGNING_TICKS)
-            signing.timestamp = max(signing.timestamp, ticks)
+        if self._signing is not None:
+            self._mav.signing.timestamp = self._signing.next_tick()
         packet = self._encode(message)
         self._mav.seq = (self._mav.seq + 1) % 256
         return packet
 
     def parse(self, data: bytes) -> list[Packet]:
-        """Return the packets completed by `data`; what is damaged is passed over."""
-        found = [m for m in self._mav.parse_buffer(data) or [] if m.get_type() != "BAD_DATA"]
-        if self._mav.signing.secret_key is None and self._mav.signing.sig_count:
-            self.lacks_key = True
-        return [Packet(bytes(m.get_msgbuf()), self._envelope(m)) for m in found]
+        """Return the packets in `data`; what is damaged or cut off is passed over."""
+        found = [self._parse_one(packet) for packet in Framer().feed(data)]
+        return [packet for packet in found if packet is not None]
+
+    def _parse_one(self, raw: bytes) -> Packet | None:
+        try:
+            message = self._reader.decode(bytearray(raw))
+        except self._dialect.MAVError:
+            return None
+        verdict, envelope = self._judge(raw), self._envelope(message, sender_of(raw))
+        if envelope is not None:
+            self.heard.add(verdict)
+        if self._signing is not None and verdict != "signed":
+            return None
+        return Packet(raw, envelope)
+
+    def _judge(self, raw: bytes) -> Verdict:
+        if self._signing is not None:
+            return self._signing.judge(raw, sender_of(raw))
+        return "signed" if is_signed(raw) else "unsigned"
 
     def _encode(self, message: Message) -> bytes:
         name = _NAMES[type(message)]
@@ -112,7 +109,7 @@ class Codec:
         payload = known + opaque_id.to_bytes(4, "little")
         return bytes(packet._pack(self._mav, packet.crc_extra, payload))
 
-    def _envelope(self, packet: Any) -> Envelope | None:
+    def _envelope(self, packet: Any, sender: Address) -> Envelope | None:
         name = packet.get_type()
         kind = _KINDS.get(name) or _LEGACY.get(name)
         if kind is None:
@@ -133,31 +130,7 @@ class Codec:
                         return None
                 case plain:
                     values[plain] = _text_or_number(getattr(packet, plain))
-        sender = Address(packet.get_srcSystem(), packet.get_srcComponent())
         return Envelope(sender, kind(**values))
-
-
-def read_key(path: Path) -> bytes:
-    """Return the signing key in the file `path`: 32 bytes, or 64 hexadecimal digits.
-
-    Raises `InputError`; the content is never shown.
-    """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    if len(content) == KEY_BYTES:
-        return content
-    try:
-        key = bytes.fromhex(content.decode("ascii").strip())
-    except ValueError:
-        key = b""
-    if len(key) != KEY_BYTES:
-        raise InputError(
-            f"{path}: {len(content)} bytes; expected a signing key: 32 bytes, or 64 hexadecimal "
-            "digits"
-        )
-    return key
 
 
 def _item_values(item: WireItem, *, exact: bool) -> dict[str, Any]:
@@ -200,16 +173,13 @@ def _arguments(kind: Any, known: dict[str, Any]) -> list[Any]:
 
 
 def _text_or_number(value: Any) -> Any:
-    if isinstance(value, bytes):
-        return value.split(b"\0", 1)[0].decode("ascii", "replace")
-    return value
+    """Return a field as it is, or its text on one line: what moves a terminal's cursor is blank."""
+    if not isinstance(value, str):
+        return value
+    return "".join(letter if letter.isprintable() else " " for letter in value)
 
 
 def _opaque_id(packet: Any) -> int:
     """Return the last field of a packet that is longer than pymavlink knows it, or 0."""
-    raw = bytes(packet.get_msgbuf())
-    if raw[0] != 0xFD:
-        return 0
-    payload = raw[10 : 10 + raw[1]]
-    tail = payload[packet.unpacker.size :][:4]
+    tail = payload_of(bytes(packet.get_msgbuf()))[packet.unpacker.size :][:4]
     return int.from_bytes(tail, "little")

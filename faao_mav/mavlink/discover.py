@@ -1,11 +1,10 @@
 """Who is on the link, and whether it is ready for a mission."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.machine import AskingMachine, Machine
-from faao_mav.mavlink.manners import autopilot_name
 from faao_mav.mavlink.messages import CommandLong, Envelope, Heartbeat, HomePosition, Message
 from faao_mav.mavlink.protocol import (
     GROUND_STATION_TYPE,
@@ -16,10 +15,17 @@ from faao_mav.mavlink.protocol import (
     MavState,
 )
 from faao_mav.mission.item import Home
-from faao_mav.vehicle import VehicleType, vehicle_type_by_numbers
+from faao_mav.plan.autopilots import types
+from faao_mav.vehicle import (
+    AutopilotFamily,
+    VehicleType,
+    families,
+    kind_by_number,
+    vehicle_type_by_numbers,
+)
 
-_FIXED_WING, _VTOLS = 1, range(19, 26)
-"""MAV_TYPEs: VTOLs take missions as planes do."""
+_SHOWN = 5
+"""Vehicles that a message lists, at most; chosen."""
 
 _LOOK_AGAIN = 0.2
 """Seconds between two looks at whether all vehicles have booted: chosen, a fifth of a heartbeat's
@@ -28,13 +34,15 @@ period."""
 
 @dataclass(frozen=True, slots=True)
 class FoundVehicle:
-    """An autopilot that was heard; `vehicle` is None if its autopilot is not known here.
+    """An autopilot that was heard; `vehicle` is None if it is not known here, or not of this type.
 
-    `kind` is its type, "copter" or "plane", whether or not the autopilot is known.
+    `family` is its autopilot, None if that is not known; `kind` its type, "copter" or "plane", or
+    its MAV_TYPE in words. It is `armed` if any heartbeat of its system said so.
     """
 
     address: Address
     vehicle: VehicleType | None
+    family: AutopilotFamily | None
     kind: str
     armed: bool
     ready: bool
@@ -42,12 +50,13 @@ class FoundVehicle:
     @property
     def autopilot(self) -> str:
         """The autopilot by its name in plans, or "generic"."""
-        return "generic" if self.vehicle is None else self.vehicle.family.key
+        return "generic" if self.family is None else self.family.key
 
     def __str__(self) -> str:
+        name = "an autopilot unknown here" if self.family is None else self.family.name
         state = "armed" if self.armed else "disarmed" if self.ready else "booting"
         where = f"system {self.address.system}, component {self.address.component}"
-        return f"{autopilot_name(self.vehicle)} {self.kind} ({where}, {state})"
+        return f"{name} {self.kind} ({where}, {state})"
 
 
 class Discovery(Machine[tuple[FoundVehicle, ...]]):
@@ -73,6 +82,7 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         self._system, self._component = system, component
         self._patience, self._settle, self._boot = patience, settle, boot
         self._found: dict[Address, FoundVehicle] = {}
+        self._armed: set[int] = set()
         self._end = 0.0
 
     def start(self, now: float) -> Sequence[Message]:
@@ -84,6 +94,8 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         message, sender = envelope.message, envelope.sender
         if not isinstance(message, Heartbeat) or message.type == GROUND_STATION_TYPE:
             return ()
+        if message.armed:
+            self._armed.add(sender.system)
         if message.autopilot == NO_AUTOPILOT or self._system not in (None, sender.system):
             return ()
         if self._component not in (None, sender.component):
@@ -95,7 +107,10 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
     def _time_out(self, now: float) -> Sequence[Message]:
         if all(found.ready for found in self._found.values()) or now >= self._end:
-            self.outcome = tuple(self._found[address] for address in sorted(self._found))
+            found = (self._found[address] for address in sorted(self._found))
+            self.outcome = tuple(
+                replace(each, armed=each.address.system in self._armed) for each in found
+            )
         else:
             self._due = min(now + _LOOK_AGAIN, self._end)
         return ()
@@ -150,17 +165,25 @@ def choose(
             "connected there, and no other program in between?"
         )
     if len(found) > 1:
-        listed = "; ".join(map(str, found))
-        raise LinkError(f"{connection}: several autopilots: {listed}. Choose one with --system")
+        listed = "; ".join(map(str, found[:_SHOWN]))
+        more = f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+        raise LinkError(
+            f"{connection}: several autopilots: {listed}{more}. Choose one with --system"
+        )
     if not found[0].ready:
         raise LinkError(f"{connection}: {found[0]} does not finish booting")
+    if found[0].family is not None and found[0].vehicle is None:
+        raise LinkError(
+            f"{connection}: {found[0]}: this type of vehicle is not supported; "
+            f"{' and '.join(types())} are (VTOLs are neither)"
+        )
     return found[0]
 
 
 def _found_vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:
-    mav_type = _FIXED_WING if heartbeat.type in _VTOLS else heartbeat.type
-    vehicle = vehicle_type_by_numbers(heartbeat.autopilot, mav_type)
-    kind = "plane" if mav_type == _FIXED_WING else "copter"
+    vehicle = vehicle_type_by_numbers(heartbeat.autopilot, heartbeat.type)
+    family = next((f for f in families() if f.mav_autopilot == heartbeat.autopilot), None)
+    kind = kind_by_number(heartbeat.type) or f"vehicle of MAV_TYPE {heartbeat.type}"
     # UNINIT is what simple vehicles say that do not tell their state.
     ready = heartbeat.system_status not in (MavState.BOOT, MavState.CALIBRATING)
-    return FoundVehicle(sender, vehicle, kind, heartbeat.armed, ready)
+    return FoundVehicle(sender, vehicle, family, kind, heartbeat.armed, ready)

@@ -6,10 +6,8 @@ from dataclasses import dataclass, field
 from itertools import count
 from random import Random
 
+from faao_mav.mavlink.framing import message_id
 from faao_mav.mavlink.transport import Transport
-
-_MAVLINK_2 = 0xFD
-"""First byte of a MAVLink 2 packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +80,11 @@ class Channel:
         return self._free
 
     def _is_lost(self, packet: bytes) -> bool:
-        if not self.faults.lost or packet[0] != _MAVLINK_2:
+        if not self.faults.lost:
             return False
-        message_id = int.from_bytes(packet[7:10], "little")
-        self._seen[message_id] = self._seen.get(message_id, 0) + 1
-        return Lost(message_id, self._seen[message_id]) in self.faults.lost
+        number = message_id(packet)
+        self._seen[number] = self._seen.get(number, 0) + 1
+        return Lost(number, self._seen[number]) in self.faults.lost
 
     def _damaged(self, packet: bytes) -> bytes:
         content = bytearray(packet)
@@ -96,10 +94,7 @@ class Channel:
 
 
 class FaultyTransport:
-    """A transport that loses, repeats, delays and damages what passes it, both ways.
-
-    Over TCP and serial lines that is pieces of the stream, not packets.
-    """
+    """A transport that loses, repeats, delays and damages what passes it, both ways."""
 
     def __init__(self, inner: Transport, faults: Faults) -> None:
         self._inner = inner

@@ -1,14 +1,17 @@
 """A machine on a real link, and the log of what passes it."""
 
+import os
 import struct
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
+from io import FileIO
 from pathlib import Path
 from typing import TypeAlias, TypeVar
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.files import check_writable
 from faao_mav.mavlink.codec import Codec
+from faao_mav.mavlink.framing import message_id
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import Heartbeat, Message
 from faao_mav.mavlink.protocol import (
@@ -18,6 +21,7 @@ from faao_mav.mavlink.protocol import (
     Address,
     MavState,
 )
+from faao_mav.mavlink.signing import Signing, Verdict
 from faao_mav.mavlink.transport import Transport, open_transport
 
 T = TypeVar("T")
@@ -28,59 +32,75 @@ Observe: TypeAlias = Callable[[str, int, int], object]
 _BEAT = 1.0
 """Seconds between two heartbeats: what the MAVLink guide asks for."""
 
+_SETUP_SIGNING = 256
+"""The number of the message SETUP_SIGNING."""
+
 
 class Tlog:
     """A `.tlog` file: before each packet the time since 1970, 8 bytes, big-endian, microseconds.
 
+    MAVProxy and Mission Planner write and read such files. Only its owner may read this one, and it
+    holds no SETUP_SIGNING, which carries a key. An older log of the name stays until the first
+    packet is received. `failure` says why the log ends early, if it does: the link goes on.
+
     Raises `InputError` if the file cannot be written, or by its name is none of these: a slip of
-    the pen must not replace the mission. MAVProxy and Mission Planner write and read such files.
+    the pen must not replace the mission.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
         if path.suffix != ".tlog":
             raise InputError(f"--log {path}: give a name that ends in .tlog")
         check_writable(path)
-        try:
-            self._file = path.open("wb")
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
-        self._clock = clock
+        self.failure: str | None = None
+        self._path, self._clock = path, clock
+        self._file: FileIO | None = None
+        self._waiting = b""
 
-    def write(self, packet: bytes) -> None:
+    def write(self, packet: bytes, *, received: bool) -> None:
         """Append `packet`, sent or received now."""
-        self._file.write(struct.pack(">Q", int(self._clock() * 1e6)) + packet)
+        if self.failure is not None or message_id(packet) == _SETUP_SIGNING:
+            return
+        self._waiting += struct.pack(">Q", int(self._clock() * 1e6)) + packet
+        try:
+            if received and self._file is None:
+                self._file = FileIO(self._path, "w", opener=_open_for_owner)
+            while self._file is not None and self._waiting:
+                self._waiting = self._waiting[self._file.write(self._waiting) :]
+        except OSError as error:
+            self.failure = f"{self._path}: cannot be written: {error.strerror}; the log ends early"
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
+
+
+def _open_for_owner(path: str, flags: int) -> int:
+    """Open a file that only its owner may read, also one that was there and others might read."""
+    handle = os.open(path, flags, mode=0o600)
+    Path(path).chmod(0o600)
+    return handle
 
 
 class WireLink:
     """A ground station's end of a link: runs machines, and says once a second that it is there.
 
-    `log` is a file for the exchange. Use it in a `with` statement.
+    `log` is the exchange in a file, if there is to be one. Use the link in a `with` statement.
     """
 
     def __init__(
         self,
         connection: str | Transport,
         *,
-        key: bytes | None = None,
+        signing: Signing | None = None,
         log: Path | None = None,
         address: Address = GROUND_STATION,
     ) -> None:
         self.address = address
-        self._codec = Codec(address, key)
-        self._log = None if log is None else Tlog(log)
+        self._codec = Codec(address, signing)
+        self.log = None if log is None else Tlog(log)
         self._next_beat = 0.0
-        try:
-            self._transport = (
-                open_transport(connection) if isinstance(connection, str) else connection
-            )
-        except Exception:
-            if self._log is not None:
-                self._log.close()
-            raise
+        self._transport = open_transport(connection) if isinstance(connection, str) else connection
 
     def __enter__(self) -> "WireLink":
         return self
@@ -91,29 +111,29 @@ class WireLink:
     def close(self) -> None:
         """Let go of the connection, finish the log."""
         self._transport.close()
-        if self._log is not None:
-            self._log.close()
+        if self.log is not None:
+            self.log.close()
 
     @property
-    def lacks_key(self) -> bool:
-        """Whether others on the link sign their packets, and this end has no key."""
-        return self._codec.lacks_key
+    def heard(self) -> Set[Verdict]:
+        """What signatures the packets of others had, as `Codec.heard`."""
+        return self._codec.heard
 
     def run(self, machine: Machine[T], observe: Observe | None = None) -> T:
         """Run `machine` to its end and return the outcome.
 
-        Interrupted from the keyboard it cancels the transfer first. Raises `LinkError`.
+        Interrupted from the keyboard it cancels the transfer first. Raises `LinkError`, which says
+        what was under way.
         """
         try:
             return self._run(machine, observe)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, LinkError) as end:
             what, done, total = machine.progress
+            text = f"while {what}" + (f" at item {done} of {total}" if total else "")
+            if isinstance(end, LinkError):
+                raise LinkError(f"{end}, {text}") from None
             self._send(machine.cancel(time.monotonic()))
-            at = f" at item {done} of {total}" if total else ""
-            left = ""
-            if what.startswith(("uploading", "clearing")):
-                left = ". What the vehicle holds now is not known: upload again, or download it"
-            raise LinkError(f"interrupted while {what}{at}: cancelled{left}") from None
+            raise LinkError(f"interrupted {text}: cancelled") from None
 
     def _run(self, machine: Machine[T], observe: Observe | None) -> T:
         self._beat(time.monotonic())
@@ -135,8 +155,8 @@ class WireLink:
         until = until if due is None else min(due, until)
         for data in self._transport.read(until - time.monotonic()):
             for packet in self._codec.parse(data):
-                if self._log is not None:
-                    self._log.write(packet.raw)
+                if self.log is not None:
+                    self.log.write(packet.raw, received=True)
                 if packet.envelope is not None and machine.outcome is None:
                     self._send(machine.on(packet.envelope, time.monotonic()))
         if machine.outcome is None:
@@ -150,6 +170,6 @@ class WireLink:
     def _send(self, messages: Sequence[Message]) -> None:
         for message in messages:
             packet = self._codec.pack(message)
-            if self._log is not None:
-                self._log.write(packet)
+            if self.log is not None:
+                self.log.write(packet, received=False)
             self._transport.write(packet)

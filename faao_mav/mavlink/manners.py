@@ -33,11 +33,12 @@ _GENERAL = {
 class Manners:
     """How an autopilot behaves in transfers; the defaults are those of one that is not known.
 
-    In uploads: `request_period` is how long after its last request it asks again, s, and
-    `upload_patience` how long it waits for an item before it gives up, s. An item that it did not
-    ask for it passes over without a word (`ignores_other_items`), or answers INVALID_SEQUENCE and
-    goes on waiting. `reminder` is the item, counted from the end (-1: the last one), to send again
-    when the last acknowledgement is missing, None if none is safe.
+    `patience` is how long it waits for the next packet of a transfer before it gives up, s.
+
+    In uploads: `request_period` is how long after its last request it asks again, s. An item that
+    it did not ask for it passes over without a word (`ignores_other_items`), or answers
+    INVALID_SEQUENCE and goes on waiting. `reminder` is the item, counted from the end (-1: the
+    last one), to send again when the last acknowledgement is missing, None if none is safe.
 
     `unset_is_zero`: a value that is not set is sent as 0, because NaN is refused.
 
@@ -48,7 +49,7 @@ class Manners:
     """
 
     request_period: float = math.inf
-    upload_patience: float = math.inf
+    patience: float = math.inf
     ignores_other_items: bool = False
     reminder: int | None = None
     unset_is_zero: bool = False
@@ -74,7 +75,7 @@ _UNKNOWN = Manners()
 _MANNERS: dict[AutopilotFamily, Manners] = {
     ARDUPILOT: Manners(
         request_period=1.0,
-        upload_patience=8.0,
+        patience=8.0,
         reminder=-2,
         unset_is_zero=True,
         any_request_order=True,
@@ -93,7 +94,7 @@ _MANNERS: dict[AutopilotFamily, Manners] = {
     ),
     PX4: Manners(
         request_period=0.25,
-        upload_patience=5.0,
+        patience=5.0,
         ignores_other_items=True,
         reminder=-1,
         final_acks=2,  # until it hears one, nobody else can begin a transfer for 5 s

@@ -202,8 +202,16 @@ class Heartbeat(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Timesync(Message):
+    """TIMESYNC: a question (`tc1` 0) is answered with its own `ts1`, and `tc1` the time there."""
+
+    tc1: int
+    ts1: int
+
+
+@dataclass(frozen=True, slots=True)
 class Statustext(Message):
-    """STATUSTEXT."""
+    """STATUSTEXT; `text` is one line."""
 
     severity: int
     text: str

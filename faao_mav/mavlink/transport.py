@@ -1,4 +1,4 @@
-"""Bytes to and from a connection string: UDP, TCP, serial.
+"""Packets to and from a connection string: UDP, TCP, serial.
 
 The strings are pymavlink's. The sockets are not: its connections print on standard output, hide
 errors, and share UDP ports silently with whoever else listens.
@@ -9,11 +9,12 @@ import errno
 import select
 import socket
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
 from faao_mav.errors import InputError, LinkError
+from faao_mav.mavlink.framing import Framer
 
 FORMS = (
     "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
@@ -26,16 +27,22 @@ _CONNECT_TIMEOUT = 5.0
 _FORGET = 30.0
 """Seconds after which a silent UDP sender is not answered any more: chosen, 30 lost heartbeats."""
 
+_MOST_PEERS = 64
+"""UDP senders that are remembered, and TCP peers, at most; chosen: each is sent every packet."""
+
+_BURST = 256
+"""Datagrams that are read at once, at most; chosen: who sends without end stops nothing else."""
+
 _MAX_DATAGRAM = 65_535
 _DEFAULT_BAUD = 57_600
 """Bits per second: what telemetry radios are delivered with."""
 
 
 class Transport(Protocol):
-    """Bytes in, bytes out."""
+    """Packets in, packets out."""
 
     def read(self, timeout: float) -> list[bytes]:
-        """Return what arrives within `timeout` seconds, as soon as something does."""
+        """Return the packets that arrive within `timeout` seconds, as soon as something does."""
         ...
 
     def write(self, data: bytes) -> None:
@@ -88,7 +95,7 @@ def open_transport(text: str) -> Transport:
         return _Serial(endpoint)
     try:
         address = socket.getaddrinfo(endpoint.host, endpoint.port, socket.AF_INET)[0][4]
-    except OSError:
+    except (OSError, UnicodeError):  # UnicodeError: empty or overlong labels between dots
         raise LinkError(f"connection {text!r}: there is no host {endpoint.host}") from None
     host_port = (str(address[0]), endpoint.port)
     try:
@@ -118,13 +125,21 @@ def _reason(error: OSError) -> str:
     return error.strerror or str(error)
 
 
+@dataclass(slots=True)
+class _Sender:
+    """Who sends datagrams from one address; `heard` is when, s."""
+
+    heard: float = 0.0
+    framer: Framer = field(default_factory=Framer)
+
+
 class _Udp:
     """A UDP socket that sends to one place, or to whoever was heard."""
 
     def __init__(self, listen: tuple[str, int] | None, target: tuple[str, int] | None) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._target = target
-        self._heard: dict[tuple[str, int], float] = {}
+        self._senders: dict[tuple[str, int], _Sender] = {}
         try:
             self._socket.setblocking(False)
             if listen is not None:
@@ -139,27 +154,32 @@ class _Udp:
         found: list[bytes] = []
         # A refused datagram is told as an error of the next call: the other side is not up yet.
         with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
-            while True:
-                data, sender = self._socket.recvfrom(_MAX_DATAGRAM)
-                if self._target is None:
-                    self._heard[sender] = time.monotonic()
-                found.append(data)
+            for _ in range(_BURST):
+                data, address = self._socket.recvfrom(_MAX_DATAGRAM)
+                found += self._sender(address).framer.feed_datagram(data)
         return found
 
     def write(self, data: bytes) -> None:
-        targets = [self._target] if self._target is not None else self._listeners()
-        for target in targets:
+        for target in self._heard() if self._target is None else [self._target]:
             # Full buffers and absent receivers lose datagrams: that is what retries are for.
-            with contextlib.suppress(BlockingIOError, ConnectionRefusedError, OSError):
+            with contextlib.suppress(OSError):
                 self._socket.sendto(data, target)
 
     def close(self) -> None:
         self._socket.close()
 
-    def _listeners(self) -> list[tuple[str, int]]:
+    def _heard(self) -> list[tuple[str, int]]:
         recent = time.monotonic() - _FORGET
-        self._heard = {who: when for who, when in self._heard.items() if when > recent}
-        return list(self._heard)
+        return [who for who, sender in self._senders.items() if sender.heard > recent]
+
+    def _sender(self, address: tuple[str, int]) -> _Sender:
+        """Return who is at `address` and was heard now; too many forget who is silent longest."""
+        sender = self._senders.pop(address, None) or _Sender()
+        sender.heard = time.monotonic()
+        if len(self._senders) == _MOST_PEERS:
+            del self._senders[next(iter(self._senders))]
+        self._senders[address] = sender
+        return sender
 
 
 class _Tcp:
@@ -168,26 +188,27 @@ class _Tcp:
     def __init__(self, address: tuple[str, int], *, listens: bool) -> None:
         self._name = f"tcp:{address[0]}:{address[1]}"
         self._listener = socket.create_server(address) if listens else None
-        self._peers: list[socket.socket] = []
+        self._peers: dict[socket.socket, Framer] = {}
         if self._listener is not None:
             self._listener.setblocking(False)
         else:
-            self._peers.append(socket.create_connection(address, timeout=_CONNECT_TIMEOUT))
-            self._peers[0].setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            peer = socket.create_connection(address, timeout=_CONNECT_TIMEOUT)
+            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._peers[peer] = Framer()
 
     def read(self, timeout: float) -> list[bytes]:
         found: list[bytes] = []
         for ready in select.select(self._sockets(), [], [], max(timeout, 0.0))[0]:
             if ready is self._listener:
                 with contextlib.suppress(OSError):
-                    self._peers.append(ready.accept()[0])
+                    self._welcome(ready.accept()[0])
                 continue
             try:
                 data, error = ready.recv(_MAX_DATAGRAM), None
             except OSError as broken:
                 data, error = b"", broken
             if data:
-                found.append(data)
+                found += self._peers[ready].feed(data)
             else:
                 self._drop(ready, error)
         return found
@@ -204,12 +225,20 @@ class _Tcp:
             each.close()
 
     def _sockets(self) -> list[socket.socket]:
-        return self._peers if self._listener is None else [self._listener, *self._peers]
+        return [*self._peers] if self._listener is None else [self._listener, *self._peers]
+
+    def _welcome(self, peer: socket.socket) -> None:
+        """Take one more peer, if there is room; it is dropped when it does not read."""
+        if len(self._peers) == _MOST_PEERS:
+            peer.close()
+            return
+        peer.setblocking(False)
+        self._peers[peer] = Framer()
 
     def _drop(self, peer: socket.socket, error: OSError | None) -> None:
         """Forget one of several peers; raise `LinkError` for the only one there can be."""
         if self._listener is not None:
-            self._peers.remove(peer)
+            del self._peers[peer]
             peer.close()
         elif error is None or isinstance(error, ConnectionError):
             raise LinkError(f"{self._name}: the other side closed the connection") from None
@@ -224,6 +253,7 @@ class _Serial:
         import serial
 
         self._name = endpoint.host
+        self._framer = Framer()
         self._error: type[Exception] = serial.SerialException
         if "/" in endpoint.host and not Path(endpoint.host).exists():
             raise InputError(
@@ -241,7 +271,7 @@ class _Serial:
             data += bytes(self._port.read(self._port.in_waiting))
         except (self._error, OSError) as error:
             raise LinkError(f"{self._name}: {error}") from None
-        return [data] if data else []
+        return self._framer.feed(data)
 
     def write(self, data: bytes) -> None:
         try:

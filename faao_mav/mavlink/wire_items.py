@@ -15,14 +15,14 @@ from faao_mav.mavlink.manners import autopilot_name, manners_of
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mission.command import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_POINT, Frame
-from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon, RallyPoint
+from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon, RallyPoint, check_place
 from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
 from faao_mav.vehicle import VehicleType
 
 GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
 """Frames whose coordinates are latitude and longitude, by their numbers in MAV_FRAME."""
 
-_INT32 = 2**31 - 1
+_INT32 = range(-(2**31), 2**31)
 _FLOAT32 = 2.0**128 - 2.0**104
 """The largest single-precision number."""
 
@@ -81,8 +81,11 @@ def mission_of(
 ) -> Mission:
     """Return the mission that the `lists` downloaded from `vehicle` make; one may be missing.
 
-    Raises `InputError` for a fence that is none.
+    Raises `InputError` for items that are none: places off the Earth, infinities, half a polygon.
     """
+    for mission_type, items in lists.items():
+        for number, item in enumerate(items):
+            _check(item, f"{mission_type.title} item {number}")
     flown, fence, rally = (
         [mission_item(item) for item in lists.get(mission_type, ())] for mission_type in MissionType
     )
@@ -122,7 +125,7 @@ def _fence_of(items: Sequence[MissionItem]) -> Fence:
     for number, item in enumerate(items):
         if item.command in POLYGON.values():
             vertices.append((item.x, item.y))
-            if len(vertices) == int(item.params[0]):
+            if len(vertices) == item.params[0]:
                 polygons.append(Polygon(tuple(vertices), item.command == POLYGON[True]))
                 vertices = []
             continue
@@ -141,6 +144,14 @@ def _fence_of(items: Sequence[MissionItem]) -> Fence:
             "its items say"
         )
     return Fence(tuple(polygons), tuple(circles), breach_return)
+
+
+def _check(item: WireItem, name: str) -> None:
+    """Raise `InputError`, which names the item, for what is no place on Earth or infinite."""
+    if item.frame in GLOBAL_FRAMES:
+        check_place((item.x / 1e7, item.y / 1e7), name)
+    if any(map(math.isinf, (*item.params, item.z))):
+        raise InputError(f"{name}: params {item.params}, z {item.z}; expected finite numbers")
 
 
 def _place_item(
@@ -171,7 +182,7 @@ def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireIt
     """
     scale = coordinate_scale(item.frame)
     x, y = (0 if math.isnan(value) else round(value * scale) for value in (item.x, item.y))
-    if max(abs(x), abs(y)) > _INT32:
+    if x not in _INT32 or y not in _INT32:
         raise InputError(
             f"item {index}: x {item.x}, y {item.y}; expected degrees within 180, or in frame "
             f"{item.frame} what 32 bits hold"

@@ -18,6 +18,7 @@ class Command(IntEnum):
     NAV_SPLINE_WAYPOINT = 82
     NAV_VTOL_TAKEOFF = 84
     NAV_VTOL_LAND = 85
+    NAV_GUIDED_ENABLE = 92
     NAV_DELAY = 93
     CONDITION_DELAY = 112
     CONDITION_DISTANCE = 114
@@ -31,21 +32,14 @@ class Command(IntEnum):
     DO_SET_ROI = 201
 
 
-FLOWN_TO = frozenset(
-    {
-        Command.NAV_WAYPOINT,
-        Command.NAV_LOITER_UNLIM,
-        Command.NAV_LOITER_TURNS,
-        Command.NAV_LOITER_TIME,
-        Command.NAV_LAND,
-        Command.NAV_TAKEOFF,
-        Command.NAV_LOITER_TO_ALT,
-        Command.NAV_SPLINE_WAYPOINT,
-        Command.NAV_VTOL_TAKEOFF,
-        Command.NAV_VTOL_LAND,
-    }
-)
+FLOWN_TO = frozenset(command for command in Command if command.name.startswith("NAV_")) - {
+    Command.NAV_RETURN_TO_LAUNCH,
+    Command.NAV_DELAY,
+}
 """Commands that fly to the place x, y, z of their item."""
+
+LANDINGS = frozenset({Command.NAV_LAND, Command.NAV_VTOL_LAND})
+TAKEOFFS = frozenset({Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF})
 
 FENCE_RETURN_POINT: Final = 5000
 """MAV_CMD_NAV_FENCE_RETURN_POINT."""

@@ -12,9 +12,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.optimizer.problem import Link
 from faao_mav.plan import Plan
-from faao_mav.radio.best_precoder import best_mean_precoders, best_precoders
 from faao_mav.radio.precoder import SCHEMES
-from faao_mav.radio.rate import cutoff_rate
 
 Draws: TypeAlias = Complex
 """Channels of (1) or (2), (..., N_r, N_t); the first axis is that of the draws if `averaged`."""
@@ -42,7 +40,7 @@ class Design:
 
     @property
     def optimal(self) -> bool:
-        """Whether precoders maximise the cutoff rate, and that rate counts."""
+        """Whether precoders maximise the rate that counts, `Link.measure`."""
         return self.scheme == "faao" and not self.gaussian
 
     def precoders(self, link: Link, H: Draws, start: Complex | None = None) -> Complex:
@@ -53,20 +51,15 @@ class Design:
         """
         power, noise = link.power, link.noise
         if self.optimal:
-            if self.blind:
-                draws = np.moveaxis(H, 0, -3)
-                return best_mean_precoders(draws, power, link.modulation, noise, start=start).P
-            return best_precoders(H, power, link.modulation, noise, start=start).P
+            draws = np.moveaxis(H, 0, -3) if self.blind else H[..., None, :, :]
+            return link.best(draws, start)
         known = H.mean(axis=0) if self.blind else H
         scheme = "waterfilling" if self.scheme == "faao" else self.scheme
         return SCHEMES[scheme](known, power, noise)
 
     def rate(self, link: Link, H: Draws, P: Complex) -> Real:
         """Return the rate that the route is optimised for, bits (n,), its mean where `averaged`."""
-        if self.gaussian:
-            rate = gaussian_rate(H, P, link.noise)
-        else:
-            rate = cutoff_rate(H, P, link.classes, link.noise)
+        rate = gaussian_rate(H, P, link.noise) if self.gaussian else link.draw_rates(H, P)
         return np.asarray(rate.mean(axis=0)) if self.averaged else rate
 
 

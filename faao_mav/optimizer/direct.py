@@ -11,6 +11,7 @@ Measured (tests/benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT 
 starts, and several times quicker.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximize_all, objectives
 from faao_mav.optimizer.interior.search import COLD_START, WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
@@ -29,6 +30,10 @@ from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.multistart import improve_starts
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
+
+_LONG_SEARCH = 6
+"""By how many times `optimizer.max_iterations` may be exceeded where a queue has a buffer, shares
+or a least speed. The plans of `_MONOTONE_AFTER` in `interior.search` need up to 290 steps."""
 
 _EXACT_ITERATIONS = 12
 """The largest number of iterations at exact rates, after those in a table.
@@ -41,6 +46,10 @@ _ROUGH = 1e-3
 
 Chosen; what a change costs is not measured.
 """
+
+CUTOFF = "cutoff"
+"""The name of the start that a plan for the mutual information has beside `optimizer.starts`: the
+flight of the plan for the cutoff rate."""
 
 _EQUAL = 1e-6
 """The difference in bit/s/Hz below which two optima count as equal: which of them is larger is then
@@ -55,12 +64,14 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     scheme = design(problem.plan)
+    counts_cutoff = options.rate == "cutoff" or scheme.gaussian
+    before = None if counts_cutoff else direct(counted_as_cutoff(problem))
     relay = problem.maximised_queue
-    # shares that jump between 0 and 1 take about twice the steps
     # the half-planes of a least speed turn too fast for the short steps of a warm start, and the
-    # shares of half duplex are sought anew; with a queue both take about twice as many steps
+    # shares of half duplex are sought anew; with a queue both take more steps, and so does a buffer
     anew = kin.min_speed > 0 or (relay is not None and relay.half)
-    steps = options.max_iterations * (2 if relay is not None and anew else 1)
+    long = relay is not None and (anew or math.isfinite(relay.buffer))
+    steps = options.max_iterations * (_LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
@@ -70,6 +81,8 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
+    if before is not None:
+        routes[CUTOFF] = before.trajectory
     tell(1, "the starts", 0.0)
     rough = improve_starts(
         kin,
@@ -108,7 +121,22 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         optima += optimized([flights[int(values.argmax())]])
     best = _best(problem, field, optima)
     final = _at_exact_rates(problem, scheme, field, best)
-    return _solution(problem, scheme, field, final, history, by_start)
+    solution = _solution(problem, scheme, field, final, history, by_start)
+    if before is None:
+        return solution
+    return replace(solution, gain=float(solution.history[-1]) - _worth(problem, before))
+
+
+def _worth(problem: Problem, other: Solution) -> float:
+    """Return what `problem` maximises, bit/s/Hz, of the flight and the precoders of `other`."""
+    rates = [
+        link.rates(other.w, H_r, P)
+        for link, H_r, P in zip(
+            problem.links, (other.H_rB, other.H_rU), (other.P_B, other.P_U), strict=True
+        )
+    ]
+    values = objectives(np.stack(rates)[:, None], problem.kinematics, problem.maximised_queue)
+    return float(values[0])
 
 
 def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> LocalOptimum:
@@ -132,6 +160,8 @@ def _at_exact_rates(
 
     With the precoders held, the rates are exact, and whatever they gain the best ones gain too.
     """
+    if problem.plan.optimizer.rate != "cutoff":
+        return optimum
     if not any(isinstance(rate, ModeRate) and not rate.exact for rate in field.rates):
         return optimum
     w = optimum.trajectory.w
@@ -197,12 +227,17 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex)
     """Return the precoders at positions w (n, 2), searched from the best that `rate` knows."""
     where = link_coordinates(link, w.T)
     at = where.gain_log, where.cosine
-    if isinstance(rate, CurveRate) and scheme.optimal:
-        return scheme.precoders(link, H, start=rate.initial_precoders(*at))
+    if not scheme.optimal or not isinstance(rate, CurveRate | BestRate | ModeRate):
+        return scheme.precoders(link, H)
+    known = rate.initial_precoders(*at)
+    if link.measure != "cutoff":
+        return known
+    carried = scheme.precoders(link, H, start=known)
+    if isinstance(rate, CurveRate):
+        return carried
     afresh = scheme.precoders(link, H)
-    if not isinstance(rate, BestRate | ModeRate) or rate.exact:
+    if rate.exact:
         return afresh
-    carried = scheme.precoders(link, H, start=rate.initial_precoders(*at))
     better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
     return np.asarray(np.where(better[:, None, None], carried, afresh))
 

@@ -18,7 +18,7 @@ from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.channel import rayleigh
-from faao_mav.radio.mutual_information import mean_mutual_information
+from faao_mav.radio.mutual_information import pooled_mutual_information
 from faao_mav.radio.rate import cutoff_rate
 
 SATURATED = 0.999
@@ -29,7 +29,7 @@ _MOST_PAIRS = 1000  # pairs of slot and draw up to which all are averaged
 _PART_PAIRS, _PARTS = 150, 6  # pairs per sample and samples beyond
 _COARSER = 6.0  # tolerance of the noise average of a sample, in that of the result
 _FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
-_FRESH_SEARCHES = 128  # slots with a new draw, and a search, where precoders know the draw
+_FRESH_SEARCHES = 128  # slots with new draws where their rates take long: a search, or noises
 
 _MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
 _BISECTIONS = 60  # bisections of the spare power: 300 dB / 2^60 is rounding
@@ -39,11 +39,13 @@ _BISECTIONS = 60  # bisections of the spare power: 300 dB / 2^60 is rounding
 class MutualInformation:
     """The rates (10) with the mutual information (5), (6) in place of the cutoff rate, bit/s/Hz.
 
-    `error` is the larger of the errors of the two means, a standard error where noise was sampled.
+    `delivered` is what the relay delivers of it. `error` is the larger of the errors of the two
+    means, a standard error where noise was sampled.
     """
 
     bs_uav: float
     uav_user: float
+    delivered: float
     error: float
 
     @property
@@ -60,8 +62,8 @@ def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
     same plan gives the same value.
     """
     problem, rng = build_problem(solution.plan), np.random.default_rng(solution.plan.radio.seed)
-    (bs_uav, first), (uav_user, second) = (
-        _mean_information(link, link.channel(solution.w, H_r), P, rng, tolerance)
+    (bs_uav, I_U, first), (uav_user, I_G, second) = (
+        _information(link, link.channel(solution.w, H_r), P, rng, tolerance)
         for link, H_r, P in zip(
             problem.links,
             (solution.H_rB, solution.H_rU),
@@ -69,36 +71,46 @@ def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
             strict=True,
         )
     )
-    return MutualInformation(bs_uav, uav_user, max(first, second))
+    delivered = solution.relay(I_U, I_G, solution.shares).rate
+    return MutualInformation(bs_uav, uav_user, delivered, max(first, second))
 
 
-def _mean_information(
+def _information(
     link: Link, H: Complex, P: Complex, rng: np.random.Generator, tolerance: float
-) -> tuple[float, float]:
-    """Return the mean of (5) or (6) over slots, and draws where there are any, and its error, bits.
+) -> tuple[float, Real, float]:
+    """Return the mean of (5) or (6) over slots and draws, that of each slot (n,), and the error.
 
     Many pairs of slot and draw are sampled evenly in the order of their cutoff rates, which nearly
-    is the order of their mutual information. The spread of several samples is the error.
+    is the order of their mutual information: those between are interpolated. The spread of several
+    samples is the error of the mean, bits.
     """
+    pairs = H.shape[:-2]
     wide = np.broadcast_to(P, (*H.shape[:-2], *P.shape[-2:]))
     H, P = H.reshape(-1, *H.shape[-2:]), wide.reshape(-1, *P.shape[-2:])
     if len(H) <= _MOST_PAIRS:
-        return mean_mutual_information(
+        all_pairs = pooled_mutual_information(
             H, P, link.modulation, link.noise, rng=rng, tolerance=tolerance
         )
-    order = np.argsort(cutoff_rate(H, P, link.classes, link.noise), kind="stable")
+        each = np.maximum(0.0, all_pairs.value).reshape(-1, pairs[-1]).mean(axis=0)
+        return float(np.mean(all_pairs.value)), each, all_pairs.mean_error
+    cutoff = cutoff_rate(H, P, link.classes, link.noise)
+    order = np.argsort(cutoff, kind="stable")
     step = len(H) // _PART_PAIRS
-    each = _COARSER * tolerance * float(np.sqrt(_PARTS))
-    means, errors = [], []
+    coarse = _COARSER * tolerance * float(np.sqrt(_PARTS))
+    means, errors, known = [], [], []
     for offset in rng.permutation(step)[:_PARTS]:
         part = order[offset::step]
-        mean, error = mean_mutual_information(
-            H[part], P[part], link.modulation, link.noise, rng=rng, tolerance=each
+        sample = pooled_mutual_information(
+            H[part], P[part], link.modulation, link.noise, rng=rng, tolerance=coarse
         )
-        means.append(mean)
-        errors.append(error)
+        means.append(float(np.mean(sample.value)))
+        errors.append(sample.mean_error)
+        known.append(np.stack([cutoff[part], np.maximum(0.0, sample.value)]))
     spread = float(np.std(means, ddof=1))
-    return float(np.mean(means)), max(spread, *errors) / float(np.sqrt(len(means)))
+    at, values = np.concatenate(known, axis=1)
+    ranked = np.argsort(at, kind="stable")
+    between = np.interp(cutoff, at[ranked], values[ranked]).reshape(pairs).mean(axis=0)
+    return float(np.mean(means)), between, max(spread, *errors) / float(np.sqrt(len(means)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,16 +138,17 @@ class FreshRates:
 def fresh_rates(solution: Solution) -> FreshRates | None:
     """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
-    Every slot has draws of its own. Precoders that know the draw are searched for each of them, on
-    every so many slots. What is delivered is the mean over flights that have one of the draws in
-    each slot, forwarded with the planned shares.
+    Every slot has draws of its own, or where that takes long (precoders that know the draw are
+    searched for each of them) every so many slots. What is delivered is the mean over flights that
+    have one of the draws in each slot, forwarded with the planned shares.
     """
     problem, how = build_problem(solution.plan), design(solution.plan)
     if not how.averaged:
         return None
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
     slots = len(solution.w)
-    step = 1 if how.blind else -(-slots // _FRESH_SEARCHES)
+    quick = how.blind and solution.plan.optimizer.rate == "cutoff"
+    step = 1 if quick else -(-slots // _FRESH_SEARCHES)
     chosen = np.arange(step // 2, slots, step)
     w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
     found, rates = [], []
@@ -144,7 +157,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
         fresh = replace(link, nlos=nlos.reshape(draws, len(w), link.receive, link.transmit))
         H = link.channel(w, fresh.small_scale(w))
         known = P[chosen] if how.blind else how.precoders(link, H)
-        at = cutoff_rate(H, known, link.classes, link.noise)
+        at = np.maximum(0.0, link.draw_rates(H, known))
         rates.append(at)
         # The error is that of the draws within each slot, not the spread from slot to slot. With
         # one draw per slot only the spread over all slots is known, an upper estimate.

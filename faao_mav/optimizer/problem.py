@@ -1,7 +1,7 @@
 """Everything that (13) needs, as arrays."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,7 @@ from faao_mav.radio.constellation import (
     difference_classes,
     difference_vector_count,
 )
-from faao_mav.radio.rate import cutoff_rate
+from faao_mav.radio.measure import Measure, best_precoders_for, draw_rates
 from faao_mav.radio.relay import RelayQueue
 
 MAX_DIFFERENCE_VECTORS = 5_000_000
@@ -38,7 +38,7 @@ class Link:
     `station` is p_B or p_U (2,), `altitude` H, `power` W_B or W_U (W), `noise` sigma² (W);
     `receive` and `transmit` are the antenna counts. `nlos` is the Rayleigh part: a known draw per
     slot (N + 2, N_r, N_t), draws to be averaged over (S, 1, N_r, N_t), or None for the line of
-    sight alone.
+    sight alone. `measure` is the rate that counts, `optimizer.rate`.
     """
 
     name: str
@@ -54,6 +54,7 @@ class Link:
     rician_factor: float
     line_of_sight: str
     nlos: Complex | None
+    measure: Measure = "cutoff"
 
     @cached_property
     def classes(self) -> DifferenceClasses:
@@ -64,6 +65,11 @@ class Link:
     def follows_position(self) -> bool:
         """Whether H_r changes with w."""
         return self.line_of_sight == "ula"
+
+    @property
+    def averaged(self) -> bool:
+        """Whether the fading is averaged over: channels then have a leading axis of draws."""
+        return self.nlos is not None and self.nlos.ndim == 4
 
     @property
     def los_share(self) -> float:
@@ -103,7 +109,7 @@ class Link:
         """
         if self.nlos is None:
             return los
-        if self.nlos.ndim == 4:
+        if self.averaged:
             return los * rician(np.ones_like(self.nlos), self.nlos, self.rician_factor)
         return rician(los, self.nlos, self.rician_factor)
 
@@ -112,9 +118,32 @@ class Link:
         return np.sqrt(self.gain(w))[:, None, None] * H_r
 
     def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
-        """Return (7) or (8) for every slot, bits (N + 2,), its mean where H_r has draws."""
-        rates = cutoff_rate(self.channel(w, H_r), P, self.classes, self.noise)
-        return np.asarray(rates.mean(axis=0)) if rates.ndim == 2 else rates
+        """Return the rate of every slot, bits (N + 2,), its mean where H_r has draws."""
+        rates = self.draw_rates(self.channel(w, H_r), P)
+        return np.asarray(rates.mean(axis=0)) if self.averaged else rates
+
+    def draw_rates(self, H: Complex, P: Complex) -> Real:
+        """Return the rates of the channels H ((S,) ..., N_r, N_t), bits ((S,) ...).
+
+        P is (..., N_t, N_t), or has the axis of the draws too. Of the mutual information the mean
+        over the draws is accurate: see `radio.measure`.
+        """
+        if not self.averaged:
+            H, P = H[..., None, :, :], P[..., None, :, :]
+            return draw_rates(self.measure, H, P, self.modulation, self.noise)[..., 0]
+        P = np.moveaxis(P, 0, -3) if P.ndim == H.ndim else P[..., None, :, :]
+        H = np.moveaxis(H, 0, -3)
+        rates = draw_rates(self.measure, H, P, self.modulation, self.noise)
+        return np.ascontiguousarray(np.moveaxis(rates, -1, 0))
+
+    def best(self, draws: Complex, start: Complex | None = None) -> Complex:
+        """Return the precoder (..., N_t, N_t) of highest mean rate over draws (..., S, N_r, N_t).
+
+        The search begins at `start` (..., N_t, N_t) where given.
+        """
+        return best_precoders_for(
+            self.measure, draws, self.power, self.modulation, self.noise, start=start
+        )
 
 
 @dataclass(frozen=True)
@@ -143,6 +172,17 @@ class Problem:
     def links(self) -> tuple[Link, Link]:
         """BS to UAV, UAV to user."""
         return self.bs_uav, self.uav_user
+
+
+def counted_as_cutoff(problem: Problem) -> Problem:
+    """Return `problem` with the cutoff rate as the rate that counts."""
+    plan = problem.plan
+    return replace(
+        problem,
+        plan=replace(plan, optimizer=replace(plan.optimizer, rate="cutoff")),
+        bs_uav=replace(problem.bs_uav, measure="cutoff"),
+        uav_user=replace(problem.uav_user, measure="cutoff"),
+    )
 
 
 def build_problem(plan: Plan) -> Problem:
@@ -192,6 +232,7 @@ def build_problem(plan: Plan) -> Problem:
             rician_factor=radio.rician_factor,
             line_of_sight=radio.line_of_sight,
             nlos=nlos,
+            measure=plan.optimizer.rate,
         )
 
     return Problem(

@@ -2,8 +2,6 @@
 
 import io
 import json
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, quote
 from faao_mav.files import write_whole
+from faao_mav.optimizer.archive import read_archive
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
@@ -60,7 +59,9 @@ class Solution:
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end. `shares` (n,) of each slot are those in which a
-    half-duplex relay receives; it sends in the rest.
+    half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
+    `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
+    by how much the rate that it maximises is above that of the plan for the cutoff rate.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -95,6 +96,7 @@ class Solution:
     ending: str
     starts: Mapping[str, float] = field(default_factory=dict)
     shares: Real | None = None
+    gain: float | None = None
 
     @property
     def rates(self) -> Rates:
@@ -232,7 +234,8 @@ def save_solution(
     """Write `solution` to the NumPy archive `path` (.npz), whole or not at all.
 
     Keys: the arrays of `Solution` by name, those of its `relayed`, `R_avg`, `R_U`, `R_G`, `R_del`,
-    `converged`, `ending`, `starts` (JSON text) and `plan`, the YAML text; and the arrays `extra`,
+    `converged`, `ending`, `starts` (JSON text), `gain` if there is one and `plan`, the YAML text;
+    and the arrays `extra`,
     which `load_solution` leaves alone. The same solution gives the same bytes.
     """
     rates = solution.rates
@@ -240,8 +243,8 @@ def save_solution(
     values |= {"R_avg": rates.R_avg, "R_U": rates.R_U, "R_G": rates.R_G}
     values |= {name: getattr(solution.relayed, name) for name in _RELAYED}
     values["R_del"] = solution.delivered_rate
-    if solution.shares is not None:
-        values["shares"] = solution.shares
+    optional = {"shares": solution.shares, "gain": solution.gain}
+    values |= {name: value for name, value in optional.items() if value is not None}
     values |= {"converged": solution.converged, "ending": solution.ending}
     values["starts"] = json.dumps(dict(solution.starts))
     values["plan"] = solution.plan.text
@@ -251,54 +254,85 @@ def save_solution(
     write_whole(path, buffer.getvalue())
 
 
-def _lack(error: Exception) -> str:
-    return f": {error.args[0]}" if isinstance(error, KeyError) else ""
-
-
-def _check_arrays(arrays: Mapping[str, Any], plan: Plan, source: str) -> None:
-    """Raise `InputError` for arrays that are not of `plan`'s slots and antennas."""
-    n, radio = plan.flight.slots, plan.radio
-    ends = {
-        "B": (radio.relay.antennas, radio.base_station.antennas),
-        "U": (radio.ground_user.antennas, radio.relay.antennas),
-    }
-    shapes: dict[str, tuple[int, ...]] = {"t": (n,), "I_U": (n,), "I_G": (n,)}
-    shapes |= dict.fromkeys(("w", "v", "a"), (n, 2))
-    for hop, (receiving, sending) in ends.items():
-        shapes[f"P_{hop}"] = (n, sending, sending)
-        shapes[f"H_r{hop}"] = (n, receiving, sending)
-    for name, shape in shapes.items():
-        found = arrays[name]
-        draws = name[0] in "PH" and found.ndim == len(shape) + 1  # a leading axis of draws
-        if found.dtype.kind not in "fc" or found.shape[draws:] != shape:
-            raise InputError(
-                f"{source}: {name}: {found.dtype} {found.shape}; expected numbers {shape}, "
-                "as the plan in the file has them"
-            )
-        if not np.isfinite(found).all():
-            raise InputError(f"{source}: {name}: expected finite numbers")
+_TOLD = ("plan", "ending", "converged", "starts")
 
 
 def load_solution(path: str | Path) -> Solution:
     """Read what `save_solution` wrote. Raises `InputError` for anything else."""
-    try:
-        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in _ARRAYS}
-            shares = archive["shares"] if "shares" in archive.files else None
-            text, ending = str(archive["plan"]), str(archive["ending"])
-            converged = bool(archive["converged"])
-            starts = json.loads(str(archive["starts"]))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"{path}: not a result of faao-mission --save{_lack(error)}") from None
-    plan = parse_plan(text, f"{path} (plan)")
-    _check_arrays(arrays, plan, str(path))
-    if shares is not None and (
-        shares.dtype.kind != "f"
-        or shares.shape != arrays["t"].shape
-        or not ((shares >= 0) & (shares <= 1)).all()
-    ):
+    found = read_archive(path, (*_TOLD, *_ARRAYS, "shares", "gain"))
+    for name in (*_TOLD, *_ARRAYS):
+        if name not in found:
+            raise InputError(f"{path}: not a result of faao-mission --save: {name} is missing")
+    plan = parse_plan(_text(found["plan"], f"{path}: plan"), f"{path} (plan)")
+    for name, (kinds, shape) in _expected(plan, len(found["history"].ravel())).items():
+        if name in found:
+            _check(found[name], kinds, shape, f"{path}: {name}")
+    shares = found.get("shares")
+    if shares is not None and not ((shares >= 0) & (shares <= 1)).all():
         raise InputError(f"{path}: shares: expected a number of 0 to 1 per slot")
-    told = {"converged": converged, "ending": ending, "starts": starts, "shares": shares}
-    return Solution(plan=plan, **told, **arrays)
+    return Solution(
+        plan=plan,
+        converged=bool(found["converged"]),
+        ending=_text(found["ending"], f"{path}: ending"),
+        starts=_starts(_text(found["starts"], f"{path}: starts"), f"{path}: starts"),
+        shares=shares,
+        gain=float(found["gain"]) if "gain" in found else None,
+        **{name: found[name] for name in _ARRAYS},
+    )
+
+
+def _expected(plan: Plan, steps: int) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Return kinds of numbers (NumPy's letters) and shape of each array of a solution of `plan`.
+
+    `steps` are the entries of the history, of which there is one or more.
+    """
+    n, radio = plan.flight.slots, plan.radio
+    averaged = radio.fading == "ergodic"
+    draws = (radio.fading_samples,) if averaged else ()
+    known = draws if radio.csi == "instantaneous" else ()
+    found: dict[str, tuple[str, tuple[int, ...]]] = {
+        "converged": ("b", ()),
+        "gain": ("f", ()),
+        "history": ("f", (max(1, steps),)),
+    }
+    found |= dict.fromkeys(("t", "I_U", "I_G", "shares"), ("f", (n,)))
+    found |= dict.fromkeys(("w", "v", "a"), ("f", (n, 2)))
+    sent, relayed, heard = (
+        side.antennas for side in (radio.base_station, radio.relay, radio.ground_user)
+    )
+    for hop, receiving, sending in (("B", relayed, sent), ("U", heard, relayed)):
+        found[f"P_{hop}"] = ("fc", (*known, n, sending, sending))
+        found[f"H_r{hop}"] = ("fc", (*draws, n, receiving, sending))
+    return found
+
+
+def _check(array: "np.ndarray[Any, Any]", kinds: str, shape: tuple[int, ...], where: str) -> None:
+    """Raise `InputError` unless `array` has finite numbers of one of the `kinds`, in `shape`."""
+    if array.dtype.kind not in kinds or array.shape != shape:
+        raise InputError(
+            f"{where}: {array.dtype} {array.shape}; expected numbers {shape}, "
+            "as the plan in the file has them"
+        )
+    if not np.isfinite(array).all():
+        raise InputError(f"{where}: expected finite numbers")
+
+
+def _text(array: "np.ndarray[Any, Any]", where: str) -> str:
+    """Return the text that `array`, of no axes, holds: NumPy does not look at its characters."""
+    if array.dtype.kind == "U" and array.shape == ():
+        code = "utf-32-be" if array.dtype.byteorder == ">" else "utf-32-le"
+        try:
+            return array.tobytes().decode(code).rstrip("\0")
+        except UnicodeDecodeError:
+            pass
+    raise InputError(f"{where}: {array.dtype} {array.shape}; expected text")
+
+
+def _starts(text: str, where: str) -> dict[str, float]:
+    """Return the rate that each start led to, of JSON `text`."""
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(dict[str, float]).validate_json(text, strict=True)
+    except ValidationError:
+        raise InputError(f"{where}: {quote(text)}; expected rates by start") from None

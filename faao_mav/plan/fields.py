@@ -29,7 +29,15 @@ MAX_LOCAL_DISTANCE = 100_000.0
 Number: TypeAlias = Annotated[float, Strict(), AllowInfNan(False)]
 Whole: TypeAlias = Annotated[int, Strict()]
 Flag: TypeAlias = Annotated[bool, Strict()]
-Text: TypeAlias = Annotated[str, Strict()]
+
+
+def _one_line(text: str) -> str:
+    if not text.isprintable():
+        raise PydanticCustomError("not_printable", "has characters that move a terminal's cursor")
+    return text
+
+
+Text: TypeAlias = Annotated[str, Strict(), AfterValidator(_one_line)]
 
 
 @dataclass(frozen=True, slots=True)

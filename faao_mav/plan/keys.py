@@ -3,10 +3,12 @@
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
 from faao_mav.plan.fields import Written, listed
 from faao_mav.plan.sections import PlanFile
 
@@ -47,6 +49,13 @@ def reference() -> Mapping[str, PlanKey]:
     >>> reference()["mission.max_items"].accepted
     'a whole number, 2 to 65535'
     """
+    return _reference(autopilots(), types())
+
+
+@cache
+def _reference(names: tuple[Autopilot, ...], kinds: tuple[Kind, ...]) -> Mapping[str, PlanKey]:
+    """Return the keys where vehicles of these `names` and `kinds` are known."""
+    del names, kinds
     return {key.path: key for key in _below(PlanFile, "")}
 
 

@@ -4,11 +4,12 @@ import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from functools import cache
+from itertools import islice
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from faao_mav.errors import PlanError, quote
+from faao_mav.errors import PlanError, place_of, quote
 from faao_mav.files import read_text
 from faao_mav.plan.checks import problems
 from faao_mav.plan.keys import PlanKey, reference
@@ -29,7 +30,7 @@ def read_plan(path: str | Path, *, method: str | None = None) -> Plan:
     >>> plan.flight.start, plan.flight.duration, plan.radio.modulation
     ((0.0, 350.0), 120.0, 'qpsk')
     """
-    text = read_text(path, 4 * MAX_CHARACTERS, "a plan", PlanError).removeprefix("\ufeff")
+    text = read_text(path, 4 * MAX_CHARACTERS, "a plan", PlanError)
     return parse_plan(text, str(path), method=method)
 
 
@@ -59,19 +60,22 @@ def _adapter() -> TypeAdapter[PlanFile]:
 
 def _describe(error: ValidationError, source: str) -> str:
     """Return one line per finding (at most `_MAX_LINES`), each naming `source`."""
-    lines = list(dict.fromkeys(_lines(error)))
-    more = len(lines) - _MAX_LINES
+    lines = list(dict.fromkeys(islice(_lines(error), _MAX_LINES)))
+    more = error.error_count() - _MAX_LINES
     if more > 0:
-        lines = [*lines[:_MAX_LINES], f"and {more} more"]
+        lines.append(f"and {more} more")
     return "\n".join(f"{source}: {line}" for line in lines)
 
 
 def _lines(error: ValidationError) -> Iterator[str]:
     known = reference()
     for detail in error.errors(include_url=False):
-        # a step in angle brackets is pydantic's choice among several sections
-        steps = [step for step in detail["loc"] if not str(step).startswith("<")]
-        place = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps)
+        # a step in angle brackets in a list is pydantic's choice among several sections
+        steps = [
+            step
+            for before, step in zip((None, *detail["loc"]), detail["loc"], strict=False)
+            if not (isinstance(before, int) and str(step).startswith("<"))
+        ]
         value, kind = detail["input"], detail["type"]
         keys = [step for step in steps if isinstance(step, str)]
         accepted = _accepted(known, *keys)
@@ -87,7 +91,7 @@ def _lines(error: ValidationError) -> Iterator[str]:
             problem = f"{value} is not a finite number; give {accepted}"
         else:
             problem = f"{quote(value)} is not accepted; give {accepted}"
-        yield f"{place.removeprefix('.')}: {problem}"
+        yield f"{place_of(steps)}: {problem}"
 
 
 def _accepted(known: Mapping[str, PlanKey], *keys: str) -> str:

@@ -40,6 +40,7 @@ Duplex: TypeAlias = Literal["full", "half"]
 Method: TypeAlias = Literal["direct", "algorithm1"]
 PrecoderScheme: TypeAlias = Literal["faao", "mmse", "mrt", "zf", "waterfilling"]
 Inputs: TypeAlias = Literal["alphabet", "gaussian"]
+Rate: TypeAlias = Literal["cutoff", "mutual_information"]
 Start: TypeAlias = Literal["straight", "bs", "user", "bs-user", "user-bs"]
 OnFinish: TypeAlias = Literal["rtl", "land", "hover"]
 MissionParameters: TypeAlias = Literal["recommend", "keep"]
@@ -264,6 +265,9 @@ class Optimizer(_Section):
     inputs: Annotated[
         Inputs, key("Inputs that the design is for; what is reported is the alphabet's rate.")
     ] = "alphabet"
+    rate: Annotated[
+        Rate, key("The rate that counts: what every code carries, or what the best come near to.")
+    ] = "cutoff"
     starts: Annotated[
         tuple[Start, ...], key("Routes that the direct method starts from.", min_length=1)
     ] = ("straight", "bs", "user", "bs-user", "user-bs")
@@ -280,7 +284,7 @@ class Optimizer(_Section):
         Whole,
         key(
             "Iterations of Algorithm 1; Newton steps per start of the direct method, which takes "
-            "twice as many at most for a relay's queue with half duplex or a least speed.",
+            "six times as many at most for a queue with a buffer, half duplex or a least speed.",
             ge=1,
             le=10_000,
         ),
@@ -376,7 +380,13 @@ class PlanFile(_Section):
     """What the file of a plan holds."""
 
     name: Annotated[
-        Text, key("Name, for the summary.", "", "text of at most 200 characters", max_length=200)
+        Text,
+        key(
+            "Name, for the summary.",
+            "",
+            "one line of at most 200 printable characters",
+            max_length=200,
+        ),
     ] = ""
     site: Site
     vehicle: VehicleOptions

@@ -17,13 +17,17 @@ from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import MappingNode, Node
 from ruamel.yaml.resolver import VersionedResolver
 
-from faao_mav.errors import PlanError
+from faao_mav.errors import PlanError, shortened
 
-MAX_CHARACTERS = 1_000_000
-"""Characters of the longest plan that is read; chosen: a plan of every key has 3,000."""
+MAX_CHARACTERS = 200_000
+"""Characters of the longest plan that is read; chosen: a plan of every key has 3,000, and the
+slowest text of this length, a list of 100,000 numbers, takes 3 s."""
 
 _MAX_DEPTH = 20
 """Levels of nesting that are read; chosen: a plan has at most six."""
+
+_MAX_PROBLEM = 200
+"""Characters of what a message says of a fault, which may repeat a word of any length; chosen."""
 
 _MAX_WIDTH = 4096
 """Characters of a line at which long values are folded when written; chosen."""
@@ -141,9 +145,10 @@ def load_yaml(text: str, source: str) -> dict[str, Any]:
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         what = "" if isinstance(error, _Refused) else "not valid YAML: "
         advice = "; indent with spaces" if r"'\t'" in (error.problem or "") else ""
-        raise PlanError(f"{source}: {where}{what}{error.problem}{advice}") from None
+        problem = shortened(error.problem or "", _MAX_PROBLEM)
+        raise PlanError(f"{source}: {where}{what}{problem}{advice}") from None
     except YAMLError as error:
-        problem = " ".join(str(error).split())
+        problem = shortened(" ".join(str(error).split()), _MAX_PROBLEM)
         raise PlanError(f"{source}: not valid YAML: {problem}") from None
     except ValueError:  # beyond the digits that Python converts
         raise PlanError(f"{source}: a whole number of thousands of digits") from None

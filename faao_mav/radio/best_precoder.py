@@ -14,15 +14,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses, difference_classes
-from faao_mav.radio.precoder import (
-    _check_positive,
-    _with_power,
-    bpsk_two_antennas,
-    mmse,
-    mrt,
-    waterfilling,
-    zf,
-)
+from faao_mav.radio.precoder import SCHEMES, bpsk_two_antennas, check_positive, with_power
 from faao_mav.radio.precoder_search import search
 from faao_mav.radio.rate import cutoff_rate
 
@@ -34,13 +26,10 @@ _STARTS = 20  # points from which each search starts, about, to reckon its memor
 class BestPrecoders:
     """Precoders of highest cutoff rate and, when asked for, that rate.
 
-    Attributes:
-        P: (..., N_t, N_t), tr(P^H P) = W.
-        exact: whether P is the global optimum, by a closed form; otherwise P is the best of the
-            local optima that the search reached.
-        draws: (..., S, N_r, N_t), the channels that each P serves.
-        classes: the differences of the alphabet.
-        noise: σ², W.
+    `P` (..., N_t, N_t) has tr(P^H P) = W. `exact` says whether it is the global optimum, by a
+    closed form; otherwise it is the best of the local optima that the search reached. `draws`
+    (..., S, N_r, N_t) are the channels that each P serves, `classes` the differences of the
+    alphabet, `noise` is σ², W.
     """
 
     P: Complex
@@ -69,8 +58,8 @@ def _checked(
     H: RealOrComplex, axes: int, power: float, noise: float, start: RealOrComplex | None
 ) -> Complex:
     """Return H (..., N_r, N_t) as complex numbers; the errors are those of ``best_precoders``."""
-    _check_positive("transmit power", power)
-    _check_positive("noise power", noise)
+    check_positive("transmit power", power)
+    check_positive("noise power", noise)
     H = np.asarray(H, dtype=np.complex128)
     if H.ndim < axes or 0 in H.shape[-axes:] or not np.all(np.isfinite(H)):
         raise InputError(f"channels must be finite with at least {axes} axes, got {H.shape}")
@@ -81,10 +70,9 @@ def _checked(
 
 
 def _known(H: Complex, power: float, noise: float) -> Complex:
-    """Return the identity and the classical schemes, (5, b, N_t, N_t), for H (b, N_r, N_t)."""
-    identity = np.broadcast_to(np.eye(H.shape[-1]), (*H.shape[:-2], H.shape[-1], H.shape[-1]))
-    schemes = (mrt(H, power), zf(H, power), mmse(H, power, noise), waterfilling(H, power, noise))
-    return np.stack([identity, *schemes])
+    """Return the identity and the classical schemes, (k, b, N_t, N_t), for H (b, N_r, N_t)."""
+    schemes = [scheme(H, power, noise) for scheme in SCHEMES.values()]
+    return np.stack([np.broadcast_to(np.eye(H.shape[-1]), schemes[0].shape), *schemes])
 
 
 def best_precoders(
@@ -111,9 +99,6 @@ def best_precoders(
             W.
         tolerance: largest gain of a further step, as the relative change of W with the same gain.
 
-    Returns:
-        The precoders, their rates and whether they are known to be optimal.
-
     Raises:
         InputError: W or σ² is not above 0, H or the start is not finite or has the wrong shape, or
             the modulation is unknown.
@@ -138,21 +123,8 @@ def best_mean_precoders(
     """Return one precoder per group of draws, max over P of mean_s R_0(H_s, P), (7) or (8).
 
     This is the best precoder for a transmitter that knows the statistics of the fading and not the
-    draw (statistical CSI).
-
-    Args:
-        H_draws: (..., S, N_r, N_t), S draws of each channel.
-        power: W, W.
-        modulation: the alphabet, one of ``MODULATIONS``.
-        noise: σ², W.
-        start: (..., N_t, N_t), as in ``best_precoders``.
-        tolerance: as in ``best_precoders``.
-
-    Returns:
-        The precoders, (..., N_t, N_t), and their mean rates.
-
-    Raises:
-        InputError: as in ``best_precoders``.
+    draw (statistical CSI). `H_draws` (..., S, N_r, N_t) are S draws of each channel; the other
+    arguments and the errors are those of ``best_precoders``.
 
     >>> draws = np.array([[[2.0, 1.0], [1.0, 1.0]], [[2.0, -1.0], [1.0, 1.0]]])
     >>> best_mean_precoders(draws, 2.0, "qpsk", 1.0).P.shape
@@ -176,5 +148,5 @@ def best_mean_precoders(
             known = None if given is not None else _known(mean[part], power, noise)
             begin = None if given is None else given[part]
             P[part] = search(A[part], classes, tolerance, begin, known)
-    P = _with_power(P, power)
+    P = with_power(P, power)
     return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)

@@ -10,16 +10,10 @@ from faao_mav.errors import InputError
 
 
 def path_gain(w: Real, p: Real, altitude: float, rho_0: float) -> Real:
-    """Return the power gain rho_0 d^-2 of (1) and (2), d² = ||w - p||² + H².
+    """Return the power gain rho_0 d^-2 of (1) and (2), d² = ||w - p||² + H², linear, (...).
 
-    Args:
-        w: (..., 2) horizontal positions of the UAV, m.
-        p: (..., 2) position of the station on the ground, m.
-        altitude: H, m above the station.
-        rho_0: gain at 1 m, linear.
-
-    Returns:
-        (...) linear gains.
+    `w` (..., 2) are horizontal positions of the UAV and `p` (..., 2) that of the station on the
+    ground, m; `altitude` is H, m above the station, `rho_0` the gain at 1 m, linear.
 
     >>> path_gain(np.array([30.0, 0.0]), np.array([0.0, 0.0]), 40.0, 1e-5)
     np.float64(4e-09)
@@ -31,21 +25,14 @@ def path_gain(w: Real, p: Real, altitude: float, rho_0: float) -> Real:
 def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
     """Return H^LoS of uniform linear arrays half a wavelength apart, both lying along east.
 
-    Entry (l, m) is exp(-jπ (l - m) u): moving the receiving element east along the wave lengthens
-    its way, moving the transmitting one shortens it. u is the east component of the unit vector
-    along the wave. The phase common to all entries, 2π d/λ, changes no rate and is left out.
+    Entry (l, m) of the result, (..., receive, transmit) and of rank one, is exp(-jπ (l - m) u):
+    moving the receiving element east along the wave lengthens its way, moving the transmitting one
+    shortens it. u is the east component of the unit vector along the wave. The phase common to all
+    entries, 2π d/λ, changes no rate and is left out.
 
-    Args:
-        path: (..., 3) vector east, north, up from transmitter to receiver, in any unit and far
-            longer than the arrays: [w - p_B, H] for BS to UAV, [p_U - w, -H] for UAV to GU.
-        receive: number of receiving antennas.
-        transmit: number of transmitting antennas.
-
-    Returns:
-        (..., receive, transmit), unit modulus, rank one.
-
-    Raises:
-        InputError: a path has no length.
+    `path` (..., 3) is the vector east, north, up from transmitter to receiver, in any unit and far
+    longer than the arrays: [w - p_B, H] for BS to UAV, [p_U - w, -H] for UAV to GU. `receive` and
+    `transmit` are numbers of antennas. Raises `InputError` for a path without a length.
 
     >>> np.round(line_of_sight_ula(np.array([1.0, 0.0, 0.0]), 2, 2), 12).real
     array([[ 1., -1.],
@@ -71,13 +58,7 @@ def line_of_sight_all_ones(receive: int, transmit: int) -> Complex:
 
 
 def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) -> Complex:
-    """Return draws of H^NLoS with independent CN(0, 1) entries, (slots, receive, transmit).
-
-    Args:
-        rng: source of the draws.
-        slots: number of draws.
-        receive: number of receiving antennas.
-        transmit: number of transmitting antennas.
+    """Return draws from `rng` of H^NLoS, (slots, receive, transmit), independent CN(0, 1) each.
 
     >>> rayleigh(np.random.default_rng(1), 3, 2, 4).shape
     (3, 2, 4)
@@ -88,16 +69,10 @@ def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) 
 
 
 def balanced_rayleigh(rng: np.random.Generator, draws: int, receive: int, transmit: int) -> Complex:
-    """Return a few draws of H^NLoS that represent CN(0, 1), (draws, receive, transmit).
+    """Return a few draws of H^NLoS from `rng` that represent CN(0, 1), (draws, receive, transmit).
 
     Every draw comes with its rotations by j, -1 and -j, and all are scaled to unit mean power: the
     sample mean 0 and the sample mean square 1 are exact. Fewer than four draws are only scaled.
-
-    Args:
-        rng: source of the draws.
-        draws: number of draws.
-        receive: number of receiving antennas.
-        transmit: number of transmitting antennas.
 
     >>> G = balanced_rayleigh(np.random.default_rng(1), 8, 2, 2)
     >>> bool(np.abs(G.mean(axis=0)).max() < 1e-15), float(np.mean(np.abs(G) ** 2).round(12))
@@ -110,18 +85,11 @@ def balanced_rayleigh(rng: np.random.Generator, draws: int, receive: int, transm
 
 
 def rician(los: RealOrComplex, nlos: RealOrComplex, K: float) -> Complex:
-    """Return √(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS, the bracket of (1) and (2).
+    """Return √(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS, the bracket of (1) and (2), (..., N_r, N_t).
 
-    Args:
-        los: (..., N_r, N_t) line-of-sight part.
-        nlos: (..., N_r, N_t) scattered part; the leading axes broadcast.
-        K: Rician factor, linear, at least 0; infinity gives the line of sight alone.
-
-    Returns:
-        (..., N_r, N_t) fading of unit mean power per entry.
-
-    Raises:
-        InputError: K is negative or not a number.
+    `los` and `nlos` (..., N_r, N_t) are the line-of-sight and the scattered part, whose leading
+    axes broadcast; both of unit mean power per entry, as is the result. `K` is the Rician factor,
+    linear; infinity gives the line of sight alone. Raises `InputError` for a K below 0 or NaN.
 
     >>> rician(np.ones((1, 1)), np.zeros((1, 1)), 3.0).round(6)
     array([[0.866025]])

@@ -65,10 +65,8 @@ def _product(values: Complex, antennas: int) -> Complex:
 def constellation(modulation: str) -> Complex:
     """Return the symbols of an alphabet, (rho,) complex, mean energy 1; read-only.
 
-    BPSK is ±1, QPSK (±1 ± j)/√2, 8-PSK the eighth roots of 1, 16- and 64-QAM square.
-
-    Raises:
-        InputError: the modulation is not one of ``MODULATIONS``.
+    BPSK is ±1, QPSK (±1 ± j)/√2, 8-PSK the eighth roots of 1, 16- and 64-QAM square. Raises
+    `InputError` for a modulation that is not one of ``MODULATIONS``.
 
     >>> constellation("bpsk").real
     array([ 1., -1.])
@@ -83,8 +81,7 @@ def constellation(modulation: str) -> Complex:
 def symbol_vectors(modulation: str, antennas: int) -> Complex:
     """Return all input vectors x of (3), (rho**N, N) complex with E[x x^H] = I; read-only.
 
-    Raises:
-        InputError: unknown modulation, or fewer than one antenna.
+    Raises `InputError` for an unknown modulation or fewer than one antenna.
 
     >>> symbol_vectors("bpsk", 2).real.tolist()
     [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]
@@ -102,11 +99,9 @@ class DifferenceClasses:
     ||H P u|| is the same for u and e^{jφ} u whatever H and P are, so a sum over all rho^{2N} pairs
     (m, k) is a sum over these classes weighted by ``multiplicity``, plus ``symbols`` pairs m = k.
 
-    Attributes:
-        vectors: (k, N) complex, one representative u of each class.
-        multiplicity: (k,) how many ordered pairs (m, k) lie in each class.
-        symbols: rho**N, the number of input vectors; also the size of the zero class.
-        bits: N log2(rho), what one channel use carries at most.
+    `vectors` (k, N) has one representative u of each class, `multiplicity` (k,) how many ordered
+    pairs (m, k) lie in it. `symbols` is rho**N, the number of input vectors and the size of the
+    zero class; `bits` is N log2(rho), what one channel use carries at most.
     """
 
     vectors: Complex
@@ -131,10 +126,8 @@ def _scalar_differences(grid: Complex) -> tuple[Complex, Real]:
 def difference_vector_count(modulation: str, antennas: int) -> int:
     """Return how many distinct difference vectors ``difference_classes`` has to go through.
 
-    Its time and memory are proportional to this number, which is known without allocating.
-
-    Raises:
-        InputError: unknown modulation, or fewer than one antenna.
+    Its time and memory are proportional to this number, which is known without allocating. Raises
+    `InputError` for an unknown modulation or fewer than one antenna.
 
     >>> difference_vector_count("64qam", 2), difference_vector_count("64qam", 4)
     (50625, 2562890625)
@@ -146,14 +139,12 @@ def difference_vector_count(modulation: str, antennas: int) -> int:
 
 @lru_cache(maxsize=16)
 def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
-    """Merge the differences of all pairs of input vectors into classes.
+    """Return the differences of all pairs of input vectors, merged into classes.
 
     Two vectors differ by a unit phase exactly if u u^H is the same, so the entries of u u^H,
     exact on the integer grids and rounded for 8-PSK, identify a class. Pairs are never enumerated:
-    the distinct differences of single symbols are counted and combined over the antennas.
-
-    Raises:
-        InputError: unknown modulation, or fewer than one antenna.
+    the distinct differences of single symbols are counted and combined over the antennas. Raises
+    `InputError` for an unknown modulation or fewer than one antenna.
 
     >>> classes = difference_classes("bpsk", 2)
     >>> classes.multiplicity.tolist(), classes.symbols, classes.bits

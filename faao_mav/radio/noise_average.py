@@ -28,19 +28,13 @@ smallest P_2 figures over 2^5 to 2^10 points in 3 to 9 dimensions."""
 
 
 def normal_grid(dimensions: int, spacing: float) -> tuple[Real, Real]:
-    """Return nodes and weights of the trapezoidal rule for the mean under N(0, I).
+    """Return nodes (g, dimensions) and weights (g,) of the trapezoidal rule for N(0, I) means.
 
     On the whole line the trapezoidal rule converges exponentially for functions analytic in a
-    strip, as the logarithm of a sum of exponentials is, and needs no more nodes than
-    Gauss-Hermite: Trefethen and Weideman, "The exponentially convergent trapezoidal rule",
-    SIAM Review 56 (2014).
-
-    Args:
-        dimensions: 1 or more; nodes lie in a ball of 6.5 standard deviations.
-        spacing: distance of neighbouring nodes, in standard deviations.
-
-    Returns:
-        Nodes (g, dimensions) and weights (g,) that sum to 1.
+    strip, as the logarithm of a sum of exponentials is, and needs no more nodes than Gauss-Hermite:
+    Trefethen and Weideman, "The exponentially convergent trapezoidal rule", SIAM Review 56 (2014).
+    Neighbouring nodes are `spacing` standard deviations apart, all lie in a ball of 6.5; the
+    weights sum to 1.
 
     >>> z, weight = normal_grid(1, 0.5)
     >>> abs(float(weight @ z[:, 0] ** 2) - 1.0) < 1e-8
@@ -59,11 +53,9 @@ def normal_grid(dimensions: int, spacing: float) -> tuple[Real, Real]:
 def lattice(points: int, dimensions: int, *, refine: bool = False) -> Real:
     """Return a rank-1 lattice in the unit cube, (points, dimensions).
 
-    Args:
-        points: how many, a power of two up to 2^19.
-        dimensions: how many coordinates; the first alone is evenly spaced in order.
-        refine: return the points that, together with ``lattice(points, dimensions)``, make up
-            ``lattice(2 * points, dimensions)``.
+    `points` is a power of two up to 2^19. The first coordinate alone is evenly spaced in order.
+    With `refine` it is the points that, together with ``lattice(points, dimensions)``, make up
+    ``lattice(2 * points, dimensions)``.
 
     >>> lattice(4, 1).ravel().tolist(), lattice(2, 1, refine=True).ravel().tolist()
     ([0.0, 0.25, 0.5, 0.75], [0.25, 0.75])
@@ -75,13 +67,9 @@ def lattice(points: int, dimensions: int, *, refine: bool = False) -> Real:
 
 
 def normal_from_uniform(uniform: Real) -> Real:
-    """Map pairs of uniform coordinates to pairs of normal ones (Box and Muller).
+    """Return normal coordinates of uniform ones in [0, 1), (..., 2 k) each (Box and Muller).
 
-    Args:
-        uniform: (..., 2 k) in [0, 1).
-
-    Returns:
-        (..., 2 k), the first k from cosines, the others from sines.
+    The first k are from cosines, the others from sines.
 
     >>> normal_from_uniform(np.array([0.5, 0.25])).round(6)
     array([0.     , 1.17741])
@@ -92,11 +80,14 @@ def normal_from_uniform(uniform: Real) -> Real:
     return np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def _log_ratio(points: Real, maps: Real, sent: Integers, z: Real) -> Real:
+def log_ratio(
+    points: Real, maps: Real, sent: Integers, z: Real, estimates: Real | None = None
+) -> Real:
     """Compute ln Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z, for every slot and noise.
 
     ``points`` (M, D) and ``maps`` (n, D, d) make s, ``sent`` (n, q) says m, ``z`` is (n, q, d);
     the result is (n, q). With ||y - s_k||² expanded, all sums over k are one product of matrices.
+    ``estimates`` (n, q, D), where given, is filled with the means of the points given y.
     """
     result = np.empty(sent.shape)
     # Long rows of noises keep the inner loops long; the rest of the room goes to slots.
@@ -116,21 +107,20 @@ def _log_ratio(points: Real, maps: Real, sent: Integers, z: Real) -> Real:
             logs -= largest[:, None]
             np.exp(logs, out=logs)
             own = np.sum((y - 0.5 * s) * s, axis=-1)
-            result[slots, part] = np.log(logs.sum(axis=1)) + largest - own
+            total = logs.sum(axis=1)
+            result[slots, part] = np.log(total) + largest - own
+            if estimates is not None:
+                estimates[slots, part] = (logs.mT @ points) / total[..., None]
     return result
 
 
 def by_quadrature(maps: Real, inputs: RealInputs, tolerance: float) -> tuple[Real, Real]:
     """Return (5) or (6) by the trapezoidal rule over the noise, on ever finer grids.
 
-    Args:
-        maps: (n, D, d) from ``real_channel``, columns that matter only.
-        inputs: from ``real_inputs``.
-        tolerance: change at which a slot is settled, bits.
-
-    Returns:
-        Values and errors (n,), bits. The error is the last change, or a quarter of the one before
-        if that is more, since one small change may be chance.
+    `maps` (n, D, d) are those of ``real_channel``, columns that matter only, `inputs` those of
+    ``real_inputs``; a slot is settled where it changes by no more than `tolerance`, bits. The
+    values and errors (n,) are bits. The error is the last change, or a quarter of the one before if
+    that is more, since one small change may be chance.
 
     >>> from faao_mav.radio.real_channel import real_inputs
     >>> inputs = real_inputs("bpsk", 1)
@@ -150,7 +140,7 @@ def by_quadrature(maps: Real, inputs: RealInputs, tolerance: float) -> tuple[Rea
         for start in range(0, len(active), step):
             slots = active[start : start + step]
             size = (len(slots), *z.shape[1:])
-            logs = _log_ratio(
+            logs = log_ratio(
                 inputs.points,
                 maps[slots],
                 np.broadcast_to(sent, size[:2]),
@@ -212,10 +202,10 @@ def by_lattice(
         z = normal_from_uniform(u[..., antennas:])[..., :d]
         sent = np.concatenate([sent, sent], axis=-1).reshape(len(slots), -1)
         z = np.concatenate([z, -z], axis=-2).reshape(len(slots), -1, d)
-        logs = _log_ratio(inputs.points, maps[slots], sent, z)
+        logs = log_ratio(inputs.points, maps[slots], sent, z)
         if rare:
             logs *= _mixture_weight(z)
-            wide = _log_ratio(inputs.points, maps[slots], sent, _WIDE * z)
+            wide = log_ratio(inputs.points, maps[slots], sent, _WIDE * z)
             logs = 0.5 * (logs + wide * _mixture_weight(_WIDE * z))
         mean: Real = logs.reshape(len(slots), _SHIFTS, -1).mean(axis=-1)
         return mean

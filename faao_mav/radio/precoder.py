@@ -26,14 +26,15 @@ _RANK = 1e-10
 the 1e-16 of the arithmetic, far below any mode that could carry power."""
 
 
-def _check_positive(name: str, value: float) -> None:
+def check_positive(name: str, value: float) -> None:
+    """Raise `InputError`, which names the quantity, for a `value` not above 0."""
     if not value > 0.0:
         raise InputError(f"the {name} must be above 0, got {value}")
 
 
-def _with_power(P: Complex, power: float) -> Complex:
-    """Scale each (N_t, N_t) matrix to tr(P^H P) = power, zero matrices becoming the identity."""
-    _check_positive("transmit power", power)
+def with_power(P: Complex, power: float) -> Complex:
+    """Return P scaled to tr(P^H P) = power, W, zero matrices as a scaled identity."""
+    check_positive("transmit power", power)
     largest = np.max(np.abs(P), axis=(-2, -1), keepdims=True)
     # Divided by its largest entry first, no P is too small or too large to be squared.
     P = np.where(largest > 0.0, P / np.where(largest > 0.0, largest, 1.0), np.eye(P.shape[-1]))
@@ -55,21 +56,14 @@ def _from_gains(U: Complex, gains: Real, Vh: Complex, power: float) -> Complex:
     V = Vh.conj().mT
     P = (V * gains[..., None, :]) @ U.conj().mT
     missing = P.shape[-2] - P.shape[-1]
-    return _with_power(np.pad(P, [(0, 0)] * (P.ndim - 1) + [(0, missing)]), power)
+    return with_power(np.pad(P, [(0, 0)] * (P.ndim - 1) + [(0, missing)]), power)
 
 
 def mrt(H: RealOrComplex, power: float) -> Complex:
-    """Return the precoder of maximum-ratio transmission, P ∝ H^H.
+    """Return the precoder of maximum-ratio transmission, P ∝ H^H, (..., N_t, N_t).
 
-    Args:
-        H: (..., N_r, N_t) channels.
-        power: W, W.
-
-    Returns:
-        (..., N_t, N_t), tr(P^H P) = W; for N_r ≠ N_t see the module.
-
-    Raises:
-        InputError: the power is not above 0.
+    `H` (..., N_r, N_t) are channels (N_r ≠ N_t: see the module), `power` is W, W. Raises
+    `InputError` for a power not above 0.
 
     >>> mrt(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0).real.round(12)
     array([[3., 0.],
@@ -82,17 +76,9 @@ def mrt(H: RealOrComplex, power: float) -> Complex:
 def zf(H: RealOrComplex, power: float) -> Complex:
     """Return the zero-forcing precoder, P ∝ H^+, the pseudo-inverse: H P is diagonal.
 
-    Directions in which H is zero to within rounding are left out.
-
-    Args:
-        H: (..., N_r, N_t) channels.
-        power: W, W.
-
-    Returns:
-        (..., N_t, N_t), tr(P^H P) = W; for N_r ≠ N_t see the module.
-
-    Raises:
-        InputError: the power is not above 0.
+    The result is (..., N_t, N_t). Directions in which H is zero to within rounding are left out.
+    `H` (..., N_r, N_t) are channels (N_r ≠ N_t: see the module), `power` is W, W. Raises
+    `InputError` for a power not above 0.
 
     >>> zf(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0).real.round(12)
     array([[4., 0.],
@@ -108,26 +94,19 @@ def mmse(H: RealOrComplex, power: float, noise: float) -> Complex:
     """Return the regularised zero-forcing (MMSE) precoder, P ∝ H^H (H H^H + (N_r σ²/W) I)^-1.
 
     It tends to zero forcing as the noise vanishes and to maximum ratio as it takes over. Source:
-    Peel, Hochwald and Swindlehurst, "A vector-perturbation technique for near-capacity
-    multiantenna multiuser communication, part I", IEEE Trans. Commun. 53 (2005).
+    Peel, Hochwald and Swindlehurst, "A vector-perturbation technique for near-capacity multiantenna
+    multiuser communication, part I", IEEE Trans. Commun. 53 (2005).
 
-    Args:
-        H: (..., N_r, N_t) channels.
-        power: W, W.
-        noise: σ², W.
-
-    Returns:
-        (..., N_t, N_t), tr(P^H P) = W; for N_r ≠ N_t see the module (N_r is then min(N_r, N_t)).
-
-    Raises:
-        InputError: the power or the noise is not above 0.
+    `H` (..., N_r, N_t) are channels (N_r ≠ N_t: see the module; N_r is then min(N_r, N_t)), `power`
+    is W and `noise` σ², W; the result is (..., N_t, N_t). Raises `InputError` for a power or a
+    noise not above 0.
 
     >>> mmse(np.array([[1.0, 0.0], [0.0, 3.0]]), 2.0, 3.0).real.round(12)
     array([[1., 0.],
            [0., 1.]])
     """
-    _check_positive("transmit power", power)
-    _check_positive("noise power", noise)
+    check_positive("transmit power", power)
+    check_positive("noise power", noise)
     U, s, Vh = _svd(H)
     return _from_gains(U, s / (s**2 + s.shape[-1] * noise / power), Vh, power)
 
@@ -135,25 +114,16 @@ def mmse(H: RealOrComplex, power: float, noise: float) -> Complex:
 def waterfilling(H: RealOrComplex, power: float, noise: float) -> Complex:
     """Return the optimal precoder for Gaussian inputs, P = V diag(√p) with H = U S V^H.
 
-    p_i = max(0, μ - σ²/s_i²), the water level μ such that Σ p_i = W.
-
-    Args:
-        H: (..., N_r, N_t) channels.
-        power: W, W.
-        noise: σ², W.
-
-    Returns:
-        (..., N_t, N_t), tr(P^H P) = W.
-
-    Raises:
-        InputError: the power or the noise is not above 0.
+    p_i = max(0, μ - σ²/s_i²), the water level μ such that Σ p_i = W. `H` (..., N_r, N_t) are
+    channels, `power` is W and `noise` σ², W; the result is (..., N_t, N_t). Raises `InputError` for
+    a power or a noise not above 0.
 
     >>> waterfilling(np.diag([1.0, 0.5]), 5.0, 1.0).real.round(12) ** 2
     array([[4., 0.],
            [0., 1.]])
     """
-    _check_positive("transmit power", power)
-    _check_positive("noise power", noise)
+    check_positive("transmit power", power)
+    check_positive("noise power", noise)
     _, s, Vh = np.linalg.svd(np.asarray(H, dtype=np.complex128), full_matrices=True)
     # Floors come lowest first. With the first r in use the level is (W + their sum) / r, and the
     # right r is the last whose highest floor lies below its level. The floor of a dead mode is
@@ -166,25 +136,18 @@ def waterfilling(H: RealOrComplex, power: float, noise: float) -> Complex:
         p = np.where(active, np.take_along_axis(level, r - 1, axis=-1) - floor, 0.0)
     p = np.pad(p, [(0, 0)] * (p.ndim - 1) + [(0, Vh.shape[-1] - p.shape[-1])])
     V = Vh.conj().mT
-    return _with_power(V * np.sqrt(p)[..., None, :], power)
+    return with_power(V * np.sqrt(p)[..., None, :], power)
 
 
 def bpsk_two_antennas(H: RealOrComplex, power: float) -> Complex:
-    """Return the precoder of highest cutoff rate for BPSK on two antennas.
+    """Return the precoder of highest cutoff rate for BPSK on two antennas, (..., 2, 2).
 
     P = √(W/2) v_1 [1, j]: both streams in quadrature on v_1, the dominant right singular vector
     of H. It reaches R_0 = 2 (1 - log2(1 + e^-x)), x = W λ_1² / (2 σ²), λ_1 the largest singular
     value of H. Source: derived for this project; no numerical search has found a better one.
 
-    Args:
-        H: (..., N_r, 2) channels.
-        power: W, W.
-
-    Returns:
-        (..., 2, 2), tr(P^H P) = W.
-
-    Raises:
-        InputError: N_t is not 2, or the power is not above 0.
+    `H` (..., N_r, 2) are channels, `power` is W, W. Raises `InputError` for other than two
+    transmitting antennas or a power not above 0.
 
     >>> np.abs(bpsk_two_antennas(np.diag([1.0, 2.0]), 2.0)).round(12)
     array([[0., 0.],
@@ -194,15 +157,16 @@ def bpsk_two_antennas(H: RealOrComplex, power: float) -> Complex:
         raise InputError(f"this optimum is for two transmitting antennas, not {np.shape(H)[-1]}")
     _, _, Vh = np.linalg.svd(np.asarray(H, dtype=np.complex128), full_matrices=False)
     v = np.conj(Vh[..., 0, :])
-    return _with_power(v[..., :, None] * np.array([1.0, 1j]), power)
+    return with_power(v[..., :, None] * np.array([1.0, 1j]), power)
 
 
 SCHEMES: Mapping[str, Scheme] = MappingProxyType(
     {
-        "mmse": mmse,
         "mrt": lambda H, power, noise: mrt(H, power),  # noqa: ARG005
         "zf": lambda H, power, noise: zf(H, power),  # noqa: ARG005
+        "mmse": mmse,
         "waterfilling": waterfilling,
     }
 )
-"""The classical schemes by name, each called with (H, power, noise)."""
+"""The classical schemes by name, each called with (H, power, noise); also where the search for the
+best precoder compares its result."""

@@ -30,10 +30,7 @@ _SATURATED = -36.0
 class Objective:
     """F at b points, with its derivatives by the m = 2 q N real coordinates [Re Q, Im Q].
 
-    Attributes:
-        value: (b,) F.
-        gradient: (b, m) ∂F.
-        hessian: (b, m, m) ∂²F.
+    `value` (b,) is F, `gradient` (b, m) ∂F and `hessian` (b, m, m) ∂²F.
     """
 
     value: Real
@@ -196,10 +193,8 @@ def value(sums: ClassSum, G: Complex, Q: Complex) -> Real:
 def evaluate(sums: ClassSum, G: Complex, Q: Complex) -> Objective:
     """Return F and its first and second derivatives by the real coordinates of Q.
 
-    Args:
-        sums: the classes of the alphabet.
-        G: (b, S, q, q) Hermitian, H^H H / (4 σ²) of each draw.
-        Q: (b, q, N) precoders.
+    `sums` are the classes of the alphabet, `G` (b, S, q, q), Hermitian, is H^H H / (4 σ²) of each
+    draw, `Q` (b, q, N) are precoders.
 
     >>> from faao_mav.radio.constellation import difference_classes
     >>> sums = ClassSum(difference_classes("bpsk", 1))

@@ -55,10 +55,8 @@ _LONGEST = 0.7  # longest step, radians on the sphere ||Q||_F = 1
 def _starts(gains: Real, antennas: int, random: int) -> Complex:
     """Return points to start from in the basis of the modes, (starts, b, q, N).
 
-    Args:
-        gains: (b, q) singular values, largest first.
-        antennas: N.
-        random: how many random points to add, the same for every call.
+    `gains` (b, q) are singular values, largest first; `random` points, the same for every call, are
+    added.
     """
     b, q = gains.shape
     stream = np.arange(antennas)
@@ -186,12 +184,9 @@ def search(
 ) -> Complex:
     """Return P (b, N_t, N_t), of any power, that maximises the mean cutoff rate over the draws.
 
-    Args:
-        A: (b, S, N_r, N_t), H √W / (2 σ).
-        classes: the differences of the alphabet.
-        tolerance: relative power at which to stop, see ``minimise``.
-        start: (b, N_t, N_t), the only start if given.
-        known: (k, b, N_t, N_t), further precoders; the result is not worse than any of them.
+    `A` (b, S, N_r, N_t) is H √W / (2 σ), `classes` are the differences of the alphabet, `tolerance`
+    is that of ``minimise``. `start` (b, N_t, N_t) is the only start if given; the result is not
+    worse than any of the precoders `known` (k, b, N_t, N_t).
 
     >>> from faao_mav.radio.constellation import difference_classes
     >>> H = np.diag([1.0, 2.0])[None, None] + 0j
@@ -247,19 +242,12 @@ def _step(x: Real, at: Objective, damping: Real) -> tuple[Real, Real, Real]:
 def minimise(
     sums: ClassSum, G: Complex, Q: Complex, tolerance: float | Real
 ) -> tuple[Complex, Real]:
-    """Minimise F over ||Q||_F = 1 by damped Newton steps from each of the given points.
+    """Return Q (b, q, N) and F (b,) where damped Newton steps over ||Q||_F = 1 lead; F never rises.
 
     A point is done once the fall of F that the next step predicts is below that of raising the
-    transmit power by the share ``tolerance``: a measure that means the same at any SNR.
-
-    Args:
-        sums: the classes of the alphabet.
-        G: (b, S, q, q) Hermitian, H^H H / (4 σ²) of each draw.
-        Q: (b, q, N), ||Q||_F = 1.
-        tolerance: relative power, (b,) or one for all.
-
-    Returns:
-        Q (b, q, N) and F (b,), never above the F of the start.
+    transmit power by the share `tolerance`, (b,) or one for all: a measure that means the same at
+    any SNR. `sums` are the classes of the alphabet, `G` (b, S, q, q), Hermitian, is H^H H / (4 σ²)
+    of each draw, `Q` (b, q, N) the start.
 
     >>> from faao_mav.radio.constellation import difference_classes
     >>> G = np.diag([1.0, 4.0])[None, None] + 0j

@@ -6,7 +6,7 @@ from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses
 
-_CHUNK = 2_000_000  # complex numbers held at once: 32 MB. Chosen
+_CHUNK = 2_000_000  # exponents held at once: 16 MB. Chosen
 
 
 def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:
@@ -17,25 +17,19 @@ def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:
 
 
 def _squared_norms(A: Complex, u: RealOrComplex) -> Real:
-    received = A @ u.T
-    norms: Real = np.sum(received.real**2 + received.imag**2, axis=-2)
-    return norms
+    """Return ||A u||² = u^H (A^H A) u, (..., k): two real products of matrices for all channels."""
+    gram = (A.conj().mT @ A).reshape(*A.shape[:-2], -1)
+    outer = (u.conj()[:, :, None] * u[:, None, :]).reshape(len(u), -1).T
+    norms: Real = gram.real @ outer.real - gram.imag @ outer.imag
+    return np.maximum(norms, 0.0, out=norms)
 
 
 def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float) -> Real:
-    """Return the exponents D = ||H P u||² / (4 σ²) of (7) and (8).
+    """Return the exponents D = ||H P u||² / (4 σ²) of (7) and (8), (..., k), never negative.
 
-    Args:
-        H: (..., N_r, N_t) channels.
-        P: (..., N_t, N_t) precoders; the leading axes of H and P broadcast.
-        u: (k, N_t) differences of input vectors, ``DifferenceClasses.vectors``.
-        noise: σ², W.
-
-    Returns:
-        (..., k), never negative.
-
-    Raises:
-        InputError: the noise is not above 0.
+    `H` (..., N_r, N_t) are channels and `P` (..., N_t, N_t) precoders, whose leading axes
+    broadcast; `u` (k, N_t) are differences of input vectors, ``DifferenceClasses.vectors``; `noise`
+    is σ², W. Raises `InputError` for a noise not above 0.
 
     >>> exponents(np.eye(1), np.eye(1), np.array([[2.0 + 0j]]), 0.5)
     array([2.])
@@ -46,24 +40,16 @@ def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float
 def cutoff_rate(
     H: RealOrComplex, P: RealOrComplex, classes: DifferenceClasses, noise: float
 ) -> Real:
-    """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz.
+    """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz, (...) from 0 to ``classes.bits``.
 
     R_0 = 2 N log2(rho) - log2 Σ_m Σ_k exp(-||H P u_mk||² / (4 σ²)), the double sum taken over the
     classes. In terms of the class probabilities it is -log2(1 + Σ weight (e^-D - 1)), exact where
     the rate is small, and N log2(rho) - log2(1 + Σ multiplicity e^-D / rho^N), exact where it is
     nearly N log2(rho); each is used on its side.
 
-    Args:
-        H: (..., N_r, N_t) channels.
-        P: (..., N_t, N_t) precoders; the leading axes of H and P broadcast.
-        classes: the differences of the alphabet on N_t antennas.
-        noise: σ², W.
-
-    Returns:
-        (...) between 0 and ``classes.bits``.
-
-    Raises:
-        InputError: the noise is not above 0.
+    `H` (..., N_r, N_t) are channels and `P` (..., N_t, N_t) precoders, whose leading axes
+    broadcast; `classes` are the differences of the alphabet on N_t antennas; `noise` is σ², W.
+    Raises `InputError` for a noise not above 0.
 
     >>> from faao_mav.radio.constellation import difference_classes
     >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))
@@ -72,7 +58,7 @@ def cutoff_rate(
     A = _received(H, P, noise)
     shape, flat = A.shape[:-2], A.reshape(-1, *A.shape[-2:])
     rate = np.empty(len(flat))
-    step = max(1, _CHUNK // (len(classes.vectors) * A.shape[-2]))
+    step = max(1, _CHUNK // len(classes.vectors))
     for start in range(0, len(flat), step):
         part = slice(start, start + step)
         D = _squared_norms(flat[part], classes.vectors)

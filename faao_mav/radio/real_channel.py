@@ -18,15 +18,12 @@ _MAX_INPUTS = 1 << 16
 
 @dataclass(frozen=True, eq=False)
 class RealInputs:
-    """The input vectors as real vectors, and those over which it is enough to average.
+    """The M input vectors as real vectors, and those over which it is enough to average.
 
-    Attributes:
-        points: (M, D), all M input vectors in D real coordinates.
-        sent: (r,), rows of ``points`` to average over; the others contribute the same by symmetry.
-        choices: how many symbols of each antenna occur in ``sent``, the last antenna running
-            fastest; their product is r.
-        variance: mean square of each real coordinate.
-        bits: log2 M, bit per channel use.
+    `points` (M, D) are all of them in D real coordinates. `sent` (r,) are the rows of ``points`` to
+    average over; the others contribute the same by symmetry. `choices` says how many symbols of
+    each antenna occur in ``sent``, the last antenna running fastest; their product is r. `variance`
+    is the mean square of each real coordinate, `bits` log2 M, bit per channel use.
     """
 
     points: Real
@@ -39,8 +36,7 @@ class RealInputs:
 def real_inputs(modulation: str, antennas: int) -> RealInputs:
     """Return the input vectors x of (3) in real coordinates, [x] for BPSK and [Re x, Im x] else.
 
-    Raises:
-        InputError: unknown modulation, or more than 65,536 input vectors.
+    Raises `InputError` for an unknown modulation or more than 65,536 input vectors.
 
     >>> inputs = real_inputs("qpsk", 1)
     >>> inputs.points.shape, inputs.sent.tolist(), inputs.bits
@@ -72,14 +68,9 @@ def real_inputs(modulation: str, antennas: int) -> RealInputs:
 def real_channel(H: RealOrComplex, P: RealOrComplex, noise: float, real: bool) -> tuple[Real, Real]:
     """Return the real channel s = x B that is equivalent to √2 H P x / σ, by its singular values.
 
-    Args:
-        H: (n, N_r, N_t) channels.
-        P: (n, N_t, N_t) precoders.
-        noise: σ², W.
-        real: whether the alphabet is real, which leaves D = N_t coordinates instead of 2 N_t.
-
-    Returns:
-        Singular values (n, d), largest first, and the maps B (n, D, d), for noise z ~ N(0, I).
+    These are (n, d), largest first, and the maps B (n, D, d), for noise z ~ N(0, I). `H`
+    (n, N_r, N_t) are channels, `P` (n, N_t, N_t) precoders, `noise` is σ², W; `real` says whether
+    the alphabet is real, which leaves D = N_t coordinates instead of 2 N_t.
 
     >>> singular, maps = real_channel(np.eye(1)[None], np.eye(1)[None], 0.5, real=True)
     >>> float(singular[0, 0]), maps.shape

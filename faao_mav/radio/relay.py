@@ -15,6 +15,7 @@ Mobile Relaying Systems", IEEE Transactions on Communications, 2016.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -114,10 +115,17 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
     >>> round(forward_by_shares(rates, rates, best_shares(rates, rates)).rate, 6)
     1.0
     """
+    _check(I_U, I_G, buffer)
+    return _best_shares(I_U.tobytes(), I_G.tobytes(), buffer)
+
+
+@lru_cache(maxsize=32)  # an optimiser asks about its starts and its results more than once
+def _best_shares(rates_U: bytes, rates_G: bytes, buffer: float) -> Real:
+    """Return the best shares, read-only, at the rates whose bytes are given."""
     import clarabel
     from scipy import sparse
 
-    _check(I_U, I_G, buffer)
+    I_U, I_G = np.frombuffer(rates_U), np.frombuffer(rates_G)
     n = len(I_U)
     one, none = sparse.eye_array(n, format="csr"), sparse.csr_array((n, n))
     arriving, leaving = (sparse.diags_array(rates, format="csr") for rates in (I_U, I_G))
@@ -146,6 +154,7 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
         settings,
     )
     shares: Real = np.clip(np.array(solver.solve().x[:n]), 0.0, 1.0)
+    shares.setflags(write=False)
     return shares
 
 

@@ -5,19 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.mission.command import FLOWN_TO
-from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
-from faao_mav.report.route_map import (
-    draw_fence,
-    draw_waypoints,
-    outlines_of,
-    places_of,
-    route_map,
-    show_all,
-    write_numbers,
-)
-from faao_mav.report.style import MUTED, SERIES, drawing, label, legend_above
+from faao_mav.report.maps import route_map
+from faao_mav.report.style import MUTED, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.vector import lengths
@@ -27,14 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WIDTH = 4.2
-"""Inches: a page makes it as wide as a phone, where 9 points must still be read."""
-
 
 def flight_figure(
-    solution: Solution,
-    conversion: Conversion | None = None,
-    prediction: Prediction | None = None,
+    solution: Solution, conversion: Conversion | None = None, prediction: Prediction | None = None
 ) -> "Figure":
     """Return the flight in one figure, as `--figure` saves it: map, speed, and both rates."""
     with drawing(9.6, 5.6) as figure:
@@ -52,14 +37,14 @@ def flight_figure(
 
 def route(solution: Solution, conversion: Conversion | None = None) -> "Figure":
     """Return the map of the route: see `route_map`."""
-    with drawing(_WIDTH, 4.2) as figure:
+    with drawing(WIDTH, 4.2) as figure:
         route_map(solution, conversion, figure.subplots())
     return figure
 
 
 def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure":
     """Return speed and acceleration over time with v_max, v_min and a_max."""
-    with drawing(_WIDTH, 4.4) as figure:
+    with drawing(WIDTH, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         _speed(upper, solution, conversion)
         _acceleration(lower, solution)
@@ -69,7 +54,7 @@ def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure"
 
 def rates(solution: Solution, prediction: Prediction | None = None) -> "Figure":
     """Return I_U and I_G of (7), (8) in every slot: planned, and where the flight is predicted."""
-    with drawing(_WIDTH, 4.4) as figure:
+    with drawing(WIDTH, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, sharey=True)
         _rates((upper, lower), solution, prediction)
         _share_time(upper)
@@ -85,15 +70,14 @@ def queue(solution: Solution, prediction: Prediction | None = None) -> "Figure":
     megabytes = plan.radio.bandwidth_mhz
     bits, unit = (1.0, "bit/Hz") if megabytes is None else (megabytes / 8, "megabytes")
     held = plan.flight.time_step * bits  # of a bit/s/Hz for a slot
-    with drawing(_WIDTH, 2.6) as figure:
+    with drawing(WIDTH, 2.6) as figure:
         plot = figure.subplots()
         flown = (solution.t, held * prediction.relayed.queue) if prediction is not None else None
         if plan.radio.relay.buffer_mbytes is not None:
             _limit(plot, plan.radio.relay.buffer_mbytes, "buffer")
         _curves(plot, (solution.t, held * solution.relayed.queue), flown)
         plot.set_ylim(bottom=0)
-        label(plot, "", "time, s", f"waiting, {unit}")
-        legend_above(plot)
+        _over_time(plot, "", f"waiting, {unit}")
     return figure
 
 
@@ -104,28 +88,20 @@ def precoder_power(solution: Solution) -> "Figure":
     Precoders that know the draw are averaged over the draws.
     """
     radio = solution.plan.radio
-    stations = (
-        ("Base station", solution.P_B, radio.base_station.power, "W_B"),
-        ("UAV", solution.P_U, radio.relay.power, "W_U"),
-    )
-    with drawing(_WIDTH, 4.4) as figure:
+    base = ("Base station", solution.P_B, radio.base_station.power, "W_B")
+    uav = ("UAV", solution.P_U, radio.relay.power, "W_U")
+    with drawing(WIDTH, 4.4) as figure:
         plots = figure.subplots(2, 1, sharex=True)
-        for plot, (name, P, power, limit) in zip(plots, stations, strict=True):
+        for plot, (station, P, power, limit) in zip(plots, (base, uav), strict=True):
             streams = _stream_powers(P).T
             unit, scale = _watts(power)
             _limit(plot, power * scale, limit)
             for k, stream in enumerate(streams):
-                plot.plot(
-                    solution.t,
-                    stream * scale,
-                    color=SERIES[k % len(SERIES)],
-                    linewidth=2.4 if k == 0 else 1.2,
-                    label=f"stream {k + 1}",
-                )
+                name, colour = f"stream {k + 1}", SERIES[k % len(SERIES)]
+                width = 1.2 if k else 2.4
+                plot.plot(solution.t, stream * scale, color=colour, linewidth=width, label=name)
             plot.set_ylim(bottom=0)
-            label(plot, name, "time, s", f"power, {unit}")
-            if len(streams) <= len(SERIES):
-                legend_above(plot)
+            _over_time(plot, station, f"power, {unit}", legend=len(streams) <= len(SERIES))
         _share_time(plots[0])
     return figure
 
@@ -134,7 +110,7 @@ def convergence(solution: Solution) -> "Figure":
     """Return the rate that the plan maximises, R_avg or R_del, after each iteration."""
     from matplotlib.ticker import MaxNLocator
 
-    with drawing(_WIDTH, 2.6) as figure:
+    with drawing(WIDTH, 2.6) as figure:
         plot = figure.subplots()
         steps = np.arange(len(solution.history))
         plot.plot(steps, solution.history, color=SERIES[0], marker="o", markersize=3.5)
@@ -144,27 +120,9 @@ def convergence(solution: Solution) -> "Figure":
     return figure
 
 
-def mission_map(mission: Mission, track: Track) -> "Figure":
-    """Return the map: the predicted flight, the places of the items with numbers, the fence.
-
-    East and north in metres about the origin of the track's frame; items count from 1.
-    """
-    flown = track.position[:, :2]
-    numbers, places = places_of(mission, track.frame, FLOWN_TO)
-    with drawing(_WIDTH, 4.2) as figure:
-        plot = figure.subplots()
-        outlines = list(outlines_of(mission.fence, track.frame))
-        draw_fence(plot, outlines)
-        plot.plot(*flown.T, color=SERIES[0], label="predicted")
-        draw_waypoints(plot, places, "item")
-        show_all(plot, np.concatenate([flown, places]), outlines)
-        write_numbers(plot, numbers, places, [flown], np.empty((0, 2)))
-    return figure
-
-
 def mission_motion(track: Track) -> "Figure":
     """Return ground speed, m/s, and height above home, m, over time, s."""
-    with drawing(_WIDTH, 4.4) as figure:
+    with drawing(WIDTH, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(track.t, lengths(track.velocity[:, :2]), color=SERIES[0])
         label(upper, "", "", "ground speed, m/s")
@@ -188,8 +146,7 @@ def _speed(plot: "Axes", solution: Solution, conversion: Conversion | None) -> N
         flown = t[inside], lengths(track["predicted_v"])[inside]
     _curves(plot, (solution.t, lengths(solution.v)), flown)
     plot.set_ylim(bottom=0)
-    label(plot, "Speed", "time, s", "speed, m/s")
-    legend_above(plot)
+    _over_time(plot, "Speed", "speed, m/s")
 
 
 def _acceleration(plot: "Axes", solution: Solution) -> None:
@@ -208,8 +165,7 @@ def _acceleration(plot: "Axes", solution: Solution) -> None:
             textcoords="offset points",
             va="top",
         )
-    label(plot, "Acceleration", "time, s", "acceleration, m/s²")
-    legend_above(plot)
+    _over_time(plot, "Acceleration", "acceleration, m/s²")
 
 
 def _rates(plots: "tuple[Axes, Axes]", solution: Solution, prediction: Prediction | None) -> None:
@@ -221,8 +177,7 @@ def _rates(plots: "tuple[Axes, Axes]", solution: Solution, prediction: Predictio
     for k, (plot, (name, values)) in enumerate(zip(plots, planned, strict=True)):
         _curves(plot, (t, values), (t, flown[k]) if flown else None)
         plot.set_ylim(0, 1.08 * top)
-        label(plot, name, "time, s", "rate, bit/s/Hz")
-        legend_above(plot)
+        _over_time(plot, name, "rate, bit/s/Hz")
 
 
 def _curves(plot: "Axes", planned: tuple[Real, Real], flown: tuple[Real, Real] | None) -> None:
@@ -231,6 +186,12 @@ def _curves(plot: "Axes", planned: tuple[Real, Real], flown: tuple[Real, Real] |
     plot.plot(*planned, color=SERIES[0], label="planned", **beneath)
     if flown is not None:
         plot.plot(*flown, color=SERIES[1], linewidth=1.1, label="predicted")
+
+
+def _over_time(plot: "Axes", title: str, what: str, *, legend: bool = True) -> None:
+    label(plot, title, "time, s", what)
+    if legend:
+        legend_above(plot)
 
 
 def _share_time(*upper: "Axes") -> None:

@@ -103,7 +103,8 @@ def _mission_figures(check: Check) -> Iterator[str]:
     """Yield the figures of a mission that is judged by itself."""
     if check.track is None:
         return
-    from faao_mav.report.figures import mission_map, mission_motion
+    from faao_mav.report.figures import mission_motion
+    from faao_mav.report.maps import mission_map
 
     title = "Map of the predicted flight with the mission's items and its fence, metres"
     yield _figure("mission-map", "Mission", mission_map(check.mission, check.track), title)
@@ -115,57 +116,39 @@ def _plan_figures(result: Result) -> Iterator[str]:
     """Yield the figures of a solved plan, and the table of the optimiser's starts."""
     from faao_mav.report import figures
 
+    plan = result.solution.plan
     solution, conversion, prediction = result.solution, result.conversion, result.prediction
-    vehicle, flight = solution.plan.vehicle, solution.plan.flight
-    yield _figure(
-        "route",
-        "Route",
-        figures.route(solution, conversion),
+    flight, vehicle, maximised = plan.flight, plan.vehicle, plan.radio.maximised
+    title = (
         f"Map of the route from {_place(flight.start)} to {_place(flight.end)}, east and north in "
         "metres, coloured by speed, with both stations"
-        + (", waypoints by item number and the predicted track" if conversion else ""),
     )
-    yield _figure(
-        "motion",
-        "Motion",
-        figures.motion(solution, conversion),
+    if conversion:
+        title += ", waypoints by item number and the predicted track"
+    yield _figure("route", "Route", figures.route(solution, conversion), title)
+    title = (
         f"Speed over time, limit {vehicle.max_speed:g} m/s, and acceleration over time, limit "
-        f"{vehicle.max_acceleration:g} m/s²",
+        f"{vehicle.max_acceleration:g} m/s²"
     )
-    yield _figure(
-        "rates",
-        "Link",
-        figures.rates(solution, prediction),
-        "Rates of both links over time, planned"
-        + (" and along the predicted flight" if prediction else ""),
+    yield _figure("motion", "Motion", figures.motion(solution, conversion), title)
+    flown = " and along the predicted flight" if prediction else ""
+    title = f"Rates of both links over time, planned{flown}"
+    yield _figure("rates", "Link", figures.rates(solution, prediction), title)
+    half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
+    title = f"What the relay has received and not yet forwarded, over time{half}"
+    yield _figure("queue", "Queue", figures.queue(solution, prediction), title)
+    first, last = solution.history[0], solution.history[-1]
+    title = (
+        f"{maximised} after each iteration, from {first:.4f} to {last:.4f} bit/s/Hz; "
+        f"ended: {solution.ending}"
     )
-    half = solution.plan.radio.duplex == "half"
-    yield _figure(
-        "queue",
-        "Queue",
-        figures.queue(solution, prediction),
-        "What the relay has received and not yet forwarded, over time"
-        + (", both hops sharing each slot" if half else ""),
-    )
-    yield _figure(
-        "convergence",
-        "Convergence",
-        figures.convergence(solution),
-        f"{solution.plan.radio.maximised} after each iteration, from {solution.history[0]:.4f} to "
-        f"{solution.history[-1]:.4f} bit/s/Hz; ended: {solution.ending}",
-    )
-    yield _figure(
-        "power",
-        "Precoders",
-        figures.precoder_power(solution),
-        "Power on each stream over time, base station and UAV, strongest stream first",
-    )
+    yield _figure("convergence", "Convergence", figures.convergence(solution), title)
+    title = "Power on each stream over time, base station and UAV, strongest stream first"
+    yield _figure("power", "Precoders", figures.precoder_power(solution), title)
     if len(solution.starts) > 1:
         ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
         rows = [(name, f"{rate:.4f}") for name, rate in ranked]
-        yield _section(
-            "Starts", _table(("start", f"{solution.plan.radio.maximised}, bit/s/Hz"), rows)
-        )
+        yield _section("Starts", _table(("start", f"{maximised}, bit/s/Hz"), rows))
 
 
 def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:

@@ -26,6 +26,9 @@ SERIES = ("#1769aa", "#c2500a", "#16825d", "#9a3d9c", "#8a6d00", "#c03352", "#54
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 """Markers of curves, in the order of `SERIES`."""
 
+WIDTH = 4.2
+"""Inches: a page makes a figure as wide as a phone, where 9 points must still be read."""
+
 FORMATS = (".png", ".svg", ".pdf")
 """What the name of a figure may end in."""
 

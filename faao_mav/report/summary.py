@@ -6,6 +6,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TypeAlias
 
+from faao_mav.plan import Plan
 from faao_mav.validate.check import Check
 from faao_mav.validate.finding import Finding, Level
 from faao_mav.workflow import Result
@@ -44,6 +45,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     # what was maximised comes first, with how that came about
     yield from (_delivered if causal else _rate)(result)
     yield from (_rate if causal else _delivered)(result)
+    yield from _gained(result)
     if bound is not None:
         reached = solution.delivered_rate if causal else solution.rates.R_avg
         short = 100 * (1 - reached / bound.value) if bound.value else 0.0
@@ -82,6 +84,21 @@ def _carried(megabytes: float | None) -> str:
     return "" if megabytes is None else f", {megabytes:.4g} megabytes"
 
 
+def _of_measure(plan: Plan) -> str:
+    return "" if plan.optimizer.rate == "cutoff" else " of mutual information"
+
+
+def _gained(result: Result) -> Iterator[Line]:
+    """Yield what planning for the mutual information gains, where the plan does that."""
+    gain, information = result.solution.gain, result.information
+    if gain is None:
+        return
+    more = f"{gain:.4f} bit/s/Hz more than by the plan for the cutoff rate"
+    error = information.error if information else 0.0
+    doubt = f", below the error of averages over the noise, {error:.1g}" if gain <= error else ""
+    yield "", f"{more}{doubt}"
+
+
 def _rate(result: Result) -> Iterator[Line]:
     solution, plan = result.solution, result.solution.plan
     rates, information, fresh = solution.rates, result.information, result.fresh
@@ -89,13 +106,16 @@ def _rate(result: Result) -> Iterator[Line]:
     most = f" of at most {limit.ceiling:g}" if limit else ""
     yield (
         "rate",
-        f"{_told_rate(rates.R_avg, plan.radio.bandwidth_mhz)}{most} "
+        f"{_told_rate(rates.R_avg, plan.radio.bandwidth_mhz)}{most}{_of_measure(plan)} "
         f"(base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f})",
     )
     start = "" if plan.radio.causal else f"{solution.history[0]:.4f} on the straight start"
     priced = ""
     if information is not None:
-        priced = f"mutual information {information.average:.3f} +- {information.error:.1g}"
+        priced = (
+            f"mutual information {information.average:.3f} +- {information.error:.1g}, "
+            f"{information.delivered:.3f} delivered"
+        )
     if start or priced:
         yield "", "; ".join(filter(None, (start, priced)))
     if fresh and not plan.radio.causal:
@@ -111,7 +131,7 @@ def _delivered(result: Result) -> Iterator[Line]:
     most = f" of at most {limit.ceiling:.5g}" if limit else ""
     yield (
         "delivered",
-        f"{_told_rate(delivered, plan.radio.bandwidth_mhz)}{most}"
+        f"{_told_rate(delivered, plan.radio.bandwidth_mhz)}{most}{_of_measure(plan)}"
         f"{_carried(plan.megabytes(delivered))}; "
         f"{'in half duplex ' if half else ''}{100 * share:.2f} % of the rate",
     )

@@ -4,6 +4,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.mission.item import Mission
 from faao_mav.schedule.assemble import assemble
@@ -13,6 +16,7 @@ from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
+from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Vehicle, vehicle_of
 from faao_mav.vehicle.recommend import candidates
 
@@ -25,6 +29,7 @@ _SPLINE_SPACING = 10.0  # the least distance of spline waypoints, m
 _SPLINE_TIMES = (2.0, 3.0)  # least times between spline waypoints to try, s
 _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the acceleration
 _PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
+_DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _GOOD_COST = 1.5  # the `Schedule.cost`, m, from which nothing better is looked for
 
 
@@ -53,12 +58,17 @@ class Conversion:
 def check_vehicle(plan: "Plan") -> None:
     """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
 
-    That is one with useless parameters, or a plane that does not fly the plan's least or greatest
-    speed.
+    That is one with useless parameters, one of a speed that no mission commands, or a plane that
+    does not fly the plan's least or greatest speed.
     """
     vehicle = vehicle_of(plan)
     vehicle.legs  # noqa: B018
     vehicle.flight_model()
+    if plan.vehicle.max_speed < SLOWEST:
+        raise InputError(
+            f"{plan.source}: vehicle.max_speed: {plan.vehicle.max_speed:g} m/s; missions command "
+            f"{SLOWEST:g} m/s and more"
+        )
     if vehicle.type.hovers:
         return
     least, most = vehicle.value("min_speed"), vehicle.value("max_speed")
@@ -81,10 +91,10 @@ def convert(solution: "Solution") -> Conversion:
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
-    plan, t, w = solution.plan, solution.t, solution.w
+    plan, t, w = solution.plan, solution.t, np.round(solution.w, _DECIMALS)
     given, sets = vehicle_of(plan), candidates(plan)
     schedulers = [
-        _scheduler(solution, replace(given, parameters={**given.parameters, **parameters}))
+        _scheduler(plan, t, w, replace(given, parameters={**given.parameters, **parameters}))
         for parameters in sets
     ]
     straight = initial_route(t, w, plan, share=1.0 if given.type.hovers else _PLANE_SHARE)
@@ -105,19 +115,19 @@ def convert(solution: "Solution") -> Conversion:
     )
 
 
-def _scheduler(solution: "Solution", vehicle: Vehicle) -> Scheduler:
+def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     """Return what schedules the flights of `vehicle`, which may have recommended parameters."""
-    plan, limits = solution.plan, solution.plan.vehicle
+    limits = plan.vehicle
     if vehicle.type.hovers:
         scheduler: type[Scheduler] = CopterScheduler
-        least, most = vehicle.legs.slowest, vehicle.type.fastest
+        least, most = min(vehicle.legs.slowest, limits.max_speed), vehicle.type.fastest
     else:
         scheduler = PlaneScheduler
         least = max(limits.min_speed, vehicle.value("min_speed"))
         most = vehicle.value("max_speed")
     return scheduler(
-        t=solution.t,
-        w=solution.w,
+        t=t,
+        w=w,
         vehicle=vehicle,
         model=vehicle.flight_model(plan.origin.latitude),
         min_speed=least,

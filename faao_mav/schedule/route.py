@@ -12,6 +12,13 @@ from faao_mav.vehicle import FlightPath
 _SPEED_DIGITS = 3  # decimals of a commanded speed in m/s: with two, 300 s of flight end 0.25 s off
 
 
+_DIGITS = 4
+"""Decimals of all values of a route, in m, m/s and s, whose flight is predicted.
+
+Chosen: far above the noise of rounding (1e-9 and less), far below what a flight shows.
+"""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
     """The relay route as m >= 1 waypoints and the m - 1 legs between them.
@@ -54,6 +61,14 @@ class Route:
         headings = np.arctan2(*np.diff(self.positions, axis=0).T[::-1])
         turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
         return np.concatenate([[0.0], turns, [0.0]])[: len(self.positions)]
+
+    def rounded(self) -> "Route":
+        """Return the route to 0.1 mm, 0.1 mm/s and 0.1 ms.
+
+        What is chosen from predicted flights then does not hang on how a processor rounds.
+        """
+        values = {name: getattr(self, name) for name in ("positions", "speeds", "waits", "lead")}
+        return replace(self, **{name: np.round(x, _DIGITS) for name, x in values.items()})
 
     def holds_and_delays(self, *, whole_seconds: bool) -> tuple[Real, Real]:
         """Return `waits` as holds, which waypoints command, and delays of items after them.

@@ -59,8 +59,8 @@ class Scheduler(ABC):
         """Return `first` brought closer to the plan, with values as they are sent."""
 
     def flight(self, route: Route) -> Schedule:
-        """Return the predicted flight of `route`."""
-        route = self._with_radii(route)
+        """Return the predicted flight of `route`, which is rounded for it."""
+        route = self._with_radii(route.rounded())
         return Schedule(route, self.model.fly(self._path(route)), self._clock(route))
 
     def fitted(self, route: Route, top_speed: float, groups: Integers | None = None) -> Schedule:

@@ -29,6 +29,7 @@ _STEP = 0.25  # seconds between the samples of a predicted flight
 _SAMPLES = 400  # the most instants at which a predicted flight is compared with the plan
 _ITERATIONS = 12  # the most steps of a fit
 _DAMPINGS = 10.0 ** np.array([-4, -2, -1, 0, 2])  # to try, of the diagonal of the squared slopes
+_DIGITS = 4  # decimals of fitted values: more are noise, which another processor has otherwise
 _LEAST_GAIN = 0.05  # the share of the sum of squares that a step saves for another one to follow
 _MOST_LATE = 5.0  # the lateness, s, beyond which more of it costs no more
 _CRAWL = 0.5  # the least speed, m/s, to which a leg is slowed that is planned to be faster
@@ -126,4 +127,4 @@ def _damped_steps(x: Real, slope: Real, error: Real, low: Real, high: Real, damp
         np.linalg.solve(square + np.diag(damping * diagonal + 1e-9), -slope.T @ error)
         for damping in dampings
     ]
-    return np.clip(x + np.array(steps), low, high)
+    return np.clip(np.round(x + np.array(steps), _DIGITS), low, high)

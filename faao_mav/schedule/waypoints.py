@@ -17,6 +17,7 @@ from faao_mav.vector import distances_to_segment, lengths
 # may be that become one.
 LEG_SHARE, _HOVER_SHARE, _MERGE_SHARE = 0.9, 0.45, 0.05
 
+SLOWEST = 0.1  # the least speed, m/s, that any autopilot is commanded: a slower trajectory hovers
 _WIDEST_HOVER = 1.0  # the largest radius of a hover, m, however large the path tolerance
 _SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
 _SPEED_WINDOW = 1.0  # s, over which a speed is averaged: it hides a trajectory's chatter
@@ -36,7 +37,7 @@ class Waypoint:
     position: Real
 
 
-def find_hovers(t: Real, w: Real, radius: float, slowest: float = 0.1) -> list[Waypoint]:
+def find_hovers(t: Real, w: Real, radius: float, slowest: float = SLOWEST) -> list[Waypoint]:
     """Return the hovers of the trajectory `t` (n,) s, `w` (n, 2) m, in order.
 
     A hover lasts 3 s at least, in which the aircraft is slower than `slowest` m/s throughout and

@@ -1,14 +1,17 @@
 """The figures of a study: rates along what is varied, and routes on a map."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
 from faao_mav.study.rows import StudyRow, spreads
-from faao_mav.study.sweep import OVERRIDES, Value
+from faao_mav.study.sweep import Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,26 +38,14 @@ _SHORT = {
 
 _SCHEMES = {
     "faao": "FAAO",
-    "algorithm1": "FAAO, Algorithm 1",
-    "mmse": "MMSE",
-    "mrt": "MRT",
-    "zf": "ZF",
-    "waterfilling": "water-filling",
     "gaussian": "designed for Gaussian inputs",
+    "mrt": "MRT",
+    "mmse": "MMSE",
+    "zf": "ZF",
+    "algorithm1": "FAAO, Algorithm 1",
+    "waterfilling": "water-filling",
 }
-"""The names of the schemes in legends."""
-
-_ALPHABETS = {
-    "bpsk": "BPSK",
-    "qpsk": "QPSK",
-    "8psk": "8-PSK",
-    "16qam": "16-QAM",
-    "64qam": "64-QAM",
-}
-"""The names of the alphabets in legends."""
-
-_LOOKS = {name: k for k, name in enumerate(("faao", "gaussian", "mrt", "mmse", "zf"))}
-"""The place of a scheme in `SERIES` and `MARKERS`, the same in every figure."""
+"""The names of the schemes in legends, in the order of their looks in `SERIES` and `MARKERS`."""
 
 
 def can_draw(rows: Sequence[StudyRow], kind: str) -> bool:
@@ -123,17 +114,16 @@ def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str, measure: str) -> N
     """Draw mean and spread over seeds."""
     at = list(rows[0].values).index(axis)
     for name, inside, shown, k in _series(rows, measure):
-        found = spreads(inside, shown)
         points = sorted(
-            (values[at], spread) for (values, _), spread in found.items() if spread is not None
+            (float(values[at]), spread.mean, spread.deviation)
+            for (values, _), spread in spreads(inside, shown).items()
+            if spread is not None
         )
-        x = [float(value) for value, _ in points]
-        mean = [spread.mean for _, spread in points]
-        low = [spread.mean - spread.deviation for _, spread in points]
-        high = [spread.mean + spread.deviation for _, spread in points]
+        x, mean, deviation = np.array(points).reshape(-1, 3).T
         k %= len(SERIES)
         plot.plot(x, mean, marker=MARKERS[k], markersize=4, color=SERIES[k], label=name)
-        plot.fill_between(x, low, high, color=SERIES[k], alpha=0.2, linewidth=0)
+        band = (mean - deviation, mean + deviation)
+        plot.fill_between(x, *band, color=SERIES[k], alpha=0.2, linewidth=0)
     plot.set_ylim(bottom=0)
 
 
@@ -144,7 +134,7 @@ def _series(
     schemes = list(dict.fromkeys(row.scheme for row in rows))
     for scheme in schemes:
         of_scheme = [row for row in rows if row.scheme == scheme]
-        k = _LOOKS.get(scheme, len(_LOOKS) + list(OVERRIDES).index(scheme))
+        k = list(_SCHEMES).index(scheme)
         if _CAUSAL not in rows[0].values:
             yield _SCHEMES[scheme], of_scheme, measure, k
             continue
@@ -170,12 +160,12 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
         several = len({row.scheme for row in rows}) > 1
         colours: dict[str, str] = {}
         for row in rows:
-            if not row.route:
+            if not len(row.route):
                 continue
             name = _named(row.values)
             if several or not name:
                 name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
-            east, north = zip(*row.route, strict=True)
+            east, north = row.route.T
             new = name not in colours
             colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
             width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
@@ -200,8 +190,8 @@ def _named(values: Mapping[str, Value]) -> str:
     parts = []
     for key, value in values.items():
         text = value if isinstance(value, str) else json.dumps(value)
-        if key == "radio.modulation":
-            text = _ALPHABETS.get(text, text)
+        if key == "radio.modulation":  # as in 16-QAM
+            text = re.sub(r"^\d+", r"\g<0>-", text.upper())
         name, unit = _SHORT.get(key, (key.rsplit(".", 1)[-1], ""))
         parts.append(f"{name} = {text}{unit}" if name else text + unit)
     return ", ".join(parts)

@@ -4,29 +4,54 @@ import csv
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
-from faao_mav.errors import InputError
-from faao_mav.files import write_whole
+import numpy as np
+from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError, place_of
+from faao_mav.files import read_bytes, write_whole
 from faao_mav.study.sweep import StudyCase, Value
 
 ROWS, TABLE = "rows.jsonl", "table.csv"
 _BEGINNING = b'{"key": "'
 """How the line of every row begins: a last line without an end that does not is no row cut off."""
 
+MAX_BYTES = 100_000_000
+"""Bytes of the rows of a study that are read; chosen: 9,000 flights of 600 slots."""
+
+_MAX_LINE = 4_000_000
+"""Bytes of the longest row; chosen: a flight of 100,000 slots has 2,400,000."""
+
+
+def _route(pairs: object) -> Real:
+    """Return `pairs` of metres as an array (n, 2)."""
+    try:
+        route = np.array(pairs or np.empty((0, 2)), dtype=np.float64)
+    except (TypeError, ValueError):
+        route = np.array(np.nan)
+    if route.shape[1:] != (2,) or not np.isfinite(route).all():
+        raise ValueError("not pairs of finite numbers")
+    return route
+
 
 @dataclass(frozen=True, slots=True)
 class StudyRow:
     """What one case of a study led to.
 
-    Rates and mutual information are bit/s/Hz; `delivered` is the delivered rate and
+    Rates and mutual information are bit/s/Hz, and `rate` names that which R_avg and all others are
+    of, `optimizer.rate`; `delivered` is the delivered rate and
     `delivered_mbytes` what a flight carries, 10^6 bytes, None without a bandwidth. `seconds` is the
     time of the optimiser. Where there is no result `error` says why and the numbers are None.
     `route` is w (n, 2), m, one pair for each slot.
     """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     key: str
     values: Mapping[str, Value]
@@ -38,16 +63,19 @@ class StudyRow:
     delivered: float | None = None
     delivered_mbytes: float | None = None
     mutual_information: float | None = None
+    rate: str = "cutoff"
     seconds: float | None = None
     iterations: int | None = None
     converged: bool | None = None
     error: str = ""
-    route: Sequence[Sequence[float]] = ()
+    route: Annotated[Real, PlainValidator(_route)] = field(
+        default_factory=lambda: np.empty((0, 2)), compare=False
+    )
 
 
 _RESULTS = (
     *("scheme", "seed", "R_avg", "R_U", "R_G", "delivered", "delivered_mbytes"),
-    *("mutual_information", "seconds", "iterations", "converged", "error"),
+    *("mutual_information", "rate", "seconds", "iterations", "converged", "error"),
 )
 """The fields of a row that are columns of the table."""
 
@@ -62,7 +90,7 @@ def append_row(row: StudyRow, directory: Path) -> None:
 
     Raises `InputError`.
     """
-    line = json.dumps(asdict(row), allow_nan=False) + "\n"
+    line = json.dumps(asdict(row) | {"route": row.route.tolist()}, allow_nan=False) + "\n"
     path = directory / ROWS
     try:
         with path.open("ab", buffering=0) as file:
@@ -71,38 +99,49 @@ def append_row(row: StudyRow, directory: Path) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def load_rows(directory: Path) -> dict[str, StudyRow]:
-    """Return the finished rows in `directory` by key.
+def load_rows(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ...]:
+    """Return the finished rows of `cases` in `directory`, in the order of the grid.
 
     A last line that was cut off when the machine stopped is dropped from the file. Raises
     `InputError` for anything else that is no row.
     """
     path = directory / ROWS
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        return {}
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    whole = content[: content.rfind(b"\n") + 1]
-    rest = content[len(whole) :]
-    if not (rest.startswith(_BEGINNING) or _BEGINNING.startswith(rest)):
-        raise InputError(f"{path}: its last line is no row of a study; give another directory")
-    if rest:
-        write_whole(path, whole)
+    if not path.exists():
+        return ()
+    content = read_bytes(path, MAX_BYTES, "the rows of a study")
+    keys = {case.key for case in cases}
     rows: dict[str, StudyRow] = {}
-    names = {field.name for field in fields(StudyRow)}
-    for number, line in enumerate(whole.splitlines(), 1):
-        try:
-            data = json.loads(line)
-            if set(data) != names:
-                raise ValueError
-            rows[data["key"]] = StudyRow(**data)
-        except (ValueError, TypeError):
-            raise InputError(
-                f"{path}: line {number}: no row of a study; give another directory"
-            ) from None
-    return rows
+    for number, line in enumerate(io.BytesIO(content), 1):
+        if not line.endswith(b"\n"):
+            if not (line.startswith(_BEGINNING) or _BEGINNING.startswith(line)):
+                raise InputError(
+                    f"{path}: its last line is no row of a study; give another directory"
+                )
+            write_whole(path, content[: -len(line)])
+            break
+        row = _row(line, f"{path}: line {number}")
+        if row.key in keys:
+            rows[row.key] = row
+    return in_order(cases, rows)
+
+
+def _row(line: bytes, where: str) -> StudyRow:
+    """Return the row in a line of the file, without its values: the case has them."""
+    try:
+        if len(line) > _MAX_LINE:
+            raise ValueError(f"more than {_MAX_LINE:,} bytes")
+        return replace(_adapter().validate_json(line), values={})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        told = f"{place_of(first['loc'])}: {first['msg']}".removeprefix(": ")
+    except ValueError as error:
+        told = str(error)
+    raise InputError(f"{where}: no row of a study: {told}; give another directory")
+
+
+@cache
+def _adapter() -> TypeAdapter[StudyRow]:
+    return TypeAdapter(StudyRow)
 
 
 def table(rows: Sequence[StudyRow]) -> str:
@@ -116,8 +155,15 @@ def table(rows: Sequence[StudyRow]) -> str:
 
 
 def in_order(cases: Sequence[StudyCase], rows: Mapping[str, StudyRow]) -> tuple[StudyRow, ...]:
-    """Return the rows of `cases` that there are, in the order of the grid."""
-    return tuple(rows[case.key] for case in cases if case.key in rows)
+    """Return the rows of `cases` that there are, by their keys, in the order of the grid.
+
+    Cases of several values may be the same plan, and so have the same key.
+    """
+    return tuple(
+        replace(rows[case.key], values=dict(case.values), scheme=case.scheme, seed=case.seed)
+        for case in cases
+        if case.key in rows
+    )
 
 
 MEASURES = ("R_avg", "delivered")
@@ -185,8 +231,9 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
         cells = (_cell(found.get((values, scheme))) for scheme in schemes)
         lines.append([*(json.dumps(v).strip('"') for v in values), *cells])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
     return [
-        f"{measure}, bit/s/Hz",
+        f"{measure}, bit/s/Hz{of_rate}",
         *(
             "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
             for line in lines

@@ -42,10 +42,11 @@ def _filled(row: StudyRow, case: StudyCase) -> StudyRow:
         delivered=solution.delivered_rate,
         delivered_mbytes=solution.plan.megabytes(solution.delivered_rate),
         mutual_information=information.average if information else None,
+        rate=solution.plan.optimizer.rate,
         seconds=round(result.seconds_optimize, 3),
         iterations=solution.iterations,
         converged=solution.converged,
-        route=solution.w.round(3).tolist(),
+        route=solution.w.round(3),
     )
 
 
@@ -65,10 +66,11 @@ def run_study(
     `observe` is told each row, old ones first. Raises `InputError` for a directory or a cluster of
     no use.
     """
-    done = _prepare(directory) if directory is not None else {}
-    for row in in_order(cases, done):
+    old = _prepare(directory, cases) if directory is not None else ()
+    for row in old:
         if observe is not None:
             observe(row)
+    done = {row.key: row for row in old}
     for row in _rows([case for case in cases if case.key not in done], jobs, cluster):
         if directory is not None:
             append_row(row, directory)
@@ -115,7 +117,7 @@ def _connected(address: str) -> Iterator[None]:
         yield
 
 
-def _prepare(directory: Path) -> dict[str, StudyRow]:
+def _prepare(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ...]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
@@ -123,4 +125,4 @@ def _prepare(directory: Path) -> dict[str, StudyRow]:
     except OSError as error:
         raise InputError(f"{directory}: cannot be made: {error.strerror or error}") from None
     check_writable(directory / TABLE)
-    return load_rows(directory)
+    return load_rows(directory, cases)

@@ -10,7 +10,7 @@ from decimal import Decimal, InvalidOperation
 from importlib.metadata import version
 from typing import Any, TypeAlias, get_args
 
-from faao_mav.errors import InputError, PlanError
+from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.plan.keys import ALIASES, unknown_key, varied_twice
 from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
@@ -62,10 +62,10 @@ def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
     """
     key, sign, values = text.partition("=")
     if not sign:
-        raise InputError(f"--vary {text}: give key=start:stop:step or key=value,value")
+        raise InputError(f"--vary {quote(text)}: give key=start:stop:step or key=value,value")
     key = key.strip()
     if problem := unknown_key(key):
-        raise InputError(f"--vary {key}: {problem}")
+        raise InputError(f"--vary {place_of([key])}: {problem}")
     return key, parse_values(values, f"--vary {key}")
 
 
@@ -86,7 +86,7 @@ def parse_values(text: str, option: str) -> tuple[Value, ...]:
     except PlanError:
         data = {}
     if list(data) != ["values"] or not isinstance(data["values"], list) or not data["values"]:
-        raise InputError(f"{option}: {text!r} is neither start:stop:step nor value,value,...")
+        raise InputError(f"{option}: {quote(text)} is neither start:stop:step nor value,value,...")
     found: list[Value] = []
     for value in data["values"]:
         is_range = isinstance(value, str) and ":" in value
@@ -107,17 +107,20 @@ def parse_schemes(text: str) -> tuple[str, ...]:
 
 def _range(text: str, option: str) -> list[float]:
     """Return the numbers of `start:stop:step` in decimal arithmetic: 0:1:0.1 has 11."""
-    expected = f"{option}: {text!r} is no range; give start:stop:step, as -40:0:5"
+    expected = f"{option}: {quote(text)} is no range; give start:stop:step, as -40:0:5"
     if not re.fullmatch(r"[^:]+:[^:]+:[^:]+", text):
         raise InputError(expected)
     try:
         start, stop, step = (Decimal(part.strip()) for part in text.split(":"))
     except InvalidOperation:
         raise InputError(expected) from None
-    if not all(number.is_finite() for number in (start, stop, step)):
+    if not all(math.isfinite(float(number)) for number in (start, stop, step)):
         raise InputError(expected)
-    if step == 0 or (stop - start) / step < 0:
-        raise InputError(f"{option}: {text!r}: steps of {step} never come from {start} to {stop}")
+    if float(step) == 0 or (stop - start) / step < 0:
+        raise InputError(
+            f"{option}: {quote(text)}: steps of {step:.6g} never come from {start:.6g} "
+            f"to {stop:.6g}"
+        )
     ratio = (stop - start) / step
     _check_count(ratio, option)
     numbers = [start + k * step for k in range(math.floor(ratio) + 1)]
@@ -127,7 +130,7 @@ def _range(text: str, option: str) -> list[float]:
 
 def _check_count(count: Decimal | int, what: str) -> None:
     if count > MAX_ROWS:
-        raise InputError(f"{what}: {count:,.0f} rows; a study has at most {MAX_ROWS:,}")
+        raise InputError(f"{what}: {float(count):,.6g} rows; a study has at most {MAX_ROWS:,}")
 
 
 def make_cases(

@@ -3,6 +3,7 @@
 from faao_mav.mission.item import Mission
 from faao_mav.validate import (
     ardupilot,
+    cages,
     delivery,
     extent,
     fences,
@@ -12,6 +13,7 @@ from faao_mav.validate import (
     px4_radius,
     refusals,
     shape,
+    speed_commands,
     speeds,
 )
 from faao_mav.validate.context import ValidationContext
@@ -35,7 +37,7 @@ __all__ = [
 RULES: tuple[Rule, ...] = tuple(
     rule
     for module in (
-        *(items, refusals, ardupilot, px4_checks, px4_flight, px4_radius),
+        *(items, refusals, ardupilot, px4_checks, px4_flight, px4_radius, cages, speed_commands),
         *(speeds, shape, extent, fences, delivery),
     )
     for rule in module.RULES
@@ -52,19 +54,21 @@ def validate(
     track: Track | None = None,
     limits: Limits | None = None,
     link: LinkCheck | None = None,
+    airborne: bool = False,
 ) -> tuple[Finding, ...]:
     """Return what all rules about `vehicle` find in `mission`, worst first, then by item.
 
     `track` is the predicted flight: with it speeds, heights, duration and fence are judged along
     the flight as well as along the straights between the items. `limits` are what the flight must
-    stay within. `link` says what of a plan's rate the flight delivers. Parameters of the vehicle
-    that are no use count as not given. Any mission can be judged, however odd; nothing is raised.
+    stay within. `link` says what of a plan's rate the flight delivers. `airborne`: the mission is
+    begun in the air, and needs no take-off. Parameters of the vehicle that are no use count as not
+    given. Any mission can be judged, however odd; nothing is raised.
 
     >>> from faao_mav.mission.item import Mission
     >>> [finding.rule for finding in validate(Mission(()), Vehicle())]
     ['empty']
     """
-    context = ValidationContext(mission, vehicle, track, limits or Limits(), link)
+    context = ValidationContext(mission, vehicle, track, limits or Limits(), link, airborne)
     found = [
         finding for rule in RULES if rule.applies_to(vehicle) for finding in rule.findings(context)
     ]

@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
-from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, Command, Frame
+from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
+from faao_mav.validate.finding import Level
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.vehicle import ARDUCOPTER, ARDUPLANE
 from faao_mav.vehicle.dialect import name_of
@@ -14,24 +15,46 @@ RULES = Rules(ARDUCOPTER.family)
 
 _SKIPPED = {
     ARDUCOPTER: (30, 83, 191, 194, 210, 212, 223, 3000),
-    ARDUPLANE: (Command.CONDITION_YAW, 213, 222, 42600),
+    ARDUPLANE: (
+        Command.NAV_VTOL_LAND,
+        Command.NAV_GUIDED_ENABLE,
+        Command.NAV_DELAY,
+        Command.CONDITION_YAW,
+        *(213, 222, 3000, 42600),
+    ),
 }
 """Commands that are stored and then passed over."""
 
-_ARMING = "ArduPilot 4.7 AP_Arming::mission_checks"
-_TAKEOFF = "ArduPilot 4.7 AP_Mission::starts_with_takeoff_cmd, ArduCopter ModeAuto::init"
+_ARMING = "ArduPilot 4.7 AP_Arming::mission_checks; measured"
+_TAKEOFF = "measured on ArduCopter and ArduPlane 4.7; AP_Mission::starts_with_takeoff_cmd"
 
-_REQUIRED = {  # bits of ARMING_MIS_ITEMS
-    1: (Command.NAV_LAND, "NAV_LAND"),
-    2: (Command.NAV_VTOL_LAND, "NAV_VTOL_LAND"),
-    4: (Command.DO_LAND_START, "DO_LAND_START"),
-    8: (Command.NAV_TAKEOFF, "NAV_TAKEOFF"),
-    16: (Command.NAV_VTOL_TAKEOFF, "NAV_VTOL_TAKEOFF"),
-    64: (Command.NAV_RETURN_TO_LAUNCH, "NAV_RETURN_TO_LAUNCH"),
+_REQUIRED = {
+    1: Command.NAV_LAND,
+    2: Command.NAV_VTOL_LAND,
+    4: Command.DO_LAND_START,
+    8: Command.NAV_TAKEOFF,
+    16: Command.NAV_VTOL_TAKEOFF,
+    64: Command.NAV_RETURN_TO_LAUNCH,
 }
+"""The items that bits of ARMING_MIS_ITEMS ask for."""
+
 _RALLY_BIT = 32
-_TAKEOFFS = (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF)
-_CEILING, _CIRCLE, _FLOOR = 1, 2, 8  # bits of FENCE_TYPE
+
+_SAME_HEIGHT = 1.0
+"""The height, m, by which home may be moved in flight: less does not matter. Chosen; at home's own
+it was flown."""
+
+_TAKEOFFS = {
+    ARDUCOPTER: TAKEOFFS,
+    ARDUPLANE: {Command.NAV_TAKEOFF},
+}
+"""What gets the aircraft off the ground. A plane without vertical rotors stays there for the other.
+Measured."""
+
+_ON_GROUND = {
+    ARDUCOPTER: "AUTO is refused (Missing Takeoff Cmd), or it disarms after 10 s",
+    ARDUPLANE: "it stays there",
+}
 
 
 @RULES.error(
@@ -42,12 +65,13 @@ _CEILING, _CIRCLE, _FLOOR = 1, 2, 8  # bits of FENCE_TYPE
 def _required(context: ValidationContext) -> Iterator[Issue]:
     bits = int(context.vehicle.value("arming_items"))
     there = {item.command for item in context.items}
-    for bit, (command, name) in _REQUIRED.items():
+    for bit, command in _REQUIRED.items():
         if bits & bit and command not in there:
             yield Issue(
                 None,
-                f"ARMING_MIS_ITEMS is {bits} and asks for {name}, which the mission does not have",
-                f"add {name}, or take {bit} off ARMING_MIS_ITEMS",
+                f"ARMING_MIS_ITEMS is {bits} and asks for {command.name}, which the mission does "
+                "not have",
+                f"add {command.name}, or take {bit} off ARMING_MIS_ITEMS",
             )
 
 
@@ -76,31 +100,42 @@ def _required_rally(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning(
+@RULES.error(
     "ardupilot-no-takeoff",
-    "without a take-off ArduCopter does not start the mission from the ground",
+    "without a take-off ArduPilot does not start the mission from the ground",
     _TAKEOFF,
-    kind="copter",
 )
 def _no_takeoff(context: ValidationContext) -> Iterator[Issue]:
-    if context.items and not any(context.each(*_TAKEOFFS)):
+    return _without_takeoff(context, airborne=False)
+
+
+@RULES.warning(
+    "ardupilot-begins-in-the-air",
+    "a plan begins in the air: ArduPilot does not start its mission from the ground",
+    _TAKEOFF,
+)
+def _begins_in_the_air(context: ValidationContext) -> Iterator[Issue]:
+    return _without_takeoff(context, airborne=True)
+
+
+def _without_takeoff(context: ValidationContext, *, airborne: bool) -> Iterator[Issue]:
+    own = context.vehicle.type
+    if context.items and airborne is context.airborne and not any(context.each(*_TAKEOFFS[own])):
         yield Issue(
             None,
-            "there is no take-off: from the ground AUTO is refused (Missing Takeoff Cmd)",
-            "add NAV_TAKEOFF as the first item, or take off before you start the mission",
+            f"there is no take-off that a {own.kind} flies: from the ground {_ON_GROUND[own]}",
+            "take off before you start the mission, or add NAV_TAKEOFF as the first item",
         )
 
 
 @RULES.error(
     "ardupilot-takeoff-first",
-    "ArduCopter starts a mission on the ground only if it begins with a take-off",
+    "ArduPilot starts a mission on the ground only if it begins with a take-off",
     _TAKEOFF,
-    kind="copter",
 )
 def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
-    takeoff = next((index for index, _ in context.each(*_TAKEOFFS)), None)
-    if takeoff is None:
-        return
+    own = context.vehicle.type
+    takeoff = next((index for index, _ in context.each(*_TAKEOFFS[own])), 0)
     before = next(
         (
             index
@@ -109,80 +144,35 @@ def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
         ),
         None,
     )
-    if before is not None:
+    if before is not None and not context.airborne:
         yield Issue(
             takeoff,
-            f"the take-off comes after item {number(before)}: from the ground AUTO is refused "
-            "(Missing Takeoff Cmd)",
+            f"the take-off comes after item {number(before)}: from the ground {_ON_GROUND[own]}",
             f"move the take-off before item {number(before)}",
         )
 
 
 @RULES.error(
-    "ardupilot-fence-ceiling",
-    "the mission climbs above FENCE_ALT_MAX while the fence is on",
-    "ArduPilot 4.7 AC_Fence::check_fence_alt_max",
+    "ardupilot-land-start",
+    "DO_LAND_START, but RTL_AUTOLAND is 0: ArduPlane does not arm",
+    _ARMING,
+    kind="plane",
 )
-def _fence_ceiling(context: ValidationContext) -> Iterator[Issue]:
-    ceiling = context.vehicle.value("fence_ceiling")
-    if _fence_on(context, _CEILING):
-        for place in context.places:
-            if place.up > ceiling:
-                yield Issue(
-                    place.index,
-                    f"{place.up:g} m above home; the fence's ceiling (FENCE_ALT_MAX) is "
-                    f"{ceiling:g} m",
-                    "lower the item or raise FENCE_ALT_MAX",
-                )
+def _land_start(context: ValidationContext) -> Iterator[Issue]:
+    for index, _ in context.each(Command.DO_LAND_START):
+        if context.vehicle.value("return_lands") == 0:
+            yield Issue(
+                index,
+                f"{context.vehicle.name_of('return_lands')} is 0: arming is refused "
+                "(DO_LAND_START set and RTL_AUTOLAND disabled)",
+                "set RTL_AUTOLAND to 2 (a return lands here) or 3 (it does not), or remove the "
+                "item",
+            )
 
 
-@RULES.error(
-    "ardupilot-fence-floor",
-    "the mission descends below FENCE_ALT_MIN while the fence is on",
-    "ArduPilot 4.7 AC_Fence::check_fence_alt_min",
-)
-def _fence_floor(context: ValidationContext) -> Iterator[Issue]:
-    floor = context.vehicle.value("fence_floor")
-    if _fence_on(context, _FLOOR):
-        for place in context.places:
-            if place.up < floor and context.items[place.index].command != Command.NAV_LAND:
-                yield Issue(
-                    place.index,
-                    f"{place.up:g} m above home; the fence's floor (FENCE_ALT_MIN) is {floor:g} m",
-                    "raise the item or lower FENCE_ALT_MIN",
-                )
-
-
-@RULES.error(
-    "ardupilot-fence-circle",
-    "the mission goes beyond FENCE_RADIUS from home while the fence is on",
-    "ArduPilot 4.7 AC_Fence::check_fence_circle",
-)
-def _fence_circle(context: ValidationContext) -> Iterator[Issue]:
-    radius = context.vehicle.value("fence_radius")
-    if _fence_on(context, _CIRCLE) and context.home is not None:
-        for place in context.places:
-            distance = place.from_origin
-            if distance > radius:
-                yield Issue(
-                    place.index,
-                    f"{distance:.0f} m from home; the fence's radius (FENCE_RADIUS) is "
-                    f"{radius:g} m",
-                    "move the item or raise FENCE_RADIUS",
-                )
-
-
-def _fence_on(context: ValidationContext, bit: int) -> bool:
-    on = context.vehicle.value("fence_enable") != 0
-    return on and bool(int(context.vehicle.value("fence_type")) & bit)
-
-
-_WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
-_HORIZONTAL = (0, 1)
-
-_LEAN = ((30.0, 10.3), (45.0, 15.2))
-"""The lean angle, degrees, and the top speed that it gave, m/s. Measured: a quadrotor of
-ArduPilot's simulator."""
+def _flying(context: ValidationContext) -> Iterator[tuple[int, int]]:
+    """Yield index and command of the items that fly, in order."""
+    return ((k, item.command) for k, item in enumerate(context.items) if item.command <= NAV_LAST)
 
 
 @RULES.error(
@@ -192,9 +182,8 @@ ArduPilot's simulator."""
     kind="copter",
 )
 def _spline_delay(context: ValidationContext) -> Iterator[Issue]:
-    flying = [(k, item) for k, item in enumerate(context.items) if item.command <= NAV_LAST]
-    for (before, first), (index, second) in pairwise(flying):
-        if (first.command, second.command) == (Command.NAV_SPLINE_WAYPOINT, Command.NAV_DELAY):
+    for (before, first), (index, second) in pairwise(_flying(context)):
+        if (first, second) == (Command.NAV_SPLINE_WAYPOINT, Command.NAV_DELAY):
             yield Issue(
                 index,
                 f"the delay follows the spline waypoint {number(before)}: the autopilot reads its "
@@ -204,83 +193,96 @@ def _spline_delay(context: ValidationContext) -> Iterator[Issue]:
 
 
 @RULES.warning(
-    "ardupilot-stays",
-    "ArduPilot takes a waypoint at latitude and longitude 0 for the place where it is",
-    "ArduPilot 4.7 ModeAuto::loc_from_cmd, Plane::set_next_WP",
-)
-def _stays(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(*_WAYPOINTS):
-        if at_zero(item):
-            yield Issue(
-                index,
-                "latitude and longitude are 0: the aircraft stays where it is",
-                "give the coordinates, or remove the item",
-            )
-
-
-@RULES.warning(
-    "ardupilot-speed-ignored",
-    "ArduPilot does nothing on this DO_CHANGE_SPEED",
-    "measured on ArduCopter 4.7; ArduPlane 4.7 Plane::do_change_speed",
-)
-def _speed_ignored(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        throttle = 0.0 if context.vehicle.type.hovers else item.params[2]
-        if context.vehicle.type.dialect.speed_change(item) is None and not throttle > 0:
-            yield Issue(
-                index,
-                f"speed type {item.params[0]:g} with {item.params[1]:g} m/s does nothing: the "
-                "speed before stays in force",
-                "give type 0 in param1 and a speed above 0 in param2, or remove the item",
-            )
-
-
-@RULES.warning(
-    "ardupilot-speed-lean",
-    "faster than a copter flies at its lean limit",
-    "measured: 10.3 m/s at 30 degrees, 15.2 m/s at 45 (quadrotor of ArduPilot's simulator)",
+    "ardupilot-spline-last",
+    "a spline waypoint behind another item is the last that flies: an internal error",
+    "measured on ArduCopter 4.7: Internal Errors 0x20000000, which refuse the next arming",
     kind="copter",
 )
-def _speed_lean(context: ValidationContext) -> Iterator[Issue]:
-    angle = round(math.degrees(context.vehicle.value("lean_angle")), 9)
-    name = context.vehicle.name_of("lean_angle")
-    (a0, v0), (a1, v1) = _LEAN
-    top = max(v0 + (angle - a0) * (v1 - v0) / (a1 - a0), 0.0)
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        kind, speed = item.params[:2]
-        if kind in _HORIZONTAL and speed > top:
-            yield Issue(
-                index,
-                f"{speed:g} m/s; with a lean of at most {angle:g} degrees "
-                f"({name}) ArduPilot's simulated quadrotor reaches {top:.1f}",
-                f"ask for {top:.1f} m/s or less, or set ANGLE_MAX if your aircraft can lean more",
-            )
+def _spline_last(context: ValidationContext) -> Iterator[Issue]:
+    *_, before, last = [(-1, 0), (-1, 0), *_flying(context)]
+    if last[1] == Command.NAV_SPLINE_WAYPOINT != before[1]:
+        yield Issue(
+            last[0],
+            "a single spline waypoint is the last item that flies: it is flown, and reported as an "
+            "internal error of the autopilot",
+            "make it a plain waypoint, or let a return, a landing or another waypoint follow",
+        )
 
 
 @RULES.warning(
-    "ardupilot-plane-speed",
-    "an airspeed outside what ArduPlane allows is not flown",
-    "ArduPlane 4.7 Plane::do_change_speed",
+    "ardupilot-land-approach",
+    "a plane lands straight from its take-off, without an approach",
+    "measured on ArduPlane 4.7: 102 m from a landing point at home, 3 m from one 700 m ahead",
     kind="plane",
 )
-def _plane_speed(context: ValidationContext) -> Iterator[Issue]:
-    least = context.vehicle.value("min_speed")
-    top = context.vehicle.value("max_speed")
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        kind, speed = item.params[:2]
-        if kind == 0 and speed > 0 and not least <= speed <= top:
+def _approach(context: ValidationContext) -> Iterator[Issue]:
+    for (_, first), (index, second) in pairwise(_flying(context)):
+        if (first, second) == (Command.NAV_TAKEOFF, Command.NAV_LAND):
             yield Issue(
                 index,
-                f"an airspeed of {speed:g} m/s; the plane flies {least:g} to {top:g} m/s "
-                "(AIRSPEED_MIN, AIRSPEED_MAX) and ignores others",
-                "ask for a speed in between",
+                "the landing follows the take-off: a plane that is not in line with it misses it "
+                "by 100 m",
+                "put waypoints before it from which it can glide to the landing",
             )
+
+
+@RULES.error(
+    "ardupilot-set-home",
+    "home is set in flight: heights above home count from there, and the aircraft comes down",
+    "measured on ArduCopter 4.7: it flew into the ground, or got to no other waypoint",
+)
+def _set_home(context: ValidationContext) -> Iterator[Issue]:
+    takeoffs = [index for index, _ in context.each(*_TAKEOFFS[context.vehicle.type])]
+    for index, item in context.each(Command.DO_SET_HOME):
+        same_height = item.params[0] == 0 and abs(context.height(item)) < _SAME_HEIGHT
+        in_flight = context.airborne or any(takeoff < index for takeoff in takeoffs)
+        if in_flight and not same_height:
+            yield Issue(
+                index,
+                "home moves in flight, and with it what heights above home count from: the "
+                "aircraft was seen to fly into the ground",
+                "remove the item",
+            )
+
+
+RULES.commands(
+    Level.WARNING,
+    "ardupilot-guided",
+    "NAV_GUIDED_ENABLE: the aircraft hovers until another computer leads it on",
+    "measured on ArduCopter 4.7: it hovers there for good",
+    (Command.NAV_GUIDED_ENABLE,),
+    "the aircraft hovers there for good, unless another computer leads it on and ends it",
+    "remove the item, if no companion computer is meant to take over",
+    where=lambda item: item.params[0] > 0,
+    kind="copter",
+)
+RULES.commands(
+    Level.WARNING,
+    "ardupilot-stays",
+    "ArduPilot takes a waypoint at latitude and longitude 0 for the place where it is",
+    "ArduPilot 4.7 ModeAuto::loc_from_cmd, Plane::set_next_WP; measured",
+    (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT),
+    "latitude and longitude are 0: the aircraft stays where it is",
+    "give the coordinates, or remove the item",
+    where=at_zero,
+)
+RULES.commands(
+    Level.WARNING,
+    "ardupilot-frame-mission",
+    "ArduPilot takes coordinates in frame 2 for heights above sea level",
+    "ArduPilot 4.7 AP_Mission::mavlink_int_to_mission_cmd; measured",
+    FLOWN_TO,
+    "frame 2 says that there are no coordinates, but ArduPilot flies there, at {item.z:g} m above "
+    "sea level",
+    "use frame 3 for heights above home, 0 for heights above sea level",
+    where=lambda item: item.frame == Frame.MISSION,
+)
 
 
 @RULES.warning(
     "ardupilot-command-skipped",
     "ArduPilot stores this command, but this kind of aircraft does nothing with it",
-    "ArduCopter 4.7 ModeAuto::start_command, ArduPlane 4.7 Plane::start_command",
+    "measured; ArduCopter 4.7 ModeAuto::start_command, ArduPlane 4.7 Plane::start_command",
 )
 def _skipped(context: ValidationContext) -> Iterator[Issue]:
     for index, item in context.each(*_SKIPPED[context.vehicle.type]):
@@ -291,56 +293,23 @@ def _skipped(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning(
-    "ardupilot-frame-mission",
-    "ArduPilot takes coordinates in frame 2 for heights above sea level",
-    "ArduPilot 4.7 AP_Mission::mavlink_int_to_mission_cmd",
-)
-def _frame_mission(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(*FLOWN_TO):
-        if item.frame == Frame.MISSION:
-            yield Issue(
-                index,
-                f"frame 2 says that there are no coordinates, but ArduPilot flies there, at "
-                f"{item.z:g} m above sea level",
-                "use frame 3 for heights above home, 0 for heights above sea level",
-            )
-
-
-@RULES.warning(
+@RULES.error(
     "ardupilot-terrain",
     "heights above terrain: without terrain data ArduPilot does not arm",
-    "measured on ArduCopter 4.7: frame 10 uploads, then arming is refused",
+    "measured on ArduCopter and ArduPlane 4.7: arming is refused (waiting for terrain data)",
 )
 def _terrain(context: ValidationContext) -> Iterator[Issue]:
-    above = _above_terrain(context)
-    if above and context.vehicle.value("terrain_enable") != 0:
+    above = [index for index, item in context.each(*FLOWN_TO) if item.frame in ABOVE_TERRAIN]
+    if above:
+        off = context.vehicle.value("terrain_enable") == 0
+        why = "TERRAIN_ENABLE is 0" if off else "that takes terrain data on the vehicle"
         yield Issue(
             above[0],
-            f"{len(above)} of the heights count from the terrain (frame 10 or 11): ArduPilot does "
-            "not arm before it has the terrain data, and they are not checked here",
-            "load the terrain data onto the vehicle's card, or use frame 3: height above home",
+            f"{len(above)} of the heights count from the terrain (frame 10 or 11): {why}; without, "
+            "ArduPilot does not arm, and such heights are not checked here",
+            "use frame 3, height above home; or make sure of the terrain data"
+            + (" and set TERRAIN_ENABLE to 1" if off else ""),
         )
-
-
-@RULES.error(
-    "ardupilot-terrain-off",
-    "heights above terrain, but TERRAIN_ENABLE is 0",
-    "ArduPilot 4.7 AP_Arming::terrain_checks",
-)
-def _terrain_off(context: ValidationContext) -> Iterator[Issue]:
-    above = _above_terrain(context)
-    if above and context.vehicle.value("terrain_enable") == 0:
-        yield Issue(
-            above[0],
-            f"{len(above)} of the heights count from the terrain (frame 10 or 11), but "
-            "TERRAIN_ENABLE is 0",
-            "set TERRAIN_ENABLE to 1, or use frame 3: height above home",
-        )
-
-
-def _above_terrain(context: ValidationContext) -> list[int]:
-    return [index for index, item in context.each(*FLOWN_TO) if item.frame in ABOVE_TERRAIN]
 
 
 @RULES.note(

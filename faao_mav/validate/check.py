@@ -42,7 +42,8 @@ def check(
 ) -> Check:
     """Predict the flight of `mission` by `vehicle` and judge both by all rules.
 
-    With a `solution` the flight is judged by what it makes of that plan too. `lead`, where it is
+    With a `solution` the flight is judged by what it makes of that plan too, from the ground or
+    from the air, as the plan has it. `lead`, where it is
     known, is by how many seconds the aircraft sets out before the plan does. A mission that cannot
     be predicted is judged by its items alone; nothing is raised.
 
@@ -59,7 +60,8 @@ def check(
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
 
         link = compare_with_plan(solution, track, lead=lead)
-    findings = validate(mission, vehicle, track=track, limits=limits, link=link)
+    airborne = solution is not None and not solution.plan.mission.takeoff
+    findings = validate(mission, vehicle, track=track, limits=limits, link=link, airborne=airborne)
     return Check(mission, vehicle, track, unpredicted, link, findings)
 
 

@@ -28,7 +28,7 @@ class ValidationContext:
     """A mission to judge; parameters of its vehicle that are no use count as not given.
 
     `track` is how it is predicted to fly, if that is known; `link` what it is predicted to
-    deliver, if there is a plan to compare with.
+    deliver, if there is a plan to compare with. `airborne`: it is begun in the air.
     """
 
     mission: Mission
@@ -36,6 +36,7 @@ class ValidationContext:
     track: Track | None = None
     limits: Limits = field(default_factory=Limits)
     link: LinkCheck | None = None
+    airborne: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vehicle", self.vehicle.usable())
@@ -88,7 +89,7 @@ class ValidationContext:
                 here = (east, north)
             else:
                 continue
-            places.append(PlacedItem(k, *here, self._height(item)))
+            places.append(PlacedItem(k, *here, self.height(item)))
         return tuple(places)
 
     def _is_place(self, item: MissionItem) -> bool:
@@ -96,7 +97,8 @@ class ValidationContext:
             return False
         return item.frame != Frame.MISSION or self.vehicle.type.dialect.placed_in_mission_frame
 
-    def _height(self, item: MissionItem) -> float:
+    def height(self, item: MissionItem) -> float:
+        """Return metres above home to `item`, NaN where nothing tells them."""
         if item.frame in ABOVE_HOME:
             return item.z
         above_sea = item.frame in ABOVE_SEA or item.frame == Frame.MISSION

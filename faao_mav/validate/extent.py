@@ -1,13 +1,14 @@
 """How high, how far and how long the mission goes."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from faao_mav.mission.command import ABOVE_HOME, Command
+from faao_mav.arrays import Real
+from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
 from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
-from faao_mav.validate.straight import HOME, Straight
+from faao_mav.validate.straight import HOME, PlacedItem, Straight
 
 RULES = Rules()
 
@@ -17,58 +18,100 @@ FAR = 10_000.0
 COMMON_CEILING = 120.0
 """The height, m above ground, that many countries allow without a permission."""
 
+LEAST_HEIGHT = 1.0
+"""The height, m above home, below which an item is about the ground: the estimate of the height is
+no better. Chosen."""
+
+HIGHEST = 20_000.0
+"""The height, m above home, that no vehicle here reaches; plans end there too. Chosen."""
+
+_WOBBLE = 1.0
+"""By how much, m, the predicted flight may exceed a limit: aircraft wobble. Chosen."""
+
 _GIVEN = "the limit that was given"
-_LANDINGS = (Command.NAV_LAND, Command.NAV_VTOL_LAND)
 _HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
 _DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
 
-@RULES.warning(
+@RULES.error(
     "below-home",
-    "an item at home's height or below",
-    "PX4: Waypoint below home; ArduPilot says nothing and flies there",
+    "an item below home: on level ground the aircraft flies into it",
+    "measured on ArduCopter and ArduPlane 4.7: on the ground, armed; on PX4 1.16.1: the same",
 )
 def _below_home(context: ValidationContext) -> Iterator[Issue]:
-    home = context.mission.home
     for place in context.places:
-        item = context.items[place.index]
-        if not place.up <= 0 or item.command in _LANDINGS:
+        if place.up < 0 and context.items[place.index].command not in LANDINGS | TAKEOFFS:
+            yield _too_low(context, place, f"{-place.up:g} m below home")
+
+
+@RULES.warning(
+    "near-ground",
+    f"an item less than {LEAST_HEIGHT:g} m above home",
+    "measured on ArduCopter 4.7 and PX4 1.16.1",
+)
+def _near_ground(context: ValidationContext) -> Iterator[Issue]:
+    for place in context.places:
+        command = context.items[place.index].command
+        if command in LANDINGS or (place.up < 0 and command not in TAKEOFFS):
             continue
-        how = f"{-place.up:g} m below home" if place.up < 0 else "at home's height"
-        if item.frame not in ABOVE_HOME and home is not None:
-            how = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: {how}"
-        yield Issue(
-            place.index,
-            how,
-            "use frame 3, height above home, or raise the item"
-            if item.frame not in ABOVE_HOME
-            else "raise the item, unless the ground there is lower than home",
-        )
+        if place.up < LEAST_HEIGHT:
+            yield _too_low(context, place, f"{place.up:g} m above home")
+
+
+def _too_low(context: ValidationContext, place: PlacedItem, how: str) -> Issue:
+    item, home = context.items[place.index], context.mission.home
+    if item.frame in ABOVE_HOME or home is None:
+        return Issue(place.index, how, "raise the item, unless the ground there is lower than home")
+    sea = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: "
+    return Issue(place.index, sea + how, "use frame 3, height above home, or raise the item")
+
+
+@RULES.error("too-high", f"higher than {HIGHEST / 1000:g} km above home", "common sense")
+def _too_high(context: ValidationContext) -> Iterator[Issue]:
+    for place in context.places:
+        if place.up > HIGHEST:
+            yield Issue(
+                place.index,
+                f"{place.up / 1000:g} km above home: no aircraft of this kind gets there",
+                "correct the height; it counts in metres",
+            )
 
 
 @RULES.error("above-ceiling", "higher than the ceiling that was set", _GIVEN)
 def _above_ceiling(context: ValidationContext) -> Iterator[Issue]:
-    ceiling = context.limits.max_altitude
-    if ceiling is None:
-        return
-    high = [place for place in context.places if place.up > ceiling]
-    for place in high:
-        yield Issue(
-            place.index,
-            f"{place.up:g} m above home; the ceiling is {ceiling:g} m",
-            f"lower the item to {ceiling:g} m or less, or raise --max-altitude",
-        )
-    if context.track is not None and len(context.track.t) and not high:
-        up = context.track.position[:, 2]
-        top = int(np.argmax(up))
-        # The aircraft is allowed to wobble.
-        if up[top] > ceiling + 1.0:
-            yield Issue(
-                int(context.track.item[top]),
-                f"the predicted flight gets {up[top]:.1f} m above home; the ceiling is "
-                f"{ceiling:g} m",
-                "plan lower, or raise --max-altitude",
-            )
+    limit = context.limits.max_altitude
+    if limit is not None:
+        heights = None if context.track is None else context.track.position[:, 2]
+        shown = f"m above home; --max-altitude is {limit:g} m"
+        yield from _outside(context, limit, lambda place: place.up, heights, shown)
+
+
+@RULES.error("beyond-distance", "farther from home than was set", _GIVEN)
+def _beyond(context: ValidationContext) -> Iterator[Issue]:
+    limit, positions = context.limits.max_distance, context.track_positions
+    if limit is not None and context.home is not None:
+        distances = None if positions is None else np.hypot(*positions[:, :2].T)
+        shown = f"m from home; --max-distance is {limit:g} m"
+        yield from _outside(context, limit, lambda place: place.from_origin, distances, shown)
+
+
+def _outside(
+    context: ValidationContext,
+    limit: float,
+    measure: Callable[[PlacedItem], float],
+    flown: Real | None,
+    shown: str,
+) -> Iterator[Issue]:
+    """Yield the items beyond `limit`, m; without any, where the flight, at `flown` (n,), is."""
+    action = "change the item, or raise the limit if you may"
+    beyond = [place for place in context.places if measure(place) > limit]
+    for place in beyond:
+        yield Issue(place.index, f"{measure(place):.6g} {shown}", action)
+    if context.track is not None and flown is not None and len(flown) and not beyond:
+        worst = int(np.argmax(flown))
+        if flown[worst] > limit + _WOBBLE:
+            there = f"the predicted flight gets {flown[worst]:.1f} {shown}"
+            yield Issue(int(context.track.item[worst]), there, action)
 
 
 @RULES.note(
@@ -104,31 +147,6 @@ def _return_above(context: ValidationContext) -> Iterator[Issue]:
             f"({name}); the ceiling is {ceiling:g} m",
             f"set {newest} to {ceiling:g} m or less",
         )
-
-
-@RULES.error("beyond-distance", "farther from home than was set", _GIVEN)
-def _beyond(context: ValidationContext) -> Iterator[Issue]:
-    limit = context.limits.max_distance
-    if limit is None or context.home is None:
-        return
-    far = [place for place in context.places if place.from_origin > limit]
-    for place in far:
-        yield Issue(
-            place.index,
-            f"{place.from_origin:.0f} m from home; the limit is {limit:g} m",
-            "move the item nearer, or raise --max-distance",
-        )
-    positions = context.track_positions
-    if positions is not None and context.track is not None and len(positions) and not far:
-        distance = np.hypot(positions[:, 0], positions[:, 1])
-        worst = int(np.argmax(distance))
-        if distance[worst] > limit + 1.0:
-            yield Issue(
-                int(context.track.item[worst]),
-                f"the predicted flight gets {distance[worst]:.0f} m from home; the limit is "
-                f"{limit:g} m",
-                "plan nearer to home, or raise --max-distance",
-            )
 
 
 @RULES.warning("far-from-home", f"farther than {FAR / 1000:g} km from home", "common sense")

@@ -40,22 +40,17 @@ def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
     """Return the parts of `fence` in `frame`: polygons, then circles."""
     import shapely
 
-    areas = []
+    areas, kind = [], {True: "inclusion", False: "exclusion"}
     for n, polygon in enumerate(fence.polygons, start=1):
         outline = shapely.Polygon(frame.to_local(*np.transpose(polygon.vertices)))
-        kind = "inclusion" if polygon.inclusion else "exclusion"
         shape = _polygonal(shapely.make_valid(outline))
-        areas.append(
-            Area(f"{kind} polygon {n}", polygon.inclusion, shape, not shapely.is_valid(outline))
-        )
+        name = f"{kind[polygon.inclusion]} polygon {n}"
+        areas.append(Area(name, polygon.inclusion, shape, not shapely.is_valid(outline)))
     for n, circle in enumerate(fence.circles, start=1):
-        kind = "inclusion" if circle.inclusion else "exclusion"
-        radius = circle.radius
-        if not circle.inclusion:
-            radius /= math.cos(math.pi / (4 * _SEGMENTS))
+        outside = 1.0 if circle.inclusion else 1 / math.cos(math.pi / (4 * _SEGMENTS))
         center = shapely.Point(frame.to_local(*circle.center))
-        shape = center.buffer(radius, quad_segs=_SEGMENTS)
-        areas.append(Area(f"{kind} circle {n}", circle.inclusion, shape))
+        shape = center.buffer(circle.radius * outside, quad_segs=_SEGMENTS)
+        areas.append(Area(f"{kind[circle.inclusion]} circle {n}", circle.inclusion, shape))
     return tuple(areas)
 
 
@@ -73,7 +68,7 @@ def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | 
     return _polygonal(joined)
 
 
-def lines(starts: Real, ends: Real) -> NDArray[np.object_]:
+def _lines(starts: Real, ends: Real) -> NDArray[np.object_]:
     """Return the straights from `starts` to `ends`, each (n, 2), as an array of n geometries."""
     import shapely
 
@@ -133,7 +128,7 @@ class FenceMap:
         legs = self.straights
         starts = np.array([[leg.start.east, leg.start.north] for leg in legs]).reshape(-1, 2)
         ends = np.array([[leg.end.east, leg.end.north] for leg in legs]).reshape(-1, 2)
-        return lines(starts, ends)
+        return _lines(starts, ends)
 
     @cached_property
     def flight(self) -> NDArray[np.object_]:
@@ -141,7 +136,7 @@ class FenceMap:
         positions = self.positions
         if positions is None or len(positions) < 2:
             return np.empty(0, dtype=object)
-        return lines(positions[:-1, :2], positions[1:, :2])
+        return _lines(positions[:-1, :2], positions[1:, :2])
 
     @cached_property
     def flight_items(self) -> NDArray[np.int_]:

@@ -1,6 +1,7 @@
 """The fence: legs and predicted flight, not only points, and how near they come."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,9 @@ def _crosses(context: ValidationContext) -> Iterator[Issue]:
 @RULES.error("fence-home", "home lies outside the fence", _GEOMETRY)
 def _home(context: ValidationContext) -> Iterator[Issue]:
     if context.home is not None:
-        yield from _points(context, [("home", (0.0, 0.0))], "move home or the fence")
+        for issue in _points(context, [("home", (0.0, 0.0))], "move home or the fence"):
+            then = context.vehicle.type.home_outside_fence
+            yield replace(issue, message="; ".join(filter(None, (issue.message, then))))
 
 
 @RULES.error("fence-rally", "a rally point lies outside the fence", _GEOMETRY)

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Iterator
 
-from faao_mav.mission.command import FLOWN_TO, Command, Frame
+from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, number
+from faao_mav.validate.finding import Level
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import PlacedItem
 from faao_mav.vehicle import PX4_COPTER
@@ -14,43 +15,32 @@ RULES = Rules(PX4_COPTER.family)
 
 _CHECKER = "PX4 1.16 FeasibilityChecker::"
 _CONDITION_GATE = 4501
-_NEVER = frozenset({Command.CONDITION_DELAY, Command.CONDITION_DISTANCE})
-_VTOL = (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000)
-_TAKEOFFS = (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF)
+_SINGLE = 1e-3
+"""The least height above home, m, that is above 0 to PX4: it adds home's height above the sea, in
+single precision. A billionth was refused."""
+
 _FLIES = FLOWN_TO | {_CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH, 187, 211, 42600}
 """What checkTakeoff counts as flying: actuators, grippers and winches as well."""
 
-_CLOSEST_GATE = 0.05
-"""The least distance of a gate from its neighbours, m. PX4's own."""
-
-_TAKEOFF, _LANDING, _BOTH, _BOTH_OR_NONE, _BOTH_OR_NONE_ON_GROUND = 1, 2, 3, 4, 5
-
-
-@RULES.error(
+RULES.commands(
+    Level.ERROR,
     "px4-command-rejected",
     "PX4 acknowledges this command on upload and then rejects the mission",
     f"{_CHECKER}checkMissionItemValidity; measured on 1.16.1",
+    (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE),
+    "{name} is acknowledged on upload, then the mission is rejected",
+    "remove the item; to wait, use a hold (param1 of a waypoint) or NAV_DELAY",
+    where=lambda item: item.frame == Frame.MISSION,
 )
-def _rejected(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(*_NEVER):
-        if item.frame == Frame.MISSION:
-            yield Issue(
-                index,
-                f"{name_of(item.command)} is acknowledged on upload, then the mission is rejected",
-                "remove the item; to wait, use a hold (param1 of a waypoint) or NAV_DELAY",
-            )
-
-
-@RULES.error(
-    "px4-vtol-items", "items for VTOL aircraft only", f"{_CHECKER}checkItemsFitToVehicleType"
+RULES.commands(
+    Level.ERROR,
+    "px4-vtol-items",
+    "items for VTOL aircraft only",
+    f"{_CHECKER}checkItemsFitToVehicleType; measured on 1.16.1",
+    (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000),
+    "{name} is for VTOL aircraft, this is a {kind}",
+    "use NAV_TAKEOFF and NAV_LAND",
 )
-def _vtol(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(*_VTOL):
-        yield Issue(
-            index,
-            f"{name_of(item.command)} is for VTOL aircraft, this is a {context.vehicle.kind}",
-            "use NAV_TAKEOFF and NAV_LAND",
-        )
 
 
 @RULES.error(
@@ -59,7 +49,7 @@ def _vtol(context: ValidationContext) -> Iterator[Issue]:
     f"{_CHECKER}checkMissionItemValidity, checkLandPatternValidity",
 )
 def _starts_with_land(context: ValidationContext) -> Iterator[Issue]:
-    if context.items and context.items[0].command in (Command.NAV_LAND, Command.NAV_VTOL_LAND):
+    if context.items and context.items[0].command in LANDINGS:
         yield Issue(0, "the first item is a landing", "put a take-off and waypoints before it")
 
 
@@ -70,9 +60,9 @@ def _starts_with_land(context: ValidationContext) -> Iterator[Issue]:
 )
 def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
     before = next((k for k, item in enumerate(context.items) if item.command in _FLIES), None)
-    for index, _ in context.each(*_TAKEOFFS):
+    for index, _ in context.each(*TAKEOFFS):
         if before is not None and before < index:
-            second = context.items[before].command in _TAKEOFFS
+            second = context.items[before].command in TAKEOFFS
             yield Issue(
                 index,
                 f"a second take-off, after item {number(before)}"
@@ -89,7 +79,7 @@ def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
 )
 def _takeoff_altitude(context: ValidationContext) -> Iterator[Issue]:
     for place in _takeoffs(context):
-        if place.up <= 0:
+        if place.up < _SINGLE:
             yield Issue(
                 place.index,
                 f"the take-off ends {place.up:g} m above home; it must be above 0",
@@ -119,7 +109,7 @@ def _takeoff_low(context: ValidationContext) -> Iterator[Issue]:
 
 def _takeoffs(context: ValidationContext) -> Iterator[PlacedItem]:
     for place in context.places:
-        if context.items[place.index].command in _TAKEOFFS:
+        if context.items[place.index].command in TAKEOFFS:
             yield place
 
 
@@ -130,27 +120,23 @@ def _takeoffs(context: ValidationContext) -> Iterator[PlacedItem]:
 )
 def _takeoff_landing(context: ValidationContext) -> Iterator[Issue]:
     required = int(context.vehicle.value("takeoff_land_required"))
-    takeoff, landing = any(context.each(*_TAKEOFFS)), any(context.each(Command.NAV_LAND))
-    wanted = {
-        _TAKEOFF: takeoff,
-        _LANDING: landing,
-        _BOTH: takeoff and landing,
-        _BOTH_OR_NONE: takeoff == landing,
-        _BOTH_OR_NONE_ON_GROUND: takeoff == landing,
+    takeoff, landing = any(context.each(*TAKEOFFS)), any(context.each(Command.NAV_LAND))
+    both_or_none = "both a take-off and a landing, or neither,", takeoff == landing
+    asked = {
+        1: ("a take-off", takeoff),
+        2: ("a landing", landing),
+        3: ("a take-off and a landing", takeoff and landing),
+        4: both_or_none,
+        5: both_or_none,  # on the ground; in the air 2
     }
-    if wanted.get(required, True):
-        return
-    missing = {
-        _TAKEOFF: "a take-off",
-        _LANDING: "a landing",
-        _BOTH: "a take-off and a landing",
-    }.get(required, "both a take-off and a landing, or neither,")
-    yield Issue(
-        None,
-        f"MIS_TKO_LAND_REQ is {required} and asks for {missing}; the mission has "
-        f"{'a' if takeoff else 'no'} take-off and {'a' if landing else 'no'} landing",
-        f"add {'NAV_LAND' if takeoff else 'NAV_TAKEOFF'}, or change MIS_TKO_LAND_REQ",
-    )
+    what, there = asked.get(required, ("", True))
+    if not there:
+        yield Issue(
+            None,
+            f"MIS_TKO_LAND_REQ is {required} and asks for {what}; the mission has "
+            f"{'a' if takeoff else 'no'} take-off and {'a' if landing else 'no'} landing",
+            f"add {'NAV_LAND' if takeoff else 'NAV_TAKEOFF'}, or change MIS_TKO_LAND_REQ",
+        )
 
 
 @RULES.warning(
@@ -171,67 +157,6 @@ def _first_far(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error(
-    "px4-gate-close",
-    "a CONDITION_GATE at the place of the item before or after it",
-    f"{_CHECKER}checkDistancesBetweenWaypoints",
-)
-def _gate(context: ValidationContext) -> Iterator[Issue]:
-    if context.frame is None:
-        return
-    placed = [
-        (k, item)
-        for k, item in context.each(*FLOWN_TO, _CONDITION_GATE)
-        if abs(item.x) <= 90 and abs(item.y) <= 180
-    ]
-    local = context.frame.to_local([item.x for _, item in placed], [item.y for _, item in placed])
-    for n in range(1, len(placed)):
-        (before, first), (index, second) = placed[n - 1], placed[n]
-        distance = math.dist(local[n - 1], local[n])
-        if _CONDITION_GATE in (first.command, second.command) and distance < _CLOSEST_GATE:
-            yield Issue(
-                index,
-                f"{distance:.3f} m from item {number(before)}; a gate and its neighbour must be "
-                f"{_CLOSEST_GATE} m apart",
-                "move the gate",
-            )
-
-
-@RULES.error(
-    "px4-max-horizontal",
-    "farther from home than GF_MAX_HOR_DIST",
-    "PX4 1.16 Geofence::check, MissionFeasibilityChecker::checkGeofence",
-)
-def _max_horizontal(context: ValidationContext) -> Iterator[Issue]:
-    limit = context.vehicle.value("fence_distance")
-    if limit > 0 and context.home is not None:
-        for place in context.places:
-            distance = place.from_origin
-            if distance > limit:
-                yield Issue(
-                    place.index,
-                    f"{distance:.0f} m from home, GF_MAX_HOR_DIST is {limit:g} m",
-                    "move the item or raise GF_MAX_HOR_DIST",
-                )
-
-
-@RULES.error(
-    "px4-max-vertical",
-    "higher above home than GF_MAX_VER_DIST",
-    "PX4 1.16 Geofence::check, MissionFeasibilityChecker::checkGeofence",
-)
-def _max_vertical(context: ValidationContext) -> Iterator[Issue]:
-    limit = context.vehicle.value("fence_height")
-    if limit > 0:
-        for place in context.places:
-            if abs(place.up) > limit:
-                yield Issue(
-                    place.index,
-                    f"{place.up:g} m above home, GF_MAX_VER_DIST is {limit:g} m",
-                    "lower the item or raise GF_MAX_VER_DIST",
-                )
-
-
 _APPROACH = "PX4 1.16 FeasibilityChecker::checkFixedWindLandApproach"
 _PATTERN = "PX4 1.16 FeasibilityChecker::checkLandPatternValidity"
 _SPARE_ANGLE = 0.1
@@ -240,12 +165,16 @@ _SPARE_ANGLE = 0.1
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)
 
 
-def _approaches(context: ValidationContext) -> Iterator[tuple[PlacedItem, PlacedItem]]:
-    """Yield the place before each landing, and the landing."""
+def _approaches(context: ValidationContext) -> Iterator[tuple[int, float, float, float]]:
+    """Yield the index of each landing and the item before it: m above, m away, m of its orbit."""
     by_index = {place.index: place for place in context.places}
     for index, _ in context.each(Command.NAV_LAND):
-        if index - 1 in by_index and index in by_index:
-            yield by_index[index - 1], by_index[index]
+        entrance, landing = by_index.get(index - 1), by_index.get(index)
+        if entrance is not None and landing is not None:
+            away = math.hypot(entrance.east - landing.east, entrance.north - landing.north)
+            item = context.items[entrance.index]
+            orbits = item.command == Command.NAV_LOITER_TO_ALT and not math.isnan(item.params[1])
+            yield index, entrance.up - landing.up, away, abs(item.params[1]) if orbits else 0.0
 
 
 @RULES.error(
@@ -272,12 +201,11 @@ def _entrance(context: ValidationContext) -> Iterator[Issue]:
     kind="plane",
 )
 def _below(context: ValidationContext) -> Iterator[Issue]:
-    for entrance, landing in _approaches(context):
-        if entrance.up - landing.up <= 0:
+    for index, above, _, _ in _approaches(context):
+        if above <= 0:
             yield Issue(
-                landing.index,
-                f"the approach starts {entrance.up:g} m above home, the landing is at "
-                f"{landing.up:g} m",
+                index,
+                f"the approach starts {-above:g} m below the landing; it must be above it",
                 "raise the item before the landing",
             )
 
@@ -289,12 +217,11 @@ def _below(context: ValidationContext) -> Iterator[Issue]:
     kind="plane",
 )
 def _orbit(context: ValidationContext) -> Iterator[Issue]:
-    for entrance, landing in _approaches(context):
-        distance, radius = _distance(entrance, landing), _orbit_radius(context, entrance)
-        if radius > 0 and distance <= radius:
+    for index, _, away, radius in _approaches(context):
+        if radius > 0 and away <= radius:
             yield Issue(
-                landing.index,
-                f"the landing is {distance:.0f} m from the centre of an orbit of {radius:g} m",
+                index,
+                f"the landing is {away:.0f} m from the centre of an orbit of {radius:g} m",
                 "move the landing point out of the orbit, or make the orbit smaller",
             )
 
@@ -305,32 +232,18 @@ def _orbit(context: ValidationContext) -> Iterator[Issue]:
 def _steep(context: ValidationContext) -> Iterator[Issue]:
     angle = math.degrees(context.vehicle.value("landing_angle"))
     slope = math.tan(math.radians(angle + _SPARE_ANGLE))
-    for entrance, landing in _approaches(context):
-        if context.items[entrance.index].command not in _ENTRANCES:
+    for index, above, away, radius in _approaches(context):
+        if context.items[index - 1].command not in _ENTRANCES or away <= radius:
             continue
-        height = entrance.up - landing.up
-        square = _distance(entrance, landing) ** 2 - _orbit_radius(context, entrance) ** 2
-        if square > 0 and height > 0 and height / math.sqrt(square) > slope:
-            distance = math.sqrt(square)
+        way = math.sqrt(away**2 - radius**2)
+        if above > 0 and above / way > slope:
             yield Issue(
-                landing.index,
-                f"{height:g} m of descent in {distance:.0f} m are "
-                f"{math.degrees(math.atan2(height, distance)):.1f} degrees, FW_LND_ANG is "
-                f"{angle:g}",
-                f"start the approach at most {slope * distance:.0f} m above the landing, or "
-                f"{math.ceil(height / slope)} m away from it",
+                index,
+                f"{above:g} m of descent in {way:.0f} m are "
+                f"{math.degrees(math.atan2(above, way)):.1f} degrees, FW_LND_ANG is {angle:g}",
+                f"start the approach at most {slope * way:.0f} m above the landing, or "
+                f"{math.ceil(above / slope)} m away from it",
             )
-
-
-def _distance(a: PlacedItem, b: PlacedItem) -> float:
-    return math.hypot(a.east - b.east, a.north - b.north)
-
-
-def _orbit_radius(context: ValidationContext, entrance: PlacedItem) -> float:
-    item = context.items[entrance.index]
-    if item.command != Command.NAV_LOITER_TO_ALT or math.isnan(item.params[1]):
-        return 0.0
-    return abs(item.params[1])
 
 
 @RULES.error(
@@ -353,7 +266,7 @@ def _land_start(context: ValidationContext) -> Iterator[Issue]:
                 f"a return to launch after the DO_LAND_START of item {number(start)}",
                 "remove one of both",
             )
-    landings = [index for index, _ in context.each(Command.NAV_LAND, Command.NAV_VTOL_LAND)]
+    landings = [index for index, _ in context.each(*LANDINGS)]
     # The landing's approach, the item before it, may be the DO_LAND_START itself.
     if not any(index - 1 >= start for index in landings):
         yield Issue(start, "there is no landing after DO_LAND_START", "add NAV_LAND, or remove it")

@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterator
 
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
-from faao_mav.validate.context import ValidationContext, at_zero
+from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
+from faao_mav.validate.finding import Level
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.vehicle import PX4_COPTER
 
@@ -15,107 +16,74 @@ _ROI_WITH_PLACE, _ROI_WITHOUT_PLACE = (0, 3), (0, 1, 2)
 
 _MEASURED = "measured on PX4 1.16.1"
 
-
-@RULES.error(
+RULES.commands(
+    Level.ERROR,
     "px4-null-island",
     "an item at latitude and longitude 0: PX4 flies there, to the Gulf of Guinea",
     _MEASURED,
+    FLOWN_TO,
+    "latitude and longitude are 0: PX4 flies off towards 0, 0, after a take-off as well",
+    "give the coordinates; for a take-off those of home",
+    where=lambda item: at_zero(item) and item.frame != Frame.MISSION,
 )
-def _null_island(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(*FLOWN_TO):
-        if at_zero(item) and item.frame != Frame.MISSION:
-            first = "climbs and then " if item.command == Command.NAV_TAKEOFF else ""
+RULES.commands(
+    Level.ERROR,
+    "px4-altitude-missing",
+    "an altitude that is not set: PX4 hovers at that item for good",
+    _MEASURED,
+    FLOWN_TO,
+    "the altitude is not set (NaN): PX4 accepts it and then hovers there for good",
+    "give the altitude",
+    where=lambda item: math.isnan(item.z),
+)
+
+
+@RULES.warning(
+    "px4-stops",
+    "an item without autocontinue: PX4 stops the mission there",
+    "PX4 1.16 MissionBase::on_active; measured",
+)
+def _stops(context: ValidationContext) -> Iterator[Issue]:
+    for index, item in enumerate(context.items[:-1]):
+        if not item.autocontinue:
             yield Issue(
                 index,
-                f"latitude and longitude are 0: PX4 {first}flies off towards 0, 0",
-                "give the coordinates; for a take-off those of home",
+                "autocontinue is off: PX4 does not go on to the next item",
+                "set autocontinue, the last field of the row",
             )
 
 
 @RULES.error(
-    "px4-altitude-missing",
-    "an altitude that is not set: PX4 hovers at that item for good",
+    "jump-in-place",
+    "a DO_JUMP goes back to an item that does not fly, with none between that does",
+    "measured on PX4 1.16.1: it stays on the ground, armed, and its processor is busy",
+)
+def _jump_in_place(context: ValidationContext) -> Iterator[Issue]:
+    for index, item in context.each(Command.DO_JUMP):
+        target = context.jump_target(index)
+        # A jump to itself is flown.
+        if target is None or target >= index or item.params[1] == 0:
+            continue
+        if all(each.command > NAV_LAST for each in context.items[target:index]):
+            yield Issue(
+                index,
+                f"the loop from item {number(target)} to here flies nowhere: PX4 does not take off",
+                "jump to a waypoint, or remove the jump",
+            )
+
+
+@RULES.error(
+    "px4-nothing-to-fly",
+    "no item flies: PX4 says that the mission is finished, on the ground",
     _MEASURED,
 )
-def _altitude_missing(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(*FLOWN_TO):
-        if math.isnan(item.z):
-            yield Issue(
-                index,
-                "the altitude is not set (NaN): PX4 accepts it and then hovers there for good",
-                "give the altitude",
-            )
-
-
-@RULES.warning(
-    "px4-speed-default",
-    "a DO_CHANGE_SPEED without a speed above 0 sets the default speed",
-    _MEASURED,
-)
-def _speed_default(context: ValidationContext) -> Iterator[Issue]:
-    default, name = context.vehicle.value("cruise_speed"), context.vehicle.name_of("cruise_speed")
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        speed = item.params[1]
-        if not speed > 0:
-            yield Issue(
-                index,
-                f"a speed of {speed:g} m/s sets the default of {default:g} m/s ({name})",
-                "give the speed in param2, unless you mean the default",
-            )
-
-
-@RULES.warning(
-    "px4-speed-type",
-    "PX4 takes a climb or descent speed for the horizontal speed",
-    _MEASURED,
-    kind="copter",
-)
-def _speed_type(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        if item.params[0] in (2, 3) and item.params[1] > 0:
-            yield Issue(
-                index,
-                f"speed type {item.params[0]:g} is ignored: {item.params[1]:g} m/s become the "
-                "horizontal speed",
-                "remove the item and set MPC_Z_V_AUTO_UP and MPC_Z_V_AUTO_DN instead",
-            )
-
-
-@RULES.warning(
-    "px4-speed-capped",
-    "faster than PX4 flies",
-    f"{_MEASURED}: capped at MPC_XY_VEL_MAX",
-    kind="copter",
-)
-def _speed_capped(context: ValidationContext) -> Iterator[Issue]:
-    limit, name = context.vehicle.value("max_speed"), context.vehicle.name_of("max_speed")
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        if item.params[1] > limit:
-            yield Issue(
-                index,
-                f"{item.params[1]:g} m/s; PX4 flies at most {limit:g} m/s ({name})",
-                f"ask for {limit:g} m/s or less, or raise MPC_XY_VEL_MAX",
-            )
-
-
-@RULES.warning(
-    "px4-plane-speed",
-    "an airspeed outside what PX4 flies a plane at",
-    "PX4 1.16: FW_AIRSPD_MIN, FW_AIRSPD_MAX",
-    kind="plane",
-)
-def _plane_speed(context: ValidationContext) -> Iterator[Issue]:
-    least = context.vehicle.value("min_speed")
-    top = context.vehicle.value("max_speed")
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        speed = item.params[1]
-        if speed > 0 and not least <= speed <= top:
-            yield Issue(
-                index,
-                f"an airspeed of {speed:g} m/s; the plane flies {least:g} to {top:g} m/s "
-                "(FW_AIRSPD_MIN, FW_AIRSPD_MAX)",
-                "ask for a speed in between",
-            )
+def _nothing(context: ValidationContext) -> Iterator[Issue]:
+    if context.items and not any(context.each(*FLOWN_TO)):
+        yield Issue(
+            None,
+            "no item flies to a place: PX4 ends the mission at once, where it stands",
+            "add a take-off and waypoints",
+        )
 
 
 @RULES.note(
@@ -136,21 +104,6 @@ def _takeoff_elsewhere(context: ValidationContext) -> Iterator[Issue]:
                 f"the take-off item is {distance:.0f} m from home: PX4 climbs at home and then "
                 "flies there",
                 "nothing, if the way is free",
-            )
-
-
-@RULES.warning(
-    "px4-stops",
-    "an item without autocontinue: PX4 stops the mission there",
-    "PX4 1.16 MissionBase::on_active",
-)
-def _stops(context: ValidationContext) -> Iterator[Issue]:
-    for index, item in enumerate(context.items[:-1]):
-        if not item.autocontinue:
-            yield Issue(
-                index,
-                "autocontinue is off: PX4 does not go on to the next item",
-                "set autocontinue, the last field of the row",
             )
 
 

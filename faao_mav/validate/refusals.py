@@ -58,43 +58,27 @@ def _replacement(command: int, frame: int) -> str:
 
 @RULES.error("storage-full", "more items than any board of the autopilot stores", _SIZES)
 def _full(context: ValidationContext) -> Iterator[Issue]:
-    rows, most = _rows(context), context.vehicle.type.dialect.items.most
-    if rows > most and not _on_card(context):
-        yield Issue(
-            None,
-            f"{rows} items{_with_home(context)}; {context.vehicle.type.name} stores {most} at "
-            "most (NO_SPACE)",
-            _thin(context),
-        )
+    own = context.vehicle.type
+    most = own.dialect.items.most
+    return _too_many(context, most, math.inf, f"{own.name} stores {most} at most (NO_SPACE)")
 
 
 @RULES.warning("storage-tight", "more items than common boards store", _SIZES)
 def _tight(context: ValidationContext) -> Iterator[Issue]:
-    rows, limit = _rows(context), context.vehicle.type.dialect.items
-    if limit.sure < rows <= limit.most and not _on_card(context):
-        yield Issue(
-            None,
-            f"{rows} items{_with_home(context)}; {limit.sure} are known to fit, boards differ",
-            _thin(context),
-        )
-
-
-def _rows(context: ValidationContext) -> int:
-    return len(context.items) + context.vehicle.type.dialect.home_row
-
-
-def _with_home(context: ValidationContext) -> str:
-    return " with home" if context.vehicle.type.dialect.home_row else ""
-
-
-def _on_card(context: ValidationContext) -> bool:
-    return context.vehicle.type.dialect.unlimited(context.vehicle)
-
-
-def _thin(context: ValidationContext) -> str:
-    return ", or ".join(
-        filter(None, ("thin the waypoints", context.vehicle.type.dialect.make_room))
+    limit = context.vehicle.type.dialect.items
+    return _too_many(
+        context, limit.sure, limit.most, f"{limit.sure} are known to fit, boards differ"
     )
+
+
+def _too_many(context: ValidationContext, sure: int, most: float, limit: str) -> Iterator[Issue]:
+    """Yield an issue where there are more than `sure` rows, and no more than `most`."""
+    dialect = context.vehicle.type.dialect
+    rows = len(context.items) + dialect.home_row
+    if sure < rows <= most and not dialect.unlimited(context.vehicle):
+        with_home = " with home" if dialect.home_row else ""
+        room = filter(None, ("thin the waypoints", dialect.make_room))
+        yield Issue(None, f"{rows} items{with_home}; {limit}", ", or ".join(room))
 
 
 @RULES.warning(

@@ -1,11 +1,13 @@
 """What a rule is, and how the modules of rules list theirs."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from faao_mav.mission.item import MissionItem
 from faao_mav.validate.finding import Finding, Level
 from faao_mav.vehicle import AutopilotFamily, Vehicle
+from faao_mav.vehicle.dialect import name_of
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
@@ -83,6 +85,32 @@ class Rules(list[Rule]):
     def note(self, *texts: str, kind: str | None = None) -> Decorator:
         """Add a rule about what is worth knowing."""
         return self._add(Level.NOTE, texts, kind)
+
+    def commands(
+        self,
+        level: Level,
+        name: str,
+        summary: str,
+        source: str,
+        commands: Container[int],
+        message: str,
+        action: str,
+        *,
+        where: Callable[[MissionItem], bool] = lambda _: True,
+        kind: str | None = None,
+    ) -> None:
+        """Add a rule about each item with one of `commands` for which `where` holds.
+
+        In `message`, `{name}` is the command, `{item}` the item and `{kind}` the type of vehicle.
+        """
+
+        def check(context: "ValidationContext") -> Iterator[Issue]:
+            for index, item in enumerate(context.items):
+                if item.command in commands and where(item):
+                    told = {"name": name_of(item.command), "kind": context.vehicle.kind}
+                    yield Issue(index, message.format(item=item, **told), action)
+
+        self._add(level, (name, summary, source), kind)(check)
 
     def _add(self, level: Level, texts: tuple[str, ...], kind: str | None) -> Decorator:
         name, summary, source = texts

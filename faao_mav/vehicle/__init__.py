@@ -10,6 +10,7 @@ from faao_mav.vehicle.px4 import PX4_COPTER, PX4_PLANE
 from faao_mav.vehicle.registry import (
     families,
     family,
+    kind_by_number,
     register,
     unregister,
     vehicle_type,
@@ -34,6 +35,7 @@ __all__ = [
     "VehicleType",
     "families",
     "family",
+    "kind_by_number",
     "register",
     "unregister",
     "vehicle_of",

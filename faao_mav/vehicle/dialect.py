@@ -26,12 +26,6 @@ Codec: TypeAlias = Callable[[float], float]
 Codecs: TypeAlias = tuple[Codec, Codec, Codec, Codec]
 """Those of param1 to param4."""
 
-FENCE_ROWS = frozenset({*POLYGON.values(), *CIRCLE.values(), FENCE_RETURN_POINT})
-"""The commands that rows of a fence have."""
-
-ROWS_BESIDE = FENCE_ROWS | {RALLY_POINT}
-"""The commands of what travels beside a mission: fence and rally points."""
-
 SpeedAxis: TypeAlias = Literal["horizontal", "climb", "descent", "airspeed", "least ground speed"]
 
 
@@ -72,6 +66,8 @@ class Dialect:
         speed_change: what a DO_CHANGE_SPEED changes, None for one that changes nothing.
         unlimited: whether the vehicle's parameters make room for any number of items, and
             `make_room` how to set them so.
+        endings: the commands behind which nothing is flown.
+        flies_on: whether, by the vehicle's parameters, a take-off behind a landing is flown.
         known: the commands of which it is known what is stored, None: all. Of the others `stored`
             takes everything to be kept.
     """
@@ -90,6 +86,8 @@ class Dialect:
     speed_change: Callable[[MissionItem], SpeedChange | None]
     unlimited: Callable[[ParameterValues], bool] = lambda _: False
     make_room: str = ""
+    endings: frozenset[int] = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
+    flies_on: Callable[[ParameterValues], bool] = lambda _: False
     known: frozenset[int] | None = None
 
     def is_known(self, command: int) -> bool:
@@ -104,6 +102,11 @@ def dropped(_: float) -> float:
 
 NOTHING: Codecs = (dropped, dropped, dropped, dropped)
 """None of the four parameters is stored."""
+
+
+def first(codec: Codec) -> Codecs:
+    """Return how param1 alone is stored."""
+    return (codec, dropped, dropped, dropped)
 
 
 def through(codecs: Codecs, item: MissionItem) -> MissionItem:
@@ -131,9 +134,18 @@ def whole(least: int, most: int) -> Codec:
     """Stored as a whole number: fractions are cut off, what is out of range ends at its limit."""
 
     def codec(value: float) -> float:
-        return 0.0 if math.isnan(value) else float(min(max(math.trunc(value), least), most))
+        return 0.0 if math.isnan(value) else float(math.trunc(min(max(value, least), most)))
 
     return codec
+
+
+BESIDE: dict[int, Codecs] = (
+    dict.fromkeys(POLYGON.values(), first(whole(0, 65_535)))
+    | dict.fromkeys(CIRCLE.values(), first(single))
+    | dict.fromkeys((FENCE_RETURN_POINT, RALLY_POINT), NOTHING)
+)
+"""What every autopilot measured keeps of the parameters of fence and rally rows: how many vertices
+a polygon has, and the radius of a circle."""
 
 
 def flag(value: float) -> float:

@@ -7,8 +7,8 @@ from pathlib import Path
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.formats import MissionFile, PlanTarget
 from faao_mav.mission.item import MissionItem
-from faao_mav.plan.autopilots import Autopilot, Kind
-from faao_mav.vehicle.registry import families, family, vehicle_type_by_numbers, vehicle_types
+from faao_mav.plan.autopilots import Autopilot
+from faao_mav.vehicle.registry import families, family, vehicle_type_by_numbers
 from faao_mav.vehicle.vehicle import Vehicle
 
 _NOT_SET = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, (math.nan, 0.0, 0.0, 0.0))
@@ -27,16 +27,14 @@ def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:
 
 
 def vehicle_in(file: MissionFile) -> Vehicle | None:
-    """Return the vehicle that a mission file names, a copter unless it says otherwise, or None."""
+    """Return the vehicle that a mission file names, None if it names none that is known.
+
+    The type is the autopilot's first where the file leaves it open (MAV_TYPE 0).
+    """
     if file.firmware is None:
         return None
-    found = vehicle_type_by_numbers(file.firmware, file.vehicle_type)
+    found = vehicle_type_by_numbers(file.firmware, file.vehicle_type or None)
     return None if found is None else Vehicle(found.family.key, found.kind)
-
-
-def kind_in(file: MissionFile) -> Kind | None:
-    """Return the kind of aircraft that a mission file names, whatever its autopilot, or None."""
-    return next((t.kind for t in vehicle_types() if file.vehicle_type in t.mav_types), None)
 
 
 def parameter_path(mission: Path, autopilot: Autopilot) -> Path:

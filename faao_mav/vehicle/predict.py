@@ -15,7 +15,7 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.vehicle.flight_path import FlightModel, FlightPath, Track, VerticalProfile
+from faao_mav.vehicle.flight_path import FlightPath, Track
 from faao_mav.vehicle.vehicle import Vehicle
 
 LONGEST = 86_400.0
@@ -54,10 +54,7 @@ def predict(
         none = np.empty(0, dtype=int)
         return Track(np.empty(0), empty, empty, none, reached, frame or LocalFrame(0.0, 0.0))
     frame = frame or LocalFrame(*start)
-    model = vehicle.flight_model(frame.latitude)
-    walk = _Walk(mission, vehicle, frame, step, model, vehicle.vertical)
-    walk.place = np.append(frame.to_local(*start), 0.0)
-    walk.home = walk.goal = walk.place
+    walk = _Walk(mission, vehicle, frame, step, np.append(frame.to_local(*start), 0.0))
     for index, item in _in_order(mission):
         walk.take(index, item)
         if walk.over:
@@ -102,45 +99,43 @@ def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
 
 
 @dataclass
-class _PathBuilder:
-    """Waypoints to be flown in one go; the first is where the aircraft rests.
+class _Stop:
+    """A point (3,), m, of a stretch, with its item and what a `FlightPath` says of it.
 
-    `waits` are items that only make it wait at one of the points, with that point's number.
+    `waits` are further items that only make the aircraft wait here.
     """
 
-    points: list[Real]
-    items: list[int]
-    waits: list[tuple[int, int]] = field(default_factory=list)
-    speeds: list[float] = field(default_factory=list)
-    holds: list[float] = field(default_factory=lambda: [0.0])
-    delays: list[float] = field(default_factory=lambda: [0.0])
-    splines: list[bool] = field(default_factory=lambda: [False])
-    radii: list[float] = field(default_factory=lambda: [0.0])
+    point: Real
+    item: int
+    speed: float = math.nan
+    hold: float = 0.0
+    delay: float = 0.0
+    spline: bool = False
+    radius: float = 0.0
+    waits: list[int] = field(default_factory=list)
 
 
 @dataclass
 class _Walk:
-    """The flight so far."""
+    """The flight so far, and the stretch still to be flown in one go from where it rests."""
 
     mission: Mission
     vehicle: Vehicle
     frame: LocalFrame
     step: float
-    model: FlightModel
-    vertical: VerticalProfile
-    place: Real = field(default_factory=lambda: np.zeros(3))
-    goal: Real = field(default_factory=lambda: np.zeros(3))
-    home: Real = field(default_factory=lambda: np.zeros(3))
-    clock: float = 0.0
-    speed: float = math.nan
-    over: bool = False
-    stretch: _PathBuilder | None = None
+    home: Real
+    stretch: list[_Stop] = field(default_factory=list)
     parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
+    clock: float = 0.0
+    over: bool = False
 
     def __post_init__(self) -> None:
-        self.reached = np.full(len(self.mission.items), np.nan)
-        self.speed = self._own_speed()
+        self.vertical = self.vehicle.vertical
         self.flying = self.vehicle
+        self.model = self.vehicle.flight_model(self.frame.latitude)
+        self.speed = self.model.cruise_speed
+        self.place = self.goal = self.home
+        self.reached = np.full(len(self.mission.items), np.nan)
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
@@ -166,8 +161,9 @@ class _Walk:
 
     def track(self) -> Track:
         """Return everything flown."""
-        if not self.parts:
-            self.parts.append(_still(self.clock, self.place, 0))
+        if not self.parts:  # one sample, at rest
+            at_rest = (np.array([self.clock]), self.place[None], np.zeros((1, 3)), np.zeros(1))
+            self.parts.append(at_rest)
         t, position, velocity, item = (
             np.concatenate(part) for part in zip(*self.parts, strict=True)
         )
@@ -175,36 +171,31 @@ class _Walk:
 
     def fly(self) -> None:
         """Fly the waypoints that are waiting."""
-        stretch, self.stretch = self.stretch, None
-        if stretch is None:
+        stops, self.stretch = self.stretch, []
+        if not stops:
             return
-        if len(stretch.points) == 1:
-            self._go(stretch.items[0], self.place, stretch.delays[0])
-            for index, _ in stretch.waits:
-                self.reached[index] = self.clock
+        if len(stops) == 1:
+            self._go(stops[0].item, self.place, stops[0].delay)
+            self.reached[stops[0].waits] = self.clock
             return
         path = FlightPath(
-            points=np.array(stretch.points),
-            speeds=np.array(stretch.speeds),
-            holds=np.array(stretch.holds),
-            splines=np.array(stretch.splines),
-            radii=np.array(stretch.radii),
-            delays=np.array(stretch.delays),
+            points=np.array([stop.point for stop in stops]),
+            speeds=np.array([stop.speed for stop in stops[1:]]),
+            holds=np.array([stop.hold for stop in stops]),
+            splines=np.array([stop.spline for stop in stops]),
+            radii=np.array([stop.radius for stop in stops]),
+            delays=np.array([stop.delay for stop in stops]),
         )
         self._check_clock(self._at_least(path))
         flown = self.model.fly(path, self.step)
         end = float(flown.departures[-1])
         kept = flown.t <= end
-        under_way = np.minimum(
-            np.searchsorted(flown.departures[1:], flown.t[kept], side="right"),
-            len(stretch.items) - 2,
-        )
-        items = np.array(stretch.items[1:])[under_way]
+        leg = np.searchsorted(flown.departures[1:], flown.t[kept], side="right")
+        items = np.array([stop.item for stop in stops[1:]])[np.minimum(leg, len(stops) - 2)]
         self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], items)
-        for index, done in zip(stretch.items[1:], flown.departures[1:], strict=True):
-            self.reached[index] = self.clock + done
-        for index, point in stretch.waits:
-            self.reached[index] = self.clock + flown.departures[point]
+        for stop, done in zip(stops, flown.departures, strict=True):
+            own = [] if stop is stops[0] else [stop.item]
+            self.reached[own + stop.waits] = self.clock + done
         self.clock += end
         self.place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
         self.goal = path.points[-1]
@@ -212,7 +203,7 @@ class _Walk:
     def _at_least(self, path: FlightPath) -> float:
         """Return how long `path` takes without ramps, s."""
         ways = np.diff(path.points, axis=0)
-        speeds = np.where(path.speeds > 0, path.speeds, self._own_speed())
+        speeds = np.where(path.speeds > 0, path.speeds, self.model.cruise_speed)
         level, rise = np.hypot(ways[:, 0], ways[:, 1]) / speeds, ways[:, 2]
         limit = np.where(rise > 0, self.vertical.climb_speed, self.vertical.descent_speed)
         legs = np.maximum(level, np.abs(rise) / limit)
@@ -242,27 +233,25 @@ class _Walk:
     def _towards(
         self, index: int, goal: Real, hold: float, *, spline: bool = False, radius: float = 0.0
     ) -> None:
-        stretch = self.stretch = self.stretch or _PathBuilder([self.place], [index])
-        if np.abs(goal - stretch.points[-1]).max() <= _SAME_PLACE:
-            whole = self.vehicle.type.whole_second_holds
-            stretch.delays[-1] += math.floor(hold) if whole else hold
-            stretch.waits.append((index, len(stretch.points) - 1))
-            return
-        stretch.points.append(goal)
-        stretch.items.append(index)
-        stretch.speeds.append(self.speed)
-        stretch.holds.append(hold)
-        stretch.delays.append(0.0)
-        stretch.splines.append(spline)
-        stretch.radii.append(radius)
+        last = self._last_stop(index)
+        if np.abs(goal - last.point).max() <= _SAME_PLACE:
+            self._delay(index, math.floor(hold) if self.vehicle.type.whole_second_holds else hold)
+        else:
+            stop = _Stop(goal, index, self.speed, hold, spline=spline, radius=radius)
+            self.stretch.append(stop)
 
     def _delay(self, index: int, seconds: float) -> None:
-        stretch = self.stretch = self.stretch or _PathBuilder([self.place], [index])
-        stretch.delays[-1] += seconds
-        stretch.waits.append((index, len(stretch.points) - 1))
+        last = self._last_stop(index)
+        last.delay += seconds
+        last.waits.append(index)
+
+    def _last_stop(self, index: int) -> _Stop:
+        """Return where the stretch ends so far; it begins with item `index` where there is none."""
+        self.stretch = self.stretch or [_Stop(self.place, index)]
+        return self.stretch[-1]
 
     def _land(self, index: int, item: MissionItem) -> None:
-        here = self.stretch.points[-1] if self.stretch else self.place
+        here = self.stretch[-1].point if self.stretch else self.place
         goal = self._height_over(here, item, index)
         if (item.x or item.y) and not (math.isnan(item.x) or math.isnan(item.y)):
             goal[:2] = self.frame.to_local(item.x, item.y)
@@ -275,7 +264,7 @@ class _Walk:
         if self.vehicle.type.hovers and level > self.place[2] + _SAME_PLACE:
             up = np.array([self.place[0], self.place[1], level])
             self._go(index, up, self.vertical.climb(level - float(self.place[2])))
-        self.speed = self._own_speed()
+        self.speed = self.model.cruise_speed
         rise, circling = level - float(self.place[2]), 0.0
         if not self.vertical.lands_on_return:  # until it is at its height, on the way or over home
             speed = self.flying.value("climb_speed" if rise > 0 else "descent_speed")
@@ -322,11 +311,7 @@ class _Walk:
                 self.flying = self.flying.having(f"{change.axis}_speed", change.speed)
                 self.model = self.flying.flight_model(self.frame.latitude)
         else:
-            self.speed = self._own_speed() if change.speed is None else change.speed
-
-    def _own_speed(self) -> float:
-        """The speed of waypoints before any command, m/s."""
-        return self.model.cruise_speed
+            self.speed = self.model.cruise_speed if change.speed is None else change.speed
 
     def _spot(self, index: int, item: MissionItem) -> Real:
         """Return the place of `item`, (3,) m."""
@@ -356,8 +341,3 @@ class _Walk:
             raise InputError(
                 f"the flight would take more than {LONGEST / 3600:g} h and is not followed that far"
             )
-
-
-def _still(clock: float, place: Real, index: int) -> tuple[Real, Real, Real, Real]:
-    """Return a track of one sample, at rest."""
-    return (np.array([clock]), place[None], np.zeros((1, 3)), np.array([index], dtype=float))

@@ -59,10 +59,15 @@ def family(autopilot: str) -> AutopilotFamily:
     raise InputError(f"autopilot: {autopilot} is unknown; known are {known}")
 
 
+def kind_by_number(mav_type: int | None) -> str | None:
+    """Return the type of vehicle with this MAV_TYPE number, whatever its autopilot, or None."""
+    return next((each.kind for each in _TYPES.values() if mav_type in each.mav_types), None)
+
+
 def vehicle_type_by_numbers(mav_autopilot: int, mav_type: int | None) -> VehicleType | None:
     """Return the vehicle type with these MAV_AUTOPILOT and MAV_TYPE numbers.
 
-    With an unknown MAV_TYPE it is the first type of that autopilot; None for an unknown autopilot.
+    Without a MAV_TYPE it is the first type of that autopilot; None for numbers that are unknown.
     """
-    own = [each for each in _TYPES.values() if each.family.mav_autopilot == mav_autopilot]
-    return next((each for each in own if mav_type in each.mav_types), own[0] if own else None)
+    own = (each for each in _TYPES.values() if each.family.mav_autopilot == mav_autopilot)
+    return next((each for each in own if mav_type is None or mav_type in each.mav_types), None)

@@ -84,6 +84,7 @@ class VehicleType:
         vertical: its take-off, climb, return and landing.
         fence_needs_one_inclusion: being inside one of several inclusion areas is enough; else the
             vehicle has to be inside all.
+        home_outside_fence: what it does with a mission where home lies outside the fence.
         legs: how it flies a leg; None if missions are not made for it.
         flight_model: how it flies a mission, with the latitude in degrees if that is known; None if
             `unmodelled` says why there is no model.
@@ -105,6 +106,7 @@ class VehicleType:
     whole_second_holds: bool = False
     fastest: float = 20.0
     fence_needs_one_inclusion: Callable[[ParameterValues], bool] = lambda _: True
+    home_outside_fence: str = ""
     legs: Callable[[ParameterValues], LegLimits] | None = None
     flight_model: Callable[[ParameterValues, float | None], FlightModel] | None = None
     unmodelled: str = ""

@@ -172,7 +172,7 @@ class Model:
                 "sb": "yes",
                 "tol": TOLERANCE,
                 "max_iter": 1000,
-                "max_wall_time": max_seconds,
+                "max_cpu_time": max_seconds,
                 "linear_solver": "mumps",
             },
         }

@@ -12,7 +12,7 @@ import pytest
 from conftest import free_port
 from mock_flights import fly
 from pymavlink import mavutil
-from stations import FENCE, HOME, RALLY, a_mission, places, signing_key, vehicle_of
+from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink import Timeouts, clear, download, upload
@@ -230,19 +230,6 @@ def test_a_log_that_cannot_be_written_is_an_error_before_anything_is_sent(
 ) -> None:
     with pytest.raises(InputError, match="there is no directory"):
         upload(a_mission(5), f"udpout:127.0.0.1:{port}", log=tmp_path / "no" / "x.tlog")
-
-
-def test_signed(port: int, tmp_path: Path) -> None:
-    key = signing_key("open sesame")
-    path = tmp_path / "key"
-    path.write_bytes(key)
-    connection = f"udpout:127.0.0.1:{port}"
-    with running(mock_of("px4"), f"udpin:127.0.0.1:{port}", key=key):
-        assert upload(a_mission(5), connection, system=1, signing_key=path).verified
-        hasty = Timeouts(response=0.1, retries=1, attempts=1)
-        report = upload(a_mission(5), connection, system=1, timeouts=hasty)
-        assert not report.verified
-        assert "signs its packets" in report.problems[-1]
 
 
 def test_interrupted_from_the_keyboard(port: int) -> None:

@@ -202,7 +202,7 @@ def test_a_link_that_is_not_known_is_asked_for_one_row() -> None:
 def test_one_refusal_of_five_requests_is_one() -> None:
     desk = wide_desk()
     for _ in range(5):
-        assert desk.tell(MissionAck(ME, 0, MavResult.DENIED)) == []
+        assert desk.tell(MissionAck(ME, 0, MavResult.INVALID)) == []
     assert desk.wait(0.3) == [MissionRequestList(VEHICLE, 0)]
 
 
@@ -213,7 +213,7 @@ def test_unsupported_changes_to_the_old_request() -> None:
     assert desk.tell(item(0)) == [wants(1, legacy=True)]
 
 
-@pytest.mark.parametrize("result", [MavResult.DENIED, MavResult.ERROR, MavResult.UNSUPPORTED])
+@pytest.mark.parametrize("result", [MavResult.INVALID, MavResult.UNSUPPORTED])
 def test_a_refusal_that_is_repeated_is_final(result: MavResult) -> None:
     desk = desk_for()
     for _ in range(Timeouts().attempts):
@@ -223,14 +223,43 @@ def test_a_refusal_that_is_repeated_is_final(result: MavResult) -> None:
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", result)
 
 
-def test_one_stray_refusal_is_survived() -> None:
+@pytest.mark.parametrize("result", [MavResult.DENIED, MavResult.ERROR])
+def test_what_may_be_about_a_late_packet_is_final_when_nothing_else_is_said(
+    result: MavResult,
+) -> None:
     desk = desk_for()
-    desk.tell(MissionAck(ME, 0, MavResult.ERROR))
-    assert desk.wait(0.3) == [MissionRequestList(VEHICLE, 0)]
-    desk.tell(MissionCount(ME, 0, 3))
+    for _ in range(Timeouts().attempts * (Timeouts().retries + 1)):
+        assert not desk.machine.outcome
+        desk.tell(MissionAck(ME, 0, result))
+        desk.wait(Timeouts().response)
+    assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", result)
+
+
+@pytest.mark.parametrize("result", [MavResult.DENIED, MavResult.ERROR])
+def test_an_answer_to_a_late_packet_of_an_upload_ends_nothing(result: MavResult) -> None:
+    desk = desk_for()
+    desk.tell(MissionAck(ME, 0, result))
+    assert desk.tell(MissionCount(ME, 0, 3)) == [wants(0)]
     for seq in range(3):
+        assert desk.tell(MissionAck(ME, 0, result)) == []
         desk.tell(item(seq))
     assert desk.machine.outcome.status == "accepted"
+
+
+def test_after_an_abort_it_waits_for_what_is_late_and_then_asks_less_often() -> None:
+    desk = desk_for("px4")
+    desk.tell(MissionCount(ME, 0, 3))
+    desk.tell(item(0))
+    desk.tell(MissionAck(ME, 0, MavResult.ERROR))
+    assert desk.wait(0.3) == [wants(1)] * 2  # in vain: it has forgotten the transfer
+    assert desk.wait(0.5) == [MissionRequestList(VEHICLE, 0)]
+    assert desk.tell(item(1)) == []  # late: of the transfer before
+    desk.tell(MissionCount(ME, 0, 3))
+    assert desk.wait(0.39) == []
+    assert desk.wait(0.02) == [wants(0)]
+    assert desk.tell(item(0)) == []  # one of the two may still come
+    assert desk.tell(item(0)) == [wants(1)]  # both have come
+    assert desk.tell(item(1)) == [wants(2)]
 
 
 def test_a_vehicle_that_falls_silent_is_asked_from_the_beginning() -> None:

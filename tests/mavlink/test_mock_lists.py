@@ -279,19 +279,10 @@ def test_clearing_one_list_leaves_the_others() -> None:
         upload(desk, rows_for(kind, 3))
         upload(desk, (RALLY_ROW,), RALLY)
         assert results(desk.tell(MissionClearAll(TO, 0))) == [MavResult.ACCEPTED]
-        assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
+        assert stored(desk) == []
         assert len(stored(desk, RALLY)) == 1
         assert results(desk.tell(MissionClearAll(TO, 255))) == [MavResult.ACCEPTED]
         assert stored(desk, RALLY) == []
-
-
-def test_clearing_during_an_upload_is_an_error_for_ardupilot_and_px4_says_nothing() -> None:
-    desk = desk_for("ardupilot")
-    desk.tell(count(3))
-    assert results(desk.tell(MissionClearAll(TO, 0))) == [MavResult.ERROR]
-    desk = desk_for("px4")
-    desk.tell(count(3))
-    assert results(desk.tell(MissionClearAll(TO, 0))) == []
 
 
 def test_a_count_of_none_clears() -> None:
@@ -299,7 +290,7 @@ def test_a_count_of_none_clears() -> None:
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
         assert results(desk.tell(count(0))) == [MavResult.ACCEPTED]
-        assert len(stored(desk)) == (1 if kind == "ardupilot" else 0)
+        assert stored(desk) == []
 
 
 def test_px4_changes_its_request_when_told_unsupported() -> None:
@@ -391,9 +382,8 @@ def test_a_fence_is_checked_and_replaced_as_a_whole() -> None:
     desk.tell(item(0, WireItem(5003, 0, (9.0, 0.0, 0.0, 0.0), *PLACE, 0.0), FENCE))
     desk.wait(10)
     assert stored(desk, FENCE) == places((corner,) * 3)
-    thin = WireItem(5001, 0, (2.0, 0.0, 0.0, 0.0), *PLACE, 0.0)
-    for kind, result in (("ardupilot", MavResult.INVALID_PARAM1), ("px4", MavResult.ERROR)):
-        assert upload(desk_for(kind), (thin,), FENCE) == [result]
+    assert upload(desk, (corner,) * 2, FENCE) == [MavResult.ERROR]
+    assert stored(desk, FENCE) == places((corner,) * 3)
 
 
 def test_refusals_can_be_prescribed() -> None:

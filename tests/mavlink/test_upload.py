@@ -22,6 +22,7 @@ from faao_mav.mavlink.protocol import (
     MavResult,
     MissionType,
 )
+from faao_mav.mavlink.transfer.exchange import TENTATIVE
 from faao_mav.mavlink.transfer.upload import Upload
 
 ME = GROUND_STATION
@@ -272,9 +273,9 @@ FINAL = sorted(
     set(MavResult)
     - {
         MavResult.ACCEPTED,
-        MavResult.ERROR,
         MavResult.INVALID_SEQUENCE,
         MavResult.OPERATION_CANCELLED,
+        *TENTATIVE,
     }
 )
 
@@ -347,6 +348,53 @@ def test_no_space_while_booting_means_not_yet() -> None:
     )
 
 
+def test_denied_about_a_late_request_of_a_download_ends_nothing() -> None:
+    desk = desk_for("ardupilot")
+    desk.tell(ack(MavResult.DENIED))
+    for seq in range(3):
+        desk.tell(request(seq))
+        desk.tell(ack(MavResult.DENIED))
+    desk.tell(ack(MavResult.ACCEPTED))
+    assert desk.machine.outcome.status == "accepted"
+
+
+@BOTH
+@pytest.mark.parametrize("sender", [VEHICLE, Address(1, 191)])
+@pytest.mark.parametrize("requests", [0, 2])
+def test_nothing_more_is_written_once_the_vehicle_is_armed(
+    firmware: str, sender: Address, requests: int
+) -> None:
+    desk = desk_for(firmware)
+    for seq in range(requests):
+        desk.tell(request(seq))
+    assert desk.tell(Heartbeat(2, 3, 128, 0, 4), sender) == [
+        MissionAck(VEHICLE, MissionType.MISSION, MavResult.OPERATION_CANCELLED)
+    ]
+    assert desk.machine.outcome.status == "armed"
+    assert desk.tell(request(requests)) == []
+    assert desk.wait(60) == []
+
+
+def test_a_vehicle_that_asks_for_the_first_item_for_ever_is_given_up() -> None:
+    desk = desk_for("px4")
+    while not desk.machine.outcome:
+        desk.tell(request(0))
+        desk.wait(0.25)
+    assert desk.machine.outcome.status == "stalled"
+    assert desk.now < 40
+
+
+def test_a_vehicle_that_always_boots_again_is_given_up() -> None:
+    desk = desk_for("ardupilot")
+    while not desk.machine.outcome:
+        for state in (1, 3):
+            desk.tell(Heartbeat(2, 3, 0, 0, state))
+            desk.tell(ack(MavResult.NO_SPACE))
+            desk.wait(1.0)
+        assert desk.now < 70
+    assert desk.machine.outcome.result == MavResult.NO_SPACE
+
+
 def test_booting_for_ever_ends_too() -> None:
     desk = desk_for("ardupilot")
     desk.tell(Heartbeat(2, 3, 0, 0, 1))
@@ -368,7 +416,8 @@ def test_booting_for_ever_ends_too() -> None:
         (ack(MavResult.DENIED, target=FOREIGN), VEHICLE),
         (ack(MavResult.DENIED, mission_type=2), VEHICLE),
         (MissionCount(ME, 0, 3), VEHICLE),
-        (Heartbeat(2, 3, 128, 0, 4), VEHICLE),
+        (Heartbeat(2, 3, 128, 0, 4), Address(2, 1)),
+        (Heartbeat(2, 3, 0, 0, 4), VEHICLE),
     ],
 )
 def test_what_is_said_to_others_or_about_other_lists_is_ignored(

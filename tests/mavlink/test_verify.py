@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import pytest
-from stations import HOME, rows_for, vehicle_of
+from stations import FENCE, HOME, RALLY, rows_for, vehicle_of
 
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.transfer.verify import compare
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
+from faao_mav.mission.fence import RallyPoint
 
 MISSION = MissionType.MISSION
 
@@ -141,3 +142,19 @@ def test_differences_in_words() -> None:
     words = [str(each) for each in compare(sent, found, MISSION, vehicle_of("ardupilot"))]
     assert "mission item 0: param1 2.7 is kept as 2.0" in words
     assert "mission item 0: x: sent -35.0, found -35.01" in words
+
+
+@pytest.mark.parametrize("firmware", ["ardupilot", "px4", "generic"])
+@pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
+def test_nothing_comes_after_a_fence_or_rally_point(firmware: str, part: MissionType) -> None:
+    sent = wire_items(Mission((), HOME, FENCE, RALLY), part, vehicle_of(firmware))
+    found = [dataclasses.replace(row, autocontinue=0) for row in sent]
+    assert kinds(sent, found, firmware, part) == {}
+    assert kinds(sent, changed(found, 1, x=found[1].x + 100), firmware, part) == {(1, "x"): "wrong"}
+
+
+def test_what_a_fence_loses_is_told() -> None:
+    fence = dataclasses.replace(FENCE, breach_return=RallyPoint(-35.36, 149.16, 30.0))
+    sent = wire_items(Mission((), HOME, fence), MissionType.FENCE, vehicle_of("ardupilot"))
+    found = changed(sent, 0, z=0.0, frame=0, autocontinue=0)
+    assert kinds(sent, found, "ardupilot", MissionType.FENCE) == {(0, "z"): "dropped"}

@@ -146,7 +146,9 @@ def test_files_that_are_no_text(tmp_path: Path) -> None:
     with pytest.raises(ParameterFileError, match="line 2: byte 0xff is not UTF-8"):
         read_parameters(tmp_path / "x.param")
     (tmp_path / "x.param").write_bytes(b"#" * 4_000_001)
-    with pytest.raises(ParameterFileError, match="more than 4 MB; expected a file of parameters"):
+    with pytest.raises(
+        ParameterFileError, match="more than 4,000,000 bytes; expected a file of parameters"
+    ):
         read_parameters(tmp_path / "x.param")
 
 

@@ -5,12 +5,13 @@ import pytest
 from conftest import MISSIONS, MakePlan, edited
 
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import maximize
+from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize
 from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search import multistart
 from faao_mav.optimizer.search.multistart import (
     COARSE_SLOTS,
     FEWEST_SLOTS,
@@ -88,3 +89,19 @@ def test_short_flights_are_improved_as_they_are(small_plan: MakePlan) -> None:
     for name, flight in routes.items():
         alone = maximize(kin, field, flight, tolerance=1e-3, max_iterations=50)
         assert rough.flights[name].w == pytest.approx(alone.trajectory.w, abs=1e-6)
+
+
+def test_of_equal_starts_the_first_is_promising_whatever_rounding_says(
+    small_plan: MakePlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = build_problem(small_plan())
+    flight = next(iter(starts_of(problem).values()))
+
+    def ends(*_: object, **__: object) -> list[LocalOptimum]:
+        values = (0.5, 0.5 + 1e-15)
+        return [LocalOptimum(flight, value, np.ones(2), 1, 0.0, True) for value in values]
+
+    monkeypatch.setattr(multistart, "maximize_all", ends)
+    flights, field = {"bs": flight, "user": flight}, rate_field(problem, design(problem.plan))
+    found = improve_starts(problem.kinematics, field, flights, tolerance=1e-3, max_iterations=1)
+    assert found.promising == ["bs"]

@@ -1,18 +1,21 @@
 """What a relay delivers, maximised: against convex programs, KKT conditions and known optima."""
 
 import math
+import tracemalloc
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cvxpy as cp
 import numpy as np
 import pytest
-from conftest import MakePlan, edited
+from conftest import MISSIONS, MakePlan, edited
 from test_interior import ACTIVE, HEIGHT, STATIONS, bpsk, copter, links, plane, worst
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.optimizer.interior.maximize import maximize, maximize_all, objectives
+from faao_mav.optimizer.interior.queue import Queue, QueueRewards
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
@@ -23,7 +26,7 @@ from faao_mav.plan import parse_plan
 from faao_mav.radio.relay import RelayQueue
 
 FULL, HALF = RelayQueue(), RelayQueue(half=True)
-SAMPLE = (Path(__file__).parents[2] / "missions" / "copter_relay.yaml").read_text()
+SAMPLE = (MISSIONS / "copter_relay.yaml").read_text()
 
 
 def hill(q: Real, c: float) -> tuple[Real, Real, Real]:
@@ -146,6 +149,36 @@ def test_the_sample_delivers_what_is_known_to_be_possible(known: Known) -> None:
     assert solution.delivered_rate <= solution.rates.R_avg
     assert solution.history[-1] == solution.delivered_rate
     assert solution.is_feasible()
+    assert solution.kkt_residual() < 1e-4
+
+
+def test_what_a_queue_adds_to_the_matrix_grows_linearly() -> None:
+    queue = Queue(QueueRewards(ACTIVE, np.zeros((2, 1, 4))))
+    tracemalloc.start()
+    queue.entries(10_000, 8)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 100 * 10_000
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("copter_relay", {"radio.bandwidth_mhz": 20, "radio.relay.buffer_mbytes": 20}),
+        (
+            "copter_relay",
+            {
+                "radio.bandwidth_mhz": 20,
+                "radio.relay.buffer_mbytes": 20,
+                "radio.duplex": "half",
+            },
+        ),
+        ("plane_relay", {"flight.duration": 200}),
+    ],
+)
+def test_small_buffers_and_planes_converge(name: str, changes: dict[str, Any]) -> None:
+    solution = optimize(parse_plan(edited((MISSIONS / f"{name}.yaml").read_text(), changes)))
+    assert solution.converged
     assert solution.kkt_residual() < 1e-4
 
 

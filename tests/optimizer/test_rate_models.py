@@ -11,7 +11,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
-from faao_mav.optimizer.rates.rate_model import rate_model
+from faao_mav.optimizer.rates.rate_model import CurveRate, rate_model
 from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate, FixedRate
 from faao_mav.radio.precoder import SCHEMES
 from faao_mav.radio.rate import cutoff_rate
@@ -154,6 +154,37 @@ def test_tables_hold_the_rate_at_every_place(
         gradient, hessian = derivatives(link, rate, w)
         assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
         assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("fading", "precoder"), [("none", "faao"), ("ergodic", "faao"), ("none", "zf")]
+)
+def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precoder: str) -> None:
+    """The curves are smooth, and nowhere above what precoders of the place itself carry."""
+    plan = small_plan(
+        {
+            "optimizer.rate": "mutual_information",
+            "optimizer.precoder": precoder,
+            "radio.fading": fading,
+            "radio.fading_samples": 4,
+            "radio.modulation": "qpsk",
+            "radio.line_of_sight": "all_ones",
+        }
+    )
+    wanted, link = design(plan), build_problem(plan).bs_uav
+    rate, w = rate_model(link, wanted, FARTHEST), places(link)
+    assert isinstance(rate, CurveRate)
+    at = coordinates(link, w)
+    H = link.channel(w, link.small_scale(w))
+    P = rate.initial_precoders(*at) if wanted.optimal else wanted.precoders(link, H)
+    assert rate.value(*at) == pytest.approx(wanted.rate(link, H, P), abs=3e-3)
+    gradient, hessian = derivatives(link, rate, w)
+
+    def value(moved: Real) -> Real:
+        return rate.value(*coordinates(link, moved))
+
+    assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
+    assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
 
 
 def test_the_best_rate_falls_with_the_distance_and_not_with_the_direction(

@@ -1,5 +1,9 @@
 """Saving, loading, proving and pricing of solutions."""
 
+import io
+import struct
+import tracemalloc
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +12,7 @@ import pytest
 from conftest import MakePlan
 
 from faao_mav.errors import InputError
+from faao_mav.optimizer import archive
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import SATURATED, price, saturation
 from faao_mav.optimizer.solution import Solution, load_solution, save_solution
@@ -20,10 +25,10 @@ def solution(paper_plan: MakePlan) -> Solution:
 
 def test_saved_keys_and_shapes(solution: Solution, tmp_path: Path) -> None:
     save_solution(solution, tmp_path / "result.npz")
-    with np.load(tmp_path / "result.npz", allow_pickle=False) as archive:
-        shapes = {name: archive[name].shape for name in archive.files}
-        assert str(archive["plan"]) == solution.plan.text
-        assert float(archive["R_avg"]) == solution.rates.R_avg
+    with np.load(tmp_path / "result.npz", allow_pickle=False) as saved:
+        shapes = {name: saved[name].shape for name in saved.files}
+        assert str(saved["plan"]) == solution.plan.text
+        assert float(saved["R_avg"]) == solution.rates.R_avg
     slots, square = (20,), (20, 2, 2)
     expected = {"t": slots, "w": (20, 2), "v": (20, 2), "a": (20, 2), "P_B": square, "P_U": square,
                 "H_rB": square, "H_rU": square, "I_U": slots, "I_G": slots, "R_avg": (), "R_U": (),
@@ -70,10 +75,98 @@ def test_arrays_that_are_not_the_plans_are_refused(
 ) -> None:
     path = tmp_path / "result.npz"
     save_solution(solution, path)
-    with np.load(path) as archive:
-        np.savez(path.with_name("other.npz"), **{**archive, name: value})
+    with np.load(path) as saved:
+        np.savez(path.with_name("other.npz"), **{**saved, name: value})
     with pytest.raises(InputError, match=rf"other\.npz: {said}"):
         load_solution(path.with_name("other.npz"))
+
+
+def npy(header: str, data: bytes = b"") -> bytes:
+    """Return an .npy file with this text in its header."""
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + data
+
+
+HUGE = "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999,), }\n"
+OBJECT = "{'descr': '|O', 'fortran_order': False, 'shape': (1,), }\n"
+WORDS = "{'descr': '<U3', 'fortran_order': False, 'shape': (), }\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "member", "said"),
+    [
+        ("history", npy(HUGE), "not a result of faao-mission --save"),
+        ("history", npy("(" * 500), "not a result of faao-mission --save"),
+        ("history", npy("{'descr': [], 'shape': None}"), "not a result"),
+        ("history", npy(OBJECT, b"\x80\x04N."), "not a result"),
+        ("history", b"no array", "not a result"),
+        ("history", np.empty(0), r"history: float64 \(0,\); expected numbers \(1,\)"),
+        ("history", np.ones((2, 2)), r"history: float64 \(2, 2\)"),
+        ("converged", np.array("yes"), r"converged: <U3 \(\); expected numbers \(\)"),
+        ("plan", np.array(5), r"plan: int64 \(\); expected text"),
+        ("ending", npy(WORDS, b"\xff" * 12), r"ending: <U3 \(\); expected text"),
+        ("starts", np.array("[1]"), r"starts: '\[1\]'; expected rates by start"),
+        ("starts", np.array("[" * 100_000), "starts: .*; expected rates by start"),
+        ("H_rB", np.ones((4, 20, 2, 2)), r"H_rB: float64 \(4, 20, 2, 2\)"),
+        ("w", np.zeros((20, 2), dtype=complex), "w: complex128"),
+    ],
+)
+def test_members_that_are_no_result_are_refused(
+    solution: Solution, tmp_path: Path, name: str, member: "np.ndarray | bytes", said: str
+) -> None:
+    path, other = tmp_path / "result.npz", tmp_path / "other.npz"
+    save_solution(solution, path)
+    if not isinstance(member, bytes):
+        content = io.BytesIO()
+        np.save(content, member)
+        member = content.getvalue()
+    with zipfile.ZipFile(path) as source, zipfile.ZipFile(other, "w") as target:
+        for each in source.namelist():
+            target.writestr(each, member if each == f"{name}.npy" else source.read(each))
+    with pytest.raises(InputError, match=rf"other\.npz: {said}"):
+        load_solution(other)
+
+
+@pytest.mark.parametrize(
+    ("offset", "value"),
+    [(8, 1), (10, 99), (6, 255)],
+    ids=["encrypted", "unknown compression", "version of the future"],
+)
+def test_archives_that_cannot_be_unpacked_are_refused(
+    solution: Solution, tmp_path: Path, offset: int, value: int
+) -> None:
+    path = tmp_path / "result.npz"
+    save_solution(solution, path)
+    content = bytearray(path.read_bytes())
+    content[content.index(b"PK\1\2") + offset] = value  # what the directory says of "t"
+    content[offset - 2] = value  # what the member says of itself
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="not a result of faao-mission --save"):
+        load_solution(path)
+
+
+def test_an_archive_that_unpacks_to_any_size_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(archive, "MAX_BYTES", 10_000_000)
+    path = tmp_path / "result.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("plan.npy", bytes(100_000_000))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="more than 10,000,000 bytes"):
+            load_solution(path)
+        assert tracemalloc.get_traced_memory()[1] < 40_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_directory_without_an_end_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "result.npz"
+    with zipfile.ZipFile(path, "w") as packed:
+        for number in range(3000):
+            packed.writestr(f"{number}.npy", b"")
+    with pytest.raises(InputError, match="not a result of faao-mission --save"):
+        load_solution(path)
 
 
 def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:

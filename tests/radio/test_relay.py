@@ -1,5 +1,6 @@
 """The relay's queue, against linear programs that know nothing of it."""
 
+import itertools
 import math
 
 import numpy as np
@@ -83,10 +84,14 @@ def test_what_is_delivered_has_come_in_before(route: tuple[Real, Real], buffer: 
 
 @given(routes())
 def test_more_room_never_delivers_less_and_half_duplex_never_more(route: tuple[Real, Real]) -> None:
-    by_buffer = [forward_greedily(*route, buffer).rate for buffer in (0.5, 1.0, 3.0, math.inf)]
-    assert by_buffer == sorted(by_buffer)
-    shared = forward_by_shares(*route, best_shares(*route))
-    assert shared.rate <= by_buffer[-1] + 1e-9
+    buffers = (0.5, 1.0, 3.0, math.inf)
+    full = [forward_greedily(*route, buffer).rate for buffer in buffers]
+    assert full == sorted(full)
+    half = [
+        forward_by_shares(*route, best_shares(*route, buffer), buffer).rate for buffer in buffers
+    ]
+    assert all(more >= less - 1e-6 for less, more in itertools.pairwise(half))
+    assert all(shared <= own + 1e-9 for shared, own in zip(half, full, strict=True))
 
 
 @given(routes())

@@ -47,7 +47,8 @@ def test_a_mission_delivers_nearly_the_plan(solution: Solution) -> None:
     I_U, I_G = rates_along(solution, found.w)
     assert found.I_U == pytest.approx(I_U)
     assert found.rates.R_G == pytest.approx(I_G.mean())
-    assert found.rms_position_error == pytest.approx(conversion.schedule.deviation.rms)
+    rms = conversion.schedule.deviation.rms  # of the trajectory to a millimetre
+    assert found.rms_position_error == pytest.approx(rms, abs=1e-3)
     assert 0 < found.rms_position_error <= found.max_position_error
     assert found.max_path_error <= found.max_position_error + 1e-9
 

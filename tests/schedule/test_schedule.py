@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
 from faao_mav.schedule import Conversion
 from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.initial_route import Splines, initial_route
 from faao_mav.vehicle import vehicle_of
@@ -104,7 +106,7 @@ def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in(
     conversion = converted(t, w, plan_with(recommend=True))
     route = conversion.schedule.route
     assert (route.first, route.last) == (1, len(route.positions) - 2)
-    assert route.positions[[route.first, route.last]] == pytest.approx(w[[0, -1]])
+    assert route.positions[[route.first, route.last]] == pytest.approx(w[[0, -1]], abs=1e-3)
     for n, planned in ((0, (w[1] - w[0]) / STEP), (-1, (w[-1] - w[-2]) / STEP)):
         place, velocity = at(conversion, t[n])
         assert np.hypot(*velocity) == pytest.approx(np.hypot(*planned), abs=0.5)
@@ -152,6 +154,12 @@ def test_a_vehicle_that_is_slow_to_speed_up_is_later_than_one_with_good_paramete
         converted(*back_and_forth(), plan).schedule.deviation.rms for plan in (sluggish, good)
     )
     assert worse > 1.5 * better
+
+
+def test_a_speed_that_no_mission_commands_is_refused_by_its_key() -> None:
+    plan = plan_with(max_speed=1e-6, recommend=True)
+    with pytest.raises(InputError, match=r"vehicle\.max_speed: 1e-06 m/s; missions command 0\.1"):
+        check_vehicle(plan)
 
 
 def test_useless_parameters_are_refused() -> None:
@@ -254,3 +262,34 @@ def test_two_samples_are_enough() -> None:
 def test_the_same_plan_gives_the_same_mission() -> None:
     first, second = (converted(*eight(), plan_with(recommend=True)).mission for _ in range(2))
     assert first == second
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "flight"), [("ardupilot", circle_at_speed), ("px4", back_and_forth)]
+)
+def test_noise_of_rounding_makes_no_other_mission(
+    autopilot: str, flight: Callable[[], Trajectory]
+) -> None:
+    """Another processor's optimum differs in the last digits, and so do its predicted flights."""
+    t, w = flight()
+    plan = plan_with(autopilot=autopilot)
+    noise = 1e-9 * np.random.default_rng(0).normal(size=w.shape)
+    assert converted(t, w + noise, plan).mission == converted(t, w, plan).mission
+
+
+def test_a_flight_is_that_of_a_rounded_route() -> None:
+    t, w = line_at_speed()
+    conversion = converted(t, w, plan_with())
+    scheduler = CopterScheduler(
+        t=t,
+        w=w,
+        vehicle=conversion.vehicle,
+        model=conversion.vehicle.flight_model(),
+        min_speed=0.1,
+        max_speed=8.0,
+        tolerance=2.0,
+    )
+    route = conversion.schedule.route
+    noisy = replace(route, positions=route.positions + 1e-9, speeds=route.speeds - 1e-9)
+    flown = scheduler.flight(noisy).flown
+    assert flown.position.tobytes() == scheduler.flight(route).flown.position.tobytes()

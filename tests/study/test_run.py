@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from conftest import SMALL, edited
@@ -19,10 +19,11 @@ from typer.testing import CliRunner
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.plan import parse_plan
+from faao_mav.plan.sections import StudyScheme
 from faao_mav.report.style import save_figure
-from faao_mav.study import StudyRow, load_rows, make_cases, run_study
+from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_study
 from faao_mav.study.figure import study_figure
-from faao_mav.study.rows import append_row
+from faao_mav.study.rows import ROWS, append_row, as_dict, comparison
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
@@ -83,7 +84,7 @@ def test_a_resumed_study_is_the_uninterrupted_one(
     again = run_study(CASES, jobs=1, directory=tmp_path)
     assert timeless(again) == timeless(whole[1])
     assert again[:2] == tuple(seen)  # not run again
-    assert len(load_rows(tmp_path)) == len(CASES)
+    assert len(load_rows(tmp_path, CASES)) == len(CASES)
     assert [row["scheme"] for row in table_in(tmp_path)] == (["faao", "mrt"] * 3)
 
 
@@ -163,6 +164,65 @@ def test_a_strange_directory_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "rows.jsonl").write_text('{"not": "a row"}\n')
     with pytest.raises(InputError, match="line 1: no row of a study"):
         run_study(CASES, jobs=1, directory=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"key": 5}, "key: Input should be a valid string"),
+        ({"scheme": None}, "scheme: Input should be a valid string"),
+        ({"seed": "0"}, "seed: Input should be a valid integer"),
+        ({"values": [1]}, "values: Input should be "),
+        ({"R_avg": "1.5"}, "R_avg: Input should be a valid number"),
+        ({"delivered": float("nan")}, "delivered: Input should be a finite number"),
+        ({"converged": 2}, "converged: Input should be a valid boolean"),
+        ({"route": [[1, 2], [3]]}, "route: Value error, not pairs of finite numbers"),
+        ({"route": [[1, "x"]]}, "route: Value error, not pairs of finite numbers"),
+        ({"route": [[1e999, 0]]}, "route: Value error, not pairs of finite numbers"),
+        ({"route": {"0": [1, 2]}}, "route: Value error, not pairs of finite numbers"),
+        ({"more": 1}, "more: Unexpected keyword argument"),
+    ],
+)
+def test_an_edited_row_is_refused_by_its_line(
+    whole: tuple[Path, tuple[StudyRow, ...]], tmp_path: Path, changes: dict[str, Any], said: str
+) -> None:
+    first, second, *_ = (whole[0] / "rows.jsonl").read_text().splitlines()
+    edit = json.dumps(json.loads(second) | changes)
+    (tmp_path / "rows.jsonl").write_text(f"{first}\n{edit}\n")
+    with pytest.raises(InputError, match=rf"rows\.jsonl: line 2: no row of a study: {said}"):
+        run_study(CASES, jobs=1, directory=tmp_path)
+
+
+@pytest.mark.parametrize("line", [b"[" * 100_000, b'{"key": "\xff"}', b"1", b"", b"9" * 5_000_000])
+def test_a_line_that_is_no_row_is_refused(tmp_path: Path, line: bytes) -> None:
+    (tmp_path / "rows.jsonl").write_bytes(line + b"\n")
+    with pytest.raises(InputError, match="line 1: no row of a study"):
+        load_rows(tmp_path, CASES)
+
+
+def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_path: Path) -> None:
+    as_is = make_cases(QUICK, vary={})
+    (first,) = run_study(as_is, jobs=1, directory=tmp_path)
+    varied = make_cases(QUICK, vary={"radio.causal": (False,), "vehicle.max_speed": (20,)})
+    (again,) = run_study(varied, jobs=1, directory=tmp_path)
+    assert (again.key, again.R_avg) == (first.key, first.R_avg)
+    assert (first.values, again.values) == ({}, {"radio.causal": False, "vehicle.max_speed": 20})
+    assert again.route.tolist() == first.route.tolist()
+
+
+def test_rows_that_name_no_rate_are_of_the_cutoff_rate(tmp_path: Path) -> None:
+    case = CASES[0]
+    row = StudyRow(case.key, dict(case.values), case.scheme, 0, R_avg=1.0, delivered=0.5)
+    append_row(row, tmp_path)
+    earlier = json.loads((tmp_path / ROWS).read_text())
+    del earlier["rate"]
+    (tmp_path / ROWS).write_text(json.dumps(earlier) + "\n")
+    (read,) = load_rows(tmp_path, CASES)
+    assert (read.key, read.rate, read.R_avg) == (row.key, "cutoff", 1.0)
+    assert comparison([row]).startswith("R_avg, bit/s/Hz\n")
+    other = replace(row, rate="mutual_information")
+    assert comparison([other]).startswith("R_avg, bit/s/Hz of mutual information\n")
+    assert as_dict(other)["rate"] == "mutual_information"
 
 
 def test_text_that_is_no_cut_off_row_is_left_alone(tmp_path: Path) -> None:
@@ -265,6 +325,18 @@ def test_every_panel_has_its_name_and_its_axis(whole: tuple[Path, tuple[StudyRow
         assert any(tick.label1.get_visible() for tick in plot.xaxis.get_major_ticks())
 
 
+def test_every_scheme_has_a_look_of_its_own() -> None:
+    rows = tuple(
+        StudyRow("k", {"power_dbm": power}, scheme, 0, R_avg=1.0)
+        for scheme in get_args(StudyScheme)
+        for power in (0, 10)
+    )
+    (axes,) = study_figure(rows, parse_plan(QUICK), "rate").axes
+    looks = {(line.get_color(), line.get_marker()) for line in axes.lines}
+    names = {line.get_label() for line in axes.lines}
+    assert len(looks) == len(names) == len(get_args(StudyScheme))
+
+
 def test_without_results_there_is_nothing_to_draw() -> None:
     failed = (StudyRow("k", {"power_dbm": 1}, "faao", 0, error="no"),)
     with pytest.raises(InputError, match="nothing to draw"):
@@ -291,4 +363,4 @@ def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> 
     assert process.returncode == 130
     assert f"interrupted; finished rows are in {out}; the same command goes on there" in said
     assert "Traceback" not in said
-    assert load_rows(out)
+    assert load_rows(out, make_cases(QUICK, vary=dict([parse_vary("power_dbm=0:20:0.1")])))

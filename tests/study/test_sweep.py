@@ -76,7 +76,12 @@ def test_values_are_those_of_yaml() -> None:
         ("flight.duration=1:2:0", "never come"),
         ("flight.duration=1:2:-1", "never come"),
         ("flight.duration=1:inf:1", "no range"),
-        ("flight.duration=0:1:1e-9", "rows"),
+        ("flight.duration=0:1:1e-9", "1e+09 rows; a study has at most 100,000"),
+        ("flight.duration=0:1e999999:1e-999999", "no range"),
+        ("flight.duration=1e999999:1e999999:1", "no range"),
+        ("flight.duration=0:1:1e-999999", "never come"),
+        ("\x1b[2J=1", r"--vary \x1b[2J: unknown key"),
+        ("k" * 1000 + "=1", "--vary " + "k" * 57 + "...: unknown key"),
         ("flight.duration=1], more: [2", "neither"),
     ],
 )

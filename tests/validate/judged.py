@@ -176,10 +176,16 @@ class Given:
     track: Track | None = None
     limits: Limits | None = None
     link: LinkCheck | None = None
+    airborne: bool = False
 
     def findings(self) -> tuple[Finding, ...]:
         return validate(
-            self.mission, self.vehicle, track=self.track, limits=self.limits, link=self.link
+            self.mission,
+            self.vehicle,
+            track=self.track,
+            limits=self.limits,
+            link=self.link,
+            airborne=self.airborne,
         )
 
     def by(self, rule: str) -> list[Finding]:

@@ -5,6 +5,7 @@ from judged import (
     COPTER,
     LAND,
     PLANE,
+    RTL,
     TAKEOFF,
     Given,
     at,
@@ -21,7 +22,7 @@ from judged import (
 
 from faao_mav.mission.command import Command
 
-DELAY = Command.NAV_DELAY
+DELAY, START, SET_HOME = Command.NAV_DELAY, Command.DO_LAND_START, Command.DO_SET_HOME
 
 # the rule, what it speaks about, the item that it names, what it lets pass
 CASES = [
@@ -55,13 +56,81 @@ CASES = [
         None,
         Given(mission(TAKEOFF, at(0, 9, 9))),
     ),
-    ("ardupilot-no-takeoff", Given(mission(at(0, 9, 9))), None, Given(mission(at(0, 9, 9)), PLANE)),
+    (
+        "ardupilot-no-takeoff",
+        Given(mission(at(0, 0, 30, command=84)), PLANE),
+        None,
+        Given(mission(at(0, 0, 30, command=84))),
+    ),
+    (
+        "ardupilot-no-takeoff",
+        Given(mission(at(0, 9, 9))),
+        None,
+        Given(mission(at(0, 9, 9)), airborne=True),
+    ),
     (
         "ardupilot-takeoff-first",
         Given(mission(at(0, 9, 9), TAKEOFF)),
         2,
         Given(mission(speed(5), do(DELAY, 3), TAKEOFF)),
     ),
+    (
+        "ardupilot-begins-in-the-air",
+        Given(mission(at(0, 9, 9)), airborne=True),
+        None,
+        Given(mission(at(0, 9, 9))),
+    ),
+    (
+        "ardupilot-takeoff-first",
+        Given(mission(at(0, 9, 9), TAKEOFF), PLANE),
+        2,
+        Given(mission(at(0, 9, 9), TAKEOFF), PLANE, airborne=True),
+    ),
+    (
+        "ardupilot-land-start",
+        Given(mission(TAKEOFF, do(START), at(0, 300, 9), LAND), PLANE),
+        2,
+        Given(mission(TAKEOFF, do(START), at(0, 300, 9), LAND), having(PLANE, RTL_AUTOLAND=2)),
+    ),
+    (
+        "ardupilot-land-start",
+        Given(mission(TAKEOFF, do(START), LAND), PLANE),
+        2,
+        Given(mission(TAKEOFF, do(START), LAND)),
+    ),
+    (
+        "ardupilot-land-approach",
+        Given(mission(TAKEOFF, LAND), PLANE),
+        2,
+        Given(mission(TAKEOFF, at(0, 300, 9), LAND), PLANE),
+    ),
+    (
+        "ardupilot-spline-last",
+        Given(mission(TAKEOFF, at(0, 9, 9), spline(0, 40), speed(5))),
+        3,
+        Given(mission(TAKEOFF, at(0, 9, 9), spline(0, 40), spline(0, 80))),
+    ),
+    (
+        "ardupilot-spline-last",
+        Given(mission(TAKEOFF, spline(0, 40))),
+        2,
+        Given(mission(TAKEOFF, spline(0, 40), RTL)),
+    ),
+    (
+        "ardupilot-set-home",
+        Given(flown(do(SET_HOME, 1))),
+        2,
+        Given(mission(do(SET_HOME, 1), TAKEOFF)),
+    ),
+    (
+        "ardupilot-set-home",
+        Given(mission(do(SET_HOME, 1), at(0, 9, 9)), airborne=True),
+        1,
+        Given(flown(at(0, 9, 584.5, command=SET_HOME, frame=0))),
+    ),
+    ("ardupilot-guided", Given(flown(do(92, 1))), 2, Given(flown(do(92, 0)))),
+    ("ardupilot-command-skipped", Given(flown(do(DELAY, 5)), PLANE), 2, Given(flown(do(DELAY, 5)))),
+    ("ardupilot-command-skipped", Given(flown(do(92, 1)), PLANE), 2, Given(flown(do(92, 1)))),
     (
         "ardupilot-fence-ceiling",
         Given(flown(at(0, 9, 100.1)), having(COPTER, FENCE_ENABLE=1)),

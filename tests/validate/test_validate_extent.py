@@ -1,7 +1,7 @@
 """How high, how far, how long."""
 
 import pytest
-from judged import COPTER, LAND, PX4, Given, at, check, flown, having, track
+from judged import COPTER, LAND, PX4, Given, at, check, flown, having, mission, track
 
 from faao_mav.validate import Limits
 from faao_mav.vehicle import Track
@@ -13,7 +13,10 @@ def flight(*points: tuple[float, float, float]) -> Track:
 
 # the rule, what it speaks about, the item that it names, what it lets pass
 CASES = [
-    ("below-home", Given(flown(at(0, 9, 0))), 2, Given(flown(at(0, 9, 0.1), LAND))),
+    ("below-home", Given(flown(at(0, 9, -0.1))), 2, Given(flown(at(0, 9, 0), LAND))),
+    ("near-ground", Given(flown(at(0, 9, 1e-9))), 2, Given(flown(at(0, 9, 1), LAND))),
+    ("near-ground", Given(mission(at(0, 0, -1, command=22))), 1, Given(flown(at(0, 9, -1)))),
+    ("too-high", Given(flown(at(0, 9, 1e6)), PX4), 2, Given(flown(at(0, 9, 2e4)), PX4)),
     (
         "above-ceiling",
         Given(flown(at(0, 9, 50.1)), limits=Limits(max_altitude=50)),

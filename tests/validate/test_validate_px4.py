@@ -30,10 +30,6 @@ STEEPEST = math.tan(math.radians(5.1))
 """The slope of FW_LND_ANG and of what PX4 lets pass beyond it."""
 
 
-def gate(north: float) -> MissionItem:
-    return at(0, north, 30, command=4501)
-
-
 def takeoff(up: float, east: float = 0.0, frame: int = 3) -> MissionItem:
     return at(east, 0, up, command=Command.NAV_TAKEOFF, frame=frame)
 
@@ -54,6 +50,25 @@ CASES = [
         Given(mission(TAKEOFF), PX4),
     ),
     ("px4-vtol-items", Given(flown(do(3000, 3)), PX4_PLANE), 2, Given(flown(), PX4_PLANE)),
+    (
+        "jump-in-place",
+        Given(flown(speed(5), do(177, 2, 3)), PX4),
+        3,
+        Given(flown(speed(5), do(177, 2, 3))),
+    ),
+    (
+        "jump-in-place",
+        Given(flown(speed(5), do(177, 2, -1)), PX4),
+        3,
+        Given(flown(speed(5), do(177, 3, 3)), PX4),
+    ),
+    (
+        "jump-in-place",
+        Given(flown(speed(5), do(177, 2, 1)), PX4),
+        3,
+        Given(flown(at(0, 9, 9), do(177, 2, 1)), PX4),
+    ),
+    ("px4-nothing-to-fly", Given(mission(speed(5), do(206, 0)), PX4), None, Given(flown(), PX4)),
     ("px4-starts-with-land", Given(mission(LAND), PX4), 1, Given(mission(at(0, 9, 9), LAND), PX4)),
     (
         "px4-takeoff-first",
@@ -134,12 +149,6 @@ CASES = [
         Given(mission(at(0, 900.1, 30)), having(PX4, MIS_DIST_1WP=900)),
         1,
         Given(mission(at(0, 20_000, 30)), having(PX4, MIS_DIST_1WP=0)),
-    ),
-    (
-        "px4-gate-close",
-        Given(flown(at(0, 9, 30), gate(9.049)), PX4),
-        3,
-        Given(flown(at(0, 9, 30), gate(9.051)), PX4),
     ),
     (
         "px4-max-horizontal",

@@ -109,10 +109,10 @@ CASES = [
     ("ardupilot-frame-mission", Given(flown(at(0, 9, 9, frame=2))), 2, Given(flown(at(0, 9, 9)))),
     ("ardupilot-terrain", Given(flown(at(0, 9, 9, frame=10))), 2, Given(flown(at(0, 9, 9)))),
     (
-        "ardupilot-terrain-off",
+        "ardupilot-terrain",
         Given(flown(at(0, 9, 9, frame=11)), having(COPTER, TERRAIN_ENABLE=0)),
         2,
-        Given(flown(at(0, 9, 9, frame=11))),
+        Given(flown(at(0, 9, 9)), having(COPTER, TERRAIN_ENABLE=0)),
     ),
     (
         "px4-roi",

@@ -140,6 +140,8 @@ def test_plans_know_the_vehicles_of_the_registry() -> None:
         for number in each.mav_types:
             assert vehicle_type_by_numbers(each.family.mav_autopilot, number) is each
     assert len({each.mav_autopilot for each in families()}) == len(families())
+    assert vehicle_type_by_numbers(3, None) is ARDUCOPTER
+    assert vehicle_type_by_numbers(3, 10) is None
 
 
 def test_an_unknown_vehicle_is_named() -> None:

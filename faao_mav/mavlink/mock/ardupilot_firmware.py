@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from faao_mav.errors import InputError
 from faao_mav.mavlink.messages import (
     Envelope,
     ListMessage,
@@ -19,7 +20,13 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock.firmware import MockFirmware
 from faao_mav.mavlink.protocol import ALL_TYPES, Address, MavResult, MavSeverity, MissionType
+from faao_mav.mavlink.wire_items import GLOBAL_FRAMES, mission_of
+from faao_mav.mission.command import RALLY_POINT
 from faao_mav.vehicle.ardupilot import ARDUPILOT
+from faao_mav.vehicle.dialect import BESIDE
+
+_RALLY_HIGHEST = 2**15
+"""The altitude from which on a rally point is refused, m: what 16 bits hold."""
 
 
 @dataclass(slots=True)
@@ -45,8 +52,18 @@ class ArduPilotFirmware(MockFirmware):
     modes = MappingProxyType({"copter": (0, 3), "plane": (2, 10)})  # COPTER_MODE, PLANE_MODE
     parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
     misplaced = MavResult.UNSUPPORTED
-    thin_polygon = MavResult.INVALID_PARAM1
     nonsense = MavResult.INVALID
+
+    def check_beside(self, part: MissionType, item: WireItem) -> MavResult:
+        """Return what it answers to `item` of a fence or of rally points that is on Earth."""
+        if (item.command == RALLY_POINT) != (
+            part is MissionType.RALLY
+        ) or item.command not in BESIDE:
+            return MavResult.UNSUPPORTED
+        if item.frame not in GLOBAL_FRAMES:
+            return MavResult.UNSUPPORTED_FRAME
+        fits = part is MissionType.FENCE or abs(item.z) < _RALLY_HIGHEST
+        return MavResult.ACCEPTED if fits else MavResult.INVALID_PARAM7
 
     @property
     def deadline(self) -> float | None:
@@ -88,7 +105,7 @@ class ArduPilotFirmware(MockFirmware):
         """Ask again, or give up."""
         out: list[Message] = []
         for part, upload in list(self._uploads.items()):
-            if now >= upload.last_item_time + self._manners.upload_patience:
+            if now >= upload.last_item_time + self._manners.patience:
                 del self._uploads[part]
                 out.append(Statustext(MavSeverity.WARNING, "Mission upload timeout"))
                 out.append(MissionAck(upload.partner, part, MavResult.OPERATION_CANCELLED))
@@ -98,7 +115,7 @@ class ArduPilotFirmware(MockFirmware):
 
     def _due(self, upload: _Receiving) -> float:
         return min(
-            upload.last_item_time + self._manners.upload_patience,
+            upload.last_item_time + self._manners.patience,
             upload.last_request_time + self._manners.request_period,
         )
 
@@ -160,9 +177,14 @@ class ArduPilotFirmware(MockFirmware):
         upload.last_item_time, upload.next_sequence = now, seq + 1
         if seq < upload.last_sequence:
             return [self._ask(part, upload, now)]
-        if part is MissionType.FENCE:
-            self._lists.replace(part, upload.fence)
         del self._uploads[part]
+        if part is MissionType.FENCE:
+            try:
+                mission_of({part: upload.fence}, self._lists.vehicle)
+            except InputError:
+                text = Statustext(MavSeverity.WARNING, "Fence validation failed")
+                return [text, MissionAck(sender, part, MavResult.ERROR)]
+            self._lists.replace(part, upload.fence)
         return [MissionAck(sender, part, MavResult.ACCEPTED)]
 
     def _on_list(self, sender: Address, part: MissionType) -> list[Message]:
@@ -185,9 +207,9 @@ class ArduPilotFirmware(MockFirmware):
     def _on_clear(
         self, sender: Address, mission_type: int, parts: tuple[MissionType, ...]
     ) -> list[Message]:
-        flown = MissionType.MISSION in parts and self._flying()
-        if flown or any(part in self._uploads for part in parts):
+        if MissionType.MISSION in parts and self._flying():
             return [MissionAck(sender, mission_type, MavResult.ERROR)]
         for part in parts:
+            self._uploads.pop(part, None)
             self._lists.clear(part)
         return [MissionAck(sender, mission_type, MavResult.ACCEPTED)]

@@ -1,6 +1,5 @@
 """What the firmwares of mock autopilots have in common: what they store, what they refuse."""
 
-import math
 import struct
 import zlib
 from abc import ABC, abstractmethod
@@ -12,10 +11,10 @@ from faao_mav.mavlink.manners import manners_of
 from faao_mav.mavlink.messages import CommandLong, Envelope, Message, WireItem
 from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.wire_items import home_items, mission_item, wire_item
-from faao_mav.mission.command import POLYGON, RALLY_POINT, Frame
+from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.vehicle import AutopilotFamily, VehicleType
-from faao_mav.vehicle.dialect import FENCE_ROWS, ROWS_BESIDE
+from faao_mav.vehicle.dialect import BESIDE
 
 COUNT = -1
 """In `Behaviour.refusals`: instead of an item, the announcement of the list."""
@@ -29,9 +28,7 @@ class StoredLists:
 
     def __init__(self, vehicle: VehicleType, home: Home) -> None:
         self.vehicle, self.home = vehicle, home
-        self._items = {
-            part: [self._home_item()] * home_items(vehicle, part) for part in MissionType
-        }
+        self._items: dict[MissionType, list[WireItem]] = {part: [] for part in MissionType}
 
     def items(self, part: MissionType) -> tuple[WireItem, ...]:
         """Return what a download gives."""
@@ -45,7 +42,8 @@ class StoredLists:
         """Return what becomes of `item`; a home item is the vehicle's own, whatever is sent."""
         if seq < home_items(self.vehicle, part):
             return self._home_item()
-        return wire_item(self.vehicle.dialect.stored(mission_item(item)), seq)
+        stored = self.vehicle.dialect.stored(mission_item(item))
+        return wire_item(stored, seq, current=seq == 0 and not self.vehicle.dialect.home_row)
 
     def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
         """Store all of `items`, which are as `kept` gives them, in place of the list."""
@@ -56,8 +54,8 @@ class StoredLists:
         del self._items[part][count:]
 
     def clear(self, part: MissionType) -> None:
-        """Forget all but home."""
-        self.truncate(part, home_items(self.vehicle, part))
+        """Forget all, home too."""
+        self.truncate(part, 0)
 
     def number(self, part: MissionType) -> int:
         """Return a number that tells this list from others: a checksum; 0 when empty."""
@@ -106,7 +104,6 @@ class MockFirmware(ABC):
         modes: its custom modes at rest and on a mission, by the type of vehicle.
         parameters: what ground stations look for beside the parameters that the package knows.
         misplaced: the answer to an item of a fence, or a rally point, in a mission.
-        thin_polygon: the answer to a fence polygon of fewer than three vertices.
         nonsense: the answer to commands 0 and 1.
         silent_at_boot: it answers nothing about lists before it is ready.
     """
@@ -116,7 +113,6 @@ class MockFirmware(ABC):
     modes: ClassVar[Mapping[str, tuple[int, int]]]
     parameters: ClassVar[Mapping[str, float]] = {}
     misplaced: ClassVar[MavResult]
-    thin_polygon: ClassVar[MavResult]
     nonsense: ClassVar[MavResult]
     silent_at_boot: ClassVar[bool] = False
 
@@ -175,20 +171,20 @@ class MockFirmware(ABC):
         if (refusal := self._behaviour.refusals.get((part, seq))) is not None:
             return refusal
         if part is MissionType.MISSION:
-            if item.command in ROWS_BESIDE:
+            if item.command in BESIDE:
                 return self.misplaced
             if item.command in (0, 1):
                 return self.nonsense
             return _check_mission_item(mission_item(item), self._lists.vehicle)
-        if item.command not in (FENCE_ROWS if part is MissionType.FENCE else {RALLY_POINT}):
-            return MavResult.UNSUPPORTED
-        if item.command in POLYGON.values() and item.params[0] < 3:
-            return self.thin_polygon
-        if item.command == RALLY_POINT and math.isnan(item.z):
-            return MavResult.INVALID_PARAM7
+        if (result := self.check_beside(part, item)) != MavResult.ACCEPTED:
+            return result
         if abs(item.x) > 900_000_000:
             return MavResult.INVALID_PARAM5_X
         return MavResult.INVALID_PARAM6_Y if abs(item.y) > 1_800_000_000 else MavResult.ACCEPTED
+
+    @abstractmethod
+    def check_beside(self, part: MissionType, item: WireItem) -> MavResult:
+        """Return what it answers to `item` of a fence or of rally points that is on Earth."""
 
 
 def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> MavResult:

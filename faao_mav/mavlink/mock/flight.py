@@ -93,11 +93,11 @@ def telemetry(posture: Posture, home: Home, since_boot: float) -> list[Message]:
             milliseconds,
             round(latitude * 1e7),
             round(longitude * 1e7),
-            round((home.altitude + up) * 1000),
-            round(up * 1000),
-            _int16(100 * v_north),
-            _int16(100 * v_east),
-            _int16(-100 * v_up),
+            _fitted((home.altitude + up) * 1000, 32),
+            _fitted(up * 1000, 32),
+            _fitted(100 * v_north, 16),
+            _fitted(100 * v_east, 16),
+            _fitted(-100 * v_up, 16),
             round(math.degrees(heading) % 360 * 100) % 36_000,
         ),
         LocalPositionNed(milliseconds, north, east, -up, v_north, v_east, -v_up),
@@ -105,9 +105,10 @@ def telemetry(posture: Posture, home: Home, since_boot: float) -> list[Message]:
     ]
 
 
-def _int16(value: float) -> int:
-    """What the field holds: 300 m/s and more, flown many times as fast, are cut."""
-    return round(min(max(value, -32_767.0), 32_767.0))
+def _fitted(value: float, bits: int) -> int:
+    """What a field of so many bits holds: 300 m/s and more, flown many times as fast, are cut."""
+    most = (1 << bits - 1) - 1
+    return round(min(max(value, -most), most))
 
 
 def _geodetic(home: Home, east: float, north: float) -> tuple[float, float]:

@@ -1,10 +1,12 @@
 """The mock autopilot: a vehicle without sockets or clock."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
+from faao_mav.errors import InputError
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import (
     Addressed,
@@ -22,6 +24,7 @@ from faao_mav.mavlink.messages import (
     ParamSet,
     SetMode,
     Statustext,
+    Timesync,
 )
 from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
 from faao_mav.mavlink.mock.flight import MockFlight, Posture, telemetry
@@ -142,6 +145,8 @@ class MockAutopilot(Machine[None]):
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self._now = now
         sender, message = envelope.sender, envelope.message
+        if isinstance(message, Timesync):
+            return [Timesync(int(now * 1e9) + 1, message.ts1)] if message.tc1 == 0 else ()
         if isinstance(message, SetMode):
             target = Address(message.target_system, 0)
         elif isinstance(message, Addressed):
@@ -238,7 +243,10 @@ class MockAutopilot(Machine[None]):
 
     def _problem(self) -> str | None:
         """Return why what is stored cannot be flown, or None."""
-        mission = self.mission()
+        try:
+            mission = self.mission()
+        except InputError as error:  # peers store what they like
+            return str(error)
         if not mission.items:
             return "no mission"
         return self._firmware.infeasible(mission)
@@ -248,8 +256,11 @@ class MockAutopilot(Machine[None]):
         if self._problem() is not None or self._fly is None:
             return DENIED
         if self.armed and self._flight is None:
-            mission = self.mission()
-            track = self._fly(Mission(mission.items, self.home, mission.fence, mission.rally))
+            mission = replace(self.mission(), home=self.home)
+            try:
+                track = self._fly(mission)
+            except InputError:
+                return DENIED
             self._flight = MockFlight(track, mission.items, now, self._speedup)
         return ACCEPTED
 

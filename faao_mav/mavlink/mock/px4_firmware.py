@@ -25,7 +25,7 @@ from faao_mav.mavlink.protocol import (
     MavSeverity,
     MissionType,
 )
-from faao_mav.mission.command import Command
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, POLYGON, Command, Frame
 from faao_mav.mission.item import Mission
 from faao_mav.vehicle.px4 import PX4
 
@@ -62,7 +62,6 @@ class Px4Firmware(MockFirmware):
     mission_limit = 1000
     modes = dict.fromkeys(("copter", "plane"), (_packed_mode(4, 3), _packed_mode(4, 4)))
     misplaced = MavResult.ERROR
-    thin_polygon = MavResult.ERROR
     nonsense = MavResult.UNSUPPORTED
     silent_at_boot = True
 
@@ -83,13 +82,22 @@ class Px4Firmware(MockFirmware):
             return "take-off is not the first position"
         return "starts with landing" if positions[:1] == [Command.NAV_LAND] else None
 
+    def check_beside(self, part: MissionType, item: WireItem) -> MavResult:  # noqa: ARG002
+        """Return what it answers to `item` of a fence or of rally points that is on Earth."""
+        if item.frame == Frame.MISSION:
+            return MavResult.UNSUPPORTED
+        if item.frame not in ABOVE_SEA | ABOVE_HOME:
+            return MavResult.UNSUPPORTED_FRAME
+        thin = item.command in POLYGON.values() and not item.params[0] >= 3
+        return MavResult.ERROR if thin else MavResult.ACCEPTED
+
     @property
     def deadline(self) -> float | None:
         """When the next request or the end of patience is due."""
         transfer = self._transfer
         if transfer.state == "idle":
             return None
-        end = transfer.last_message_time + self._manners.upload_patience
+        end = transfer.last_message_time + self._manners.patience
         if transfer.state == "receiving":
             return min(end, transfer.last_request_time + self._manners.request_period)
         return end
@@ -121,7 +129,7 @@ class Px4Firmware(MockFirmware):
         transfer = self._transfer
         if transfer.state == "idle":
             return []
-        if now >= transfer.last_message_time + self._manners.upload_patience:
+        if now >= transfer.last_message_time + self._manners.patience:
             transfer.state = "idle"
             return [_said("Operation timeout")]
         request_due = transfer.last_request_time + self._manners.request_period
@@ -137,7 +145,7 @@ class Px4Firmware(MockFirmware):
                 return [self._ask(now)]
         if transfer.state != "idle":
             return [
-                MissionAck(sender, mission_type, MavResult.ERROR),
+                MissionAck(sender, transfer.part, MavResult.ERROR),
                 _said("WPM: IGN MISSION_COUNT: Busy"),
             ]
         if mission_type not in tuple(MissionType):

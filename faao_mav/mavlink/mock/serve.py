@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from faao_mav.mavlink.faults import Faults, FaultyTransport
 from faao_mav.mavlink.link import WireLink
 from faao_mav.mavlink.mock.mock_autopilot import Fly, MockAutopilot
+from faao_mav.mavlink.signing import Signing
 from faao_mav.mavlink.transport import Transport, open_transport
 from faao_mav.mission.item import Mission
 from faao_mav.vehicle import Track, Vehicle
@@ -32,7 +33,8 @@ def serve(
     transport = open_transport(connection) if isinstance(connection, str) else connection
     if faults is not None:
         transport = FaultyTransport(transport, faults)
-    with WireLink(transport, key=key, address=mock.address) as link:
+    signing = None if key is None else Signing(key)
+    with WireLink(transport, signing=signing, address=mock.address) as link:
         link.begin(mock)
         while not stop():
             link.step(mock, time.monotonic() + _PATIENCE)

@@ -9,6 +9,7 @@ from faao_mav.mavlink.machine import AskingMachine, Progress
 from faao_mav.mavlink.manners import Manners, manners_of
 from faao_mav.mavlink.messages import (
     Envelope,
+    Heartbeat,
     ListMessage,
     Message,
     MissionAck,
@@ -17,10 +18,16 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.protocol import Address, MavResult, MissionType
-from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.mavlink.transfer.pace import Budget, Timeouts
 from faao_mav.vehicle import VehicleType
 
-Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "cancelled"]
+Status: TypeAlias = Literal[
+    "accepted", "unknown", "refused", "silent", "stalled", "armed", "cancelled"
+]
+
+TENTATIVE = frozenset({MavResult.ERROR, MavResult.DENIED})
+"""Results that PX4 and ArduPilot also give to late packets of an earlier transfer: they count when
+nothing else is said."""
 
 _TEXTS = 5
 """The number of status texts that are kept, the last ones; chosen."""
@@ -28,11 +35,16 @@ _TEXTS = 5
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """Both ends of a transfer, and what flies at the other: None if its autopilot is not known."""
+    """Both ends of a transfer, and what flies at the other: None if its autopilot is not known.
+
+    Unless it `may_be_armed`, nothing more is written once any heartbeat of that system says that it
+    is armed.
+    """
 
     own: Address
     address: Address
     vehicle: VehicleType | None
+    may_be_armed: bool = False
 
     @property
     def manners(self) -> Manners:
@@ -49,10 +61,11 @@ class Outcome:
     """How a transfer ended.
 
     `status`: "accepted"; "unknown": everything was sent, but the last answer is missing or
-    ambiguous; "refused" with the `result`; "silent": nothing came any more; "cancelled" by us, or
-    by the vehicle with the `result`. `last_requested` is the number of the item last asked for,
+    ambiguous; "refused" with the `result`; "silent": nothing came any more; "stalled": it got no
+    further in the time there is; "armed": stopped because the vehicle is armed; "cancelled" by us,
+    or by the vehicle with the `result`. `last_requested` is the number of the item last asked for,
     `items` what was downloaded, `said` the vehicle's status texts, `opaque_id` its number for the
-    list, 0 for none.
+    list, 0 for none. `armed` tells whether a heartbeat said so meanwhile.
     """
 
     status: Status
@@ -61,24 +74,31 @@ class Outcome:
     items: tuple[WireItem, ...] = ()
     said: tuple[str, ...] = ()
     opaque_id: int = 0
+    armed: bool = False
 
 
 class Exchange(AskingMachine[Outcome]):
     """The transfer of one list: it opens with a question and ends with an `Outcome`.
 
-    What derives from it gives `_question`, which opens the transfer, and `_take`, which answers the
-    vehicle's messages about the list.
+    It takes its time from `budget`, its own if none is given. What derives from it gives
+    `_question`, which opens the transfer, and `_take`, which answers the vehicle's messages about
+    the list, and says whether it writes.
     """
+
+    writes = True
 
     def __init__(
         self,
         peer: Peer,
         mission_type: MissionType = MissionType.MISSION,
         timeouts: Timeouts | None = None,
+        budget: Budget | None = None,
     ) -> None:
         self._timeouts = timeouts or Timeouts()
         super().__init__(self._timeouts.response, self._timeouts.retries)
         self._peer, self._type = peer, mission_type
+        self._budget = budget or Budget(self._timeouts)
+        self._armed = False
         self._texts: list[str] = []
         self._result: int | None = None
         """What the vehicle said last, if it was no."""
@@ -87,14 +107,42 @@ class Exchange(AskingMachine[Outcome]):
     def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         """Answer what the vehicle says to us about the list."""
 
+    @property
+    def _reached(self) -> int | None:
+        """The number of the item last asked for."""
+        return None
+
+    def start(self, now: float) -> Sequence[Message]:
+        """Ask, and begin to spend the budget."""
+        self._budget.open(now)
+        return super().start(now)
+
+    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        """Take note of what arrived, and of the time."""
+        return [*super().on(envelope, now), *self._stop_if_stalled(now)]
+
+    def tick(self, now: float) -> Sequence[Message]:
+        """Take note of the time."""
+        return [*super().tick(now), *self._stop_if_stalled(now)]
+
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        message = envelope.message
-        if envelope.sender != self._peer.address:
+        message, sender = envelope.message, envelope.sender
+        if isinstance(message, Heartbeat) and sender.system == self._peer.address.system:
+            self._armed = self._armed or message.armed
+            if message.armed and self.writes and not self._peer.may_be_armed:
+                return self._stop("armed")
+        if sender != self._peer.address:
             return ()
+        if isinstance(message, Heartbeat):
+            return self._on_heartbeat(message, now)
         if isinstance(message, Statustext):
             self._texts = [*self._texts[1 - _TEXTS :], message.text.strip()]
         elif isinstance(message, ListMessage) and message.mission_type == self._type:
             return self._take(message, now) if self._peer.own.takes(message.target) else ()
+        return ()
+
+    def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> Sequence[Message]:  # noqa: ARG002
+        """Answer the vehicle's heartbeat."""
         return ()
 
     def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
@@ -103,21 +151,25 @@ class Exchange(AskingMachine[Outcome]):
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Give up and tell the vehicle."""
-        if self.outcome is not None:
-            return ()
-        self._end("cancelled")
+        return () if self.outcome is not None else self._stop("cancelled")
+
+    def _stop_if_stalled(self, now: float) -> Sequence[Message]:
+        stalled = self.outcome is None and self._budget.is_spent(now)
+        return self._stop("stalled", self._result) if stalled else ()
+
+    def _stop(self, status: Status, result: int | None = None) -> Sequence[Message]:
+        self._end(status, result)
         return [self._peer.ack(MavResult.OPERATION_CANCELLED, self._type)]
 
     def _end(
         self,
         status: Status,
         result: int | None = None,
-        last_requested: int | None = None,
         items: tuple[WireItem, ...] = (),
         opaque_id: int = 0,
     ) -> None:
         said = tuple(dict.fromkeys(self._texts))
-        self.outcome = Outcome(status, result, last_requested, items, said, opaque_id)
+        self.outcome = Outcome(status, result, self._reached, items, said, opaque_id, self._armed)
 
 
 class Clear(Exchange):

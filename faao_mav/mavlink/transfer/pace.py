@@ -17,7 +17,9 @@ class Timeouts:
     in the turns of their main loop, of which the slowest (ArduPlane's) has 50 a second. `silence`
     is how long a vehicle may say nothing in the middle of a transfer before it has given up
     itself: PX4 asks again for 5 s, ArduPilot for 8 s, so that six lost packets in a row end
-    nothing. `attempts` is how often a whole transfer is begun.
+    nothing. `attempts` is how often a whole transfer is begun. `patience` is what all of it may
+    take together, and `per_item` what each item that gets further adds: chosen, above what items
+    took that 30 % loss each way and late packets held up.
     """
 
     response: float = 1.5
@@ -27,24 +29,72 @@ class Timeouts:
     silence: float = 9.0
     boot: float = 60.0
     attempts: int = 3
+    patience: float = 30.0
+    per_item: float = 2.0
+
+
+class Budget:
+    """How long the upload of a list, reading it back and all repetitions may take together.
+
+    Each item of the upload, and of the download, adds to it when it is the furthest so far: a
+    vehicle that answers for ever and gets nowhere is given up in time.
+
+    >>> budget = Budget(Timeouts(patience=30.0, per_item=2.0))
+    >>> budget.open(now=100.0)
+    >>> budget.reach("upload", 1), budget.reach("upload", 1), budget.is_spent(132.0)
+    (None, None, False)
+    >>> budget.is_spent(132.1)
+    True
+    """
+
+    def __init__(self, timeouts: Timeouts) -> None:
+        self._timeouts = timeouts
+        self._opened: float | None = None
+        self._earned = timeouts.patience
+        self._reached: dict[str, int] = {}
+
+    def open(self, now: float) -> None:
+        """Note that the first transfer begins; later ones change nothing."""
+        self._opened = now if self._opened is None else self._opened
+
+    def reach(self, way: str, items: int) -> None:
+        """Note that `way`, "upload" or "download", has got as far as so many items."""
+        further = items - self._reached.get(way, 0)
+        if further > 0:
+            self._reached[way] = items
+            self._earned += further * self._timeouts.per_item
+
+    def allow_boot(self) -> None:
+        """Note that the vehicle is still booting, which may take its own time."""
+        self._earned = max(self._earned, self._timeouts.boot)
+
+    def is_spent(self, now: float) -> bool:
+        """Tell whether it is time to give up."""
+        return self._opened is not None and now > self._opened + self._earned
 
 
 @dataclass(slots=True)
 class Question:
     """A question to the vehicle: `first_sent` and `last_sent` are times, s.
 
-    `repeats` counts how often it was sent again for want of an answer; `ambiguous` tells that it
-    was sent more than once, for whatever reason.
+    `repeats` counts how often it was sent again for want of an answer, `sent` how often it was sent
+    in all.
     """
 
     first_sent: float
     last_sent: float
     repeats: int = 0
-    ambiguous: bool = False
+    sent: int = 1
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether it was sent more than once, for whatever reason."""
+        return self.sent > 1
 
     def send_again(self, now: float) -> None:
         """Note that it is sent once more, for another reason than that time has passed."""
-        self.last_sent, self.ambiguous = now, True
+        self.last_sent = now
+        self.sent += 1
 
 
 class Pace:

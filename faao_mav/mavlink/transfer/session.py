@@ -13,8 +13,8 @@ from faao_mav.mavlink.manners import autopilot_name
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.transfer.download import Download
-from faao_mav.mavlink.transfer.exchange import Clear, Outcome, Peer
-from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.mavlink.transfer.exchange import TENTATIVE, Clear, Outcome, Peer
+from faao_mav.mavlink.transfer.pace import Budget, Timeouts
 from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.transfer.verify import Difference, compare
 from faao_mav.mavlink.wire_items import home_items
@@ -23,7 +23,9 @@ T = TypeVar("T")
 Job: TypeAlias = Generator[Machine[Any], Outcome, T]
 """What `Script` runs: yields exchanges, is sent their outcomes, returns its own."""
 
-Verdict: TypeAlias = Literal["verified", "different", "unread", "refused", "silent", "cancelled"]
+Verdict: TypeAlias = Literal[
+    "verified", "different", "unread", "refused", "silent", "stalled", "armed", "cancelled"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,14 +71,18 @@ def upload_parts(
     """Upload lists one after the other, read each back and compare; stop at the first failure.
 
     A transfer that the link broke is begun again, and one whose last answer was lost or whose
-    list reads back differently too, at most `Timeouts.attempts` times and not if it reads back
-    the same again. A refusal is final, except an ERROR, which may be about something else.
+    list reads back differently too (ArduPilot now and then loses a fence that it accepted), at
+    most `Timeouts.attempts` times. A refusal is final, except one that may be about something else.
     """
     reports: list[PartReport] = []
     for part, items in parts:
-        report = yield from _upload_part(part, items, peer, timeouts or Timeouts())
+        report, armed = yield from _upload_part(part, items, peer, timeouts or Timeouts())
         reports.append(report)
         if not report.verified:
+            break
+        if armed and not peer.may_be_armed and len(reports) < len(parts):
+            left = parts[len(reports)]
+            reports.append(PartReport(left[0], _own_items(*left, peer), "armed"))
             break
     return tuple(reports)
 
@@ -115,21 +121,27 @@ def clear_lists(
                 verdict: Verdict = "different" if differences else "verified"
                 report = replace(report, verdict=verdict, differences=differences)
         reports.append(report)
-        if report.verdict in ("silent", "cancelled"):
+        if report.verdict in ("silent", "stalled", "armed", "cancelled"):
             break
     return tuple(reports)
 
 
+def _own_items(part: MissionType, items: Sequence[WireItem], peer: Peer) -> int:
+    """Return how many of `items` are not the home item."""
+    return len(items) - home_items(peer.vehicle, part)
+
+
 def _upload_part(
     part: MissionType, items: tuple[WireItem, ...], peer: Peer, timeouts: Timeouts
-) -> Job[PartReport]:
-    number = len(items) - home_items(peer.vehicle, part)
-    last: PartReport | None = None
+) -> Job[tuple[PartReport, bool]]:
+    """Return what became of a list, and whether the vehicle was armed when it was read back."""
+    number, budget = _own_items(part, items, peer), Budget(timeouts)
     for attempt in range(1, timeouts.attempts + 1):
-        sent = yield Upload(items, peer, part, timeouts)
-        report = _failed(part, number, sent, attempt)
+        sent = yield Upload(items, peer, part, timeouts, budget)
+        report, armed, stop = _failed(part, number, sent, attempt), sent.armed, _is_final(sent)
         if sent.status in ("accepted", "unknown"):
-            read = yield Download(peer, part, timeouts)
+            read = yield Download(peer, part, timeouts, budget)
+            armed, stop = armed or read.armed, _is_final(read)
             if read.status == "accepted":
                 differences = compare(items, read.items, part, peer.vehicle)
                 wrong = any(difference.kind == "wrong" for difference in differences)
@@ -139,21 +151,19 @@ def _upload_part(
                     differences=differences,
                     opaque_id=sent.opaque_id or read.opaque_id,
                 )
-                if sent.result == MavResult.ERROR:
+                if sent.result in TENTATIVE:
                     # Of a reminder or a duplicate if the list is right, else of an item.
                     told = replace(report, verdict="refused")
                     report = told if wrong else replace(report, result=None)
             elif _by_us(read):
-                return replace(report, verdict="cancelled")
+                report = replace(report, verdict="cancelled")
             elif sent.status == "accepted":
                 report = replace(report, verdict="unread", said=read.said)
         # PX4 says ERROR when busy, and of packets that come late or twice: that may pass.
-        refused = report.verdict == "refused" and report.result != MavResult.ERROR
-        if report.verified or refused or _by_us(sent) or _alike(report, last):
-            return report
-        last = report
-    assert last is not None
-    return last
+        refused = report.verdict == "refused" and report.result not in TENTATIVE
+        if report.verified or refused or stop:
+            break
+    return report, armed
 
 
 def _failed(part: MissionType, items: int, outcome: Outcome, attempts: int) -> PartReport:
@@ -163,6 +173,8 @@ def _failed(part: MissionType, items: int, outcome: Outcome, attempts: int) -> P
         "unknown": "silent",
         "refused": "refused",
         "silent": "silent",
+        "stalled": "stalled",
+        "armed": "armed",
         "cancelled": "cancelled",
     }
     verdict = verdicts[outcome.status]
@@ -174,8 +186,9 @@ def _by_us(outcome: Outcome) -> bool:
     return outcome.status == "cancelled" and outcome.result is None
 
 
-def _alike(one: PartReport, other: PartReport | None) -> bool:
-    return other is not None and bool(one.differences) and one.differences == other.differences
+def _is_final(outcome: Outcome) -> bool:
+    """Tell whether nothing is to be tried again after `outcome`."""
+    return _by_us(outcome) or outcome.status in ("armed", "stalled")
 
 
 def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int], str]) -> str:
@@ -194,6 +207,12 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
             text = f"not what was sent: {shown}{more}"
         case "unread":
             text += "accepted, but it could not be read back; download it to see what is there"
+        case "armed":
+            text += "the vehicle is armed: nothing more is written (--allow-armed allows it)"
+        case "stalled":
+            text += "the transfer got no further in time"
+            if report.item is not None:
+                text += f" than item {report.item} of {report.items + home}"
         case "silent":
             text += "the vehicle stopped answering"
             if report.item is not None:
@@ -212,8 +231,17 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
                 text += f", at {describe(report.item - home)}"
     if report.said:
         text += f". The vehicle says: {'; '.join(report.said)}"
-    begun = report.item is not None and report.verdict in ("silent", "cancelled", "refused")
+    begun = report.item is not None and report.verdict not in ("different", "unread")
     if begun and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
-        text += f". {autopilot_name(peer.vehicle)} may now hold old and new items mixed: upload "
-        text += "again before flying"
+        text += f". {what_is_left(peer)}"
     return text
+
+
+def what_is_left(peer: Peer) -> str:
+    """Return in words what a vehicle may hold when a change of its lists has stopped half-way."""
+    if peer.vehicle is None:
+        return "What the vehicle holds now is not known: upload again, or download it"
+    name = autopilot_name(peer.vehicle)
+    if peer.vehicle.dialect.atomic:
+        return f"{name} holds the old list or the new one, whole: download it to see which"
+    return f"{name} may now hold old and new items mixed: upload again before flying"

@@ -7,7 +7,6 @@ from typing import Literal
 from faao_mav.errors import InputError
 from faao_mav.mavlink.machine import Progress
 from faao_mav.mavlink.messages import (
-    Envelope,
     Heartbeat,
     ListMessage,
     Message,
@@ -18,8 +17,8 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.protocol import MavResult, MavState, MissionType
-from faao_mav.mavlink.transfer.exchange import Exchange, Peer, Status
-from faao_mav.mavlink.transfer.pace import Pace, Question, Timeouts
+from faao_mav.mavlink.transfer.exchange import TENTATIVE, Exchange, Peer, Status
+from faao_mav.mavlink.transfer.pace import Budget, Pace, Question, Timeouts
 
 _REASONS = 0.3
 """Seconds to wait after a refusal for the status text that gives the reason: chosen, above what
@@ -36,8 +35,8 @@ class Upload(Exchange):
     - Any item below the count is sent whenever it is asked for, by either request, as
       MISSION_ITEM_INT.
     - INVALID_SEQUENCE is no end for ArduPilot: it says so of duplicates and goes on asking. An
-      ERROR may be about a duplicate too (PX4: of MISSION_COUNT, ArduPilot: of the last item): it
-      counts when nothing more is asked for.
+      ERROR may be about a duplicate too (PX4: of MISSION_COUNT, ArduPilot: of the last item), and
+      DENIED about a late request of a download before: they count when nothing more is asked for.
     - When everything was sent and no answer comes, PX4 is sent the last item again, which it
       takes, or acknowledges again. ArduPilot is sent the item before: if it still waits for the
       last one it says INVALID_SEQUENCE, and is sent that; ERROR says that it does not wait any
@@ -63,10 +62,11 @@ class Upload(Exchange):
         peer: Peer,
         mission_type: MissionType = MissionType.MISSION,
         timeouts: Timeouts | None = None,
+        budget: Budget | None = None,
     ) -> None:
         if not items:
             raise InputError(f"upload: no {mission_type.title} items; clear the list instead")
-        super().__init__(peer, mission_type, timeouts)
+        super().__init__(peer, mission_type, timeouts, budget)
         self._items, self._manners = tuple(items), peer.manners
         self._phase: Literal["count", "items", "booting", "refused"] = "count"
         self._booting = False
@@ -92,13 +92,10 @@ class Upload(Exchange):
         self._last_requested, self._ahead, self._sent_unasked = -1, 0, False
         return super().start(now)
 
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        message = envelope.message
-        if isinstance(message, Heartbeat) and envelope.sender == self._peer.address:
-            self._booting = message.system_status < MavState.STANDBY
-            ready = self._phase == "booting" and not self._booting
-            return self.start(now) if ready else ()
-        return super()._receive(envelope, now)
+    def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> Sequence[Message]:
+        self._booting = heartbeat.system_status < MavState.STANDBY
+        ready = self._phase == "booting" and not self._booting
+        return self.start(now) if ready else ()
 
     def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         match message:
@@ -121,12 +118,13 @@ class Upload(Exchange):
             self._most_ahead = 0
             return self.start(now)
         status: Status = "silent" if self._result is None else "refused"
-        self._end(status, self._result, self._last_sent())
+        self._end(status, self._result)
         return ()
 
     def _on_request(self, seq: int, now: float) -> Sequence[Message]:
         if seq >= len(self._items):
             return ()
+        self._budget.reach("upload", seq + 1)
         if seq <= self._current:
             self._unanswered.send_again(now)
         else:
@@ -150,19 +148,20 @@ class Upload(Exchange):
         if result == MavResult.ACCEPTED:
             # Before the last item was asked for it can only be about something else.
             if self._all_sent():
-                self._end("accepted", result, self._last_sent(), opaque_id=ack.opaque_id)
+                self._end("accepted", result, opaque_id=ack.opaque_id)
         elif result == MavResult.INVALID_SEQUENCE and not self._manners.ignores_other_items:
             return self._on_invalid_sequence(now)
-        elif result == MavResult.ERROR:
+        elif result in TENTATIVE:
             self._result = result
             if self._phase == "items":
                 soon = 2 * self._timeouts.item
                 self._due = now + (soon if self._all_sent() else self._timeouts.response)
         elif result == MavResult.NO_SPACE and self._booting:
             self._phase, self._result = "booting", result
+            self._budget.allow_boot()
             self._due = now + self._timeouts.boot
         elif result == MavResult.OPERATION_CANCELLED:
-            self._end("cancelled", result, self._last_sent())
+            self._end("cancelled", result)
         else:
             self._phase, self._result = "refused", result
             self._due = now + _REASONS
@@ -196,7 +195,7 @@ class Upload(Exchange):
             self._retries_done += 1
             self._due = now + self._reminder_wait()
             return [self._item(reminder)]
-        self._end("unknown", self._result, self._last_sent())
+        self._end("unknown", self._result)
         return ()
 
     def _repetition(self) -> Sequence[Message]:
@@ -215,7 +214,8 @@ class Upload(Exchange):
     def _all_sent(self) -> bool:
         return len(self._sent) == len(self._items)
 
-    def _last_sent(self) -> int | None:
+    @property
+    def _reached(self) -> int | None:
         return self._current if self._sent else None
 
     def _may_repeat(self) -> bool:

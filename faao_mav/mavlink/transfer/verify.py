@@ -57,7 +57,8 @@ def compare(
 
     Not a difference: one step of the integer coordinates, single precision, a centimetre of
     altitude, frames that mean the same (3 and 6), the frame of a command without a place, "not
-    set" read back as 0. A home item is the vehicle's own: told as dropped where it differs by
+    set" read back as 0, autocontinue of a fence or rally point, which nothing comes after. A home
+    item is the vehicle's own: told as dropped where it differs by
     more than a metre or so.
     """
     differences = []
@@ -95,9 +96,12 @@ def _compare_items(
         stored = vehicle.dialect.stored(sent)
         unknown = part is MissionType.MISSION and not vehicle.dialect.is_known(sent.command)
     differences = []
-    for (field, was), is_, kept in zip(
+    values = zip(
         _fields(sent).items(), _fields(found).values(), _fields(stored).values(), strict=True
-    ):
+    )
+    for (field, was), is_, kept in values:
+        if field == "autocontinue" and part is not MissionType.MISSION:
+            continue
         if field == "frame" and not _same_frame(sent, int(is_), stored):
             differences.append(Difference(part, index, field, was, is_, "wrong"))
         if field == "frame" or _same(field, was, is_, sent.frame):

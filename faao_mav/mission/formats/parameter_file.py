@@ -52,7 +52,6 @@ def read_parameters(path: str | Path) -> dict[str, float]:
     has two values; for no parameters.
     """
     text = read_text(path, MAX_BYTES, "a file of parameters", ParameterFileError)
-    text = text.removeprefix("\ufeff")
     result: dict[str, float] = {}
     lines: dict[str, int] = {}
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):

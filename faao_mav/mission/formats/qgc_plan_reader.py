@@ -19,7 +19,7 @@ from pydantic import (
     ValidationError,
 )
 
-from faao_mav.errors import InputError, MissionFileError, quote
+from faao_mav.errors import InputError, MissionFileError, place_of, quote
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats.mission_file import MissionFile
@@ -161,27 +161,23 @@ def _describe(error: ValidationError) -> str:
     """Return the first finding: its place, the value there and what is expected."""
     detail = error.errors(include_url=False)[0]
     steps = [step for step in detail["loc"] if step not in _ITEM_TYPES]
-    place = _place(steps)
+    where = place_of(steps)
     last = next((step for step in reversed(steps) if isinstance(step, str)), "")
     hint = _HINTS.get(last, "")
     kind, told = detail["type"], detail.get("ctx", {})
     if kind == "missing":
-        return f"{place}: is missing{hint}"
+        return f"{where}: is missing{hint}"
     if kind == "union_tag_not_found":
-        return f"{place}.type: is missing"
+        return f"{where}.type: is missing"
     if kind == "union_tag_invalid":
-        return f"{place}.type: {quote(told['tag'])}; expected {told['expected_tags']}"
+        return f"{where}.type: {quote(told['tag'])}; expected {told['expected_tags']}"
     if kind in ("too_short", "too_long"):
         length = told.get("min_length", told.get("max_length"))
-        return f"{place}: {quote(detail['input'])}; expected an array of {length} values"
+        return f"{where}: {quote(detail['input'])}; expected an array of {length} values"
     words = (
         "an object" if kind.startswith("model_") else detail["msg"].removeprefix("Input should be ")
     )
-    return f"{place}: {quote(detail['input'])}; expected {words}{hint}".removeprefix(": ")
-
-
-def _place(steps: list[str | int]) -> str:
-    return "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).removeprefix(".")
+    return f"{where}: {quote(detail['input'])}; expected {words}{hint}".removeprefix(": ")
 
 
 class _Odd(NamedTuple):
@@ -212,11 +208,9 @@ def _parse(text: str) -> Any:
         return mark(f"{word}; expected a finite number or null (not set): JSON has no such number")
 
     try:
-        tree = json.loads(
-            text.removeprefix("\ufeff"), object_pairs_hook=unique, parse_constant=constant
-        )
+        tree = json.loads(text, object_pairs_hook=unique, parse_constant=constant)
         for steps, problem in _odd_in([], tree) if odd else ():
-            raise MissionFileError(f"{_place(steps)}: {problem}".removeprefix(": "))
+            raise MissionFileError(f"{place_of(steps)}: {problem}".removeprefix(": "))
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         raise MissionFileError(f"{where}: not JSON: {error.msg}") from None

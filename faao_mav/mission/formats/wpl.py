@@ -142,7 +142,7 @@ def _format(value: float) -> str:
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
     """Yield line number and content of the lines that say something."""
-    for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), start=1):
+    for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
         content = line.strip(" \t")
         if content and not content.startswith("#"):
             yield number, content

@@ -25,12 +25,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex
 from faao_mav.errors import PlanError, SolverError
 from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
 from faao_mav.optimizer.algorithm1.trajectory_step import link_sum, optimize_trajectory
 from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.problem import Problem
+from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.precoder import SCHEMES
@@ -43,7 +43,7 @@ Pair = tuple[Complex, Complex]
 
 
 @dataclass(frozen=True, slots=True)
-class _Alternate:
+class _Iterate:
     """Trajectory, H_r and precoders after an iteration."""
 
     flight: Trajectory
@@ -55,15 +55,9 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
     """Return the best iterate of Algorithm 1 on `problem`.
 
     With an `optimizer.precoder` other than `faao`, that scheme at the new positions takes the place
-    of (35): the paper's comparison.
-
-    Args:
-        problem: the feasible set and the links, with known or no fading.
-        observe: is told the progress after every convex problem.
-
-    Raises:
-        PlanError: the plan is not for Algorithm 1, or its alphabet makes the problems too large.
-        InfeasibleError: no flight satisfies the plan.
+    of (35): the paper's comparison. `observe` is told the progress after every convex problem.
+    Raises `PlanError` for a plan that is not for Algorithm 1 or whose alphabet makes the problems
+    too large, `InfeasibleError` where no flight satisfies the plan.
     """
     _check_plan(problem)
     options = problem.plan.optimizer
@@ -77,7 +71,7 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
                 observe(Progress(iteration, options.max_iterations, stage, max(history)))
 
         try:
-            current = _iterate(problem, current, tell)
+            current = _next(problem, current, tell)
         except SolverError as error:
             ending = f"stopped in iteration {iteration}, the best so far is kept: {error}"
             break
@@ -87,67 +81,55 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
         if abs(history[-1] - history[-2]) < options.tolerance:
             converged, ending = True, f"R_avg changed by less than {options.tolerance:g} bit/s/Hz"
             break
-    return make_solution(
-        problem,
-        best.flight,
-        best.fading,
-        best.precoders,
-        history,
-        converged=converged,
-        ending=ending,
-    )
+    made = (best.flight, best.fading, best.precoders)
+    return make_solution(problem, *made, history, converged=converged, ending=ending)
 
 
-def _start(problem: Problem) -> _Alternate:
+def _start(problem: Problem) -> _Iterate:
     """Return the straight flight with equal-power precoders, sqrt(W / N) I, or the scheme's."""
-    flight = straight_flight(problem.kinematics)
-    fading = _fading(problem, flight.w)
-    scheme = problem.plan.optimizer.precoder
-    if scheme != "faao":
-        return _Alternate(flight, fading, _scheme_precoders(problem, scheme, flight.w, fading))
-    bs, relay = (
-        np.tile(np.sqrt(k.power / k.transmit) * np.eye(k.transmit) + 0j, (len(flight.w), 1, 1))
-        for k in problem.links
-    )
-    return _Alternate(flight, fading, (bs, relay))
+
+    def equal_power(_: int, link: Link, H: Complex) -> Complex:
+        N = link.transmit
+        return np.tile(np.sqrt(link.power / N) * np.eye(N) + 0j, (len(H), 1, 1))
+
+    return _iterate_at(problem, straight_flight(problem.kinematics), equal_power)
 
 
-def _iterate(problem: Problem, last: _Alternate, tell: Callable[[str], None]) -> _Alternate:
+def _next(problem: Problem, last: _Iterate, tell: Callable[[str], None]) -> _Iterate:
     """Return the next iterate, by steps 3 and 4."""
-    scheme = problem.plan.optimizer.precoder
     tell("trajectory (27)")
-    first, second = (
-        link_sum(link, H_r, P)
-        for link, H_r, P in zip(problem.links, last.fading, last.precoders, strict=True)
-    )
+    both = zip(problem.links, last.fading, last.precoders, strict=True)
+    sums = tuple(link_sum(*one) for one in both)
     flight = optimize_trajectory(
-        problem, (first, second), last.flight, observe=lambda _: tell("trajectory (27)")
+        problem, sums, last.flight, observe=lambda _: tell("trajectory (27)")
     )
-    fading = _fading(problem, flight.w)
-    if scheme != "faao":
-        return _Alternate(flight, fading, _scheme_precoders(problem, scheme, flight.w, fading))
-    bs, relay = (
-        optimize_precoders(
-            link, link.channel(flight.w, H_r), P, observe=lambda _: tell("precoders (35)")
-        )
-        for link, H_r, P in zip(problem.links, fading, last.precoders, strict=True)
-    )
-    return _Alternate(flight, fading, (bs, relay))
+
+    def best(number: int, link: Link, H: Complex) -> Complex:
+        before = last.precoders[number]
+        return optimize_precoders(link, H, before, observe=lambda _: tell("precoders (35)"))
+
+    return _iterate_at(problem, flight, best)
 
 
-def _fading(problem: Problem, w: Real) -> Pair:
-    return problem.bs_uav.small_scale(w), problem.uav_user.small_scale(w)
+def _iterate_at(
+    problem: Problem, flight: Trajectory, precoders: Callable[[int, Link, Complex], Complex]
+) -> _Iterate:
+    """Return the iterate at `flight`, with the plan's scheme or else `precoders`.
+
+    These are given for the number of a link, the link and its channels H, (1) or (2).
+    """
+    scheme = SCHEMES.get(problem.plan.optimizer.precoder)
+    fading, chosen = [], []
+    for number, link in enumerate(problem.links):
+        H_r = link.small_scale(flight.w)
+        H = link.channel(flight.w, H_r)
+        fading.append(H_r)
+        P = scheme(H, link.power, link.noise) if scheme else precoders(number, link, H)
+        chosen.append(P)
+    return _Iterate(flight, (fading[0], fading[1]), (chosen[0], chosen[1]))
 
 
-def _scheme_precoders(problem: Problem, scheme: str, w: Real, fading: Pair) -> Pair:
-    bs, relay = (
-        SCHEMES[scheme](link.channel(w, H_r), link.power, link.noise)
-        for link, H_r in zip(problem.links, fading, strict=True)
-    )
-    return bs, relay
-
-
-def _rate(problem: Problem, iterate: _Alternate) -> float:
+def _rate(problem: Problem, iterate: _Iterate) -> float:
     """Return R_avg of (9), bit/s/Hz."""
     return min(
         float(link.rates(iterate.flight.w, H_r, P).mean())
@@ -167,6 +149,11 @@ def _check_plan(problem: Problem) -> None:
         raise PlanError(
             f"{plan.source}: optimizer.inputs: gaussian is not for algorithm1, whose sums are "
             "those of an alphabet; use optimizer.method: direct"
+        )
+    if plan.optimizer.rate != "cutoff":
+        raise PlanError(
+            f"{plan.source}: optimizer.rate: {plan.optimizer.rate} is not for algorithm1, whose "
+            "sums are those of the cutoff rate; use cutoff, or optimizer.method: direct"
         )
     cones = problem.kinematics.slots * sum(len(k.classes.multiplicity) for k in problem.links)
     if cones > MAX_CONES:

@@ -24,14 +24,9 @@ def optimize_precoders(
 ) -> Complex:
     """Return precoders that minimise the sum of (15) of `link` within tr(P^H P) <= W.
 
-    Args:
-        link: the link.
-        H: (N + 2, N_r, N_t) channels (1) or (2).
-        P: (N + 2, N_t, N_t) precoders to start from, sqrt(W).
-        observe: is told the sum over the non-zero classes, which never increases.
-
-    Raises:
-        SolverError: Clarabel fails.
+    `H` (N + 2, N_r, N_t) are channels (1) or (2), `P` (N + 2, N_t, N_t) the precoders to start
+    from, sqrt(W). `observe` is told the sum over the non-zero classes, which never increases.
+    Raises `SolverError` where Clarabel fails.
     """
     M = H.conj().mT @ H
 
@@ -64,10 +59,8 @@ def precoder_tangent(
 ) -> tuple[Real, Real]:
     """Return the tangent C^ap / (4 sigma²) = slope p - c of Proposition 2 about the precoders P_i.
 
-    p (n, 2 N²) is [Re P, Im P] row by row, in units of sqrt(W), W = `power`.
-
-    Returns:
-        slope (n, k, 2 N²) and c (n, k), the exponents at P_i.
+    p (n, 2 N²) is [Re P, Im P] row by row, in units of sqrt(W), W = `power`. The slope is
+    (n, k, 2 N²), c (n, k) are the exponents at P_i.
     """
     N = P_i.shape[1]
     b = np.einsum("nab,nbc,kc->nka", M, P_i, u, optimize=True)

@@ -34,15 +34,11 @@ def successive_approximation(
     scale: float,
     observe: Observer | None,
 ) -> Point:
-    """Return the point that repeated convex problems lead to; `objective` never increases.
+    """Return the point that repeated convex problems lead to from the feasible `start`.
 
-    Args:
-        start: the first point of expansion, feasible.
-        objective: the true value of a point.
-        solve_about: the solution of the convex problem about a point, given its gap.
-        floor: a lower bound on the objective; the gap is the distance to it.
-        scale: the largest possible gap.
-        observe: is told the objective after every convex problem.
+    `objective`, the true value of a point, never increases; `floor` is a lower bound on it, the gap
+    the distance to that, `scale` the largest possible gap. `solve_about` gives the solution of the
+    convex problem about a point with a gap. `observe` is told the objective after each.
     """
     point, value = start, objective(start)
     for _ in range(MAX_STEPS):

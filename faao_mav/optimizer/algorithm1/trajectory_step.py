@@ -15,11 +15,7 @@ import scipy.sparse as sp
 
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import SolverError
-from faao_mav.optimizer.algorithm1.successive import (
-    Observer,
-    shrink,
-    successive_approximation,
-)
+from faao_mav.optimizer.algorithm1.successive import Observer, shrink, successive_approximation
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.scaled import flight_variables, solve
@@ -40,12 +36,8 @@ class SumOfExponentials:
 
     def value(self, w: Real) -> float:
         """Return the sum over slots and non-zero classes of multiplicity exp(-D) at w."""
-        d2 = _squared_distance(self.link, w)
+        d2 = np.sum((w - self.link.station) ** 2, axis=-1) + self.link.altitude**2
         return float((self.link.classes.multiplicity * np.exp(-self.A / d2[:, None])).sum())
-
-
-def _squared_distance(link: Link, w: Real) -> Real:
-    return np.asarray(np.sum((w - link.station) ** 2, axis=-1) + link.altitude**2)
 
 
 def link_sum(link: Link, H_r: Complex, P: Complex) -> SumOfExponentials:
@@ -71,9 +63,7 @@ def optimize_trajectory(
     """Solve (27) again and again about its last solution, from the feasible `flight`.
 
     The objective is xi, which never increases; its floor is the xi of two links without errors.
-
-    Raises:
-        SolverError: Clarabel fails.
+    Raises `SolverError` where Clarabel fails.
     """
     floor = max(-s.offset for s in sums)
     return successive_approximation(
@@ -127,14 +117,9 @@ def convex_bound(
 
 
 def merge_equal(c: Real, multiplicity: Real) -> tuple[Integers, Real, Real]:
-    """Merge the terms multiplicity exp(-c) of one slot whose exponents agree to 1e-12.
+    """Merge the terms multiplicity exp(-c) of one slot whose exponents `c` (n, k) agree to 1e-12.
 
-    Args:
-        c: (n, k) exponents.
-        multiplicity: (k,) factors.
-
-    Returns:
-        Slot index, exponent and multiplicity of the remaining terms, flat, slot by slot.
+    Returns slot index, exponent and multiplicity of the remaining terms, flat, slot by slot.
 
     >>> merge_equal(np.array([[1.0, 2.0, 1.0]]), np.array([1.0, 2.0, 4.0]))
     (array([0, 0]), array([1., 2.]), array([5., 2.]))

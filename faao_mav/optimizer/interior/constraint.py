@@ -113,6 +113,13 @@ class State(Protocol):
     def target(self, mu: Real, ahead: Any, share: Real) -> Any:
         """Return mu s^-1 less Mehrotra's correction by the `share` of the step `ahead`."""
 
+    def recentred(self, target: Any, mu: Real, step: Any, share: Real) -> Any:  # noqa: ARG002
+        """Return `target`, changed so that less of the `share` of `step` is lost to bad centring.
+
+        By default nothing is changed.
+        """
+        return target
+
     def solved(self, move: Move, target: Any, rest: Forces) -> tuple[Any, Forces]:
         """Return the constraint's changes along `move`, and the forces of its new multipliers.
 
@@ -170,6 +177,11 @@ class Constraint(ABC):
         """How many unknowns per slot it brings into the Newton system."""
         return 0
 
+    @property
+    def corrections(self) -> int:
+        """How often a direction of a search with this constraint is corrected at most."""
+        return 0
+
     def entries(self, slots: int, first: int) -> Sequence[Entry]:  # noqa: ARG002
         """Return what never changes of the rows of its own unknowns, which count from `first`."""
         return ()
@@ -193,6 +205,7 @@ class ScaledFlight:
 
     def __init__(self, kin: Kinematics, constraints: Sequence[Constraint]) -> None:
         self.constraints = constraints
+        self.corrections = max(constraint.corrections for constraint in constraints)
         ends = SIZE + np.cumsum([constraint.unknowns for constraint in constraints])
         self.own = [
             slice(int(end) - constraint.unknowns, int(end))

@@ -76,6 +76,17 @@ Measured on 16 flights of up to 400 slots, from 68 starts: 1,283 iterations, 1 s
 converge; in half duplex 3,322 and 4. With 0.01 to 0.1 as elsewhere: 1,749 and 4; 4,942 and 23.
 """
 
+_MONOTONE_AFTER = 2
+_SOLVED = 3.0
+_MONOTONE_FALL = 0.2
+"""With a queue, the centrings after which mu stays until the scaled gradient is below `_SOLVED` mu,
+and then falls to this share: iterates that hug the limits again and again are led along the centre.
+
+Measured on eight flights of the samples with buffers of 5 to 100 MB or a least speed, to a
+tolerance of 1e-4: 7 converge, 3 with the adaptive rule alone. From the first centring on, flights
+in half duplex take a third more iterations; with 1 or 10 in place of 3, up to four do not converge.
+"""
+
 _MU_PER_TOLERANCE = 1 / 20
 """The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
 
@@ -249,12 +260,17 @@ class Search:
         newton, ahead = self._newton()
         share = np.minimum(1, ahead.reach(at))
         now, left = at.mean_gap(), at.mean_gap(share, ahead)
-        slowest = np.where(slope < 1, 0.01, 0.1) if len(at.total) else _QUEUE_FALL
+        queued = not len(at.total)
+        slowest = _QUEUE_FALL if queued else np.where(slope < 1, 0.01, 0.1)
         keep = np.maximum((left / now) ** 3, slowest)
         least = self.tolerance * _MU_PER_TOLERANCE * control.steepness
-        control.mu = np.fmax(np.fmin(control.mu, keep * now), least)
-        direction = newton.corrector(control.mu, ahead, share)
-        share = np.minimum(1, _TO_BOUNDARY * direction.reach(at))
+        adaptive = np.fmin(control.mu, keep * now)
+        solved = slope * control.steepness < _SOLVED * control.mu
+        monotone = np.where(solved, _MONOTONE_FALL, 1.0) * control.mu
+        hugged = queued & (control.centrings >= _MONOTONE_AFTER)
+        control.mu = np.fmax(np.where(hugged, monotone, adaptive), least)
+        direction, reach = newton.corrector(control.mu, ahead, share)
+        share = np.minimum(1, _TO_BOUNDARY * reach)
         sound = newton.factors.sound
         moved = self._accept(newton, direction, share, sound)
         if not moved.all():

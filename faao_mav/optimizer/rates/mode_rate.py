@@ -16,13 +16,15 @@ from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import DirectionPartials, RatePartials
 from faao_mav.optimizer.rates.spline import BicubicSpline, GridPosition
-from faao_mav.radio.best_precoder import best_precoders, has_closed_form
+from faao_mav.radio.best_precoder import has_closed_form
+from faao_mav.radio.measure import Measure, best_precoders_for, draw_rates
 
 # Chosen; what a change costs is not measured.
-_SPACING = 0.125  # spacing of the grid of a: 0.54 dB
+_SPACING = 0.125  # spacing of the grid of a, 0.54 dB: of the cutoff rate
+_INFORMATION_SPACING = 0.25  # that of the mutual information, whose points take ten times as long
 _WHOLE = 2  # the grid of a ends at multiples of this, so that the links of a plan share a table
 _MARGIN = 0.1  # margin of the grid of a beyond the values at the sampled directions
-_RATIOS = 17  # grid points of κ, evenly from 0 to 1
+_RATIOS, _INFORMATION_RATIOS = 17, 9  # grid points of κ, evenly from 0 to 1
 _SEARCH_EVERY = (8, 4)  # steps of a and of κ between points that are searched from all starts
 _STEP = 1e-3  # step of u in the central differences of a and κ, whose errors are about 1e-6
 _DIRECTIONS = 33  # directions u at which the range of a is sampled
@@ -46,7 +48,7 @@ class ModeTable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModeRate:
-    """The cutoff rate (7), (8) at the best precoders, for links with one or two modes.
+    """The rate that counts at the best precoders, for links with one or two modes.
 
     `fixed` is the result of `_located` for a link whose H_r does not depend on u, else None.
     """
@@ -89,7 +91,7 @@ class ModeRate:
         return RatePartials(value, by_a, by_aa, direction)
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return precoders (n, N_t, N_t) close to the best at l and u (n,).
+        """Return precoders ((S,) n, N_t, N_t) close to the best at l and u (n,).
 
         They are those of the nearest grid points, in the basis of each slot's singular vectors.
         """
@@ -98,7 +100,7 @@ class ModeRate:
         j = _nearest(self.table.ratios, ratio)
         H_r = self.link.fade(self.link.line_of_sight_at(cosine))
         _, _, Vh = np.linalg.svd(H_r)
-        return np.asarray(Vh.conj().mT @ self.table.Q[i, j])
+        return np.asarray(Vh.conj().mT @ self.table.Q[i, j]) * math.sqrt(self.link.power)
 
 
 def has_few_modes(link: Link) -> bool:
@@ -115,7 +117,7 @@ def mode_rate(link: Link, least: float, most: float) -> ModeRate:
     high = most + max(s.max() for s in strengths) + _MARGIN
     ends = (math.floor(low / _WHOLE) * _WHOLE, math.ceil(high / _WHOLE) * _WHOLE)
     modes = min(2, link.receive, link.transmit)
-    table = _table(link.modulation, link.transmit, modes, *ends)
+    table = _table(link.measure, link.modulation, link.transmit, modes, *ends)
     if link.follows_position:
         return ModeRate(link, table, None)
     return ModeRate(link, table, _located(table, *_modes(link, np.zeros(slots))))
@@ -127,39 +129,48 @@ def _located(table: ModeTable, strength: Real, ratio: Real) -> tuple[Real, GridP
 
 
 @lru_cache(maxsize=8)
-def _table(modulation: str, antennas: int, modes: int, low: int, high: int) -> ModeTable:
+def _table(
+    measure: Measure, modulation: str, antennas: int, modes: int, low: int, high: int
+) -> ModeTable:
     """Return the table for an alphabet and a number of modes, from a = `low` to a = `high`."""
-    gains = np.linspace(low, high, round((high - low) / _SPACING) + 1)
-    ratios = np.linspace(0, 1, _RATIOS)
+    cutoff = measure == "cutoff"
+    spacing = _SPACING if cutoff else _INFORMATION_SPACING
+    gains = np.linspace(low, high, round((high - low) / spacing) + 1)
+    ratios = np.linspace(0, 1, _RATIOS if cutoff else _INFORMATION_RATIOS)
     H = np.zeros((len(gains), len(ratios), modes, antennas), dtype=np.complex128)
     H[..., 0, 0] = np.exp(gains / 2)[:, None]
     if modes == 2:
         H[..., 1, 1] = np.exp(gains / 2)[:, None] * ratios
-    rate, Q, exact = _search(modulation, H)
+    rate, Q, exact = _search(measure, modulation, H)
     return ModeTable(BicubicSpline.through(gains, ratios, rate), gains, ratios, Q, exact)
 
 
-def _search(modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
+def _search(measure: Measure, modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
     """Return best rates (m, c) and precoders (m, c, N, N) for H (m, c, modes, N); whether exact.
 
     Without a closed form, every `_SEARCH_EVERY`-th point is searched from all starts. All points
     are then searched from the four of these around them, and keep the best.
     """
+
+    def searched(H: Complex, start: Complex | None = None) -> tuple[Real, Complex]:
+        draws = H[..., None, :, :]
+        P = best_precoders_for(measure, draws, 1.0, modulation, 1.0, start=start)
+        return draw_rates(measure, draws, P[..., None, :, :], modulation, 1.0)[..., 0], P
+
     if has_closed_form(modulation, H.shape[-1]):
-        best = best_precoders(H, 1.0, modulation, 1.0)
-        return best.rate, best.P, True
+        return *searched(H), True
     every_a, every_k = _SEARCH_EVERY
-    coarse = best_precoders(H[::every_a, ::every_k], 1.0, modulation, 1.0).P
+    _, coarse = searched(H[::every_a, ::every_k])
     i, j = np.arange(H.shape[0]) // every_a, np.arange(H.shape[1]) // every_k
     rate, Q = np.full(H.shape[:2], -np.inf), np.zeros((*H.shape[:2], *coarse.shape[2:]), complex)
     for up in (0, 1):
         for right in (0, 1):
             near = coarse[np.minimum(i + up, coarse.shape[0] - 1)]
             near = near[:, np.minimum(j + right, coarse.shape[1] - 1)]
-            best = best_precoders(H, 1.0, modulation, 1.0, start=near)
-            better = best.rate > rate
-            rate = np.where(better, best.rate, rate)
-            Q = np.where(better[..., None, None], best.P, Q)
+            reached, P = searched(H, near)
+            better = reached > rate
+            rate = np.where(better, reached, rate)
+            Q = np.where(better[..., None, None], P, Q)
     return rate, Q, False
 
 

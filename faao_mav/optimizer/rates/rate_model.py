@@ -20,10 +20,11 @@ from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
 from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate
 from faao_mav.optimizer.rates.spline import BicubicSpline, CubicSpline
 
-_CURVE_POINTS = 97
+_CURVE_POINTS, _INFORMATION_POINTS = 97, 49
 _SURFACE_POINTS = (49, 65)
-"""Grid points of a curve over l, and of a surface over l and u. Chosen so that tables differ from
-exact rates by less than 2e-4 bit in the tests (test_rate_models.py)."""
+"""Grid points of a curve over l, of one of the mutual information, and of a surface over l and u.
+Chosen so that tables differ from exact rates by less than 2e-4 bit in the tests
+(test_rate_models.py)."""
 
 _SEARCH_EVERY = 12
 """Every so many points of a curve the best precoders are searched from all starts; between, from
@@ -99,10 +100,16 @@ def rate_model(link: Link, design: Design, farthest: float) -> RateModel:
 
 def best_curve(link: Link, design: Design, least: float, most: float) -> CurveRate:
     """Return the rate of `link` tabulated from l = `least` to l = `most`."""
-    gain_log = _grid(least, most, _CURVE_POINTS)
+    cutoff = link.measure == "cutoff"
+    gain_log = _grid(least, most, _CURVE_POINTS if cutoff else _INFORMATION_POINTS)
     H_r = link.fade(link.line_of_sight_at(np.zeros(len(gain_log))))
     H = np.exp(gain_log / 2)[:, None, None] * H_r
-    P = _along(link, design, H) if design.optimal else design.precoders(link, H)
+    if not design.optimal:
+        P = design.precoders(link, H)
+    elif cutoff or design.blind or not (design.averaged and has_few_modes(link)):
+        P = _along(link, design, H)
+    else:  # one for each draw: those of the table of modes
+        P = mode_rate(link, least, most).initial_precoders(gain_log, 0 * gain_log)
     return CurveRate(link, CubicSpline.through(gain_log, design.rate(link, H, P)), gain_log, P)
 
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import DirectionPartials, RatePartials
-from faao_mav.radio.best_precoder import best_precoders
 from faao_mav.radio.rate import cutoff_rate
 
 _LN2 = float(np.log(2.0))
@@ -18,7 +18,7 @@ _STEP = 1e-3
 
 
 class BestRate:
-    """The cutoff rate (7), (8) at the best precoders, searched in every slot at every call.
+    """The rate that counts at the best precoders, searched in every slot at every call.
 
     By the envelope theorem its gradient is that at fixed best precoders. Its Hessian is that of
     precoders which are rotated with the line of sight and fixed otherwise; it never exceeds the
@@ -34,15 +34,9 @@ class BestRate:
 
     def precoders(self, gain_log: Real, cosine: Real) -> Complex:
         """Return the best precoders (..., n, N_t, N_t) at l and u (..., n)."""
-        best = best_precoders(
-            channel(self.link, gain_log, cosine),
-            self.link.power,
-            self.link.modulation,
-            self.link.noise,
-            start=self._near(gain_log.shape),
-        )
-        self._last = best.P
-        return best.P
+        H = channel(self.link, gain_log, cosine)[..., None, :, :]
+        self._last = P = self.link.best(H, self._near(gain_log.shape))
+        return P
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
         """Return precoders (..., n, N_t, N_t) close to the best: those of the last call."""
@@ -59,12 +53,17 @@ class BestRate:
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate R of every slot, bits (n,)."""
         P = self.precoders(gain_log, cosine)
-        H = channel(self.link, gain_log, cosine)
-        return cutoff_rate(H, P, self.link.classes, self.link.noise)
+        return self.link.draw_rates(channel(self.link, gain_log, cosine), P)
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
-        """Return the rate and its derivatives with precoders that rotate with the line of sight."""
+        """Return the rate and its derivatives with precoders that rotate with the line of sight.
+
+        Those of the mutual information are differences, with precoders that stay.
+        """
         P = self.precoders(gain_log, cosine)
+        if self.link.measure != "cutoff":
+            held = DifferencedRate(self.link, partial(self.link.draw_rates, P=P))
+            return held.partials(gain_log, cosine)
         return FixedRate(self.link, P, rotating=True).partials(gain_log, cosine)
 
 

@@ -55,12 +55,8 @@ class Bound:
 def upper_bound(problem: Problem, known: float = 0.0) -> Bound:
     """Return an upper bound on R_avg over all trajectories and precoders of `problem`.
 
-    Args:
-        problem: the feasible set and the links.
-        known: R_avg of any plan for the problem, bit/s/Hz: the better it is, the tighter the bound.
-
-    Raises:
-        SolverError: Clarabel fails.
+    `known` is R_avg of any plan for it, bit/s/Hz: the better it is, the tighter the bound. Raises
+    `SolverError` where Clarabel fails.
     """
     import cvxpy as cp
 
@@ -193,12 +189,11 @@ def _longest_way(kin: Kinematics, velocity: Real | None, *, free_jump: bool) -> 
 
     `free_jump`: the first acceleration has no limit.
     """
-    n = np.arange(kin.slots, dtype=float)
     speed = np.full(kin.slots, kin.max_speed)
     if velocity is not None:
-        gain = (
-            np.where(n > 0, np.inf, 0.0) if free_jump else kin.max_acceleration * kin.time_step * n
-        )
+        n = np.arange(kin.slots, dtype=float)
+        jump = np.where(n > 0, np.inf, 0.0)
+        gain = jump if free_jump else kin.max_acceleration * kin.time_step * n
         speed = np.minimum(speed, float(np.linalg.norm(velocity)) + gain)
     return np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2)]) * kin.time_step
 
@@ -210,7 +205,7 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     upper bound: each singular value of H_r is the largest over all directions.
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
-    exact = has_closed_form(link.modulation, link.transmit)
+    exact = has_closed_form(link.modulation, link.transmit) and link.measure == "cutoff"
     gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
     if link.nlos is None or optimal.averaged:
         curve = best_curve(link, optimal, gain_log.min(), gain_log.max())
@@ -230,12 +225,11 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     from scipy.interpolate import CubicSpline
 
     columns = np.linspace(0, r.shape[1] - 1, _SEARCHED).astype(np.intp)
-    rates, start = [], None
+    rates, P = [], None
     for column in columns:
         H = np.exp(gain_log[:, column] / 2)[:, None, None] * H_r
-        best = best_precoders(H, link.power, link.modulation, link.noise, start=start)
-        rates.append(best.rate)
-        start = best.P
+        P = link.best(H[:, None], P)
+        rates.append(link.draw_rates(H, P))
     spline = CubicSpline(columns, np.stack(rates, axis=1), axis=1)
     return np.asarray(spline(np.arange(r.shape[1]))), False
 

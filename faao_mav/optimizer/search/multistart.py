@@ -25,6 +25,11 @@ _COARSE_ERROR = 5e-3  # share of the best value within which starts are equally 
 _SAME = 0.02  # distance of flights that count as one, in the longer of their extents in x and y
 
 
+_DECIMALS = 6
+"""Decimals of the values, bit/s/Hz, by which starts are ranked: which of two that differ by less is
+larger is up to rounding, and differs from machine to machine. Chosen."""
+
+
 @dataclass(frozen=True, slots=True)
 class BlockStage:
     """The rewards of `slots` positions, each of which stands for a block of the slots of `stage`.
@@ -94,7 +99,7 @@ def improve_starts(
         copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations, relay=relay
     )
     optima = dict(zip(flights, solved, strict=True))
-    ranked = sorted(optima, key=lambda name: -optima[name].value)
+    ranked = sorted(optima, key=lambda name: -round(optima[name].value, _DECIMALS))
     least = optima[ranked[0]].value * (1 - (0.0 if copy is kin else _COARSE_ERROR))
     promising: list[str] = []
     for name in ranked:

@@ -12,6 +12,9 @@ ARDUPILOT = AutopilotFamily(
     parameter_prefixes=("WPNAV_", "WP_", "ATC_", "PSC_", "ARMING_"),
 )
 
+HOME_OUTSIDE_FENCE = "with FENCE_ENABLE 1 ArduPilot does not arm there"
+"""Measured on ArduCopter and ArduPlane 4.7."""
+
 _UNION = 2
 """The bit of FENCE_OPTIONS by which being inside one of several inclusions is enough."""
 
@@ -37,6 +40,7 @@ SHARED = (
     switch("fence_radius", 300.0, "FENCE_RADIUS", "m"),
     switch("sd_storage", 0, "BRD_SD_MISSION"),
     switch("terrain_enable", 1, "TERRAIN_ENABLE"),
+    switch("mission_options", 0, "MIS_OPTIONS"),
 )
 """Arming, fence, storage and terrain. Each vehicle has defaults of its own for FENCE_OPTIONS and
 FENCE_TYPE, whose bits are 1 ceiling, 2 circle, 4 areas, 8 floor."""

@@ -10,17 +10,16 @@ from faao_mav.mission.command import (
     ABOVE_HOME,
     ABOVE_SEA,
     ABOVE_TERRAIN,
-    FENCE_RETURN_POINT,
     FLOWN_TO,
+    LANDINGS,
     RALLY_POINT,
     Command,
     Frame,
 )
 from faao_mav.mission.item import MissionItem
 from faao_mav.vehicle.dialect import (
+    BESIDE,
     NOTHING,
-    ROWS_BESIDE,
-    Codec,
     Codecs,
     Dialect,
     Limit,
@@ -28,6 +27,7 @@ from faao_mav.vehicle.dialect import (
     SpeedChange,
     degrees,
     dropped,
+    first,
     flag,
     misplaced,
     name_of,
@@ -38,6 +38,10 @@ from faao_mav.vehicle.dialect import (
 
 _HIGHEST = 83_000.0
 """The altitude from which on items are refused, m. Read in AP_Mission."""
+
+_CONTINUE_AFTER_LAND = 4
+"""The bit of MIS_OPTIONS by which a take-off behind a landing is flown. Measured on ArduCopter 4.7:
+without it the mission ends there, and with it before any other item too."""
 
 _uint8, _uint16, _int8, _int16 = (
     whole(0, 255),
@@ -63,35 +67,31 @@ def _turning_radius(value: float) -> float:
     return math.copysign(stored, value) if stored else 0.0
 
 
-def _first(codec: Codec) -> Codecs:
-    return (codec, dropped, dropped, dropped)
-
-
 _COMMON: dict[int, Codecs] = {
     Command.NAV_LOITER_UNLIM: (dropped, dropped, _signed_radius, dropped),
     Command.NAV_LOITER_TURNS: (_uint8, dropped, _turning_radius, flag),
     Command.NAV_LOITER_TIME: (_uint16, dropped, _direction, flag),
     Command.NAV_RETURN_TO_LAUNCH: NOTHING,
     Command.NAV_LAND: (_uint16, dropped, dropped, _direction),
-    Command.NAV_TAKEOFF: _first(_uint16),
+    Command.NAV_TAKEOFF: first(_uint16),
     Command.NAV_LOITER_TO_ALT: (dropped, _signed_radius, dropped, flag),
     Command.NAV_VTOL_TAKEOFF: NOTHING,
-    Command.NAV_VTOL_LAND: _first(_uint16),
+    Command.NAV_VTOL_LAND: first(_uint16),
     Command.NAV_DELAY: (single, _int8, _int8, _int8),
-    Command.CONDITION_DELAY: _first(single),
-    Command.CONDITION_DISTANCE: _first(single),
+    Command.CONDITION_DELAY: first(single),
+    Command.CONDITION_DISTANCE: first(single),
     Command.CONDITION_YAW: (single, single, _int8, _uint8),
     Command.DO_JUMP: (_uint16, _int16, dropped, dropped),
     Command.DO_CHANGE_SPEED: (_uint8, single, single, dropped),
-    Command.DO_SET_HOME: _first(_uint16),
+    Command.DO_SET_HOME: first(_uint16),
     Command.DO_LAND_START: NOTHING,
     Command.DO_SET_ROI_LOCATION: NOTHING,
     Command.DO_SET_ROI_NONE: NOTHING,
-    Command.DO_SET_ROI: _first(_uint16),
+    Command.DO_SET_ROI: first(_uint16),
 }
 _COPTER: dict[int, Codecs] = {
-    Command.NAV_WAYPOINT: _first(_uint16),
-    Command.NAV_SPLINE_WAYPOINT: _first(_uint16),
+    Command.NAV_WAYPOINT: first(_uint16),
+    Command.NAV_SPLINE_WAYPOINT: first(_uint16),
 }
 _PLANE: dict[int, Codecs] = {Command.NAV_WAYPOINT: (dropped, _uint8, _uint8, dropped)}
 
@@ -110,9 +110,6 @@ _PLACED = FLOWN_TO | {
     *(30, 92, 94, 188, 191),
 }
 """Commands that are stored with a place; the others come back at 0, 0, 0 in frame 0."""
-
-_NARROW = {5: 0, 6: 3, 11: 10}
-"""The frame in which a row of the fence is read back that was sent in this one."""
 
 _FRAMES = ABOVE_SEA | ABOVE_HOME | ABOVE_TERRAIN | {Frame.MISSION}
 
@@ -159,19 +156,16 @@ def _refusal(item: MissionItem, known: dict[int, Codecs], kind: str) -> str | No
 
 
 def _stored(item: MissionItem, known: dict[int, Codecs]) -> MissionItem:
-    if item.command in ROWS_BESIDE:
+    if item.command in BESIDE:
         return _stored_beside(item)
     codecs = known.get(item.command)
     result = replace(item, autocontinue=True)
     if codecs is not None:
         result = through(codecs, result)
     if item.command in _PLACED:
-        frame = Frame.GLOBAL
-        if item.frame in ABOVE_HOME:
-            frame = Frame.GLOBAL_RELATIVE_ALT
-        elif item.frame in ABOVE_TERRAIN:
-            frame = Frame.GLOBAL_TERRAIN_ALT
-        centimetres = int(np.float32(item.z) * np.float32(100))
+        frame = _frame(item)
+        within = min(max(item.z, -_HIGHEST), _HIGHEST)
+        centimetres = int(np.float32(within) * np.float32(100))
         altitude = float(np.float32(centimetres) * np.float32(0.01))
         return replace(result, frame=frame, x=degrees(item.x), y=degrees(item.y), z=altitude)
     if codecs is not None or item.frame == Frame.MISSION:
@@ -194,11 +188,21 @@ def _plane_speed(item: MissionItem) -> SpeedChange | None:
 
 
 def _stored_beside(item: MissionItem) -> MissionItem:
-    """A rally point has whole metres of altitude, a vertex or circle of the fence has none."""
-    if item.command == RALLY_POINT:
-        return replace(item, z=float(math.trunc(item.z)))
-    altitude = item.z if item.command == FENCE_RETURN_POINT else 0.0
-    return replace(item, frame=_NARROW.get(item.frame, item.frame), z=altitude)
+    """A rally point has whole metres of altitude, a row of the fence has none."""
+    flat = item.command != RALLY_POINT
+    return replace(
+        through(BESIDE[item.command], item),
+        frame=Frame.GLOBAL if flat else _frame(item),
+        z=0.0 if flat else _int16(item.z),
+        autocontinue=False,
+    )
+
+
+def _frame(item: MissionItem) -> Frame:
+    """Return the frame in which a place is read back: what its altitude counts from."""
+    if item.frame in ABOVE_HOME:
+        return Frame.GLOBAL_RELATIVE_ALT
+    return Frame.GLOBAL_TERRAIN_ALT if item.frame in ABOVE_TERRAIN else Frame.GLOBAL
 
 
 def _dialect(
@@ -224,6 +228,8 @@ def _dialect(
         stored=lambda item: _stored(item, known),
         speed_change=speed_change,
         unlimited=lambda values: values.value("sd_storage") > 0,
+        endings=LANDINGS | {Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH},
+        flies_on=lambda values: bool(int(values.value("mission_options")) & _CONTINUE_AFTER_LAND),
         make_room="set BRD_SD_MISSION to store missions on the card",
         known=frozenset(known),
     )

@@ -23,6 +23,9 @@ from faao_mav.vehicle.vehicle_type import OVERSPEED, AutopilotFamily, VehicleTyp
 
 __all__ = ["PX4", "PX4_COPTER", "PX4_PLANE", "Px4", "Px4Legs"]
 
+_HOME_OUTSIDE_FENCE = "PX4 says so (Geofence invalid), and flies the mission all the same"
+"""Measured on PX4 1.16.1."""
+
 PX4 = AutopilotFamily(
     key="px4",
     name="PX4",
@@ -100,11 +103,12 @@ PX4_COPTER = VehicleType(
     family=PX4,
     kind="copter",
     name="PX4",
-    mav_types=(2, 3, 4, 13, 14, 15),
+    mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
     hovers=True,
     parameters=COPTER_TABLE,
     dialect=DIALECT,
     vertical=_vertical,
+    home_outside_fence=_HOME_OUTSIDE_FENCE,
     fastest=_FASTEST,
     legs=Px4Legs.from_vehicle,
     flight_model=_model,
@@ -123,6 +127,7 @@ PX4_PLANE = VehicleType(
     parameters=PLANE_TABLE,
     dialect=DIALECT,
     vertical=_plane_vertical,
+    home_outside_fence=_HOME_OUTSIDE_FENCE,
     unmodelled="there is no model of how PX4 flies planes",
 )
 """A plane with PX4 1.16: its missions can be validated, not made."""

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, Command, Frame
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, RALLY_POINT, Command, Frame
 from faao_mav.mission.item import MissionItem
 from faao_mav.vehicle.dialect import (
+    BESIDE,
     NOTHING,
-    ROWS_BESIDE,
     Codec,
     Codecs,
     Dialect,
@@ -72,9 +72,6 @@ _UNPLACED = frozenset(
 )
 """Commands in frame 2."""
 
-_WIDE = {0: 5, 3: 6}
-"""The frame in which a fence or rally row is read back that was sent in this one."""
-
 _JUMP: Codecs = (whole(-32_768, 32_767), whole(0, 65_535), single, single)
 
 
@@ -99,8 +96,8 @@ def _refusal(item: MissionItem) -> str | None:
 
 
 def _stored(item: MissionItem) -> MissionItem:
-    if item.command in ROWS_BESIDE:
-        return replace(item, frame=_WIDE.get(item.frame, item.frame))
+    if item.command in BESIDE:
+        return _stored_beside(item)
     if item.frame == Frame.MISSION:
         codecs = _JUMP if item.command == Command.DO_JUMP else (single, single, single, single)
         x, y = (0.0 if math.isnan(v) else float(round(v)) for v in (item.x, item.y))
@@ -115,6 +112,16 @@ def _stored(item: MissionItem) -> MissionItem:
     )
 
 
+def _stored_beside(item: MissionItem) -> MissionItem:
+    """Of a rally point PX4 keeps what its altitude counts from, of a row of the fence nothing."""
+    relative = item.command == RALLY_POINT and item.frame in ABOVE_HOME
+    return replace(
+        through(BESIDE[item.command], item),
+        frame=Frame.GLOBAL_RELATIVE_ALT_INT if relative else Frame.GLOBAL_INT,
+        autocontinue=item.autocontinue and item.command == RALLY_POINT,
+    )
+
+
 def _speed_change(item: MissionItem) -> SpeedChange | None:
     """The type does not matter; what is not above 0 brings the default back."""
     speed = item.params[1]
@@ -123,7 +130,7 @@ def _speed_change(item: MissionItem) -> SpeedChange | None:
 
 DIALECT = Dialect(
     home_row=False,
-    items=Limit(1_000, 65_534),
+    items=Limit(1_000, 10_000),  # most boards; the simulator, measured
     jumps=None,
     fence_rows=64,
     rally_rows=8,

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from faao_mav.vehicle.ardupilot import ARDUPILOT, needs_one_inclusion
+from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
@@ -55,7 +55,7 @@ ARDUCOPTER = VehicleType(
     family=ARDUPILOT,
     kind="copter",
     name="ArduCopter",
-    mav_types=(2, 3, 4, 13, 14, 15),
+    mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
     hovers=True,
     parameters=TABLE,
     dialect=COPTER_DIALECT,
@@ -63,6 +63,7 @@ ARDUCOPTER = VehicleType(
     whole_second_holds=True,
     fastest=_FASTEST,
     fence_needs_one_inclusion=needs_one_inclusion,
+    home_outside_fence=HOME_OUTSIDE_FENCE,
     legs=ArduCopterLegs.from_vehicle,
     flight_model=ArduCopter.from_vehicle,
     calibrated=True,

@@ -38,6 +38,7 @@ TABLE = table(
     *SHARED,
     switch("fence_options", 1, "FENCE_OPTIONS"),
     switch("fence_type", 4, "FENCE_TYPE"),
+    switch("return_lands", 0, "RTL_AUTOLAND"),
     rally_limit(5000.0),
 )
 """ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate

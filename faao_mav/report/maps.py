@@ -1,4 +1,4 @@
-"""The route on a map: planned with its speeds, predicted, waypoints, stations, fence."""
+"""Maps: of a plan's route with its speeds, and of a mission alone, each with what is about it."""
 
 import itertools
 from collections.abc import Collection, Iterator, Sequence
@@ -8,43 +8,45 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import Command
+from faao_mav.mission.command import FLOWN_TO, Command
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
-from faao_mav.report.style import INK, MUTED, SERIES, label, legend_above, mark_stations
+from faao_mav.report.style import (
+    INK,
+    MUTED,
+    SERIES,
+    WIDTH,
+    drawing,
+    label,
+    legend_above,
+    mark_stations,
+)
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.schedule import positions_at
 from faao_mav.vector import lengths
+from faao_mav.vehicle import Track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-Outline: TypeAlias = tuple[Real, bool]
+_Outline: TypeAlias = tuple[Real, bool]
 """Corners (k, 2), m, closed, and whether the aircraft has to stay inside."""
 
-WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+_WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 """The commands of a relay route, whose items are numbered on its map."""
 
-_PIECES = 240
-"""Pieces of the route with a colour each, at most: more cannot be told apart."""
-_LEVELS = 32
-"""Colours on the scale of speeds; chosen: the steps cannot be seen."""
-_SHADES = (0.85, 0.3)
-"""Slow and fast on the scale of viridis: its ends vanish on white and on black paper."""
-_ROUND = 72
-"""Corners that a circle is drawn with; chosen: 5 degrees each."""
+_PIECES = 240  # pieces of the route with a colour each, at most: more cannot be told apart
+_LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
+_SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
+_ROUND = 72  # corners that a circle is drawn with; chosen: 5 degrees each
 
-_SIZE = 8.0
-"""Height of a number, points."""
-_DIGIT = 0.66
-"""Width of a digit in the widest usual font, of its size."""
-_GAP = 5.0
-"""Points between a waypoint and its number."""
-_CLEAR = 2.5
-"""Points between a number and the middle of a line: half the width that routes are drawn with."""
-_MARK = 4.0
-"""Half of a station's mark, points."""
+_SIZE = 8.0  # height of a number, points
+_DIGIT = 0.66  # width of a digit in the widest usual font, of its size
+_GAP = 5.0  # points between a waypoint and its number
+_CLEAR = 2.5  # points between a number and the middle of a line: half the width of a route's line
+_MARK = 4.0  # half of a station's mark, points
 _SIDES = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0)])
 """Where a number may stand beside its waypoint, right and up of it, the first that is free."""
 
@@ -60,31 +62,46 @@ def route_map(
     radio, origin = solution.plan.radio, solution.plan.origin
     stations = np.array([radio.base_station.position, radio.ground_user.position])
     marked = zip(("base station", "user"), stations.tolist(), "s^", strict=True)
-    outlines: list[Outline] = []
+    outlines: list[_Outline] = []
     lines, places = [solution.w], np.empty((0, 2))
     numbers: list[int] = []
     if conversion is not None:
         frame, mission = LocalFrame(origin.latitude, origin.longitude), conversion.mission
-        outlines = list(outlines_of(mission.fence, frame))
-        numbers, places = places_of(mission, frame, WAYPOINTS)
+        outlines = list(_outlines_of(mission.fence, frame))
+        numbers, places = _places_of(mission, frame, _WAYPOINTS)
         lines.append(conversion.schedule.track()["predicted_w"])
-    draw_fence(plot, outlines)
+    _draw_fence(plot, outlines)
     _coloured(plot, solution)
     if conversion is not None:
         plot.plot(*lines[1].T, "--", color=INK, linewidth=0.9, label="predicted")
-        draw_waypoints(plot, places, "waypoint")
+        _draw_waypoints(plot, places, "waypoint")
     mark_stations(plot, list(marked))
-    show_all(plot, np.concatenate([*lines, stations, places]), outlines, title)
-    write_numbers(plot, numbers, places, lines, stations)
+    _show_all(plot, np.concatenate([*lines, stations, places]), outlines, title)
+    _write_numbers(plot, numbers, places, lines, stations)
 
 
-def places_of(
+def mission_map(mission: Mission, track: Track) -> "Figure":
+    """Return the map: the predicted flight, the places of the items with numbers, the fence.
+
+    East and north in metres about the origin of the track's frame; items count from 1.
+    """
+    flown = track.position[:, :2]
+    numbers, places = _places_of(mission, track.frame, FLOWN_TO)
+    with drawing(WIDTH, 4.2) as figure:
+        plot = figure.subplots()
+        outlines = list(_outlines_of(mission.fence, track.frame))
+        _draw_fence(plot, outlines)
+        plot.plot(*flown.T, color=SERIES[0], label="predicted")
+        _draw_waypoints(plot, places, "item")
+        _show_all(plot, np.concatenate([flown, places]), outlines)
+        _write_numbers(plot, numbers, places, [flown], np.empty((0, 2)))
+    return figure
+
+
+def _places_of(
     mission: Mission, frame: LocalFrame, commands: Collection[int]
 ) -> tuple[list[int], Real]:
-    """Return the numbers of the items with one of `commands` and a place, and the places (k, 2).
-
-    Items count from 1; places are metres about the origin of `frame`.
-    """
+    """Return numbers, from 1, and places (k, 2), m, of the items with one of `commands`."""
     found = [
         (number, item.x, item.y)
         for number, item in enumerate(mission.items, 1)
@@ -94,31 +111,24 @@ def places_of(
     return list(numbers), frame.to_local(latitudes, longitudes)
 
 
-def draw_waypoints(plot: "Axes", places: Real, name: str) -> None:
-    """Draw the waypoints at `places` (k, 2), m, as dots, with a legend for all that is drawn."""
+def _draw_waypoints(plot: "Axes", places: Real, name: str) -> None:
+    """Draw dots at `places` (k, 2), m, and a legend for all that is drawn."""
     plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)
     legend_above(plot, 2)
 
 
-def draw_fence(plot: "Axes", outlines: Sequence[Outline]) -> None:
+def _draw_fence(plot: "Axes", outlines: Sequence[_Outline]) -> None:
     """Draw the fence: dashed where the aircraft has to stay inside, filled where outside."""
-    named: set[bool] = set()
+    names = {True: "stay inside", False: "stay out"}
     for corners, inside in outlines:
-        colour = MUTED if inside else SERIES[5]
-        name = "stay inside" if inside else "stay out"
-        plot.plot(
-            *corners.T,
-            "--" if inside else "-",
-            color=colour,
-            linewidth=1.2,
-            label=None if inside in named else name,
-        )
-        named.add(inside)
+        colour, style = (MUTED, "--") if inside else (SERIES[5], "-")
+        name = names.pop(inside, None)  # once in the legend
+        plot.plot(*corners.T, style, color=colour, linewidth=1.2, label=name)
         if not inside:
             plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
 
 
-def show_all(plot: "Axes", seen: Real, outlines: Sequence[Outline], title: str = "") -> None:
+def _show_all(plot: "Axes", seen: Real, outlines: Sequence[_Outline], title: str = "") -> None:
     """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it.
 
     A metre is as long to the east as to the north.
@@ -158,7 +168,7 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
         bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
 
 
-def outlines_of(fence: Fence, frame: LocalFrame) -> Iterator[Outline]:
+def _outlines_of(fence: Fence, frame: LocalFrame) -> Iterator[_Outline]:
     """Yield the areas of `fence` in metres about `frame`'s origin."""
     for polygon in fence.polygons:
         corners = np.array([*polygon.vertices, polygon.vertices[0]])
@@ -170,12 +180,8 @@ def outlines_of(fence: Fence, frame: LocalFrame) -> Iterator[Outline]:
         yield center + circle.radius * ring, circle.inclusion
 
 
-def write_numbers(
-    plot: "Axes",
-    numbers: Sequence[int],
-    places: Real,
-    lines: Sequence[Real],
-    marks: Real,
+def _write_numbers(
+    plot: "Axes", numbers: Sequence[int], places: Real, lines: Sequence[Real], marks: Real
 ) -> None:
     """Write `numbers` beside their `places` (k, 2), m, on a map on which all else is drawn.
 

@@ -1,0 +1,184 @@
+"""Tapes: what one end of a link hears, datagram by datagram; recorded from mocks, and mutated.
+
+A tape is the datagrams one after the other, before each its length in two bytes, big-endian.
+"""
+
+import math
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from random import Random
+from typing import Any
+
+from pymavlink.dialects.v20 import common
+from pymavlink.generator.mavcrc import x25crc
+
+from faao_mav.mavlink.codec import Codec
+from faao_mav.mavlink.framing import message_id
+from faao_mav.mavlink.machine import Machine
+from faao_mav.mavlink.mock import MockAutopilot
+
+_HEADER = 10
+"""Bytes of a MAVLink 2 packet before its payload."""
+
+_SIGNED = 1
+"""The flag of a packet with a signature, which is not written anew: only the key could."""
+
+_NUMBERS = (math.nan, math.inf, -math.inf, 3e38, -1.0, 1e-30, 3.0, 65_536.0, 2.0**31, 90.5)
+_ODD = (
+    *(struct.pack("<f", number) for number in _NUMBERS),
+    *(struct.pack("<i", number) for number in (0, -1, 2**31 - 1, -(2**31), 2_000_000_000)),
+    *(struct.pack("<h", number) for number in (0, -1, 1, 2**15 - 1)),
+    *(b"\x00", b"\x01", b"\xff", b"\xfe", b"\x1b[2J", b"\r\n"),
+)
+"""What stands in place of some bytes of a payload: limits of its numbers, and odd characters."""
+
+_STEP = 0.002
+"""Seconds from one datagram to the next; chosen: shorter than a client waits for an answer."""
+
+
+def datagrams(tape: bytes) -> Iterator[bytes]:
+    """Return the datagrams on `tape`; the last may be cut short."""
+    while tape:
+        size = int.from_bytes(tape[:2], "big")
+        yield tape[2 : 2 + size]
+        tape = tape[2 + size :]
+
+
+def tape_of(packets: Sequence[bytes]) -> bytes:
+    return b"".join(len(packet).to_bytes(2, "big") + packet for packet in packets)
+
+
+def converse(machine: Machine[Any], codec: Codec, heard: Iterator[bytes], now: float) -> float:
+    """Run `machine` on what is `heard`, then on silence, to its end; return the time of that, s.
+
+    What it sends is made into packets. Raises `AssertionError` if it does not end.
+    """
+    begun = now
+    packed(codec, machine.start(now))
+    while machine.outcome is None:
+        assert now - begun < 3600, f"no end: {machine.progress}"
+        datagram = next(heard, None)
+        now += _STEP
+        if datagram is None:
+            assert machine.deadline is not None, f"waits for ever: {machine.progress}"
+            now = max(now, machine.deadline)
+        else:
+            answer(machine, codec, datagram, now)
+        packed(codec, machine.tick(now))
+    return now
+
+
+def answer(machine: Machine[Any], codec: Codec, datagram: bytes, now: float) -> list[bytes]:
+    """Return the packets with which `machine` answers `datagram`."""
+    return [
+        packet
+        for heard in codec.parse(datagram)
+        if heard.envelope is not None
+        for packet in packed(codec, machine.on(heard.envelope, now))
+    ]
+
+
+def packed(codec: Codec, messages: Sequence[Any]) -> list[bytes]:
+    return [codec.pack(message) for message in messages]
+
+
+def recorded(
+    client: Machine[Any], station: Codec, mock: MockAutopilot, vehicle: Codec
+) -> tuple[bytes, bytes]:
+    """Return what the client and what the mock heard until the client had its outcome."""
+    to_client: list[bytes] = packed(vehicle, mock.start(0.0))
+    to_mock = packed(station, client.start(0.0))
+    tapes: tuple[list[bytes], list[bytes]] = ([], [])
+    now = 0.0
+    while client.outcome is None:
+        now += _STEP
+        heard, to_client = to_client, packed(vehicle, mock.tick(now))
+        tapes[0].extend(heard)
+        for packet in heard:
+            to_mock += answer(client, station, packet, now)
+        to_mock += packed(station, client.tick(now))
+        heard, to_mock = to_mock, []
+        tapes[1].extend(heard)
+        for packet in heard:
+            to_client += answer(mock, vehicle, packet, now)
+    return tape_of(tapes[0]), tape_of(tapes[1])
+
+
+def mutated(tape: bytes, others: Sequence[bytes], random: Random) -> bytes:
+    """Return `tape` after one to four changes of its datagrams; some come from the `others` too."""
+    found = list(datagrams(tape))
+    for _ in range(random.choice((1, 1, 2, 4))):
+        random.choice(_CHANGES)(found, others, random)
+    return tape_of(found)
+
+
+Change = Callable[[list[bytes], Sequence[bytes], Random], None]
+
+
+def _place(found: Sequence[bytes], random: Random) -> int:
+    return random.randrange(len(found)) if found else 0
+
+
+def _lose(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
+    start = _place(found, random)
+    del found[start : start + random.choice((1, 1, 3, 20))]
+
+
+def _repeat(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
+    start = _place(found, random)
+    part = found[start : start + random.choice((1, 1, 5))]
+    found[start:start] = part * random.choice((1, 1, 2, 30))
+
+
+def _swap(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
+    if found:
+        one, other = _place(found, random), _place(found, random)
+        found[one], found[other] = found[other], found[one]
+
+
+def _splice(found: list[bytes], others: Sequence[bytes], random: Random) -> None:
+    other = list(datagrams(random.choice(others)))
+    start, end = _place(other, random), _place(found, random)
+    found[end:] = other[start:]
+
+
+def _damage(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
+    if found and found[place := _place(found, random)]:
+        content = bytearray(found[place])
+        content[random.randrange(len(content))] = random.randrange(256)
+        found[place] = bytes(content[: random.choice((len(content), random.randrange(300)))])
+
+
+def _noise(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
+    start = random.choice((b"", b"\xfd", b"\xfe", b"\xfd\xff\x00", b"\xfd\x09\x01"))
+    found.insert(_place(found, random), start + random.randbytes(random.choice((0, 5, 40, 300))))
+
+
+def _lie(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
+    """Change a packet's payload, sender or message and make its checksum right."""
+    if found:
+        place = _place(found, random)
+        found[place] = _lied(found[place], random)
+
+
+def _lied(packet: bytes, random: Random) -> bytes:
+    kind = common.mavlink_map.get(message_id(packet) if len(packet) > _HEADER else None)
+    if kind is None or packet[0] != 0xFD or packet[2] & _SIGNED:
+        return packet
+    content = bytearray(packet[_HEADER : _HEADER + packet[1]].ljust(kind.unpacker.size, b"\0"))
+    for _ in range(random.choice((1, 1, 3))):
+        odd, start = random.choice(_ODD), random.randrange(len(content))
+        start -= start % len(odd) if random.random() < 0.8 else 0  # as fields are aligned
+        content[start : start + len(odd)] = odd[: len(content) - start]
+    header = bytearray(packet[:_HEADER])
+    if random.random() < 0.1:
+        header[random.choice((5, 6))] = random.choice((0, 1, 2, 255))
+    header[1] = len(content)
+    checksum: int = x25crc(bytes(header[1:] + content + bytes([kind.crc_extra]))).crc
+    return bytes(header + content) + checksum.to_bytes(2, "little")
+
+
+_CHANGES: tuple[Change, ...] = (
+    *(_lie, _lie, _lie, _lie, _lie, _lie),
+    *(_lose, _repeat, _swap, _splice, _damage, _noise),
+)

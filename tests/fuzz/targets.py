@@ -1,0 +1,102 @@
+"""The readers of files, as fuzzers see them."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import mutate
+from conftest import MISSIONS, SMALL
+from harness import Target
+
+from faao_mav import optimize, parse_plan
+from faao_mav.errors import MissionFileError
+from faao_mav.mission.formats import losses_in, read_mission_file, render_mission
+from faao_mav.mission.formats.parameter_file import read_parameters
+from faao_mav.optimizer.solution import load_solution, save_solution
+from faao_mav.plan import read_plan
+from faao_mav.study import run_study
+from faao_mav.study.rows import ROWS, comparison, load_rows, table
+from faao_mav.study.sweep import make_cases, parse_vary
+
+_DATA = Path(__file__).parent.parent / "data"
+
+_BRIEF = SMALL + "optimizer: {max_iterations: 1, starts: [straight]}\n"
+
+_STUDY = (
+    SMALL
+    + """
+study:
+  vary: {power_dbm: [-40, 0.5, 1e1], radio.modulation: [bpsk, 8psk]}
+  schemes: [faao, mrt]
+mission: {parameters: keep, takeoff: false}
+"""
+)
+
+_PARAMETERS = (
+    b"# vehicle\nWPNAV_SPEED,800\nWPNAV_JERK 1.5\nFENCE_TYPE 0x7 # circle\nSYS_ID,1,@READONLY\n",
+    b"# Vehicle-Id Component-Id Name Value Type\n1\t1\tMPC_XY_CRUISE\t5.000\t9\n1\t1\tNAV\t3\t6\n",
+)
+
+_LARGEST_SEED = 5_000
+"""Bytes of a mission that is mutated; chosen: small ones are read often."""
+
+_VALUES = (b"flight.duration=60:120:30", b"power_dbm=-40:0:5,7", b"radio.modulation=bpsk,8psk")
+
+
+def targets(directory: Path) -> dict[str, Target]:
+    """Return the targets by name; the files that they read are written to `directory`."""
+    found: dict[str, Target] = {}
+
+    def add(name: str, file: str, read: Callable[[Path], object], *seeds: bytes) -> None:
+        def run(content: bytes) -> object:
+            path = directory / file
+            path.write_bytes(content)
+            return read(path)
+
+        change = mutate.archive if file.endswith(".npz") else mutate.text
+        found[name] = Target(name, run, seeds, change)
+
+    plans = [path.read_bytes() for path in sorted(MISSIONS.glob("*.yaml"))]
+    add("plan", "plan.yaml", read_plan, SMALL.encode(), _STUDY.encode(), *plans)
+    add("wpl", "mission.waypoints", _mission, *_missions("*.waypoints", "*.txt"))
+    add("qgc_plan", "mission.plan", _mission, *_missions("*.plan"))
+    add("parameters", "vehicle.param", read_parameters, *_PARAMETERS)
+    solution = directory / "solution.npz"
+    save_solution(optimize(parse_plan(_BRIEF)), solution)
+    add("npz", "result.npz", load_solution, solution.read_bytes())
+    cases = make_cases(_BRIEF, vary={"flight.altitude": [40, 50]})
+    run_study(cases, jobs=1, directory=directory)
+
+    def rows(path: Path) -> object:
+        found = load_rows(path.parent, cases)
+        return table(found), comparison(found)
+
+    add("rows", ROWS, rows, (directory / ROWS).read_bytes())
+    found["vary"] = Target("vary", _vary, _VALUES, mutate.text)
+    return found
+
+
+def _missions(*patterns: str) -> list[bytes]:
+    """Return the small sound missions of the tests in the files of these names."""
+    folders = [_DATA / "missions", _DATA / "validate"]
+    paths = [path for folder in folders for pattern in patterns for path in folder.glob(pattern)]
+    found = []
+    for path in sorted(paths):
+        if path.stat().st_size < _LARGEST_SEED:
+            with suppress(MissionFileError):
+                _mission(path)
+                found.append(path.read_bytes())
+    return found
+
+
+def _mission(path: Path) -> object:
+    """Read a mission and write it in every format."""
+    mission = read_mission_file(path).mission
+    return [
+        (render_mission(mission, f"out{ending}"), losses_in(mission, f"out{ending}"))
+        for ending in (".waypoints", ".plan", ".kml")
+    ]
+
+
+def _vary(content: bytes) -> object:
+    return parse_vary(content.decode("utf-8", errors="surrogateescape"))

@@ -1,0 +1,213 @@
+"""Both ends of a link, as fuzzers see them: a client, mock autopilots, and who holds a key."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from harness import Target
+from tapes import answer, converse, datagrams, mutated, packed, recorded, tape_of
+
+from faao_mav.cli.upload import as_dict, as_text
+from faao_mav.errors import FaaoError
+from faao_mav.mavlink.client import UploadReport
+from faao_mav.mavlink.codec import Codec
+from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
+from faao_mav.mavlink.framing import Framer
+from faao_mav.mavlink.liveness import AskAlive
+from faao_mav.mavlink.machine import Machine, Script
+from faao_mav.mavlink.messages import (
+    CommandLong,
+    Heartbeat,
+    MissionRequestInt,
+    MissionRequestList,
+    MissionSetCurrent,
+    MissionWritePartialList,
+    ParamRequestRead,
+    ParamSet,
+    SetMode,
+    Statustext,
+    Timesync,
+)
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock.serve import predicted
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION,
+    Address,
+    MavCommand,
+    MissionType,
+)
+from faao_mav.mavlink.signing import Signing
+from faao_mav.mavlink.transfer.exchange import Peer
+from faao_mav.mavlink.transfer.session import (
+    Lists,
+    clear_lists,
+    download_lists,
+    explain,
+    upload_parts,
+)
+from faao_mav.mavlink.wire_items import mission_of, wire_items
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission.formats import losses_in, render_mission
+from faao_mav.vehicle import Vehicle, vehicle_type
+
+_VEHICLE = Address(1, 1)
+_KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")
+_HOME = Home(-35.363262, 149.165237, 584.0)
+
+_MISSION = Mission(
+    (
+        MissionItem(22, 3, x=-35.363262, y=149.165237, z=20.0),
+        MissionItem(16, 3, (3.0, 0.0, 0.0, 0.0), -35.3620, 149.1650, 30.0),
+        MissionItem(178, 2, (1.0, 4.0, -1.0, 0.0)),
+        MissionItem(16, 3, x=-35.3630, y=149.1660, z=25.0),
+        MissionItem(177, 2, (2.0, 1.0, 0.0, 0.0)),
+        MissionItem(20, 2),
+    ),
+    _HOME,
+    Fence(
+        (Polygon(((-35.3, 149.1), (-35.4, 149.1), (-35.4, 149.2)), inclusion=True),),
+        (Circle((-35.36, 149.16), 40.0, inclusion=False),),
+    ),
+    (RallyPoint(-35.36, 149.16, 30.0),),
+)
+"""What is uploaded: some of each list."""
+
+_COMMANDS = (
+    SetMode(1, 1, 0),
+    ParamRequestRead(_VEHICLE, "WPNAV_SPEED", -1),
+    ParamSet(_VEHICLE, "WPNAV_SPEED", 500.0, 9),
+    MissionSetCurrent(_VEHICLE, 1),
+    MissionWritePartialList(_VEHICLE, MissionType.MISSION, 0, 1),
+    CommandLong(_VEHICLE, MavCommand.SET_MODE, 0, 1.0, 4.0, 4.0),
+    CommandLong(_VEHICLE, MavCommand.REQUEST_MESSAGE, 0, 148.0),
+    CommandLong(_VEHICLE, MavCommand.REBOOT, 0, 1.0),
+    Timesync(0, 1),
+)
+"""What ground stations say beside the mission protocol."""
+
+
+def wire_targets() -> dict[str, Target]:
+    """Return the targets by name."""
+    heard = {kind: _session(kind) for kind in _KINDS}
+    found = [Target("client", _hear, [tapes[0] for tapes in heard.values()], mutated)]
+    station = Codec(GROUND_STATION)
+    for kind, (_, session) in heard.items():
+        tape = session + tape_of(packed(station, _COMMANDS))
+
+        def serve(content: bytes, kind: MockKind = kind) -> object:
+            return _serve(kind, content)
+
+        found.append(Target(f"mock_{kind.replace('-', '_')}", serve, [tape], mutated))
+    genuine = packed(Codec(_VEHICLE, _signing()), [_said(number) for number in range(20)])
+    found.append(Target("signed", lambda tape: _take(tape, genuine), [tape_of(genuine)], mutated))
+    return {target.name: target for target in found}
+
+
+def _mock(kind: MockKind) -> MockAutopilot:
+    family = behaviour_of(kind).family.key
+    return MockAutopilot(
+        behaviour_of(kind), home=_HOME, fly=predicted(Vehicle(family)), speedup=50.0
+    )
+
+
+def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
+    """Return all that a client does once it has found a vehicle."""
+    lists = [(part, wire_items(_MISSION, part, peer.vehicle)) for part in MissionType]
+    yield AskAlive(peer.address, 1)
+    yield Script(upload_parts(lists, peer))
+    yield Script(download_lists(tuple(MissionType), peer))
+    yield AskHome(peer.address)
+    yield Script(clear_lists(tuple(MissionType), peer))
+
+
+def _session(kind: MockKind) -> tuple[bytes, bytes]:
+    """Return what the client and a mock hear of each other from the heartbeat to the clearing."""
+    mock, station, vehicle = _mock(kind), Codec(GROUND_STATION), Codec(_VEHICLE)
+    peer = Peer(GROUND_STATION, _VEHICLE, vehicle_type(mock.vehicle.family.key, "copter"))
+    tapes = [recorded(job, station, mock, vehicle) for job in (Discovery(1), *_jobs(peer))]
+    ours, theirs = zip(*tapes, strict=True)
+    return b"".join(ours), b"".join(theirs)
+
+
+def _hear(tape: bytes) -> object:
+    """Do all that a client does with a vehicle that says what is on `tape`, and tell of it."""
+    codec, heard = Codec(GROUND_STATION), datagrams(tape)
+    discovery = Discovery(patience=1.0, settle=0.0)
+    now = converse(discovery, codec, heard, 0.0)
+    assert discovery.outcome is not None
+    found = choose(discovery.outcome, "tape", None, None, 1.0)
+    peer = Peer(GROUND_STATION, found.address, found.vehicle)
+    verdicts: list[str] = []
+    refusals: list[FaaoError] = []
+    for job in _jobs(peer):
+        now = converse(job, codec, heard, now)
+        try:
+            verdicts += _told(job, peer, found)
+        except FaaoError as error:
+            refusals.append(error)
+    if refusals:
+        raise refusals[0]
+    return verdicts
+
+
+def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
+    """Say in every way what became of `job`, and return the verdicts on its lists."""
+    outcome = job.outcome
+    if isinstance(outcome, Lists):
+        mission = mission_of(outcome.items, peer.vehicle)
+        for ending in (".waypoints", ".plan", ".kml"):
+            render_mission(mission, f"m{ending}")
+            losses_in(mission, f"m{ending}")
+    elif isinstance(outcome, tuple):
+        problems = tuple(explain(each, peer, 650, str) for each in outcome if not each.verified)
+        report = UploadReport(found, outcome, 1.0, problems)
+        lines = as_text(report).split("\n")
+        assert all(line.isprintable() for line in lines), lines
+        assert report.verified == any(line.startswith("verified") for line in lines), lines
+        json.dumps(as_dict(report), allow_nan=False)
+        return [each.verdict for each in outcome]
+    return []
+
+
+def _serve(kind: MockKind, tape: bytes) -> object:
+    """Tell a mock what is on `tape`, start it whatever it holds, and ask it for everything."""
+    mock, vehicle, station = _mock(kind), Codec(_VEHICLE), Codec(GROUND_STATION)
+    packed(vehicle, mock.start(0.0))
+    asked = [
+        CommandLong(_VEHICLE, MavCommand.ARM, 0, 1.0),
+        CommandLong(_VEHICLE, MavCommand.START, 0),
+        *(MissionRequestList(_VEHICLE, part) for part in MissionType),
+        *(MissionRequestInt(_VEHICLE, part, 0) for part in MissionType),
+    ]
+    now = 0.0
+    for datagram in [*datagrams(tape), *packed(station, asked)]:
+        now += 0.01
+        answer(mock, vehicle, datagram, now)
+        packed(vehicle, mock.tick(now))
+    for later in (1.0, 10.0, 100.0, 1e4):
+        packed(vehicle, mock.tick(now + later))
+    assert mock.deadline is not None
+    assert math.isfinite(mock.deadline)
+    return mock.lists
+
+
+def _signing() -> Signing:
+    """Return a key, at a time that stands still: a tape stays what it was."""
+    return Signing(bytes(range(32)), clock=lambda: 1_800_000_000.0)
+
+
+def _said(number: int) -> Heartbeat | Statustext:
+    return Heartbeat(2, 12, 0, 0, 3) if number % 3 else Statustext(6, f"number {number}")
+
+
+def _take(tape: bytes, genuine: Sequence[bytes]) -> object:
+    """Take what is on `tape` as who holds the key does: each packet of `genuine` once, no other."""
+    codec, framer, taken = Codec(GROUND_STATION, _signing()), Framer(), list[bytes]()
+    for datagram in datagrams(tape):
+        for packet in framer.feed_datagram(datagram):
+            taken += [found.raw for found in codec.parse(packet)]
+    order = [genuine.index(packet) for packet in taken]
+    assert order == sorted(set(order)), order
+    return taken

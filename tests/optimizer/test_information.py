@@ -1,0 +1,134 @@
+"""Plans for the mutual information: `optimizer.rate: mutual_information`."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import MakePlan
+
+from faao_mav.errors import PlanError
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.pricing import fresh_rates, price, saturation
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.search.bound import upper_bound
+from faao_mav.optimizer.solution import Solution, load_solution, save_solution
+from faao_mav.plan import Plan
+
+FOR_IT = {"optimizer.rate": "mutual_information", "radio.modulation": "qpsk", "power": 5}
+
+
+@pytest.fixture(scope="module")
+def planned(small_plan: MakePlan) -> Solution:
+    return optimize(plan_of(small_plan, {"radio.fading_samples": 8, "radio.causal": True}))
+
+
+def plan_of(small_plan: MakePlan, changes: dict[str, Any]) -> Plan:
+    """The small plan for the mutual information of QPSK, at a power where it matters."""
+    wanted = FOR_IT | {"optimizer.starts": ["straight"]} | changes
+    power = wanted.pop("power")
+    powers = {"radio.base_station.power_dbm": power, "radio.relay.power_dbm": power}
+    return small_plan(powers | wanted)
+
+
+def maximised(solution: Solution) -> float:
+    causal = solution.plan.radio.causal
+    return solution.delivered_rate if causal else solution.rates.R_avg
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"radio.fading": "none", "radio.causal": False},
+        {"radio.fading": "none", "radio.causal": True, "radio.duplex": "half"},
+        {"radio.fading": "realization", "radio.modulation": "bpsk", "radio.causal": True},
+        {
+            "radio.fading": "ergodic",
+            "radio.fading_samples": 4,
+            "radio.causal": True,
+            "radio.bandwidth_mhz": 1,
+            "radio.relay.buffer_mbytes": 1,
+        },
+        {"radio.fading": "none", "optimizer.precoder": "mrt", "radio.line_of_sight": "all_ones"},
+        {"radio.fading": "none", "optimizer.inputs": "gaussian"},
+    ],
+)
+def test_it_is_never_below_the_plan_for_the_cutoff_rate(
+    small_plan: MakePlan, changes: dict[str, Any]
+) -> None:
+    plan = plan_of(small_plan, changes)
+    solution = optimize(plan)
+    assert solution.is_feasible()
+    assert solution.history[-1] == pytest.approx(maximised(solution), abs=1e-12)
+    if plan.optimizer.inputs == "gaussian":
+        assert solution.gain is None
+        return
+    assert solution.gain is not None
+    assert solution.gain > -1e-4
+    before = optimize(replace(plan, optimizer=replace(plan.optimizer, rate="cutoff")))
+    assert before.gain is None
+    assert solution.rates.R_avg > before.rates.R_avg  # of the same flight it would be above too
+    problem = build_problem(plan)
+    rates = [
+        link.rates(before.w, H_r, P)
+        for link, H_r, P in zip(
+            problem.links, (before.H_rB, before.H_rU), (before.P_B, before.P_U), strict=True
+        )
+    ]
+    reached = before.relay(*rates).rate if plan.radio.causal else min(r.mean() for r in rates)
+    assert maximised(solution) - solution.gain == pytest.approx(reached, abs=1e-9)
+
+
+def test_its_rates_are_those_that_sampling_finds(planned: Solution) -> None:
+    """Two ways to average over the noise, and one answer; more than the plan for cutoff rates."""
+    information = price(planned)
+    assert planned.rates.R_avg == pytest.approx(information.average, abs=0.02)
+    assert planned.delivered_rate == pytest.approx(information.delivered, abs=0.02)
+    assert information.delivered <= information.average + 1e-9
+    assert planned.gain is not None
+    assert planned.gain > 0.05
+    assert planned.converged
+    assert planned.kkt_residual() < 2e-4
+
+
+def test_what_surrounds_a_plan_speaks_of_it(planned: Solution, tmp_path: Path) -> None:
+    fresh = fresh_rates(planned)
+    assert fresh is not None
+    assert fresh.delivered == pytest.approx(planned.delivered_rate, abs=0.3)
+    assert fresh.delivered_error < 0.1
+    assert not saturation(planned).saturated
+    bound = upper_bound(build_problem(planned.plan), planned.rates.R_avg)
+    assert planned.rates.R_avg <= bound.value < 1.1 * planned.rates.R_avg
+    assert not bound.exact
+    save_solution(planned, tmp_path / "result.npz")
+    loaded = load_solution(tmp_path / "result.npz")
+    assert loaded.gain == planned.gain
+    assert loaded.recomputed() == planned.rates
+
+
+def test_precoders_that_know_the_draw(small_plan: MakePlan) -> None:
+    draws = {"radio.fading_samples": 4, "radio.modulation": "bpsk", "power": 0}
+    each = optimize(plan_of(small_plan, draws | {"radio.csi": "instantaneous"}))
+    assert each.P_B.shape == (4, 20, 2, 2)
+    assert each.rates.R_avg > optimize(plan_of(small_plan, draws)).rates.R_avg
+
+
+def test_more_than_two_modes(small_plan: MakePlan) -> None:
+    three = {f"radio.{end}.antennas": 3 for end in ("base_station", "relay", "ground_user")}
+    few = {
+        "flight.time_step": 2,
+        "optimizer.max_iterations": 2,
+        "radio.modulation": "bpsk",
+        "radio.fading": "realization",
+        "power": -3,
+    }
+    many = optimize(plan_of(small_plan, three | few))
+    assert many.gain is not None
+    assert many.gain > -1e-4
+    assert np.sum(np.abs(many.P_U) ** 2, axis=(1, 2)) == pytest.approx(10**-3.3)
+
+
+def test_algorithm1_is_not_made_for_it(paper_plan: MakePlan) -> None:
+    with pytest.raises(PlanError, match=r"optimizer\.rate: mutual_information is not for algorit"):
+        optimize(paper_plan({"optimizer.rate": "mutual_information"}))
