@@ -134,7 +134,8 @@ class Scheduler(ABC):
         """Return `route` with the acceptance radii that suit its legs and turns."""
         stops = route.waits > 0
         stops[[0, -1]] = True
-        leg_lengths = np.concatenate([[np.inf], route.leg_lengths, [np.inf]])
+        onward = np.where(route.waits[1:] > 0, np.inf, route.leg_lengths)  # it waits there anyway
+        leg_lengths = np.concatenate([[np.inf], onward, [np.inf]])
         room = np.minimum(leg_lengths[:-1], leg_lengths[1:])
         radii = self.vehicle.legs.radii(room, route.turns, stops)
         return replace(route, radii=np.round(radii, 1))

@@ -40,7 +40,8 @@ def _radii(context: ValidationContext) -> Iterator[tuple[Straight, float]]:
 )
 def _covers(context: ValidationContext) -> Iterator[Issue]:
     for leg, radius in _radii(context):
-        if leg.start.index != HOME and 0.05 <= leg.length <= radius:
+        held = context.items[leg.index].params[0] > 0  # it is held at all the same
+        if leg.start.index != HOME and 0.05 <= leg.length <= radius and not held:
             yield Issue(
                 leg.index,
                 f"the leg is {leg.length:.1f} m long, the acceptance radius {radius:g} m: the "

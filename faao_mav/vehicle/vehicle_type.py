@@ -61,8 +61,8 @@ class LegLimits(Protocol):
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:
         """Return acceptance radii, m, that suit waypoints; 0 leaves them to the autopilot.
 
-        `room` (n,), m, is the shorter of the two legs at each waypoint, `turn` (n,) the angle
-        between them, rad; `stops` (n,) marks the waypoints at which it waits.
+        `room` (n,), m, is the shorter of the legs at each waypoint that do not end at a stop,
+        `turn` (n,) the angle between them, rad; `stops` (n,) marks the waypoints at which it waits.
         """
         ...
 

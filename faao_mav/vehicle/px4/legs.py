@@ -38,7 +38,7 @@ _LEAST_LEG = 5.0
 """The least length of a leg, m: two acceptance radii with which an aircraft half a metre off is in
 time. Chosen; what a change costs is not measured."""
 
-_SLOWEST = 2.0
+_SLOWEST = 1.5
 """The least speed that is commanded, m/s. Measured: an aircraft that is half a metre off comes half
 a metre sooner or later to its waypoint, a second at 0.5 m/s."""
 
