@@ -18,7 +18,8 @@ ATTITUDE_LAG = 0.26
 flights."""
 
 DRAG = 0.2
-"""The air drag over mass, 1/s. Fitted to recorded flights."""
+"""The air drag over mass, 1/s: that of the recorded flights (SIH_KDV over SIH_MASS of PX4's
+simulator). A fit finds 0.19."""
 
 _POSITION, _VELOCITY, _THRUST, _INTEGRAL = range(4)
 _TRAJECTORY, _CHANGES, _STATES = 4, 7, 10

@@ -18,7 +18,7 @@ STEP = 0.1
 
 SWITCH_DELAY = 0.065
 """How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
-next, s. Measured: 0.1 s late after holds."""
+next, s. Fitted to recorded flights."""
 
 START_LAG = 0.05
 """How long after the first leg becomes current the trajectory moves, s. Fitted to recorded
@@ -39,7 +39,7 @@ _STEADY = 1e-5
 millimetres in minutes."""
 
 _LEAST_SHARE = 0.01
-"""The least share of a step that is taken before what the aircraft heads for is looked at anew."""
+"""The least share of a step that is flown before it is asked anew what the aircraft heads for."""
 
 _NEAREST = 1e-3
 """Radii below this count as this, m: the simulated aircraft comes to rest before it is much nearer;
