@@ -254,3 +254,18 @@ def test_two_samples_are_enough() -> None:
 def test_the_same_plan_gives_the_same_mission() -> None:
     first, second = (converted(*eight(), plan_with(recommend=True)).mission for _ in range(2))
     assert first == second
+
+
+@pytest.mark.parametrize(("autopilot", "flight"), [("ardupilot", eight), ("px4", dash_hover_dash)])
+def test_small_changes_of_the_trajectory_change_little(
+    autopilot: str, flight: Callable[[], Trajectory]
+) -> None:
+    t, w = flight()
+    plan = plan_with(autopilot=autopilot, recommend=True)
+    rng = np.random.default_rng(1)
+    waves = np.sin(np.pi * np.outer((t - t[0]) / (t[-1] - t[0]), np.arange(1, 20)))
+    found = [converted(t, w, plan).schedule.deviation.rms]
+    for _ in range(3):
+        noise = waves @ rng.normal(size=(19, 2))
+        found.append(converted(t, w + 0.05 * noise / noise.std(), plan).schedule.deviation.rms)
+    assert max(found) - min(found) < 0.6
