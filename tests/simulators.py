@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from random import SystemRandom
 
 from conftest import free_port
 
@@ -78,8 +79,12 @@ def _ardupilot(program: Path, where: Path, options: Sequence[str]) -> Iterator[i
 
 
 def _free_instance() -> int:
-    """Return an instance of ArduPilot whose first TCP port nobody listens at."""
-    for instance in range(40, 90):
+    """Return an instance of ArduPilot whose first TCP port nobody listens at.
+
+    Where the search begins is drawn, so that two that are started at once do not meet.
+    """
+    begin = SystemRandom().randrange(50)
+    for instance in [40 + (begin + k) % 50 for k in range(50)]:
         with socket.socket() as probe:
             if probe.connect_ex(("127.0.0.1", 5760 + 10 * instance)):
                 return instance

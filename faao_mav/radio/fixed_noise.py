@@ -9,6 +9,7 @@ rotation of what is received changes nothing.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 
@@ -24,6 +25,9 @@ _NODES = 2048
 The means over the 32 draws of the copter's sample err by up to 0.006 bit with QPSK and with 16-QAM,
 a quarter as many by up to three times as much.
 """
+
+_HELD = 1 << 20
+"""Pairs of channel and noise held at once: 8 MB for each number that is kept of them. Chosen."""
 
 _RAREST = 1e-9
 """Probability of the noises beyond the largest that is drawn, 6 standard deviations. Chosen."""
@@ -111,16 +115,18 @@ def _averages(A: Complex, modulation: str, noise: float, errors: Complex | None)
     used, real = noise_set(modulation, N, S), modulation == "bpsk"
     points, q = used.inputs.points, used.z.shape[1]
     maps = _maps(A, noise, real=real)
-    value = np.empty((b, S))
-    for s in range(S):
-        sent = np.broadcast_to(used.sent[s], (b, q))
-        z = np.broadcast_to(used.z[s], (b, *used.z[s].shape))
+    value, step = np.empty((b, S)), max(1, _HELD // q)
+    for s, start in product(range(S), range(0, b, step)):
+        part = slice(start, start + step)
+        chosen = maps[part, s]
+        sent = np.broadcast_to(used.sent[s], (len(chosen), q))
+        z = np.broadcast_to(used.z[s], (len(chosen), *used.z[s].shape))
         estimates = None if errors is None else np.empty(z.shape)
-        value[:, s] = log_ratio(points, maps[:, s], sent, z, estimates).mean(axis=1)
+        value[part, s] = log_ratio(points, chosen, sent, z, estimates).mean(axis=1)
         if errors is not None and estimates is not None:
             missed = points[used.sent[s]] - estimates
             x = missed if real else missed[..., :N] + 1j * missed[..., N:]
-            errors[:, s] = x.mT @ x.conj() / q
+            errors[part, s] = x.mT @ x.conj() / q
     return np.asarray(used.inputs.bits - value / _LN2)
 
 

@@ -19,7 +19,8 @@ def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:
 def _squared_norms(A: Complex, u: RealOrComplex) -> Real:
     """Return ||A u||² = u^H (A^H A) u, (..., k): two real products of matrices for all channels."""
     gram = (A.conj().mT @ A).reshape(*A.shape[:-2], -1)
-    outer = (u.conj()[:, :, None] * u[:, None, :]).reshape(len(u), -1).T
+    v = np.asarray(u, dtype=np.complex128)
+    outer = (v.conj()[:, :, None] * v[:, None, :]).reshape(len(v), -1).T
     norms: Real = gram.real @ outer.real - gram.imag @ outer.imag
     return np.maximum(norms, 0.0, out=norms)
 

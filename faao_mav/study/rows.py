@@ -181,15 +181,15 @@ class Spread:
 
 def spreads(
     rows: Sequence[StudyRow], measure: str
-) -> dict[tuple[tuple[Value, ...], str], Spread | None]:
+) -> dict[tuple[tuple[str, ...], str], Spread | None]:
     """Return the spread of `measure`, one of `MEASURES`, over seeds by values and scheme, in order.
 
-    None: all failed.
+    The values are JSON: those of a position, a list or a mapping, can then be looked up. None: all
+    failed.
     """
-    groups: dict[str, tuple[tuple[tuple[Value, ...], str], list[float]]] = {}
+    groups: dict[tuple[tuple[str, ...], str], list[float]] = {}
     for row in rows:
-        place = (tuple(row.values.values()), row.scheme)
-        _, rates = groups.setdefault(json.dumps(place), (_hashable(place), []))
+        rates = groups.setdefault((tuple(map(json.dumps, row.values.values())), row.scheme), [])
         rate = getattr(row, measure)
         if rate is not None:
             rates.append(rate)
@@ -197,14 +197,8 @@ def spreads(
         place: Spread(fmean(rates), stdev(rates) if len(rates) > 1 else 0.0, len(rates))
         if rates
         else None
-        for place, rates in groups.values()
+        for place, rates in groups.items()
     }
-
-
-def _hashable(place: tuple[tuple[Value, ...], str]) -> tuple[tuple[Value, ...], str]:
-    """Positions are lists in a plan; tuples can be looked up."""
-    values, scheme = place
-    return tuple(tuple(v) if isinstance(v, list) else v for v in values), scheme
 
 
 def comparison(rows: Sequence[StudyRow]) -> str:
@@ -229,7 +223,7 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
     lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
     for values in dict.fromkeys(values for values, _ in found):
         cells = (_cell(found.get((values, scheme))) for scheme in schemes)
-        lines.append([*(json.dumps(v).strip('"') for v in values), *cells])
+        lines.append([*(value.strip('"') for value in values), *cells])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
     return [

@@ -85,13 +85,10 @@ def _required_rally(context: ValidationContext) -> Iterator[Issue]:
     if not bits & _RALLY_BIT or context.frame is None:
         return
     limit = context.vehicle.value("rally_limit")
-    distances = [
-        float(math.hypot(*context.frame.to_local(point.latitude, point.longitude)))
-        for point in context.mission.rally
-    ]
-    nearest = min(distances, default=math.inf)
-    if nearest > (limit or math.inf) or not distances:
-        there = f"the nearest is {nearest:.0f} m away" if distances else "there is none"
+    places = (context.frame.to_local(p.latitude, p.longitude) for p in context.mission.rally)
+    nearest = min((math.hypot(*place) for place in places), default=None)
+    if nearest is None or (limit and nearest > limit):
+        there = "there is none" if nearest is None else f"the nearest is {nearest:.0f} m away"
         yield Issue(
             None,
             f"ARMING_MIS_ITEMS is {bits} and asks for a rally point"
@@ -228,8 +225,8 @@ def _approach(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.error(
     "ardupilot-set-home",
-    "home is set in flight: heights above home count from there, and the aircraft comes down",
-    "measured on ArduCopter 4.7: it flew into the ground, or got to no other waypoint",
+    "home is set in flight: heights above home count from there, and no waypoint is reached",
+    "measured on ArduCopter 4.7: it hovers at the next waypoint for good",
 )
 def _set_home(context: ValidationContext) -> Iterator[Issue]:
     takeoffs = [index for index, _ in context.each(*_TAKEOFFS[context.vehicle.type])]
@@ -240,7 +237,7 @@ def _set_home(context: ValidationContext) -> Iterator[Issue]:
             yield Issue(
                 index,
                 "home moves in flight, and with it what heights above home count from: the "
-                "aircraft was seen to fly into the ground",
+                "aircraft hovers at the next waypoint for good",
                 "remove the item",
             )
 

@@ -7,7 +7,7 @@ from faao_mav.mission.command import Command
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.finding import Level
 from faao_mav.validate.rule import Issue, Rule
-from faao_mav.vehicle import ARDUCOPTER, PX4_COPTER, AutopilotFamily
+from faao_mav.vehicle import ARDUCOPTER, PX4_COPTER
 
 _ARDUPILOT, _PX4 = ARDUCOPTER.family, PX4_COPTER.family
 
@@ -51,46 +51,47 @@ class _Cage:
         return switched_on and bool(int(context.vehicle.value("fence_type")) & self.bit)
 
 
-def _rule(family: AutopilotFamily, name: str, summary: str, source: str, cage: _Cage) -> Rule:
-    return Rule(name, Level.ERROR, summary, source, cage.check, family)
-
-
 _GEOFENCE = "PX4 1.16 Geofence::check, MissionFeasibilityChecker::checkGeofence"
 
 RULES = [
-    _rule(
-        _ARDUPILOT,
+    Rule(
         "ardupilot-fence-ceiling",
+        Level.ERROR,
         "the mission climbs above FENCE_ALT_MAX while the fence is on",
         "ArduPilot 4.7 AC_Fence::check_fence_alt_max; measured",
-        _Cage("fence_ceiling", bit=1),
-    ),
-    _rule(
+        _Cage("fence_ceiling", bit=1).check,
         _ARDUPILOT,
+    ),
+    Rule(
         "ardupilot-fence-floor",
+        Level.ERROR,
         "the mission descends below FENCE_ALT_MIN while the fence is on",
         "ArduPilot 4.7 AC_Fence::check_fence_alt_min",
-        _Cage("fence_floor", bit=8, floor=True),
-    ),
-    _rule(
+        _Cage("fence_floor", bit=8, floor=True).check,
         _ARDUPILOT,
+    ),
+    Rule(
         "ardupilot-fence-circle",
+        Level.ERROR,
         "the mission goes beyond FENCE_RADIUS from home while the fence is on",
         "ArduPilot 4.7 AC_Fence::check_fence_circle; measured",
-        _Cage("fence_radius", bit=2, distance=True),
+        _Cage("fence_radius", bit=2, distance=True).check,
+        _ARDUPILOT,
     ),
-    _rule(
-        _PX4,
+    Rule(
         "px4-max-horizontal",
+        Level.ERROR,
         "farther from home than GF_MAX_HOR_DIST",
         _GEOFENCE,
-        _Cage("fence_distance", distance=True),
-    ),
-    _rule(
+        _Cage("fence_distance", distance=True).check,
         _PX4,
+    ),
+    Rule(
         "px4-max-vertical",
+        Level.ERROR,
         "higher above home than GF_MAX_VER_DIST",
         _GEOFENCE,
-        _Cage("fence_height"),
+        _Cage("fence_height").check,
+        _PX4,
     ),
 ]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partialmethod
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.mission.item import MissionItem
@@ -64,27 +65,26 @@ Decorator: TypeAlias = Callable[[Check], Check]
 
 
 class Rules(list[Rule]):
-    """The rules of one module, in the order of its functions; all about `family`, if given.
-
-    `error`, `warning` and `note` return a decorator that makes a rule of that level of a check:
-    they take `Rule.id`, `summary`, `source` and, if it is about one type of vehicle, `kind`.
-    """
+    """The rules of one module, in the order of its functions; all about `family`, if given."""
 
     def __init__(self, family: AutopilotFamily | None = None) -> None:
         super().__init__()
         self._family = family
 
-    def error(self, *texts: str, kind: str | None = None) -> Decorator:
-        """Add a rule about what is refused, dangerous or breaks a limit that was set."""
-        return self._add(Level.ERROR, texts, kind)
+    def add(
+        self, level: Level, name: str, summary: str, source: str, kind: str | None = None
+    ) -> Decorator:
+        """Return a decorator that makes a rule of a check; for the arguments see `Rule`."""
 
-    def warning(self, *texts: str, kind: str | None = None) -> Decorator:
-        """Add a rule about what will not fly as it is written."""
-        return self._add(Level.WARNING, texts, kind)
+        def register(check: Check) -> Check:
+            self.append(Rule(name, level, summary, source, check, self._family, kind))
+            return check
 
-    def note(self, *texts: str, kind: str | None = None) -> Decorator:
-        """Add a rule about what is worth knowing."""
-        return self._add(Level.NOTE, texts, kind)
+        return register
+
+    error = partialmethod(add, Level.ERROR)
+    warning = partialmethod(add, Level.WARNING)
+    note = partialmethod(add, Level.NOTE)
 
     def commands(
         self,
@@ -110,13 +110,4 @@ class Rules(list[Rule]):
                     told = {"name": name_of(item.command), "kind": context.vehicle.kind}
                     yield Issue(index, message.format(item=item, **told), action)
 
-        self._add(level, (name, summary, source), kind)(check)
-
-    def _add(self, level: Level, texts: tuple[str, ...], kind: str | None) -> Decorator:
-        name, summary, source = texts
-
-        def register(check: Check) -> Check:
-            self.append(Rule(name, level, summary, source, check, self._family, kind))
-            return check
-
-        return register
+        self.add(level, name, summary, source, kind)(check)

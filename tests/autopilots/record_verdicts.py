@@ -50,6 +50,9 @@ OFF_THE_GROUND = 1.0
 TOUCH = 0.3
 """The height, m above home, below which an aircraft is down: its estimate is no better."""
 
+LEAP = 5.0
+"""Metres that no aircraft climbs or falls in a tenth of a second."""
+
 TAKEOFFS = {22, 84}
 TO_GROUND = {20, 21, 85, 94}
 """Return, landings, and placing a payload."""
@@ -382,11 +385,20 @@ def settled(summary: dict[str, Any]) -> bool:
 
 
 def read_track(track: Path) -> list[tuple[float, int]]:
-    """Return height, m above home, and the number of the item under way, ten times a second."""
+    """Return height, m above the start, and the number of the item under way, ten times a second.
+
+    Heights are recorded above home: one that leaps is home that moves.
+    """
     if not track.exists():
         return []
     with track.open() as file:
-        return [(float(row["alt_rel_m"]), int(row["seq"])) for row in csv.DictReader(file)]
+        rows = [(float(row["alt_rel_m"]), int(row["seq"])) for row in csv.DictReader(file)]
+    found, raised, before = [], 0.0, 0.0
+    for height, item in rows:
+        raised += before - height if abs(before - height) > LEAP else 0.0
+        found.append((height + raised, item))
+        before = height
+    return found
 
 
 def became(

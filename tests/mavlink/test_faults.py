@@ -1,7 +1,7 @@
 """Whatever the link does: an upload is verified and right, or reported as failed, and ends."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import pytest
@@ -14,6 +14,7 @@ from stations import (
     KINDS,
     RALLY,
     VEHICLE,
+    Desk,
     a_mission,
     mock_of,
     peer_of,
@@ -44,7 +45,7 @@ from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.vehicle import PX4_COPTER, register, unregister
 
-MISSION = MissionType.MISSION
+MISSION, FENCES = MissionType.MISSION, MissionType.FENCE
 REQUEST, MISSION_ACK, COUNT_ID, REQUEST_INT, ITEM_INT = 40, 47, 44, 51, 73
 
 shares = st.floats(0, 0.4)
@@ -256,6 +257,70 @@ def test_an_upload_stops_at_the_list_that_fails() -> None:
     simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE))
     assert [report.verdict for report in script.outcome] == ["verified", "refused"]
     assert mock.lists.items(MissionType.RALLY) == ()
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("seed", range(6))
+def test_late_packets_and_copies_of_them_end_no_upload(kind: MockKind, seed: int) -> None:
+    mock, rows = mock_of(kind), rows_for(kind, 30)
+    faults = Faults(duplication=0.05, reordering=0.1, delay=0.3, seed=seed)
+    report, took = upload_to(mock, rows, faults)
+    assert report.verified
+    assert places(mock.lists.items(MISSION)) == places(rows)
+    assert took < 60
+
+
+def test_an_accepted_fence_that_is_lost_is_sent_again() -> None:
+    """A real ArduPilot reads back an empty fence after about one of twelve uploads."""
+
+    class Loses(StoredLists):
+        times = 2
+
+        def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
+            self.times -= 1
+            super().replace(part, items if self.times < 0 else ())
+
+    mock = mock_of("ardupilot")
+    mock.lists.__class__ = Loses
+    rows = wire_items(a_mission(6, fence=FENCE), MissionType.FENCE, vehicle_of("ardupilot"))
+    report, _ = upload_to(mock, rows, part=MissionType.FENCE)
+    assert (report.verified, report.attempts) == (True, 3)
+
+
+@pytest.mark.parametrize("may_be_armed", [False, True])
+@pytest.mark.parametrize("when", ["before", "while it is read back"])
+def test_an_armed_vehicle_gets_no_fence_after_its_mission(may_be_armed: bool, when: str) -> None:
+    mock = mock_of("px4", beat=0.01)
+    mission = a_mission(6, fence=FENCE)
+    parts = [(part, wire_items(mission, part, vehicle_of("px4"))) for part in (MISSION, FENCES)]
+    peer = dataclasses.replace(peer_of("px4"), may_be_armed=may_be_armed)
+    script: Any = Script(upload_parts(parts, peer))
+
+    def arm(envelope: Envelope, _: float) -> None:
+        counted = isinstance(envelope.message, MissionCount)
+        mock.armed = mock.armed or when == "before" or counted
+
+    simulate(
+        Station(script, GROUND_STATION),
+        Station(mock, VEHICLE),
+        Faults(latency=0.02),
+        heard=arm,
+    )
+    verdicts = [report.verdict for report in script.outcome]
+    if may_be_armed:
+        assert verdicts == ["verified", "verified"]
+    else:
+        assert verdicts == (["armed"] if when == "before" else ["verified", "armed"])
+        assert mock.lists.items(FENCES) == ()
+
+
+def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
+    desk = Desk(Discovery())
+    desk.start()
+    desk.tell(Heartbeat(2, 3, 128, 0, 4))
+    desk.tell(Heartbeat(2, 3, 0, 0, 3))
+    desk.wait(2.0)
+    assert [found.armed for found in desk.machine.outcome] == [True]
 
 
 def test_a_vehicle_that_stores_something_else_is_found_out() -> None:

@@ -92,6 +92,30 @@ def test_its_rates_are_those_that_sampling_finds(planned: Solution) -> None:
     assert planned.kkt_residual() < 2e-4
 
 
+@pytest.mark.parametrize(
+    "fading",
+    [{"radio.fading": "none"}, {"radio.fading": "ergodic", "radio.fading_samples": 64}],
+)
+@pytest.mark.parametrize("duplex", ["full", "half"])
+def test_mutual_information_is_delivered_too(
+    small_plan: MakePlan, fading: dict[str, Any], duplex: str
+) -> None:
+    """Of a plan for the cutoff rate: all pairs of slot and draw, or a sample of them."""
+    changes = {"radio.duplex": duplex, "optimizer.rate": "cutoff", "radio.causal": True}
+    solution = optimize(plan_of(small_plan, fading | changes))
+    information, problem = price(solution), build_problem(solution.plan)
+    I_U, I_G = (
+        replace(link, measure="mutual_information").rates(solution.w, H_r, P)
+        for link, H_r, P in zip(
+            problem.links, (solution.H_rB, solution.H_rU), (solution.P_B, solution.P_U), strict=True
+        )
+    )
+    assert information.average == pytest.approx(min(I_U.mean(), I_G.mean()), abs=0.02)
+    exact = solution.relay(I_U, I_G, solution.shares).rate
+    assert information.delivered == pytest.approx(exact, abs=0.02)
+    assert solution.delivered_rate < information.delivered <= information.average
+
+
 def test_what_surrounds_a_plan_speaks_of_it(planned: Solution, tmp_path: Path) -> None:
     fresh = fresh_rates(planned)
     assert fresh is not None

@@ -287,6 +287,13 @@ def test_figures_are_written_and_labelled(plan: Path, tmp_path: Path) -> None:
     assert (out / "figure.svg").read_bytes() == again
 
 
+def test_positions_in_degrees_are_varied_and_compared(plan: Path) -> None:
+    vary = "flight.start={latitude: -35.3629, longitude: 149.1652},[0, 50]"
+    result = run(plan, "--vary", vary, "--jobs", 1)
+    assert result.exit_code == 0, result.output
+    assert '{"latitude": -35.3629, "longitude": 149.1652}' in result.stdout
+
+
 def test_routes_are_drawn_on_a_map(
     whole: tuple[Path, tuple[StudyRow, ...]], tmp_path: Path
 ) -> None:

@@ -18,8 +18,9 @@ class Timeouts:
     is how long a vehicle may say nothing in the middle of a transfer before it has given up
     itself: PX4 asks again for 5 s, ArduPilot for 8 s, so that six lost packets in a row end
     nothing. `attempts` is how often a whole transfer is begun. `patience` is what all of it may
-    take together, and `per_item` what each item that gets further adds: chosen, above what items
-    took that 30 % loss each way and late packets held up.
+    take together, and `per_item` what each item that gets further adds: chosen, so that 8 of 9
+    uploads to PX4 are verified which 30 % loss each way, copies and 0.3 s for an answer held up
+    longest of 1,000; with 2 s it was none.
     """
 
     response: float = 1.5
@@ -30,7 +31,7 @@ class Timeouts:
     boot: float = 60.0
     attempts: int = 3
     patience: float = 30.0
-    per_item: float = 2.0
+    per_item: float = 5.0
 
 
 class Budget:

@@ -28,7 +28,8 @@ model                 fading, precoders                   method
 
 To change which model a plan gets, or to add one: write a class with ``value`` and ``partials`` and
 return it from ``rate_model.rate_model``, the only place that chooses. What counts as the rate
-(cutoff rate, Gaussian inputs) and how precoders follow a channel is ``optimizer.design``.
+(cutoff rate, mutual information) is ``radio.measure``; Gaussian inputs and how precoders follow a
+channel are ``optimizer.design``.
 """
 
 from dataclasses import dataclass

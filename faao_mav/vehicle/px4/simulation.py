@@ -41,6 +41,10 @@ millimetres in minutes."""
 _LEAST_SHARE = 0.01
 """The least share of a step that is flown before it is asked anew what the aircraft heads for."""
 
+_NEAREST = 1e-3
+"""Radii below this count as this, m: the simulated aircraft comes to rest before it is much nearer;
+a real one wavers by more, and may arrive late."""
+
 _TINY = 1e-9
 """The shortest time, s, and length, m, that count."""
 
@@ -87,12 +91,15 @@ class Simulation:
     """
 
     def __init__(self, limits: Px4Limits, points: Real, radii: Real) -> None:
-        self._limits, self._points, self._radii = limits, points, radii.tolist()
+        self._limits, self._points = limits, points
+        self._radii = np.maximum(radii, _NEAREST).tolist()
         self._known: dict[tuple[GuidedLeg, FlightState], FlownLeg] = {}
 
     def leads_along(self, points: Real, radii: Real) -> bool:
         """Tell whether these are the points and radii."""
-        return np.array_equal(points, self._points) and self._radii == radii.tolist()
+        return np.array_equal(points, self._points) and np.array_equal(
+            np.maximum(radii, _NEAREST), self._radii
+        )
 
     def fly(self, speeds: Real, holds: Real, beyond: float) -> list[FlightLog]:
         """Fly every variant until the last one has ended, and on for `beyond` seconds.
@@ -254,7 +261,7 @@ def _distances(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> tuple[f
     across = abs(state.level[0] - leg.target) - leg.radius
     if state.climb is None:
         return (across,)
-    return across, abs(state.climb[0] - leg.height) - limits.height_radius
+    return across, abs(state.climb[0] - leg.height) - max(limits.height_radius, _NEAREST)
 
 
 def _share(
