@@ -34,6 +34,7 @@ class Command(IntEnum):
 
 FLOWN_TO = frozenset(command for command in Command if command.name.startswith("NAV_")) - {
     Command.NAV_RETURN_TO_LAUNCH,
+    Command.NAV_GUIDED_ENABLE,
     Command.NAV_DELAY,
 }
 """Commands that fly to the place x, y, z of their item."""

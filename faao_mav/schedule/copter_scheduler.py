@@ -25,8 +25,9 @@ _FIRST_WAIT = 6.0
 
 _LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
 _MOST_WAYPOINTS = 24  # the most that splitting legs leads to; the path itself may take more
+_FIRST_FLIGHTS = 3  # the most flights of a first fit: they tell which parameters to go on with
 _ROUNDS = 5  # the most rounds of splitting legs, and of moving waypoints
-_WORTHWHILE = 0.98  # the largest ratio of the costs after and before a change that is kept
+_WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
 _MOVE_SHARE = 0.8  # of its offset from the plan by which a waypoint is moved the other way
 
@@ -44,7 +45,7 @@ class CopterScheduler(Scheduler):
         waits[0] = max(waits[0], _FIRST_WAIT)
         if route.last == len(waits) - 1:  # it ends at rest
             waits[-1] = max(waits[-1], _LAST_WAIT)
-        return self.fitted(replace(route, waits=waits), self.max_speed)
+        return self.fitted(replace(route, waits=waits), self.max_speed, flights=_FIRST_FLIGHTS)
 
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""
@@ -54,6 +55,8 @@ class CopterScheduler(Scheduler):
             best = self.fitted(best.route, top_speed)
         for changes in (self._splits, self._moves):
             for _ in range(_ROUNDS):
+                if best.cost <= ALLOWED_ERROR:
+                    break
                 tried = (self.fitted(route, top_speed) for route in changes(best))
                 good = (each for each in tried if each.cost <= _WORTHWHILE * best.cost)
                 better = next(good, None)

@@ -12,9 +12,9 @@ from faao_mav.arrays import Integers, Real
 from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Clock, Schedule
-from faao_mav.schedule.timing import SHORTEST_HOLD, fit
+from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
 from faao_mav.vector import lengths
-from faao_mav.vehicle import FlightModel, FlightPath, Vehicle
+from faao_mav.vehicle import FlightModel, Vehicle
 
 # The position error at equal times, m, that is left as it is. Repeats of one flight in ArduCopter's
 # simulator differ by up to 0.4 m rms.
@@ -61,27 +61,35 @@ class Scheduler(ABC):
     def flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`, which is rounded for it."""
         route = self._with_radii(route.rounded())
-        return Schedule(route, self.model.fly(self._path(route)), self._clock(route))
+        path = route.path(whole_seconds=self.vehicle.type.whole_second_holds)
+        return Schedule(route, self.model.fly(path), self._clock(route))
 
-    def fitted(self, route: Route, top_speed: float, groups: Integers | None = None) -> Schedule:
+    def fitted(
+        self,
+        route: Route,
+        top_speed: float,
+        *,
+        groups: Integers | None = None,
+        flights: int = MOST_FLIGHTS,
+    ) -> Schedule:
         """Return the flight of `route` with the speeds and waits that fit best.
 
-        No speed is above `top_speed`, m/s; legs with the same number in `groups` share one.
+        No speed is above `top_speed`, m/s; legs with the same number in `groups` share one. So many
+        `flights` are predicted at most.
         """
         route = self._with_radii(route)
         free = (route.waits > 0) & (np.arange(len(route.waits)) != 0)
         free[-1] = False
         free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
-        speeds, waits, lead = fit(
-            self.model,
-            self._path(route),
-            self._clock(route),
+        return fit(
+            self.flight,
+            route,
             groups=_spline_groups(route) if groups is None else groups,
             free=free,
             min_speed=self.min_speed,
             max_speed=top_speed,
+            flights=flights,
         )
-        return self.flight(replace(route, speeds=speeds, waits=waits, lead=lead))
 
     def moved(self, schedule: Schedule, points: Integers, share: float) -> Route:
         """Return the route with the waypoints `points` (k,) moved against the flight's offset.
@@ -107,7 +115,7 @@ class Scheduler(ABC):
             groups = _speed_groups(schedule.route.speeds, alike)
             if len(groups) == 0 or groups[-1] == len(groups) - 1:
                 continue
-            with_fewer = self.fitted(schedule.route, top_speed, groups)
+            with_fewer = self.fitted(schedule.route, top_speed, groups=groups)
             if with_fewer.cost <= max(_SHARED_COST * schedule.cost, ALLOWED_ERROR / 2):
                 return with_fewer
         return schedule
@@ -139,9 +147,6 @@ class Scheduler(ABC):
         room = np.minimum(leg_lengths[:-1], leg_lengths[1:])
         radii = self.vehicle.legs.radii(room, route.turns, stops)
         return replace(route, radii=np.round(radii, 1))
-
-    def _path(self, route: Route) -> FlightPath:
-        return route.path(whole_seconds=self.vehicle.type.whole_second_holds)
 
     def _clock(self, route: Route) -> Clock:
         """Return the clock by which the plan and the flight of `route` meet at w_I."""

@@ -1,36 +1,37 @@
 """Speeds and waits with which the predicted flight keeps the plan's time.
 
 minimise sum_i |p(t_i) - w(t_i)|² over the speeds commanded for the legs, the waits at the hovers
-and the lead, p being the predicted flight. A Levenberg-Marquardt method with bounds on finite
-differences: the prediction has no gradients, but it is smooth. The variants of all differences are
-flown at once, and then those of all dampings: roughly, which costs less, as each is compared with
-a flight that is known. The best of them is flown in full before it counts. An error early in the
-flight shows in everything that follows: later legs and waits make up for earlier ones.
+and the lead, p being the predicted flight. A Levenberg-Marquardt method with bounds minimises this
+of the last predicted flight `retimed`; what it finds is then flown. Where that is better it is the
+next flight to retime, else it tells how much its legs really differ, and a step that is shorter is
+tried. A few flights do. An error early in the flight shows in everything that follows: later legs
+and waits make up for earlier ones.
 
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.schedule.schedule import LATE_WEIGHT, Clock
-from faao_mav.vehicle import FlightModel, FlightPath
+from faao_mav.schedule.leg_times import LegTimes
+from faao_mav.schedule.retimed import Retimed, Retiming
+from faao_mav.schedule.route import Route
+from faao_mav.schedule.schedule import LATE_WEIGHT, Clock, Schedule
 
 MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the plan, s
 SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
 
-# Steps of the finite differences, m/s and s: above the predictions' numerical noise, and below what
-# changes their slope.
-_SPEED_DIFFERENCE, _WAIT_DIFFERENCE = 0.02, 0.05
+MOST_FLIGHTS = 6  # of a fit: four in the mean of 270 fits
 
-_STEP = 0.25  # seconds between the samples of a predicted flight
-_SAMPLES = 400  # the most instants at which a predicted flight is compared with the plan
-_ITERATIONS = 12  # the most steps of a fit
-_DAMPINGS = 10.0 ** np.array([-4, -2, -1, 0, 2])  # to try, of the diagonal of the squared slopes
-_DIGITS = 4  # decimals of fitted values: more are noise, which another processor has otherwise
-_LEAST_GAIN = 0.05  # the share of the sum of squares that a step saves for another one to follow
+_SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
+_STEPS = 8  # the most steps with one flight retimed
+_LEAST_GAIN = 0.05  # the share of the sum of squares that a flight saves for another one to follow
+_WORTH_AGAIN = 0.3  # the share that is to be saved for a second try after a flight that was worse
+_GOOD = 0.4  # the root of the sum of squares, m, that is left as it is
+_SETTLED = 1e-3  # the share of the sum of squares that a step saves for another one to follow
 _MOST_LATE = 5.0  # the lateness, s, beyond which more of it costs no more
 _CRAWL = 0.5  # the least speed, m/s, to which a leg is slowed that is planned to be faster
 
@@ -41,90 +42,179 @@ _FINAL_SECONDS, _FINAL_WEIGHT = 4.0, 3.5
 # hardly matter where they are.
 _SPEED_PULL = 0.05
 
+# After a flight that was worse than the last, steps from there cost: this share of the sum of
+# squares for 1 m/s, a tenth of it for a second.
+_LEASH, _WAIT_LEASH = 0.05, 0.1
+
 
 def fit(
-    model: FlightModel,
-    path: FlightPath,
-    clock: Clock,
+    flight: Callable[[Route], Schedule],
+    route: Route,
     *,
     groups: Integers,
     free: Flags,
     min_speed: float,
     max_speed: float,
-) -> tuple[Real, Real, float]:
-    """Return the speeds (m - 1,), the waits at the points (m,) and the lead, s, that fit best.
+    flights: int = MOST_FLIGHTS,
+) -> Schedule:
+    """Return the `flight` of `route` with the speeds, the waits and the lead that fit best.
 
     Legs with the same number in `groups` (m - 1,), counted from 0, share a speed. Speeds stay
     within `min_speed` and `max_speed` (m/s), the waits at the points `free` (m,) at or above
     `SHORTEST_HOLD`; the others stay as they are. The lead is within `MOST_LEAD`, 0 for a flight
     that begins at speed. Being late or early at the end counts as well: `LATE_WEIGHT`.
+    So many `flights` are predicted at most.
     """
-    waits = path.holds + path.delays
-    if len(path.speeds) == 0:
-        return path.speeds, waits, 0.0
-    samples = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
-    t, w = clock.t[samples], clock.w[samples]
-    weights = np.where(t > t[-1] - _FINAL_SECONDS, _FINAL_WEIGHT, 1.0)[:, None] / np.sqrt(len(t))
-
-    # The unknowns x: a speed for each group, the free waits, the lead.
-    means = np.bincount(groups, path.speeds) / np.bincount(groups)
-    speed_count, wait_count = len(means), int(free.sum())
-    slowest = np.maximum(min_speed, np.minimum(_CRAWL, means))
-    most_lead = MOST_LEAD if clock.leaving else 0.0
-    low = np.concatenate([slowest, np.full(wait_count, SHORTEST_HOLD), [0.0]])
-    high = np.concatenate(
-        [np.full(speed_count, max_speed), np.full(wait_count, np.inf), [most_lead]]
-    )
-    differences = np.repeat([_SPEED_DIFFERENCE, _WAIT_DIFFERENCE], [speed_count, wait_count + 1])
-    initial = np.clip(np.concatenate([means, waits[free], [clock.lead]]), low, high)
-
-    def commands(x: Real) -> tuple[Real, Real]:
-        """Return the speeds (B, m - 1) and the waits (B, m) of the variants x (B, k)."""
-        all_waits = np.tile(waits, (len(x), 1))
-        all_waits[:, free] = x[:, speed_count:-1]
-        return x[:, :speed_count][:, groups], all_waits
-
-    def residuals(x: Real, *, rough: bool) -> Real:
-        """Return the residuals (B, r), m, of the variants x (B, k)."""
-        rows = []
-        flights = model.fly_many(path, *commands(x), _STEP, rough=rough)
-        for flown, lead in zip(flights, x[:, -1], strict=True):
-            led = replace(clock, lead=lead)
-            late = LATE_WEIGHT * np.clip(led.late(flown), -_MOST_LATE, _MOST_LATE)
-            rows.append(np.append((led.positions(flown, t) - w) * weights, late))
-        pull = _SPEED_PULL * (x[:, :speed_count] - initial[:speed_count])
-        return np.hstack([np.stack(rows), pull / np.sqrt(speed_count)])
-
-    x, error = initial, residuals(initial[None], rough=False)[0]
-    dampings = _DAMPINGS
-    for _ in range(_ITERATIONS):
-        signed = np.where(x + differences > high, -differences, differences)
-        rough = residuals(np.vstack([x, x + np.diag(signed)]), rough=True)
-        slope = ((rough[1:] - rough[0]) / signed[:, None]).T
-        damped = _damped_steps(x, slope, error, low, high, dampings)
-        estimated = error + residuals(damped, rough=True) - rough[0]
-        least = int(np.argmin(np.sum(estimated**2, axis=1)))
-        chosen = np.flatnonzero(dampings[least] == _DAMPINGS)[0]
-        dampings = _DAMPINGS[max(0, chosen - 1) : chosen + 2]
-        new = residuals(damped[least][None], rough=False)[0]
-        before, after = float(error @ error), float(new @ new)
-        if after < before:
-            x, error = damped[least], new
-        if after > (1 - _LEAST_GAIN) * before:
+    if len(route.speeds) == 0:
+        return flight(route)
+    unknowns = _Unknowns(route, groups, free, min_speed, max_speed)
+    x = unknowns.initial
+    best = flight(unknowns.commanded(x))
+    goal = _Goal(best.clock)
+    cost = goal.cost(best, unknowns.pull(x))
+    times, leash = LegTimes(len(groups)), 0.0
+    for _ in range(flights - 1):
+        retimed = Retimed(best, times)
+        tried, foreseen = _stepped(goal, unknowns, retimed, x, leash)
+        if foreseen > (1 - _LEAST_GAIN) * cost:
             break
-    fitted_speeds, fitted_waits = commands(x[None])
-    return fitted_speeds[0], fitted_waits[0], float(x[-1])
+        flown = flight(unknowns.commanded(tried))
+        new = goal.cost(flown, unknowns.pull(tried))
+        retimed.learn(flown)
+        gain = 1 - new / cost
+        if gain > 0:
+            x, best, cost, leash = tried, flown, new, leash / 4
+        elif foreseen > (1 - _WORTH_AGAIN) * cost:
+            break
+        else:
+            leash = max(10 * leash, _LEASH * cost)
+        if 0 < gain < _LEAST_GAIN or cost < _GOOD**2:
+            break
+    return best
 
 
-def _damped_steps(x: Real, slope: Real, error: Real, low: Real, high: Real, dampings: Real) -> Real:
-    """Return where the damped Gauss-Newton steps from `x` (k,) lead, (dampings, k), in bounds."""
-    gradient = slope.T @ error
-    stuck = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
-    slope = np.where(stuck, 0.0, slope)
-    square = slope.T @ slope
-    diagonal = np.diag(square) + 1e-12
-    steps = [
-        np.linalg.solve(square + np.diag(damping * diagonal + 1e-9), -slope.T @ error)
-        for damping in dampings
-    ]
-    return np.clip(np.round(x + np.array(steps), _DIGITS), low, high)
+class _Unknowns:
+    """The unknowns x (k,) of a fit: a speed for each group of legs, the free waits, the lead.
+
+    They stay within `low` and `high` (k,). `chain` (2 m, k) tells what they do to the speeds of
+    all legs, the waits at all points and the lead, `pull_slope` (k, k) what they do to the `pull`,
+    and `leash` (k,) how much a step of each counts where steps cost.
+    """
+
+    def __init__(
+        self, route: Route, groups: Integers, free: Flags, min_speed: float, max_speed: float
+    ) -> None:
+        self._route, self._groups, self._free = route, groups, free
+        means = np.bincount(groups, route.speeds) / np.bincount(groups)
+        self._speeds, waits = len(means), int(free.sum())
+        slowest = np.maximum(min_speed, np.minimum(_CRAWL, means))
+        most_lead = MOST_LEAD if route.first == 0 else 0.0
+        fastest = np.full(len(means), max_speed)
+        self.low = np.concatenate([slowest, np.full(waits, SHORTEST_HOLD), [0.0]])
+        self.high = np.concatenate([fastest, np.full(waits, np.inf), [most_lead]])
+        begin = np.concatenate([means, route.waits[free], [route.lead]])
+        self.initial = np.clip(begin, self.low, self.high)
+        self.chain = np.zeros((2 * len(free), len(begin)))
+        self.chain[np.arange(len(groups)), groups] = 1.0
+        self.chain[len(groups) + np.flatnonzero(free), self._speeds + np.arange(waits)] = 1.0
+        self.chain[-1, -1] = 1.0
+        self._pull = np.where(np.arange(len(begin)) < self._speeds, _SPEED_PULL, 0.0)
+        self._pull /= np.sqrt(self._speeds)
+        self.pull_slope = np.diag(self._pull)
+        self.leash = np.where(np.arange(len(begin)) < self._speeds, 1.0, _WAIT_LEASH)
+
+    def commanded(self, x: Real) -> Route:
+        """Return the route with the speeds, waits and lead of `x`."""
+        waits = self._route.waits.copy()
+        waits[self._free] = x[self._speeds : -1]
+        return replace(self._route, speeds=x[self._groups], waits=waits, lead=float(x[-1]))
+
+    def reached(self, x: Real, limits: Real) -> Real:
+        """Return `x` with no speed above the greatest of its legs' `limits` (m - 1,), m/s."""
+        fastest = np.zeros(self._speeds)
+        np.maximum.at(fastest, self._groups, limits)
+        fastest = np.append(fastest, np.full(len(x) - self._speeds, np.inf))
+        within: Real = np.maximum(np.minimum(x, fastest), self.low)
+        return within
+
+    def pull(self, x: Real) -> Real:
+        """Return the residuals (k,) that keep speeds near the initial ones, m."""
+        pull: Real = self._pull * (x - self.initial)
+        return pull
+
+
+class _Goal:
+    """The residuals whose sum of squares is least for a flight that keeps the plan of `clock`."""
+
+    def __init__(self, clock: Clock) -> None:
+        samples = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
+        self.t, self._w = clock.t[samples], clock.w[samples]
+        final = self.t > self.t[-1] - _FINAL_SECONDS
+        self._weights = np.where(final, _FINAL_WEIGHT, 1.0)[:, None] / np.sqrt(len(samples))
+
+    def cost(self, schedule: Schedule, pull: Real) -> float:
+        """Return the sum of squares, m², of a flight and the pull (k,) of its speeds."""
+        apart = (schedule.positions(self.t) - self._w) * self._weights
+        late = _late_cost(schedule.clock.late(schedule.flown))
+        return float(np.sum(apart**2) + late**2 + pull @ pull)
+
+    def residuals(self, found: Retiming, pull: Real) -> Real:
+        """Return the residuals (r,), m, of a retimed flight and the `pull` (k,) of its speeds."""
+        apart = (found.positions - self._w) * self._weights
+        return np.concatenate([apart.T.ravel(), [_late_cost(found.late)], pull])
+
+    def slopes(self, found: Retiming, later: Real, pull_slope: Real) -> Real:
+        """Return what the unknowns do to the residuals, (r, k).
+
+        `later` (n + 1, k), s, is by how much later they make the flight, in the end by its last
+        row; `pull_slope` (k, k) is what they do to the pull.
+        """
+        velocities = found.velocities * self._weights
+        apart = -(velocities.T[:, :, None] * later[:-1]).reshape(-1, later.shape[1])
+        late = later[-1:] * (LATE_WEIGHT * (abs(found.late) < _MOST_LATE))
+        slopes: Real = np.vstack([apart, late, pull_slope])
+        return slopes
+
+
+def _late_cost(late: float) -> float:
+    return LATE_WEIGHT * min(max(late, -_MOST_LATE), _MOST_LATE)
+
+
+def _stepped(
+    goal: _Goal, unknowns: _Unknowns, retimed: Retimed, begin: Real, leash: float
+) -> tuple[Real, float]:
+    """Return the best `x` (k,) of the `retimed` flight from `begin` on, and its sum of squares, m².
+
+    Going away from `begin` costs: `leash` times the square of the way.
+    """
+    low, high, pulled = unknowns.low, unknowns.high, leash * unknowns.leash
+
+    def flown(x: Real) -> tuple[Route, Retiming, Real, float]:
+        route = unknowns.commanded(x)
+        found = retimed.at(goal.t, route)
+        residuals = goal.residuals(found, unknowns.pull(x))
+        away = x - begin
+        return route, found, residuals, float(residuals @ residuals + pulled @ (away * away))
+
+    x, damping = unknowns.reached(begin, retimed.limits), 1e-3
+    route, found, residuals, cost = flown(x)
+    for _ in range(_STEPS):
+        later = retimed.slopes(route, found.samples) @ unknowns.chain
+        slopes = goal.slopes(found, later, unknowns.pull_slope)
+        gradient = residuals @ slopes + pulled * (x - begin)
+        stuck = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
+        slopes[:, stuck] = 0.0
+        square = slopes.T @ slopes
+        diagonal, downhill = np.diag(square), np.where(stuck, 0.0, -gradient)
+        before = cost
+        for _ in range(4):
+            damped = square + np.diag(damping * diagonal + pulled + 1e-9)
+            tried = np.minimum(np.maximum(x + np.linalg.solve(damped, downhill), low), high)
+            new = flown(tried)
+            if new[-1] < cost:
+                x, (route, found, residuals, cost), damping = tried, new, damping / 5
+                break
+            damping *= 10
+        if cost > (1 - _SETTLED) * before:
+            break
+    return x, cost

@@ -1,6 +1,5 @@
 """What a flight model is asked, what it answers, and the predicted flight of a whole mission."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -46,6 +45,11 @@ class Flown:
     position: Real
     velocity: Real
 
+    @property
+    def leg_durations(self) -> Real:
+        """How long each leg takes, from leaving a point to reaching the next one, (m - 1,), s."""
+        return self.arrivals[1:] - self.departures[:-1]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
@@ -75,22 +79,6 @@ class FlightModel(Protocol):
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds."""
-        ...
-
-    def fly_many(
-        self,
-        path: FlightPath,
-        speeds: Real,
-        waits: Real,
-        step: float = 0.1,
-        *,
-        rough: bool = False,
-    ) -> Sequence[Flown]:
-        """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s.
-
-        Waits are exact, however holds and delays make them up. Of `rough` flights only the
-        differences between variants mean something: a model may leave out what they share.
-        """
         ...
 
 

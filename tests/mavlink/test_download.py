@@ -203,7 +203,7 @@ def test_one_refusal_of_five_requests_is_one() -> None:
     desk = wide_desk()
     for _ in range(5):
         assert desk.tell(MissionAck(ME, 0, MavResult.INVALID)) == []
-    assert desk.wait(0.3) == [MissionRequestList(VEHICLE, 0)]
+    assert desk.wait(0.5) == [MissionRequestList(VEHICLE, 0)]
 
 
 def test_unsupported_changes_to_the_old_request() -> None:
@@ -219,7 +219,7 @@ def test_a_refusal_that_is_repeated_is_final(result: MavResult) -> None:
     for _ in range(Timeouts().attempts):
         assert not desk.machine.outcome
         desk.tell(MissionAck(ME, 0, result))
-        desk.wait(0.3)
+        desk.wait(0.5)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", result)
 
 
@@ -248,12 +248,13 @@ def test_an_answer_to_a_late_packet_of_an_upload_ends_nothing(result: MavResult)
 
 def test_after_an_abort_it_waits_for_what_is_late_and_then_asks_less_often() -> None:
     desk = desk_for("px4")
-    desk.tell(MissionCount(ME, 0, 3))
-    desk.tell(item(0))
-    desk.tell(MissionAck(ME, 0, MavResult.ERROR))
-    assert desk.wait(0.3) == [wants(1)] * 2  # in vain: it has forgotten the transfer
-    assert desk.wait(0.5) == [MissionRequestList(VEHICLE, 0)]
-    assert desk.tell(item(1)) == []  # late: of the transfer before
+    for _ in range(2):
+        assert desk.tell(MissionCount(ME, 0, 3)) == [wants(0)]
+        desk.tell(item(0))
+        desk.tell(MissionAck(ME, 0, MavResult.ERROR))
+        sent = desk.wait(1.0)  # in vain: it has forgotten the transfer
+        assert sent == [wants(1), wants(1), MissionRequestList(VEHICLE, 0)]
+        assert desk.tell(item(1)) == []  # late: of the transfer before
     desk.tell(MissionCount(ME, 0, 3))
     assert desk.wait(0.39) == []
     assert desk.wait(0.02) == [wants(0)]

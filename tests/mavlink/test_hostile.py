@@ -265,7 +265,8 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
     mock = Ended(behaviour_of(kind), home=HOME, beat=0.1)
     port = free_port()
     with running(mock, f"udpin:127.0.0.1:{port}"):
-        command = "from faao_mav.cli.main import run; run()"
+        heard = f"import signal; signal.signal({int(number)}, signal.SIG_DFL); "  # nohup ignores it
+        command = heard + "from faao_mav.cli.main import run; run()"
         to = f"udpout:127.0.0.1:{port}"
         client = subprocess.Popen(
             [sys.executable, "-c", command, "upload", path, "--to", to, "--system", "1"],

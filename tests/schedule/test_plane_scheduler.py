@@ -14,7 +14,7 @@ from faao_mav.schedule import Conversion
 from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.initial_route import initial_route, with_run_in
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
-from faao_mav.vehicle import FlightPath, Track, vehicle_of
+from faao_mav.vehicle import Track, vehicle_of
 from faao_mav.vehicle.ardupilot.plane import ArduPlane
 from faao_mav.vehicle.predict import predict
 
@@ -126,14 +126,3 @@ def test_a_plane_that_cannot_fly_the_plans_speeds_is_refused(
 
 def test_a_plane_at_its_limits_is_taken() -> None:
     check_vehicle(plane_plan(AIRSPEED_MIN=12, AIRSPEED_MAX=16))
-
-
-def test_variants_fly_as_paths_of_their_own() -> None:
-    plane = ArduPlane()
-    points = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [300.0, 300.0, 0.0]])
-    path = FlightPath(points, np.full(2, 15.0), np.zeros(3), np.zeros(3, bool), np.zeros(3))
-    speeds, waits = np.array([[12.0, 15.0], [15.0, 18.0]]), np.zeros((2, 3))
-    for speed, flown in zip(speeds, plane.fly_many(path, speeds, waits), strict=True):
-        np.testing.assert_array_equal(
-            flown.position, plane.fly(replace(path, speeds=speed)).position
-        )

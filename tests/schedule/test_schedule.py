@@ -293,3 +293,18 @@ def test_a_flight_is_that_of_a_rounded_route() -> None:
     noisy = replace(route, positions=route.positions + 1e-9, speeds=route.speeds - 1e-9)
     flown = scheduler.flight(noisy).flown
     assert flown.position.tobytes() == scheduler.flight(route).flown.position.tobytes()
+
+
+@pytest.mark.parametrize(("autopilot", "flight"), [("ardupilot", eight), ("px4", dash_hover_dash)])
+def test_small_changes_of_the_trajectory_change_little(
+    autopilot: str, flight: Callable[[], Trajectory]
+) -> None:
+    t, w = flight()
+    plan = plan_with(autopilot=autopilot, recommend=True)
+    rng = np.random.default_rng(1)
+    waves = np.sin(np.pi * np.outer((t - t[0]) / (t[-1] - t[0]), np.arange(1, 20)))
+    found = [converted(t, w, plan).schedule.deviation.rms]
+    for _ in range(3):
+        noise = waves @ rng.normal(size=(19, 2))
+        found.append(converted(t, w + 0.05 * noise / noise.std(), plan).schedule.deviation.rms)
+    assert max(found) - min(found) < 0.6

@@ -7,6 +7,8 @@ from relay_flights import plan_with
 from faao_mav.errors import InputError
 from faao_mav.vehicle import FlightPath, LegLimits, vehicle_of
 from faao_mav.vehicle.ardupilot.copter import ArduCopter, ArduCopterLegs
+from faao_mav.vehicle.ardupilot.copter.course import motion_of
+from faao_mav.vehicle.ardupilot.copter.route import Router
 from faao_mav.vehicle.px4 import Px4Legs
 
 
@@ -45,8 +47,10 @@ def test_the_model_reaches_the_speed_on_its_shortest_leg(jerk: float) -> None:
     points = np.array([[0.0, 0.0, 30.0], [0.0, length, 30.0]])
     path = FlightPath(points, np.array([9.0]), np.zeros(2), np.zeros(2, dtype=bool), np.zeros(2))
     model = ArduCopter(acceleration=4.0, jerk=jerk)
-    (target,) = model.fly_many(path, path.speeds[None], path.holds[None], 0.01, rough=True)
-    assert target.velocity.max() == pytest.approx(5.0, abs=0.01)
+    stops = np.ones(2, dtype=bool)
+    course = Router(points, path.splines, stops, model).course([9.0], [0.0, 0.0])
+    target = motion_of(course, np.arange(0.0, course.end, 0.01))
+    assert target[:, 3:6].max() == pytest.approx(5.0, abs=0.01)
 
 
 def test_a_px4_leg_is_one_in_which_it_can_stop() -> None:

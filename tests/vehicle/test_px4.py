@@ -51,46 +51,6 @@ def test_arrivals_are_in_order_and_within_the_radius(path: FlightPath, model: Px
         assert abs(place[2] - point[2]) <= model.height_radius + 0.02
 
 
-@settings(max_examples=10)
-@given(wandering(), st.integers(0, 2**32 - 1), models)
-def test_variants_side_by_side_fly_as_they_do_alone(
-    path: FlightPath, seed: int, model: Px4
-) -> None:
-    rng = np.random.default_rng(seed)
-    speeds = path.speeds * rng.uniform(0.6, 1.4, (3, len(path.speeds)))
-    holds = path.holds * rng.uniform(0.5, 2, (3, len(path.holds)))
-    assert_as_alone(model, path, speeds, holds)
-
-
-@settings(max_examples=10)
-@given(wandering(), models)
-def test_variants_that_share_most_of_a_flight_fly_as_they_do_alone(
-    path: FlightPath, model: Px4
-) -> None:
-    legs, points = len(path.speeds), len(path.holds)
-    speeds = path.speeds + 0.3 * np.eye(legs + points + 1, legs)
-    holds = path.holds + 0.7 * np.eye(legs + points + 1, points, -legs)
-    assert_as_alone(model, path, speeds, holds)
-
-
-def assert_as_alone(model: Px4, path: FlightPath, speeds: Real, holds: Real) -> None:
-    many = model.fly_many(path, speeds, holds)
-    for flown, speed, hold in zip(many, speeds, holds, strict=True):
-        alone = model.fly(replace(path, speeds=speed, holds=hold))
-        np.testing.assert_allclose(flown.arrivals, alone.arrivals, atol=1e-3)
-        np.testing.assert_allclose(flown.departures, alone.departures, atol=1e-3)
-        shared = len(alone.t) - 1
-        np.testing.assert_allclose(flown.position[:shared], alone.position[:shared], atol=3e-3)
-
-
-def test_variants_fly_on_until_the_last_has_ended() -> None:
-    path = line(50, 3)
-    slow, fast = Px4().fly_many(path, np.array([[2.0] * 3, [8.0] * 3]), np.zeros((2, 4)))
-    assert fast.departures[-1] < slow.departures[-1] <= fast.t[-1]
-    np.testing.assert_array_equal(fast.t, slow.t)
-    np.testing.assert_allclose(fast.position[-1], [150, 0, 30], atol=0.01)
-
-
 @settings(max_examples=15)
 @given(
     st.lists(st.floats(4, 80), min_size=2, max_size=8),
@@ -129,8 +89,7 @@ def test_arrivals_are_smooth_in_speeds(model: Px4, leg: int) -> None:
 
 def ends(model: Px4, path: FlightPath, speeds: Real) -> Real:
     """Return when the last point is reached with each of `speeds` (B, m - 1)."""
-    many = model.fly_many(path, speeds, np.tile(path.holds, (len(speeds), 1)))
-    return np.array([flown.arrivals[-1] for flown in many])
+    return np.array([model.fly(replace(path, speeds=tried)).arrivals[-1] for tried in speeds])
 
 
 @pytest.mark.parametrize("model", [Px4(), SUITED])
@@ -150,7 +109,7 @@ def test_fractions_of_holds_count() -> None:
     path = path_of([0, 60, 60 + 60j])
     holds = np.zeros((4, 3))
     holds[:, 1] = [0.4, 5.0, 5.3, 12.5]
-    many = Px4().fly_many(path, np.tile(path.speeds, (4, 1)), holds)
+    many = [Px4().fly(replace(path, holds=each)) for each in holds]
     waited = [flown.departures[1] - flown.arrivals[1] for flown in many]
     np.testing.assert_allclose(waited, holds[:, 1] + SWITCH_DELAY, atol=1e-9)
 

@@ -43,9 +43,9 @@ class Download(Exchange):
       has been answered: links rarely change the order (as in RFC 8985, until one does).
     - A request that comes late ends a transfer of PX4 with ERROR; but ERROR and DENIED may as well
       be about late packets of an upload before. When nothing is answered after it, this waits
-      until what is under way has come, and begins anew. From then on a request is repeated no
-      sooner than packets are late (`_SPREAD`), and if it was repeated the next one waits until
-      every copy must have come; after a second time every request waits so long for the one
+      until what is under way has come, and begins anew. After a second such end a request is
+      repeated no sooner than packets are late (`_SPREAD`), and if it was repeated the next one
+      waits until every copy must have come; after a third every request waits so long for the one
       before, as links repeat packets too.
     - After `Timeouts.silence`, or another refusal, it begins anew, `Timeouts.attempts` times.
       UNSUPPORTED changes to MISSION_REQUEST, once.
@@ -169,13 +169,13 @@ class Download(Exchange):
     def _rest(self, now: float) -> None:
         """Begin anew, but not at once: more may be on the way that is about the same."""
         self._phase, self._doubts = "resting", 0
-        self._due = now + max(self._timeouts.item, self._spread)
+        self._due = now + max(_SPREAD, self._spread)
 
     @property
     def _spread(self) -> float:
         """How late packets may be, s; 0 while nothing tells that the link changes their order."""
         ended = self._ended_by_disorder
-        return 0.0 if ended == 0 else _SPREAD * 2.0 ** max(ended - 2, 0)
+        return 0.0 if ended < 2 else _SPREAD * 2.0 ** max(ended - 3, 0)
 
     @property
     def _repeat_after(self) -> float:
@@ -187,7 +187,7 @@ class Download(Exchange):
             self._finish()
             return [self._peer.ack(MavResult.ACCEPTED, self._type)] * self._peer.manners.final_acks
         wide = self._peer.manners.any_request_order and not self._pace.is_doubtful
-        copies_come = self._copies_under_way > 0 or self._ended_by_disorder > 1
+        copies_come = self._copies_under_way > 0 or self._ended_by_disorder > 2
         if copies_come and not wide and now < self._last_sent + self._spread:
             self._due = self._last_sent + self._spread
             return ()

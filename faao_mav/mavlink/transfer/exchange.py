@@ -185,7 +185,7 @@ class Clear(Exchange):
     1.5
     >>> accepted = MissionAck(Address(255, 190), MissionType.RALLY, MavResult.ACCEPTED)
     >>> clearing.on(Envelope(vehicle, accepted), now=0.1)
-    ()
+    []
     >>> clearing.outcome.status
     'accepted'
     """

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.flight_path import FlightPath, Flown
@@ -38,37 +37,14 @@ class Px4(Px4Limits):
         refuses, are flown as plain ones. The end is when the last waypoint is done: the aircraft
         is then within its radius and may still be braking.
         """
-        return self.fly_many(path, path.speeds[None], (path.holds + path.delays)[None], step)[0]
-
-    def fly_many(
-        self,
-        path: FlightPath,
-        speeds: ArrayLike,
-        waits: ArrayLike,
-        step: float = 0.1,
-        *,
-        rough: bool = False,  # noqa: ARG002
-    ) -> Sequence[Flown]:
-        """Fly variants of `path` with other `speeds` (B, m - 1), m/s, and `waits` (B, m), s.
-
-        All reach the latest end. Results are smooth in speeds and waits to about 1e-3 s, so finite
-        differences of 0.01 m/s and more work. Variants that differ little cost far less together
-        than one by one: see `Simulation`.
-        """
-        speed = np.atleast_2d(np.asarray(speeds, float))
-        hold = np.atleast_2d(np.asarray(waits, float))
-        speed = np.minimum(np.where(speed > 0, speed, self.cruise_speed), self.max_speed)
+        speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
+        holds = path.holds + path.delays
         if len(path.points) == 1:
-            return _standing(path.points[0], hold[:, 0], step)
+            return _standing(path.points[0], holds, step)[0]
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
-        logs = self._simulation(path.points, radii).fly(speed, hold, beyond=step)
-        return sampled(logs, path.points[0, 2], step)
-
-    def _simulation(self, points: Real, radii: Real) -> Simulation:
-        """Return what has flown legs of this path already, if it is that of the last call."""
-        if not (self._simulations and self._simulations[0].leads_along(points, radii)):
-            self._simulations[:] = [Simulation(self, points, radii)]
-        return self._simulations[0]
+        simulation = Simulation(self, path.points, radii)
+        logs = simulation.fly(np.minimum(speeds, self.max_speed)[None], holds[None], beyond=step)
+        return sampled(logs, path.points[0, 2], step)[0]
 
 
 def _standing(point: Real, holds: Real, step: float) -> list[Flown]:

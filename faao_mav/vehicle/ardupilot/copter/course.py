@@ -1,9 +1,8 @@
 """The course: where the target that the aircraft follows is, on the target's own clock."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -15,7 +14,7 @@ from faao_mav.vehicle.ardupilot.copter.spline import CurvedLeg
 GRID = 0.1
 """The step of the target's clock and of the pursuit, s."""
 
-TargetRow: TypeAlias = Sequence[float]
+TargetRow: TypeAlias = tuple[float, ...]
 """What the target does at a sample, each value with its change up to the next sample: position
 east, north; speed east, north; climb rate squared; acceleration east, north."""
 
@@ -64,42 +63,36 @@ class Course:
         return max([placed.end for placed in self.legs], default=0.0)
 
 
-def motions(courses: Sequence[Course], clocks: Sequence[Real], derivatives: int) -> list[Real]:
-    """Return for every course positions, m, and so many of their `derivatives`, up to 2.
+def motion_of(course: Course, clock: Real) -> Real:
+    """Return the target's position, velocity and acceleration (n, 9), SI, at `clock` (n,) s.
 
-    The clocks (n,) increase; the shapes are (n, 3 (1 + derivatives)). The acceleration on splines
-    is not fed forward, so it is left out.
+    The times increase. The acceleration on splines is not fed forward, so it is left out.
     """
-    bounds = np.cumsum([0, *map(len, clocks)])
-    motion: Real = np.zeros((bounds[-1], 3 * (derivatives + 1)))
-    parts = [motion[first:last] for first, last in pairwise(bounds.tolist())]
-    under_way: list[tuple[PlacedLeg, StraightLeg, int, int]] = []
-    for course, clock, part, first in zip(
-        courses, clocks, parts, bounds[:-1].tolist(), strict=True
-    ):
-        begins, ends = np.searchsorted(
-            clock,
-            [[placed.start for placed in course.legs], [placed.end for placed in course.legs]],
-        )
-        steps = np.zeros((len(clock) + 1, 3))
-        steps[0] = course.origin
-        np.add.at(steps, ends, np.reshape([placed.step for placed in course.legs], (-1, 3)))
-        np.cumsum(steps[:-1], axis=0, out=part[:, :3])
-        for placed, begin, end in zip(course.legs, begins.tolist(), ends.tolist(), strict=True):
-            if isinstance(placed.leg, StraightLeg):
-                under_way.append((placed, placed.leg, first + begin, end - begin))
-            else:
-                _add_curved(part, clock, slice(begin, end), placed, placed.leg)
-    if under_way:
-        _add_straight(motion, np.concatenate(clocks), under_way)
-    return parts
+    legs = course.legs
+    begins, ends = np.searchsorted(
+        clock, [[placed.start for placed in legs], [placed.end for placed in legs]]
+    )
+    motion: Real = np.zeros((len(clock) + 1, 9))
+    motion[0, :3] = course.origin
+    np.add.at(motion[:, :3], ends, np.reshape([placed.step for placed in legs], (-1, 3)))
+    np.cumsum(motion[:, :3], axis=0, out=motion[:, :3])
+    motion = motion[:-1]
+    straight: list[tuple[PlacedLeg, StraightLeg, int, int]] = []
+    for placed, begin, end in zip(legs, begins.tolist(), ends.tolist(), strict=True):
+        if isinstance(placed.leg, StraightLeg):
+            straight.append((placed, placed.leg, begin, end - begin))
+        else:
+            _add_curved(motion[begin:end], clock[begin:end] - placed.start, placed, placed.leg)
+    if straight:
+        _add_straight(motion, clock, straight)
+    return motion
 
 
-def table_of(motion: Real) -> Sequence[TargetRow]:
-    """Return the rows of `motion` (n, 9) across the ground."""
-    values = np.column_stack([motion[:, :2], motion[:, 3:5], motion[:, 5] ** 2, motion[:, 6:8]])
-    rows = np.stack([values[:-1], np.diff(values, axis=0)], axis=2).reshape(len(motion) - 1, -1)
-    return list(rows.tolist())
+def rows_of(motion: Real) -> Iterator[TargetRow]:
+    """Yield the rows of `motion` (n, 9) across the ground, n - 1 of them."""
+    values = np.vstack([motion.T[[0, 1, 3, 4]], motion[:, 5] ** 2, motion.T[6:8]])
+    columns = np.stack([values[:, :-1], np.diff(values)], axis=1).reshape(-1, len(motion) - 1)
+    return zip(*columns.tolist(), strict=True)
 
 
 def grid_of(course: Course) -> Real:
@@ -111,7 +104,7 @@ def grid_of(course: Course) -> Real:
 def _add_straight(
     motion: Real, clock: Real, legs: Sequence[tuple[PlacedLeg, StraightLeg, int, int]]
 ) -> None:
-    """Add the motion under way on straight legs to `motion` (n, 3 to 9).
+    """Add the motion under way on straight legs to `motion` (n, 9).
 
     Each comes with its first sample and the number of its samples.
     """
@@ -122,17 +115,17 @@ def _add_straight(
     local = clock[sample] - starts[which]
     # the phases of all legs in one sorted list: no leg lasts as long as `far`
     far = 2 * max(leg.duration for leg in flown) + 1
-    table = np.concatenate([leg.table for leg in flown])
-    table_of_leg = np.repeat(np.arange(len(legs)), [len(leg.table) for leg in flown])
+    table = np.array([row for leg in flown for row in leg.rows()])
+    table_of_leg = np.repeat(np.arange(len(legs)), [len(leg.phases) for leg in flown])
     found = np.searchsorted(table_of_leg * far + table[:, 0], which * far + local, "right") - 1
     begin, w, q, c, s, v, a = table[found].T
     t = local - begin
     sine = np.sin(w * t)
-    along = [s + t * (v + t * (a / 2 + t * c / 6)) + q * (t - sine / w)]
-    if motion.shape[1] > 3:
-        along.append(v + t * (a + t * c / 2) + q * (1 - np.cos(w * t)))
-    if motion.shape[1] > 6:
-        along.append(a + t * c + q * w * sine)
+    along = (
+        s + t * (v + t * (a / 2 + t * c / 6)) + q * (t - sine / w),
+        v + t * (a + t * c / 2) + q * (1 - np.cos(w * t)),
+        a + t * c + q * w * sine,
+    )
     steps = np.array([one.step for one in placed])
     directions = steps / np.array([[leg.length] for leg in flown])
     for axis in np.flatnonzero(directions.any(axis=0)):
@@ -141,14 +134,8 @@ def _add_straight(
             motion[:, 3 * kind + axis] += np.bincount(sample, share * scalar, len(motion))
 
 
-def _add_curved(
-    motion: Real, clock: Real, under_way: slice, placed: PlacedLeg, leg: CurvedLeg
-) -> None:
-    """Add position and velocity under way on a spline leg."""
-    local = clock[under_way] - placed.start
-    kinds = [leg.curve.points - placed.origin]
-    if motion.shape[1] > 3:
-        kinds.append(leg.curve.tangents * leg.speeds[:, None])
-    for kind, values in enumerate(kinds):
-        for axis in range(3):
-            motion[under_way, 3 * kind + axis] += np.interp(local, leg.times, values[:, axis])
+def _add_curved(motion: Real, local: Real, placed: PlacedLeg, leg: CurvedLeg) -> None:
+    """Add position and velocity of a spline leg at its times `local` (n,), s, to `motion`."""
+    along = np.hstack([leg.curve.points - placed.origin, leg.curve.tangents * leg.speeds[:, None]])
+    for k, values in enumerate(along.T):
+        motion[:, k] += np.interp(local, leg.times, values)

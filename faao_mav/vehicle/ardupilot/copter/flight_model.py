@@ -1,14 +1,13 @@
 """ArduCopter as a flight model."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
-from faao_mav.vehicle.ardupilot.copter.course import Course, grid_of, motions, table_of
+from faao_mav.vehicle.ardupilot.copter.course import Course, grid_of, motion_of, rows_of
 from faao_mav.vehicle.ardupilot.copter.follow import pursue
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.route import Router
@@ -37,37 +36,13 @@ class ArduCopter(ArduCopterLimits):
         """
         waits = np.floor(path.holds) + path.delays
         _check(path, waits, step)
-        return self.fly_many(path, path.speeds[None], waits[None], step)[0]
-
-    def fly_many(
-        self,
-        path: FlightPath,
-        speeds: Real,
-        waits: Real,
-        step: float = 0.1,
-        *,
-        rough: bool = False,
-    ) -> Sequence[Flown]:
-        """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s.
-
-        A `rough` flight is that of the target, as if it never waited for the aircraft.
-        """
-        stopping = np.any(waits > 0, axis=0)
+        stopping = waits > 0
         stopping[[0, -1]] = True
         scale = np.array([self.east_metre, self.north_metre, 1.0])
         router = self._router(path.points * scale, path.splines, stopping)
-        courses = [
-            router.course(speed, wait)
-            for speed, wait in zip(speeds.tolist(), waits.tolist(), strict=True)
-        ]
-        if rough:
-            flights = _targets(courses, step)
-        else:
-            flights = [self._followed(course, step) for course in courses]
-        return [
-            replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
-            for flown in flights
-        ]
+        course = router.course(path.speeds.tolist(), waits.tolist())
+        flown = self._followed(course, step)
+        return replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
 
     def _router(self, points: Real, splines: Flags, stopping: Flags) -> Router:
         """Return what knows the legs along `points` already, if they are those of the last call."""
@@ -78,8 +53,8 @@ class ArduCopter(ArduCopterLimits):
     def _followed(self, course: Course, step: float) -> Flown:
         """Return the flight of the aircraft after its target."""
         grid = grid_of(course)
-        (target,) = motions([course], [grid], 2)
-        pursuit = pursue(course, table_of(target), self)
+        target = motion_of(course, grid)
+        pursuit = pursue(course, rows_of(target), self)
         arrivals = np.interp(course.passed, pursuit.clock, pursuit.t)
         departures = _stopped(course, arrivals, pursuit.arrivals)
         motion = np.column_stack(
@@ -90,33 +65,9 @@ class ArduCopter(ArduCopterLimits):
                 pursuit.rate * np.interp(pursuit.clock, grid, target[:, 5]),
             ]
         )
-        t = _times(departures, step)
+        t = step * np.arange(math.ceil(departures[-1] / step - 1e-9) + 1)
         flown = np.column_stack([np.interp(t, pursuit.t, column) for column in motion.T])
         return Flown(arrivals, departures, t, flown[:, :3], flown[:, 3:])
-
-
-def _targets(courses: Sequence[Course], step: float) -> list[Flown]:
-    """Return the flights of the targets, whose clocks only stand still where they have to wait."""
-    timings = [_timing(course, step) for course in courses]
-    found = motions(courses, [clock for *_, clock in timings], 1)
-    return [
-        Flown(arrivals, departures, t, motion[:, :3], motion[:, 3:])
-        for (arrivals, departures, t, _), motion in zip(timings, found, strict=True)
-    ]
-
-
-def _timing(course: Course, step: float) -> tuple[Real, Real, Real, Real]:
-    """Return arrivals and departures, times, and the target's clock then."""
-    times = [stop.time for stop in course.stops]
-    waited = np.cumsum([course.wait] + [stop.wait for stop in course.stops])
-    arrivals = course.passed + waited[np.searchsorted(times, course.passed)]
-    departures = _stopped(course, arrivals, waited[:-1] + times)
-    t = _times(departures, step)
-    knots = np.column_stack([times + waited[:-1], times + waited[1:]]).ravel()
-    clock = np.interp(
-        t, np.append([0.0, course.wait], knots), np.append([0.0, 0.0], np.repeat(times, 2))
-    )
-    return arrivals, departures, t, clock
 
 
 def _stopped(course: Course, arrivals: Real, stops: Real) -> Real:
@@ -126,10 +77,6 @@ def _stopped(course: Course, arrivals: Real, stops: Real) -> Real:
     for stop, arrival in zip(course.stops, stops.tolist(), strict=True):
         arrivals[stop.point], departures[stop.point] = arrival, arrival + stop.wait
     return departures
-
-
-def _times(departures: Real, step: float) -> Real:
-    return step * np.arange(math.ceil(departures[-1] / step - 1e-9) + 1)
 
 
 def _check(path: FlightPath, waits: Real, step: float) -> None:

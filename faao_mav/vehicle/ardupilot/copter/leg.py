@@ -2,9 +2,8 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import accumulate
 from typing import ClassVar, TypeAlias
 
@@ -58,14 +57,10 @@ class StraightLeg:
         """When the ramp down begins, s."""
         return self.times[-1] - self.down.duration
 
-    @cached_property
-    def table(self) -> Real:
-        """The phases as rows (phases, 7): begin, s; w = pi / T; q = d / w²; c; s, v, a then."""
-        rows = [
-            (time, math.pi / span, d * (span / math.pi) ** 2, c, *state)
-            for time, (span, c, d), state in zip(self.times, self.phases, self.states, strict=False)
-        ]
-        return np.array(rows)
+    def rows(self) -> Iterator[tuple[float, ...]]:
+        """Yield for each phase its begin, s; w = pi / T; q = d / w²; c; s, v, a then."""
+        for time, (span, c, d), state in zip(self.times, self.phases, self.states, strict=False):
+            yield time, math.pi / span, d * (span / math.pi) ** 2, c, *state
 
     def at(self, time: float) -> LegState:
         """Return where the target is `time` s, 0 to `duration`, after the beginning."""

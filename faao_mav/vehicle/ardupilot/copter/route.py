@@ -25,7 +25,7 @@ from faao_mav.vehicle.ardupilot.copter.spline import (
 Direction: TypeAlias = tuple[float, float, float]
 """A unit vector: east, north, up."""
 
-_TICKS = 1 << 40
+_TICKS = 1 << 24
 """The number of steps into which the longest overlap of two legs is divided to find it."""
 
 

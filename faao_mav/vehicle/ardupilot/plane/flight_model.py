@@ -1,8 +1,7 @@
 """How an ArduPlane flies a mission: from its documentation, not compared with flights."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -61,21 +60,6 @@ class ArduPlane(ArduPlaneLimits):
         """
         flight = _Flight(self, path)
         return flight.flown(step)
-
-    def fly_many(
-        self,
-        path: FlightPath,
-        speeds: Real,
-        waits: Real,
-        step: float = 0.1,
-        *,
-        rough: bool = False,  # noqa: ARG002
-    ) -> Sequence[Flown]:
-        """Return the flights of variants with other `speeds` (B, m - 1) and `waits` (B, m), s."""
-        return [
-            self.fly(replace(path, speeds=speed, holds=wait, delays=0.0), step)
-            for speed, wait in zip(speeds, waits, strict=True)
-        ]
 
     def airspeed(self, command: float) -> float:
         """Return the airspeed flown for a commanded one, m/s."""
