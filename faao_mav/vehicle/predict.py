@@ -21,8 +21,9 @@ from faao_mav.vehicle.vehicle import Vehicle
 LONGEST = 86_400.0
 """The longest flight that is followed, s: no copter flies for a day."""
 
-_MOST_STEPS = 5000
-"""The largest number of items that are flown, repeats by DO_JUMP included. Chosen."""
+_MOST_STEPS = 2000
+"""The largest number of items that are flown, repeats by DO_JUMP included. Chosen: a few seconds of
+work at most, whatever a file or a peer asks for."""
 
 _REPEATS = 20
 """How often a DO_JUMP that never ends is followed. Chosen."""

@@ -41,9 +41,9 @@ millimetres in minutes."""
 _LEAST_SHARE = 0.01
 """The least share of a step that is flown before it is asked anew what the aircraft heads for."""
 
-_NEAREST = 1e-3
-"""Radii below this count as this, m: the simulated aircraft comes to rest before it is much nearer;
-a real one wavers by more, and may arrive late."""
+_NEAREST = 0.05
+"""Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at such
+a waypoint by chance (0.05 m took 53 s), which no prediction foretells."""
 
 _TINY = 1e-9
 """The shortest time, s, and length, m, that count."""
