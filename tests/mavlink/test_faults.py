@@ -40,7 +40,7 @@ from faao_mav.mavlink.mock import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.firmware import StoredLists
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.transfer.exchange import TENTATIVE, Peer
-from faao_mav.mavlink.transfer.session import clear_lists, download_lists, upload_parts
+from faao_mav.mavlink.transfer.session import clear_lists, download_lists, explain, upload_parts
 from faao_mav.mavlink.transfer.upload import Upload
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.vehicle import PX4_COPTER, register, unregister
@@ -342,6 +342,14 @@ def test_650_items_over_a_bad_link() -> None:
         report, took = upload_to(mock, rows, Faults(loss=0.2, latency=0.01), until=2000)
         assert report.verified
         assert took < 400
+
+
+def test_a_vehicle_that_another_station_uploads_to_is_given_up_after_one_attempt() -> None:
+    mock = mock_of(behaviour_of("ardupilot", refusals={(0, COUNT): MavResult.DENIED}))
+    report, took = upload_to(mock, rows_for("ardupilot", 5))
+    assert took < 10
+    told = explain(report, peer_of("ardupilot"), 650, str)
+    assert told == "mission: refused: DENIED (another ground station is uploading)"
 
 
 def test_who_is_interrupted_frees_the_vehicle() -> None:

@@ -159,8 +159,10 @@ def _upload_part(
                 report = replace(report, verdict="cancelled")
             elif sent.status == "accepted":
                 report = replace(report, verdict="unread", said=read.said)
-        # PX4 says ERROR when busy, and of packets that come late or twice: that may pass.
-        refused = report.verdict == "refused" and report.result not in TENTATIVE
+        # PX4 says ERROR when busy, and of packets that come late or twice: that may pass. So may
+        # DENIED, but not if it is said of every announcement of a whole attempt.
+        unheard = report.result == MavResult.DENIED and report.item is None
+        refused = report.verdict == "refused" and (unheard or report.result not in TENTATIVE)
         if report.verified or refused or stop:
             break
     return report, armed

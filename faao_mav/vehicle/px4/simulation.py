@@ -42,8 +42,8 @@ _LEAST_SHARE = 0.01
 """The least share of a step that is flown before it is asked anew what the aircraft heads for."""
 
 _NEAREST = 0.05
-"""Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at such
-a waypoint by chance (0.05 m took 53 s), which no prediction foretells."""
+"""Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at
+such a waypoint by chance (0.05 m took 53 s), which no prediction foretells."""
 
 _TINY = 1e-9
 """The shortest time, s, and length, m, that count."""
