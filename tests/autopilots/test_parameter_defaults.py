@@ -26,14 +26,19 @@ def listed(connection: str) -> Mapping[str, float]:
     link.wait_heartbeat(timeout=PATIENCE)
     link.mav.param_request_list_send(link.target_system, link.target_component)
     found: dict[str, float] = {}
-    count = None
-    while count is None or len(found) < count:
-        message = link.recv_match(type="PARAM_VALUE", blocking=True, timeout=5)
-        assert message is not None or time.monotonic() < end, "it does not list its parameters"
-        if message is None:  # a lost one: the list again
+    left: set[int] | None = None  # of the numbers of all parameters; some packets are lost
+    while left is None or left:
+        message = link.recv_match(type="PARAM_VALUE", blocking=True, timeout=1)
+        if message is not None:
+            left = set(range(message.param_count)) if left is None else left
+            left.discard(message.param_index)
+            found[message.param_id] = message.param_value
+            continue
+        assert time.monotonic() < end, "it does not list its parameters"
+        if left is None:
             link.mav.param_request_list_send(link.target_system, link.target_component)
-        else:
-            found[message.param_id], count = message.param_value, message.param_count
+        for index in sorted(left or ())[:50]:
+            link.mav.param_request_read_send(link.target_system, link.target_component, b"", index)
     link.close()
     return found
 
