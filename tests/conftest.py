@@ -45,6 +45,9 @@ radio:
 """
 """Twenty slots in the active region, for R_avg of the paper: solved in a second."""
 
+FLYABLE = SMALL.replace("max_speed: 20", "max_speed: 10")
+"""The small plan within what ArduCopter flies."""
+
 MakePlan = Callable[..., Plan]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SMALL, edited
+from conftest import FLYABLE, edited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -27,7 +27,7 @@ def run(*arguments: object) -> Any:
 @pytest.fixture
 def plan(tmp_path: Path) -> Path:
     path = tmp_path / "plan.yaml"
-    path.write_text(SMALL)
+    path.write_text(FLYABLE)
     return path
 
 
@@ -57,7 +57,7 @@ def test_the_main_job(plan: Path, tmp_path: Path) -> None:
 
 
 def test_the_mission_as_a_plan_of_qgroundcontrol_is_the_same(plan: Path, tmp_path: Path) -> None:
-    plan.write_text(edited(SMALL, {"vehicle.autopilot": "px4"}))
+    plan.write_text(edited(FLYABLE, {"vehicle.autopilot": "px4"}))
     for name in ("m.waypoints", "m.plan", "m.kml"):
         assert run(plan, "--out", tmp_path / name, "--quiet").output == ""
     read = read_mission_file(tmp_path / "m.plan")
@@ -96,7 +96,7 @@ def test_the_bound_is_computed_when_asked_for(plan: Path) -> None:
 
 
 def test_algorithm_1_by_option(plan: Path) -> None:
-    plan.write_text(edited(SMALL, {"radio.fading": "realization"}))
+    plan.write_text(edited(FLYABLE, {"radio.fading": "realization"}))
     data = json.loads(run(plan, "--method", "algorithm1", "--json").stdout)
     assert data["fresh_rate"] is None
     assert data["starts"] == {}
@@ -114,7 +114,7 @@ def test_same_plan_same_bytes(plan: Path, tmp_path: Path) -> None:
 
 def test_saturation_is_said_with_the_power_to_save(plan: Path) -> None:
     plan.write_text(
-        edited(SMALL, {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40})
+        edited(FLYABLE, {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40})
     )
     result = run(plan)
     assert result.exit_code == 0
@@ -151,16 +151,16 @@ def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
     plan: Path, tmp_path: Path
 ) -> None:
     out, save = tmp_path / "m.txt", tmp_path / "r.npz"
-    plan.write_text(SMALL.replace("altitude: 40", "altitude: -1"))
+    plan.write_text(FLYABLE.replace("altitude: 40", "altitude: -1"))
     result = run(plan, "--out", out)
     assert result.exit_code == 2
     assert result.stderr.startswith(f"faao-mission: {plan}: flight.altitude: -1")
-    plan.write_text(edited(SMALL, {"vehicle.parameters": {"WPNAV_JERK": 0}}))
+    plan.write_text(edited(FLYABLE, {"vehicle.parameters": {"WPNAV_JERK": 0}}))
     result = run(plan, "--out", out, "--save", save)
     assert result.exit_code == 2
     assert "vehicle.parameters: WPNAV_JERK: 0" in result.stderr
     assert not save.exists()
-    plan.write_text(edited(SMALL, {"mission.max_items": 4}))
+    plan.write_text(edited(FLYABLE, {"mission.max_items": 4}))
     result = run(plan, "--out", out, "--save", save)
     assert result.exit_code == 1
     assert "mission.max_items" in result.stderr
@@ -171,7 +171,7 @@ def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
 def test_a_failed_run_keeps_the_old_mission(plan: Path, tmp_path: Path) -> None:
     out = tmp_path / "m.txt"
     out.write_text("precious")
-    plan.write_text(edited(SMALL, {"mission.max_items": 4}))
+    plan.write_text(edited(FLYABLE, {"mission.max_items": 4}))
     assert run(plan, "--out", out).exit_code == 1
     assert out.read_text() == "precious"
 
@@ -234,7 +234,7 @@ def test_names_that_are_no_unicode(plan: Path, tmp_path: Path) -> None:
     assert (tmp_path / f"{name}.param").read_text().startswith("# for m?.waypoints")
 
 
-TINY = edited(SMALL, {"flight.duration": 3, "flight.end": [5, 45], "optimizer.max_iterations": 1})
+TINY = edited(FLYABLE, {"flight.duration": 3, "flight.end": [5, 45], "optimizer.max_iterations": 1})
 VALUES = st.one_of(
     st.none(),
     st.booleans(),
@@ -300,16 +300,16 @@ def test_no_output_replaces_the_plan_or_another_output(
     arguments: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("plan.txt").write_text(SMALL)
+    Path("plan.txt").write_text(FLYABLE)
     result = run("plan.txt", *arguments)
     assert result.exit_code == 2
     assert said in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["plan.txt"]
-    assert Path("plan.txt").read_text() == SMALL
+    assert Path("plan.txt").read_text() == FLYABLE
 
 
 def test_a_plan_is_piped_in(tmp_path: Path) -> None:
     out = tmp_path / "m.waypoints"
-    result = CliRunner().invoke(app, ["-", "--out", str(out), "--quiet"], input=SMALL)
+    result = CliRunner().invoke(app, ["-", "--out", str(out), "--quiet"], input=FLYABLE)
     assert (result.exit_code, result.stderr) == (0, "")
     assert read_mission(out).items

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import SMALL
+from conftest import FLYABLE
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -22,7 +22,7 @@ def run(*arguments: object) -> Any:
 @pytest.fixture(autouse=True)
 def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "plan.yaml").write_text(SMALL)
+    (tmp_path / "plan.yaml").write_text(FLYABLE)
     (tmp_path / "m.waypoints").write_text(MISSION)
     return tmp_path
 
@@ -38,9 +38,9 @@ def test_a_plan_needs_no_command(arguments: list[str], in_folder: Path) -> None:
 
 
 def test_a_plan_may_have_any_name(in_folder: Path) -> None:
-    (in_folder / "valley").write_text(SMALL)
+    (in_folder / "valley").write_text(FLYABLE)
     assert run("valley", "--quiet", "--out", "out.waypoints").exit_code == 0
-    (in_folder / "convert").write_text(SMALL)
+    (in_folder / "convert").write_text(FLYABLE)
     assert run("./convert", "--quiet").exit_code == 0
 
 

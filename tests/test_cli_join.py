@@ -82,6 +82,7 @@ def test_a_mission_with_errors_is_kept_but_not_called_good(
     lame = {"vehicle.parameters": {"WPNAV_ACCEL": 50}, "mission.parameters": "keep"}
     plan.write_text(edited(SMALL, lame | {"radio.fading": "none"}))
     port = free_port()
+    options = ["--force", *options]  # accelerates at a tenth of the plan's
     result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", *options)
     assert result.exit_code == 1
     assert re.search(r"^faao-mission: error: .* \[link-rate-lost\]; ", result.stderr, re.M)
@@ -147,6 +148,31 @@ def test_options_of_an_upload_without_one(plan: Path, out: Path, option: tuple[s
     assert result.exit_code == 2
     assert f"{' '.join(option)}: is for an upload; give --upload" in result.stderr
     assert not out.exists()
+
+
+@pytest.mark.parametrize("option", ["--out", "--upload"])
+def test_a_plan_beyond_the_vehicle_is_refused_before_the_work(
+    plan: Path, out: Path, option: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("faao_mav.workflow.plan_mission", lambda *_, **__: pytest.fail("worked"))
+    beyond = {"vehicle.max_speed": 12, "vehicle.max_acceleration": 5.5}
+    plan.write_text(edited(GENTLE, beyond))
+    result = run(plan, option, out if option == "--out" else f"udpout:127.0.0.1:{free_port()}")
+    assert (result.exit_code, result.stdout) == (2, "")
+    end = "give that or less, or --force to make the mission all the same"
+    assert result.stderr.splitlines() == [
+        f"faao-mission: {plan}: vehicle.max_speed: 12 m/s; ArduCopter keeps plans of at most "
+        f"10.3 m/s (ATC_ANGLE_MAX, its default); {end}",
+        f"{plan}: vehicle.max_acceleration: 5.5 m/s^2; ArduCopter keeps plans of at most 5 m/s^2 "
+        f"(WP_ACC); {end}",
+    ]
+    assert not out.exists()
+
+
+def test_force_is_for_a_mission(plan: Path) -> None:
+    result = run(plan, "--force")
+    assert result.exit_code == 2
+    assert "--force: is for a mission; give --out MISSION or --upload" in result.stderr
 
 
 @pytest.mark.parametrize("as_json", [False, True])
@@ -291,7 +317,10 @@ def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
     assert "error: predicted" in told.stdout
     assert save.exists()
     assert page.exists()
-    flown = run(paper, "--out", out)
+    refused = run(paper, "--out", out, "--save", save)
+    assert (refused.exit_code, refused.stdout) == (2, "")
+    assert not out.exists()
+    flown = run(paper, "--out", out, "--force")
     assert flown.exit_code == 1
     assert "the mission does not pass validation; do not fly it" in flown.stderr
 

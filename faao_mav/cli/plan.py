@@ -36,6 +36,9 @@ def plan(
     ] = None,
     system: System = None,
     allow_armed: AllowArmed = False,
+    force: Annotated[
+        bool, flag("--force", "Make the mission of a plan beyond the vehicle all the same.")
+    ] = False,
     method: Annotated[
         str | None, option("M", "Replace optimizer.method: direct or algorithm1.")
     ] = None,
@@ -48,6 +51,9 @@ def plan(
     The mission is validated, with the parameters that it is timed for. One with errors is
     written, to be looked at, but not uploaded. Without --out and --upload the plan is only
     optimised, and what validation finds is information.
+
+    A plan whose max_speed or max_acceleration is beyond the vehicle is refused with --out and
+    --upload, before the work: no mission keeps it.
 
     Exit status: 0 done; 1 there is no such flight, or with --out or --upload no such mission,
     validation found errors, or it is not known to be on the vehicle; 2 unusable arguments or
@@ -62,8 +68,10 @@ def plan(
     files = {"--save": save, "--precoders": precoders, "--report": report, "--figure": figure}
     shown = sys.stderr.isatty() and not quiet
     to_fly = out is not None or upload is not None
+    if force and not to_fly:
+        raise InputError("--force: is for a mission; give --out MISSION or --upload CONNECTION too")
     started = time.perf_counter()
-    plan = _checked_plan(plan_file, method, out, files, upload)
+    plan = _checked_plan(plan_file, method, out, files, upload, force)
     with optimizer_progress(shown=shown) as observe:
         result = plan_mission(plan, bound=bound, observe=observe)
         for name, path in files.items():
@@ -95,16 +103,18 @@ def _checked_plan(
     out: Path | None,
     files: dict[str, Path | None],
     upload: str | None,
+    force: bool,
 ) -> "Plan":
     """Return the plan; what it asks for and where to is refused before the work if of no use."""
     from faao_mav.plan import read_plan
     from faao_mav.report.style import FORMATS
-    from faao_mav.schedule.conversion import check_vehicle
+    from faao_mav.schedule.conversion import beyond_vehicle, check_vehicle
     from faao_mav.vehicle import vehicle_of
     from faao_mav.workflow import mission_files
 
     plan = read_plan(plan_file, method=method)
-    if out is not None or upload is not None:
+    to_fly = out is not None or upload is not None
+    if to_fly:
         check_vehicle(plan)
     else:
         vehicle_of(plan).flight_model()  # what is useless is refused, what is not flown is told
@@ -120,6 +130,9 @@ def _checked_plan(
         from faao_mav.mavlink.transport import parse_connection
 
         parse_connection(upload)
+    if to_fly and not force and (beyond := beyond_vehicle(plan)):
+        end = "give that or less, or --force to make the mission all the same"
+        raise InputError("\n".join(f"{each}; {end}" for each in beyond))
     return plan
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import floor, inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
 from faao_mav.schedule.waypoints import SLOWEST
-from faao_mav.vehicle import Vehicle, vehicle_of
+from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
 from faao_mav.vehicle.recommend import candidates
 
 if TYPE_CHECKING:
@@ -82,6 +83,46 @@ def check_vehicle(plan: "Plan") -> None:
             )
 
 
+def beyond_vehicle(plan: "Plan") -> list[str]:
+    """Return a line for each limit of `plan` that is beyond its vehicle, with what it may be.
+
+    The vehicle has the parameters that are recommended for it, or its own if the plan keeps them.
+    """
+    vehicles = _vehicles(plan)
+    lines = []
+    for key, unit in (("max_speed", "m/s"), ("max_acceleration", "m/s^2")):
+        limits = [_ceiling(vehicle, key) for vehicle in vehicles]
+        most, why = max(limits)
+        value = getattr(plan.vehicle, key)
+        if value > most:
+            lines.append(
+                f"{plan.source}: vehicle.{key}: {value:g} {unit}; {vehicles[0].type.name} keeps "
+                f"plans of at most {floor(10 * most) / 10:g} {unit} ({why})"
+            )
+    return lines
+
+
+def _ceiling(vehicle: Vehicle, key: str) -> tuple[float, str]:
+    """Return the greatest value of a plan's `key` that `vehicle` keeps, and what sets it."""
+    kind = vehicle.type
+    told = [Ceiling("max_speed", kind.fastest)] if kind.hovers else []
+    own = [each for each in (*kind.ceilings(vehicle), *told) if each.key == key]
+    least = min(own, key=lambda each: each.value, default=None)
+    if least is None:
+        return inf, ""
+    name = vehicle.name_of(least.parameter) if least.parameter else "the most that it is told"
+    return least.value, name
+
+
+def _vehicles(plan: "Plan") -> list[Vehicle]:
+    """Return the vehicle of `plan` with each set of parameters that is recommended for it."""
+    given = vehicle_of(plan)
+    return [
+        replace(given, parameters={**given.parameters, **parameters})
+        for parameters in candidates(plan)
+    ]
+
+
 def convert(solution: "Solution") -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
@@ -93,10 +134,7 @@ def convert(solution: "Solution") -> Conversion:
     """
     plan, t, w = solution.plan, solution.t, np.round(solution.w, _DECIMALS)
     given, sets = vehicle_of(plan), candidates(plan)
-    schedulers = [
-        _scheduler(plan, t, w, replace(given, parameters={**given.parameters, **parameters}))
-        for parameters in sets
-    ]
+    schedulers = [_scheduler(plan, t, w, vehicle) for vehicle in _vehicles(plan)]
     straight = initial_route(t, w, plan, share=1.0 if given.type.hovers else _PLANE_SHARE)
     found = _refined((straight, scheduler) for scheduler in schedulers)
     best = min(found, key=_cost)

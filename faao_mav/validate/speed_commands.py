@@ -7,12 +7,9 @@ from faao_mav.mission.command import Command
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.vehicle import ARDUCOPTER, PX4_COPTER
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 
 _ARDUPILOT, _PX4 = Rules(ARDUCOPTER.family), Rules(PX4_COPTER.family)
-
-_LEAN = ((30.0, 10.3), (45.0, 15.2))
-"""The lean angle, degrees, and the top speed that it gave, m/s. Measured: a quadrotor of
-ArduPilot's simulator."""
 
 _MEASURED = "measured on PX4 1.16.1"
 
@@ -49,8 +46,7 @@ def _ignored(context: ValidationContext) -> Iterator[Issue]:
 )
 def _lean(context: ValidationContext) -> Iterator[Issue]:
     angle = round(math.degrees(context.vehicle.value("lean_angle")), 9)
-    (a0, v0), (a1, v1) = _LEAN
-    top = max(v0 + (angle - a0) * (v1 - v0) / (a1 - a0), 0.0)
+    top = ArduCopterLimits.from_vehicle(context.vehicle).top_speed
     for index, kind, speed in _asked(context):
         if kind in (0, 1) and speed > top:
             yield Issue(

@@ -18,7 +18,7 @@ from faao_mav.vehicle.registry import (
     vehicle_types,
 )
 from faao_mav.vehicle.vehicle import Vehicle, vehicle_of
-from faao_mav.vehicle.vehicle_type import AutopilotFamily, LegLimits, VehicleType
+from faao_mav.vehicle.vehicle_type import AutopilotFamily, Ceiling, LegLimits, VehicleType
 
 __all__ = [
     "ARDUCOPTER",
@@ -26,6 +26,7 @@ __all__ = [
     "PX4_COPTER",
     "PX4_PLANE",
     "AutopilotFamily",
+    "Ceiling",
     "FlightModel",
     "FlightPath",
     "Flown",

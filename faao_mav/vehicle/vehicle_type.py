@@ -1,5 +1,6 @@
 """What the rest of the package asks about an autopilot and a type of vehicle."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -12,6 +13,14 @@ from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
 OVERSPEED = 1.1
 """The greatest speed that a mission may command, as a multiple of the plan's max_speed: it makes up
 for corners. Chosen; what a change costs is not measured."""
+
+_G = 9.80665
+"""Standard gravity, m/s²."""
+
+
+def lean_acceleration(angle: float) -> float:
+    """Return the level acceleration at the lean or bank `angle`, rad, at constant height, m/s²."""
+    return _G * math.tan(angle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +39,19 @@ class AutopilotFamily:
     parameter_suffix: str
     parameter_style: Literal["list", "qgroundcontrol"]
     parameter_prefixes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Ceiling:
+    """How far a plan's `key`, "max_speed" or "max_acceleration", may go for a vehicle to keep it.
+
+    `value` is in m/s or m/s²; `parameter` is the key of the vehicle's parameter that sets it, ""
+    for what the vehicle can be told at most.
+    """
+
+    key: Literal["max_speed", "max_acceleration"]
+    value: float
+    parameter: str = ""
 
 
 class LegLimits(Protocol):
@@ -91,6 +113,8 @@ class VehicleType:
         recommended: the sets of parameters to try for a plan's greatest speed, m/s, and
             acceleration, m/s², the gentlest first; one empty set: it flies with its own.
         calibrated: the flight model is compared with recorded flights.
+        ceilings: how far a plan may go for the vehicle to keep it, beside `fastest`; the least of
+            those with one key counts.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
             radians; None if no such law is known.
     """
@@ -112,6 +136,7 @@ class VehicleType:
     unmodelled: str = ""
     calibrated: bool = False
     recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
+    ceilings: Callable[[ParameterValues], Sequence[Ceiling]] = lambda _: ()
     corner_speed: Callable[[ParameterValues, float], float] | None = None
 
     @property

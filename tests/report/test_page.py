@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from conftest import SMALL
+from conftest import FLYABLE, SMALL
 from reported import HOSTILE, conversion, flown, prediction
 from typer.testing import CliRunner
 
@@ -206,7 +206,7 @@ def test_dark_paper_has_every_colour_of_the_light(full: str) -> None:
 
 
 def test_the_main_job_writes_page_and_figure(tmp_path: Path) -> None:
-    (tmp_path / "plan.yaml").write_text(SMALL)
+    (tmp_path / "plan.yaml").write_text(FLYABLE)
     names = ("m.waypoints", "r.html", "f.png")
     options = zip(("--out", "--report", "--figure"), names, strict=True)
     arguments = [word for option, name in options for word in (option, str(tmp_path / name))]

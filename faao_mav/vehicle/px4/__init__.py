@@ -18,8 +18,15 @@ from faao_mav.vehicle.px4.flight_model import Px4
 from faao_mav.vehicle.px4.guidance import corner_speed
 from faao_mav.vehicle.px4.legs import Px4Legs
 from faao_mav.vehicle.px4.parameters import COPTER_TABLE, PLANE_TABLE
+from faao_mav.vehicle.px4.response import DRAG
 from faao_mav.vehicle.recommend import accelerations_to_try
-from faao_mav.vehicle.vehicle_type import OVERSPEED, AutopilotFamily, VehicleType
+from faao_mav.vehicle.vehicle_type import (
+    OVERSPEED,
+    AutopilotFamily,
+    Ceiling,
+    VehicleType,
+    lean_acceleration,
+)
 
 __all__ = ["PX4", "PX4_COPTER", "PX4_PLANE", "Px4", "Px4Legs"]
 
@@ -99,6 +106,16 @@ def _corner_speed(vehicle: ParameterValues, turn: float) -> float:
     return corner_speed(gain, acceleration, radius, cos(turn))
 
 
+def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
+    lean = lean_acceleration(vehicle.value("lean_angle"))
+    return (
+        Ceiling("max_speed", vehicle.value("max_speed"), "max_speed"),
+        Ceiling("max_speed", lean / DRAG, "lean_angle"),
+        Ceiling("max_acceleration", lean, "lean_angle"),
+        Ceiling("max_acceleration", vehicle.value("acceleration"), "acceleration"),
+    )
+
+
 PX4_COPTER = VehicleType(
     family=PX4,
     kind="copter",
@@ -114,6 +131,7 @@ PX4_COPTER = VehicleType(
     flight_model=_model,
     calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),
+    ceilings=_ceilings,
     corner_speed=_corner_speed,
 )
 """A multicopter with PX4 1.16."""

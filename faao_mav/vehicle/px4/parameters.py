@@ -47,6 +47,9 @@ COPTER_TABLE = table(
     _parameter("max_speed", "m/s", 12.0, "MPC_XY_VEL_MAX", 0.1),
     _parameter("acceleration", "m/s^2", 3.0, "MPC_ACC_HOR", 0.1, documented=(2.0, 15.0)),
     _parameter("jerk", "m/s^3", 4.0, "MPC_JERK_AUTO", 0.1),
+    _parameter(
+        "lean_angle", "rad", radians(45), "MPC_TILTMAX_AIR", radians(20), radians(89), radians(1)
+    ),
     _parameter("corner_gain", "1/s", 0.5, "MPC_XY_TRAJ_P", 0.01),
     _parameter("error_limit", "m", 2.0, "MPC_XY_ERR_MAX", 0.1),
     _parameter("acceptance_radius", "m", 2.0, "NAV_ACC_RAD", 0.05),

@@ -5,12 +5,12 @@ from collections.abc import Iterator, Mapping
 from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
-from faao_mav.vehicle.ardupilot.copter.parameters import TABLE
+from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.recommend import accelerations_to_try
-from faao_mav.vehicle.vehicle_type import VehicleType
+from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType
 
 __all__ = ["ARDUCOPTER", "ArduCopter", "ArduCopterLegs"]
 
@@ -51,6 +51,15 @@ def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[
         yield {name: TABLE[key].written(value, name) for name, (key, value) in (old | new).items()}
 
 
+def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
+    limits = ArduCopterLimits.from_vehicle(vehicle)
+    return (
+        Ceiling("max_speed", limits.top_speed, "lean_angle"),
+        Ceiling("max_acceleration", limits.lean, "lean_angle"),
+        Ceiling("max_acceleration", limits.acceleration, "acceleration"),
+    )
+
+
 ARDUCOPTER = VehicleType(
     family=ARDUPILOT,
     kind="copter",
@@ -68,5 +77,6 @@ ARDUCOPTER = VehicleType(
     flight_model=ArduCopter.from_vehicle,
     calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),
+    ceilings=_ceilings,
 )
 """ArduCopter 4.1 and later; measured on 4.7."""

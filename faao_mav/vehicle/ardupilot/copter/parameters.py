@@ -7,6 +7,7 @@ from typing import Self
 
 from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, ParameterValues, table
+from faao_mav.vehicle.vehicle_type import lean_acceleration
 
 
 def _parameter(
@@ -55,8 +56,9 @@ TABLE = table(
 """ArduCopter's parameters. A `corner_acceleration` of 0 stands for twice `acceleration`."""
 
 
-_G = 9.80665
-"""Standard gravity, m/s²."""
+_TOP_SPEEDS = ((30.0, 10.3), (45.0, 15.2))
+"""The largest lean angle, degrees, and the top speed that it gave, m/s. Measured: a quadrotor of
+ArduPilot's simulator."""
 
 _LEAST_INPUT_TIME = 0.1
 """The autopilot's own lower bound of ATC_INPUT_TC, s."""
@@ -119,7 +121,14 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
     @property
     def lean(self) -> float:
         """The acceleration at the largest lean angle, m/s²."""
-        return _G * math.tan(self.lean_angle)
+        return lean_acceleration(self.lean_angle)
+
+    @property
+    def top_speed(self) -> float:
+        """The speed, m/s, at which the drag takes all of `lean`: on the line of `_TOP_SPEEDS`."""
+        (a0, v0), (a1, v1) = _TOP_SPEEDS
+        angle = round(math.degrees(self.lean_angle), 9)
+        return max(v0 + (angle - a0) * (v1 - v0) / (a1 - a0), 0.0)
 
 
 def _metres(latitude: float) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane, ArduPlaneLe
 from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
-from faao_mav.vehicle.vehicle_type import VehicleType
+from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType, lean_acceleration
 
 __all__ = ["ARDUPLANE", "ArduPlane", "ArduPlaneLegs"]
 
@@ -32,6 +32,12 @@ def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # 
     return ArduPlane.from_vehicle(vehicle)
 
 
+def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
+    """A coordinated turn accelerates by what the bank gives; airspeeds have limits of their own."""
+    bank = lean_acceleration(vehicle.value("roll_limit"))
+    return (Ceiling("max_acceleration", bank, "roll_limit"),)
+
+
 ARDUPLANE = VehicleType(
     family=ARDUPILOT,
     kind="plane",
@@ -45,6 +51,7 @@ ARDUPLANE = VehicleType(
     home_outside_fence=HOME_OUTSIDE_FENCE,
     legs=ArduPlaneLegs.from_vehicle,
     flight_model=_model,
+    ceilings=_ceilings,
 )
 """ArduPlane 4.7, by its documents. How it turns and how fast it may fly is tuned on each aircraft:
 no parameters are recommended."""

@@ -1,0 +1,83 @@
+"""Plans beyond what their vehicle flies: what is refused, and what would be accepted."""
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from conftest import MakePlan
+from hypothesis import given
+from hypothesis import strategies as st
+
+from faao_mav.plan import Plan
+from faao_mav.schedule.conversion import beyond_vehicle
+
+COPTERS = st.sampled_from(["ardupilot", "px4"])
+
+
+def limited(small_plan: MakePlan, speed: float, acceleration: float, **vehicle: Any) -> Plan:
+    """Return the small plan with these limits; `keep` its vehicle's parameters."""
+    keep = vehicle.pop("keep", False)
+    plan = small_plan({"mission.parameters": "keep"} if keep else {})
+    vehicle |= {"max_speed": speed, "max_acceleration": acceleration}
+    return replace(plan, vehicle=replace(plan.vehicle, **vehicle))
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "most"),
+    [
+        ({}, (10.3, 5)),
+        ({"keep": True}, (10.3, 2.5)),
+        ({"keep": True, "parameters": {"WPNAV_ACCEL": 700}}, (10.3, 5.6)),  # g tan 30 degrees
+        ({"parameters": {"ANGLE_MAX": 4500}}, (15.2, 5)),
+        ({"parameters": {"ANGLE_MAX": 8000}}, (20, 5)),  # the most that it is told
+        ({"autopilot": "px4"}, (20, 9.8)),
+        ({"autopilot": "px4", "keep": True}, (12, 3)),
+        ({"autopilot": "px4", "parameters": {"MPC_TILTMAX_AIR": 20}}, (17.8, 3.5)),
+        ({"autopilot": "px4", "keep": True, "parameters": {"MPC_XY_VEL_MAX": 9}}, (9, 3)),
+    ],
+)
+def test_what_is_accepted_follows_the_parameters(
+    small_plan: MakePlan, vehicle: dict[str, Any], most: tuple[float, float]
+) -> None:
+    lines = beyond_vehicle(limited(small_plan, 100, 50, **vehicle))
+    assert [re.findall(r"at most (\S+) m/s", line) for line in lines] == [
+        [f"{each:g}"] for each in most
+    ]
+    assert beyond_vehicle(limited(small_plan, *most, **vehicle)) == []
+    assert len(beyond_vehicle(limited(small_plan, most[0], most[1] + 0.11, **vehicle))) == 1
+    assert len(beyond_vehicle(limited(small_plan, most[0] + 0.11, most[1], **vehicle))) == 1
+
+
+def test_the_line_names_what_sets_the_limit(small_plan: MakePlan) -> None:
+    """Also where that is the greatest speed that the vehicle can be told."""
+    (line,) = beyond_vehicle(limited(small_plan, 25, 1, parameters={"ANGLE_MAX": 8000}))
+    assert line == (
+        "plan: vehicle.max_speed: 25 m/s; ArduCopter keeps plans of at most 20 m/s "
+        "(the most that it is told)"
+    )
+    (line,) = beyond_vehicle(limited(small_plan, 13, 1, autopilot="px4", keep=True))
+    assert line.endswith("PX4 keeps plans of at most 12 m/s (MPC_XY_VEL_MAX, its default)")
+
+
+@given(COPTERS, st.booleans(), st.floats(0.2, 300), st.floats(0.2, 90))
+def test_what_is_accepted_is_accepted(
+    small_plan: MakePlan, autopilot: str, keep: bool, speed: float, acceleration: float
+) -> None:
+    wanted = limited(small_plan, speed, acceleration, autopilot=autopilot, keep=keep)
+    accepted = {
+        key: float(most)
+        for line in beyond_vehicle(wanted)
+        for key, most in re.findall(r"vehicle\.(\w+): .* at most (\S+) m/s", line)
+    }
+    assert all(most < getattr(wanted.vehicle, key) for key, most in accepted.items())
+    limits: dict[str, Any] = {**accepted}
+    tamed = replace(wanted.vehicle, **limits)
+    assert beyond_vehicle(replace(wanted, vehicle=tamed)) == []
+
+
+def test_a_plane_turns_no_tighter_than_its_bank_allows(small_plan: MakePlan) -> None:
+    plane = {"type": "plane", "min_speed": 12, "parameters": {"ROLL_LIMIT_DEG": 30}}
+    (line,) = beyond_vehicle(limited(small_plan, 16, 7, **plane))
+    assert line.endswith("ArduPlane keeps plans of at most 5.6 m/s^2 (ROLL_LIMIT_DEG)")
+    assert beyond_vehicle(limited(small_plan, 16, 5.6, **plane)) == []
