@@ -114,3 +114,5 @@ def run() -> None:
         note(f"{where}: cannot be used: {error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is buffered fails no second time
         sys.exit(2)
+    finally:
+        gc.freeze()  # at the end all memory goes: no search for garbage in it

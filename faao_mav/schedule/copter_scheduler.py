@@ -55,8 +55,6 @@ class CopterScheduler(Scheduler):
             best = self.fitted(best.route, top_speed)
         for changes in (self._splits, self._moves):
             for _ in range(_ROUNDS):
-                if best.cost <= ALLOWED_ERROR:
-                    break
                 tried = (self.fitted(route, top_speed) for route in changes(best))
                 good = (each for each in tried if each.cost <= _WORTHWHILE * best.cost)
                 better = next(good, None)

@@ -24,12 +24,12 @@ from faao_mav.schedule.schedule import LATE_WEIGHT, Clock, Schedule
 MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the plan, s
 SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
 
-MOST_FLIGHTS = 6  # of a fit: four in the mean of 270 fits
+MOST_FLIGHTS = 5  # of a fit
 
 _SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
 _STEPS = 8  # the most steps with one flight retimed
-_LEAST_GAIN = 0.05  # the share of the sum of squares that a flight saves for another one to follow
-_WORTH_AGAIN = 0.3  # the share that is to be saved for a second try after a flight that was worse
+_LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
+_WORTH_AGAIN = 0.5  # the share that is to be saved for a second try after a flight that was worse
 _GOOD = 0.4  # the root of the sum of squares, m, that is left as it is
 _SETTLED = 1e-3  # the share of the sum of squares that a step saves for another one to follow
 _MOST_LATE = 5.0  # the lateness, s, beyond which more of it costs no more
