@@ -82,7 +82,7 @@ def mission(plan: Path, environment: dict[str, str]) -> bytes:
         out = Path(folder) / "mission.waypoints"
         program = "from faao_mav.cli.main import run; run()"
         told = subprocess.run(
-            [sys.executable, "-c", program, str(plan), "--out", str(out), "--quiet"],
+            [sys.executable, "-c", program, str(plan), "--out", str(out), "--quiet", "--force"],
             env=os.environ | environment,
             capture_output=True,
             check=False,
