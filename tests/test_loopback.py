@@ -32,7 +32,7 @@ SHORTER: dict[str, Any] = {
     "flight.start": [0, 100],
     "flight.end": [100, 0],
     "flight.altitude": 40,
-    "flight.duration": 30,
+    "flight.duration": 40,
     "flight.time_step": 1,
     "radio.ground_user.position": [120, 120],
     "radio.base_station.power_dbm": 0,

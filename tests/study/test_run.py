@@ -152,7 +152,7 @@ def test_options_go_before_the_plans_study(plan: Path, tmp_path: Path) -> None:
 def test_the_main_job_takes_no_notice_of_a_study(plan: Path, tmp_path: Path) -> None:
     written = []
     for study in ({}, {"study": {"vary": {"flight.duration": [20]}, "seeds": 3}}):
-        plan.write_text(edited(QUICK, study))
+        plan.write_text(edited(QUICK, {"vehicle.max_speed": 10} | study))
         out = tmp_path / "m.waypoints"
         result = CliRunner().invoke(app, [str(plan), "--out", str(out), "--quiet"])
         assert result.exit_code == 0, result.output
