@@ -1,15 +1,14 @@
 """A PX4 multicopter as a flight model."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.flight_path import FlightPath, Flown
 from faao_mav.vehicle.px4.parameters import Px4Limits
-from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, FlightLog, Simulation
+from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, FlightLog, simulate
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +23,6 @@ class Px4(Px4Limits):
     SI: m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
     """
 
-    _simulations: list[Simulation] = field(
-        default_factory=list, init=False, repr=False, compare=False
-    )
-    """The last one: flights along the same points come one after the other."""
-
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
 
@@ -40,19 +34,19 @@ class Px4(Px4Limits):
         speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
         holds = path.holds + path.delays
         if len(path.points) == 1:
-            return _standing(path.points[0], holds, step)[0]
+            return _standing(path.points[0], float(holds[0]), step)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
-        simulation = Simulation(self, path.points, radii)
-        logs = simulation.fly(np.minimum(speeds, self.max_speed)[None], holds[None], beyond=step)
-        return sampled(logs, path.points[0, 2], step)[0]
+        speeds = np.minimum(speeds, self.max_speed)
+        log = simulate(self, path.points, radii, speeds, holds, beyond=step)
+        return sampled(log, path.points[0, 2], step)
 
 
-def _standing(point: Real, holds: Real, step: float) -> list[Flown]:
-    """Return what becomes of a path of one point (3,): `holds` (B,) s there."""
-    ends = np.where(holds > 0, holds + SWITCH_DELAY, 0.0)
-    t = grid(float(ends.max()), step)
+def _standing(point: Real, hold: float, step: float) -> Flown:
+    """Return what becomes of a path of one point (3,): `hold` s there."""
+    end = hold + SWITCH_DELAY if hold > 0 else 0.0
+    t = grid(end, step)
     position = np.tile(point, (len(t), 1))
-    return [Flown(np.zeros(1), end, t, position, np.zeros_like(position)) for end in ends[:, None]]
+    return Flown(np.zeros(1), np.array([end]), t, position, np.zeros_like(position))
 
 
 def grid(end: float, step: float) -> Real:
@@ -60,20 +54,17 @@ def grid(end: float, step: float) -> Real:
     return np.arange(math.ceil(end / step - 1e-9) + 1, dtype=float) * step
 
 
-def sampled(logs: Sequence[FlightLog], height: float, step: float) -> list[Flown]:
-    """Return the flights of `logs` every `step` seconds up to the latest end.
+def sampled(log: FlightLog, height: float, step: float) -> Flown:
+    """Return the flight of `log` every `step` seconds up to its end.
 
     `height` m is that of a path that does not climb.
     """
-    t = grid(max(float(log.departures[-1]) for log in logs), step)
-    flights = []
-    for log in logs:
-        place, velocity = _between(t, log.time, log.motion)
-        if place.shape[1] == 2:
-            place = np.column_stack([place, np.full(len(t), height)])
-            velocity = np.column_stack([velocity, np.zeros(len(t))])
-        flights.append(Flown(log.arrivals, log.departures, t, place, velocity))
-    return flights
+    t = grid(float(log.departures[-1]), step)
+    place, velocity = _between(t, log.time, log.motion)
+    if place.shape[1] == 2:
+        place = np.column_stack([place, np.full(len(t), height)])
+        velocity = np.column_stack([velocity, np.zeros(len(t))])
+    return Flown(log.arrivals, log.departures, t, place, velocity)
 
 
 def _between(t: Real, time: Real, motion: Real) -> tuple[Real, Real]:

@@ -1,9 +1,8 @@
-"""Flying variants of one path, leg by leg."""
+"""Flying a path, leg by leg."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
-from typing import TypeAlias
 
 import numpy as np
 
@@ -27,12 +26,6 @@ flights."""
 _SETTLED = 2e-3
 """The speed, m/s, below which a holding aircraft is taken to stand. Chosen; what a change costs is
 not measured."""
-
-_ALIKE = 3e-4
-"""States that differ by less, m, m/s, m/s², are taken to be the same.
-
-Variants of a flight take some 20 s to move alike again; ten times less would take 10 s more.
-"""
 
 _STEADY = 1e-5
 """The deviation of a velocity, m/s, below which it is taken to stay as it is along a leg: a few
@@ -77,91 +70,32 @@ class FlightLog:
     motion: Real
 
 
-_Entered: TypeAlias = dict[GuidedLeg, list[tuple[FlightState, FlownLeg]]]
-"""The legs that variants have flown, with the states in which they were entered."""
+def simulate(
+    limits: Px4Limits, points: Real, radii: Real, speeds: Real, holds: Real, beyond: float
+) -> FlightLog:
+    """Return the flight along `points` (m, 3), m >= 2, and on for `beyond` s after its end.
 
-
-class Simulation:
-    """Flights of variants of the path through `points` (m, 3), m >= 2, with `radii` (m,).
-
-    A leg that is entered as it was before, with the same command, is flown as it was before. So
-    variants that differ by one speed or hold are flown from there only, and until they move as if
-    it had not changed. From one call of `fly` to the next only legs that are entered in exactly the
-    same state are remembered: what is flown does not depend on what was flown before.
+    `radii` (m,) m, `speeds` (m - 1,) m/s, `holds` (m,) s.
     """
-
-    def __init__(self, limits: Px4Limits, points: Real, radii: Real) -> None:
-        self._limits, self._points = limits, points
-        self._radii = np.maximum(radii, _NEAREST).tolist()
-        self._known: dict[tuple[GuidedLeg, FlightState], FlownLeg] = {}
-
-    def leads_along(self, points: Real, radii: Real) -> bool:
-        """Tell whether these are the points and radii."""
-        return np.array_equal(points, self._points) and np.array_equal(
-            np.maximum(radii, _NEAREST), self._radii
-        )
-
-    def fly(self, speeds: Real, holds: Real, beyond: float) -> list[FlightLog]:
-        """Fly every variant until the last one has ended, and on for `beyond` seconds.
-
-        `speeds` are (B, m - 1), `holds` (B, m).
-        """
-        starts = np.where(holds[:, 0] > 0, holds[:, 0] + SWITCH_DELAY, 0.0).tolist()
-        routes = [
-            legs(self._limits, self._points, self._radii, speed, hold)
-            for speed, hold in zip(speeds.tolist(), holds.tolist(), strict=True)
-        ]
-        alike: _Entered = {}
-        flights = [self._flight(route, alike) for route in routes]
-        ends = [
-            start + START_LAG + sum(stretch.departure for stretch in flight)
-            for start, flight in zip(starts, flights, strict=True)
-        ]
-        last = max(ends) + beyond
-        logs = []
-        for start, route, flight, end in zip(starts, routes, flights, ends, strict=True):
-            after = _stay(self._limits, route[-1], flight[-1].end, last - end)
-            logs.append(self._log(start, [*flight, after]))
-        return logs
-
-    def _start(self) -> FlightState:
-        east, north, up = self._points[0].tolist()
-        return at_rest(complex(east, north), up if np.ptp(self._points[:, 2]) > 0 else None)
-
-    def _flight(self, route: list[GuidedLeg], alike: _Entered) -> list[FlownLeg]:
-        state, result = self._start(), []
-        for leg in route:
-            flown = alike.setdefault(leg, [])
-            stretch = next((after for before, after in flown if _alike(before, state)), None)
-            if stretch is None:
-                if (stretch := self._known.get((leg, state))) is None:
-                    stretch = self._known[leg, state] = _fly(self._limits, leg, state)
-                flown.append((state, stretch))
-            result.append(stretch)
-            state = stretch.end
-        return result
-
-    def _log(self, start: float, stretches: list[FlownLeg]) -> FlightLog:
-        moving = start + START_LAG
-        begun = moving + np.cumsum([0.0] + [stretch.departure for stretch in stretches[:-1]])
-        arrivals = [stretch.arrival for stretch in stretches[:-1]]
-        times = [at + stretch.time for at, stretch in zip(begun, stretches, strict=True)]
-        return FlightLog(
-            np.concatenate([[0.0], begun[:-1] + arrivals]),
-            np.concatenate([[start], begun[1:]]),
-            np.concatenate([[moving], *times]),
-            np.concatenate([_motion([self._start()]), *(each.motion for each in stretches)]),
-        )
-
-
-def _alike(one: FlightState, other: FlightState) -> bool:
-    if abs(one.remembered - other.remembered) > _ALIKE:
-        return False
-    if one.climb is not None and other.climb is not None:
-        pairs = zip(one.level + one.climb, other.level + other.climb, strict=True)
-    else:
-        pairs = zip(one.level, other.level, strict=True)
-    return all(abs(mine - yours) <= _ALIKE for mine, yours in pairs)
+    radii = np.maximum(radii, _NEAREST)
+    route = legs(limits, points, radii.tolist(), speeds.tolist(), holds.tolist())
+    east, north, up = points[0].tolist()
+    first = at_rest(complex(east, north), up if np.ptp(points[:, 2]) > 0 else None)
+    flown, state = list[FlownLeg](), first
+    for leg in route:
+        flown.append(_fly(limits, leg, state))
+        state = flown[-1].end
+    flown.append(_stay(limits, route[-1], state, beyond))
+    start = float(holds[0]) + SWITCH_DELAY if holds[0] > 0 else 0.0
+    moving = start + START_LAG
+    begun = moving + np.cumsum([0.0] + [each.departure for each in flown[:-1]])
+    times = [at + each.time for at, each in zip(begun, flown, strict=True)]
+    return FlightLog(
+        np.concatenate([[0.0], begun[:-1] + [each.arrival for each in flown[:-1]]]),
+        np.concatenate([[start], begun[1:]]),
+        np.concatenate([[moving], *times]),
+        np.concatenate([_motion([first]), *(each.motion for each in flown)]),
+    )
 
 
 def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
