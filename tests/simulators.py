@@ -1,14 +1,17 @@
 """Real autopilots in their simulators, on the loopback interface, for tests and benchmarks."""
 
+import os
+import shlex
 import shutil
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from random import SystemRandom
+from typing import TypeAlias
 
 from conftest import free_port
 
@@ -22,6 +25,21 @@ _MODELS = {"arducopter": ("+", "copter.parm"), "arduplane": ("plane", "plane.par
 """ArduPilot's programs: the simulated airframe, and the file with its parameters."""
 
 KINDS = (*_MODELS, "px4")
+
+Running: TypeAlias = tuple[str, Callable[[], None]]
+"""Where an autopilot is heard, and what reboots it."""
+
+_RESPAWN = """#!/bin/sh
+trap 'kill "$child"; exit' TERM
+while :; do
+    {program} "$@" &
+    child=$!
+    echo "$child" > {pid}
+    wait "$child"
+    [ $? -eq 137 ] || exit
+done
+"""
+"""What PX4's runner runs for PX4: it starts it again whenever it is killed."""
 
 
 def usable(named: Path, where: Path) -> Path:
@@ -52,27 +70,55 @@ def simulated(
     what ArduPilot stores. `options` go to ArduPilot's program or PX4's runner. A `bare` ArduPilot
     has its program's own defaults, with which it does not fly, instead of its simulator's.
     """
-    if kind == "px4":
-        with _px4(autopilots / "fly_px4.py", options) as port:
-            yield f"udpin:127.0.0.1:{port}"
-    else:
-        model, parameters = _MODELS[kind]
-        if not bare:
-            options = ("--defaults", str(autopilots / "ardupilot" / parameters), *options)
-        program = autopilots / "ardupilot" / kind
-        with _ardupilot(program, where, ("--model", model, *options)) as port:
-            yield f"udpin:127.0.0.1:{port}"
+    if kind != "px4" and not bare:
+        parameters = autopilots / "ardupilot" / _MODELS[kind][1]
+        options = ("--defaults", str(parameters), *options)
+    start = _px4 if kind == "px4" else _ardupilot
+    with start(autopilots, kind, where, options) as (connection, _):
+        yield connection
 
 
 @contextmanager
-def _ardupilot(program: Path, where: Path, options: Sequence[str]) -> Iterator[int]:
+def rebootable(autopilots: Path, kind: str, where: Path) -> Iterator[Running]:
+    """Run an autopilot as `simulated` does, and yield what cuts its power too.
+
+    It boots again at once, with what it has stored.
+    """
+    if kind == "px4":
+        program, respawn, pid = autopilots / "px4/bin/px4", where / "respawn", where / "pid"
+        quoted = {"program": shlex.quote(str(program)), "pid": shlex.quote(str(pid))}
+        respawn.write_text(_RESPAWN.format(**quoted))
+        respawn.chmod(0o700)
+        with _px4(autopilots, kind, where, ("--binary", str(respawn))) as (connection, _):
+            yield connection, lambda: os.kill(int(pid.read_text()), signal.SIGKILL)
+    else:
+        parameters = autopilots / "ardupilot" / _MODELS[kind][1]
+        with _ardupilot(autopilots, kind, where, ("--defaults", str(parameters))) as running:
+            yield running
+
+
+@contextmanager
+def _ardupilot(
+    autopilots: Path, kind: str, where: Path, options: Sequence[str]
+) -> Iterator[Running]:
     port = free_port()
-    command = [str(program), "--home", f"{HOME},0", "-I", str(_free_instance()), "--sysid", "1"]
-    command += ["--serial0", f"udpclient:127.0.0.1:{port}", "-w", *options]
-    quiet = subprocess.DEVNULL
-    process = subprocess.Popen(command, cwd=where, stdout=quiet, stderr=quiet)
+    command = [str(autopilots / "ardupilot" / kind), "--model", _MODELS[kind][0], *options]
+    command += ["--home", f"{HOME},0", "-I", str(_free_instance()), "--sysid", "1"]
+    command += ["--serial0", f"udpclient:127.0.0.1:{port}"]
+
+    def start(*wiping: str) -> subprocess.Popen[bytes]:
+        quiet = subprocess.DEVNULL
+        return subprocess.Popen([*command, *wiping], cwd=where, stdout=quiet, stderr=quiet)
+
+    def reboot() -> None:
+        nonlocal process
+        process.kill()
+        process.wait()
+        process = start()
+
+    process = start("-w")
     try:
-        yield port
+        yield f"udpin:127.0.0.1:{port}", reboot
     finally:
         process.kill()
         process.wait()
@@ -92,15 +138,20 @@ def _free_instance() -> int:
 
 
 @contextmanager
-def _px4(runner: Path, options: Sequence[str]) -> Iterator[int]:
-    port = free_port()
-    command = [sys.executable, str(runner), "--serve", f"--home={HOME}", "--gcs-port", str(port)]
+def _px4(
+    autopilots: Path,
+    kind: str,
+    where: Path,
+    options: Sequence[str],
+) -> Iterator[Running]:
+    port, runner = free_port(), str(autopilots / "fly_px4.py")
+    command = [sys.executable, runner, "--serve", f"--home={HOME}", "--gcs-port", str(port)]
     for _ in range(PX4_STARTS):
         process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
         try:
             assert process.stdout is not None
             if any(line.startswith("READY") for line in process.stdout):
-                yield port
+                yield f"udpin:127.0.0.1:{port}", lambda: None
                 return
         finally:
             process.send_signal(signal.SIGTERM)

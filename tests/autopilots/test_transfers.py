@@ -1,13 +1,14 @@
 """Verified uploads to the real autopilots, over links that lose, repeat, delay and disorder."""
 
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
-from simulators import KINDS, simulated
+from simulators import KINDS, rebootable, simulated
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
 from stations import FENCE, RALLY, a_mission, signing_key
@@ -80,6 +81,28 @@ def test_signed(autopilots: Path, tmp_path: Path) -> None:
         assert upload(MISSION, connection, wait=PATIENCE, signing_key=right).problems == ()
         with pytest.raises(LinkError):
             upload(MISSION, connection, wait=3, signing_key=wrong)
+
+
+@pytest.mark.parametrize("moment", ["uploading", "reading"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_reboot_in_the_middle(kind: str, moment: str, autopilots: Path, tmp_path: Path) -> None:
+    """The power goes while a mission replaces another: what is said of it afterwards is true."""
+    old, new = a_mission(150, shift=0.01), a_mission(200)
+    with rebootable(autopilots, kind, tmp_path) as (connection, reboot):
+        assert upload(old, connection, wait=PATIENCE).problems == ()
+        rebooted = threading.Thread(target=reboot)
+
+        def observe(what: str, done: int, total: int) -> None:
+            if what.startswith(moment) and done >= 50 and rebooted.ident is None:
+                rebooted.start()
+
+        report = upload(new, connection, wait=PATIENCE, observe=observe)
+        rebooted.join()
+        found = download(connection, wait=PATIENCE)
+        held = [places(item) for item in found.items]
+        wanted = [places(item) for item in new.items]
+        assert (held == wanted) if report.verified else report.problems
+        assert upload(new, connection, wait=PATIENCE).problems == ()
 
 
 def places(item: MissionItem) -> tuple[int, float, float, float]:

@@ -290,7 +290,7 @@ def test_a_refusal_is_final_at_any_moment(firmware: str, result: MavResult, requ
     desk.tell(ack(result))
     desk.tell(Statustext(4, "because"))
     assert desk.tell(request(0)) == []
-    desk.wait(0.5)
+    desk.wait(2.0)
     outcome = desk.machine.outcome
     assert (outcome.status, outcome.result, outcome.said) == ("refused", result, ("because",))
     assert outcome.last_requested == (requests - 1 if requests else None)
@@ -341,11 +341,40 @@ def test_no_space_while_booting_means_not_yet() -> None:
     desk.tell(Heartbeat(2, 3, 0, 0, 2))
     assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(VEHICLE, 0, 3)]
     desk.tell(ack(MavResult.NO_SPACE))
-    desk.wait(0.5)
+    desk.wait(1.5)
     assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
         "refused",
         MavResult.NO_SPACE,
     )
+
+
+def test_a_reboot_in_the_middle_begins_anew_when_the_vehicle_is_ready() -> None:
+    """A real ArduCopter, 50 ms after its power was cut: UNSUPPORTED, and CALIBRATING later."""
+    desk = desk_for("ardupilot")
+    desk.tell(request(0))
+    desk.tell(ack(MavResult.UNSUPPORTED))
+    assert desk.wait(1.0) == []
+    for state in (2, 2):
+        desk.tell(Heartbeat(2, 3, 0, 0, state))
+        desk.tell(ack(MavResult.UNSUPPORTED))
+        assert desk.wait(1.0) == []
+    assert desk.tell(Heartbeat(2, 3, 0, 0, 3)) == [MissionCount(VEHICLE, 0, 3)]
+    for seq in range(3):
+        assert [message.seq for message in desk.tell(request(seq))] == [seq]
+    desk.tell(ack(MavResult.ACCEPTED))
+    assert desk.machine.outcome.status == "accepted"
+
+
+@pytest.mark.parametrize("heard", [True, False])
+def test_a_refusal_by_a_vehicle_that_is_ready_is_final(heard: bool) -> None:
+    desk = desk_for("ardupilot")
+    desk.tell(request(0))
+    desk.tell(ack(MavResult.UNSUPPORTED))
+    if heard:
+        desk.tell(Heartbeat(2, 3, 0, 0, 3))
+    desk.wait(0.4 if heard else 2.0)
+    assert desk.machine.outcome.status == "refused"
+    assert desk.machine.outcome.last_requested == 0
 
 
 def test_denied_about_a_late_request_of_a_download_ends_nothing() -> None:

@@ -24,6 +24,13 @@ _REASONS = 0.3
 """Seconds to wait after a refusal for the status text that gives the reason: chosen, above what
 ArduPilot and PX4 took in simulation."""
 
+_HEARTBEAT = 1.5
+"""Seconds after a refusal within which a heartbeat tells whether the vehicle has rebooted: vehicles
+send one a second; a rebooting ArduCopter's came 0.96 s after it had refused."""
+
+_NOT_YET = frozenset({MavResult.NO_SPACE, MavResult.UNSUPPORTED})
+"""What ArduPilot answers while it boots: before it has storage, and before it knows missions."""
+
 _AHEAD = 3
 """Items that are sent beyond the one that was asked for, at most: chosen; each costs a packet for
 each repetition."""
@@ -51,7 +58,8 @@ class Upload(Exchange):
       (`MissionItemProtocol::handle_mission_item`): it is sent the same again, and if it says so
       the next one. Neither is sent more than three items ahead, and never the last one unasked:
       that it is asked for shows that the vehicle has the others. Other autopilots lead alone.
-    - NO_SPACE from an ArduPilot that is still booting means "not yet".
+    - NO_SPACE or UNSUPPORTED from an ArduPilot that boots means "not yet". UNSUPPORTED is what it
+      says right after a reboot in the middle: the next heartbeat is waited for to tell.
 
     Raises `InputError` without items: an empty list is what `Clear` is for.
     """
@@ -94,8 +102,18 @@ class Upload(Exchange):
 
     def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> Sequence[Message]:
         self._booting = heartbeat.system_status < MavState.STANDBY
-        ready = self._phase == "booting" and not self._booting
-        return self.start(now) if ready else ()
+        if self._phase == "booting" and not self._booting:
+            return self.start(now)
+        if self._phase == "refused" and self._booting and self._result == MavResult.UNSUPPORTED:
+            self._wait_for_boot(now)
+        elif self._phase == "refused":
+            self._due = min(self._due, now + _REASONS)
+        return ()
+
+    def _wait_for_boot(self, now: float) -> None:
+        self._phase = "booting"
+        self._budget.allow_boot()
+        self._due = now + self._timeouts.boot
 
     def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         match message:
@@ -156,15 +174,14 @@ class Upload(Exchange):
             if self._phase == "items":
                 soon = 2 * self._timeouts.item
                 self._due = now + (soon if self._all_sent() else self._timeouts.response)
-        elif result == MavResult.NO_SPACE and self._booting:
-            self._phase, self._result = "booting", result
-            self._budget.allow_boot()
-            self._due = now + self._timeouts.boot
+        elif result in _NOT_YET and self._booting:
+            self._result = result
+            self._wait_for_boot(now)
         elif result == MavResult.OPERATION_CANCELLED:
             self._end("cancelled", result)
         else:
             self._phase, self._result = "refused", result
-            self._due = now + _REASONS
+            self._due = now + (_HEARTBEAT if result == MavResult.UNSUPPORTED else _REASONS)
         return ()
 
     def _on_invalid_sequence(self, now: float) -> Sequence[Message]:
