@@ -110,13 +110,14 @@ def _ardupilot(
         quiet = subprocess.DEVNULL
         return subprocess.Popen([*command, *wiping], cwd=where, stdout=quiet, stderr=quiet)
 
+    process = start("-w")
+
     def reboot() -> None:
         nonlocal process
         process.kill()
         process.wait()
         process = start()
 
-    process = start("-w")
     try:
         yield f"udpin:127.0.0.1:{port}", reboot
     finally:
