@@ -18,10 +18,10 @@ from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.vehicle.flight_path import FlightPath, Track
 from faao_mav.vehicle.vehicle import Vehicle
 
-LONGEST, LONGEST_COPTER = 21_600.0, 7_200.0
+LONGEST, LONGEST_COPTER = 21_600.0, 5_400.0
 """The longest flights that are followed, s: of planes, and of what can hover. Chosen: fuzzing took
 one of almost a day beyond 500 MB of memory, which six hours stay below; few copters can stay up for
-two, in which the model of PX4 takes 72,000 steps and 4 s of processor time."""
+1.5, in which the model of PX4 takes 54,000 steps and 3 to 4 s of processor time."""
 
 _MOST_STEPS = 2000
 """The largest number of items that are flown, repeats by DO_JUMP included. Chosen: a few seconds of
@@ -49,7 +49,7 @@ def predict(
 
     Raises `InputError` for places that cannot be flown to (NaN, altitudes above sea level
     without a home), parameters that are useless, or a flight that takes more than
-    two hours, of a plane more than six.
+    1.5 hours, of a plane more than six.
     """
     start = _start(mission)
     if start is None:

@@ -162,3 +162,11 @@ def test_a_link_is_never_flooded(least: float, jitter: float, loss: float, seed:
         puts += asker.ask(least * (1 + jitter * random.random()), lost)
         needed += 1 + lost
     assert puts <= 1.1 * needed + 10
+
+
+def test_what_an_earlier_transfer_measured_holds_from_the_first_question() -> None:
+    earlier = settled(0.03)
+    later = Pace(TIMES, before=earlier.pace)
+    assert later.wait == earlier.pace.wait < TIMES.item
+    assert not later.is_doubtful
+    assert Pace(TIMES, before=Pace(TIMES)).wait == TIMES.item

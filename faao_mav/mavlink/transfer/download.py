@@ -49,6 +49,8 @@ class Download(Exchange):
       before, as links repeat packets too.
     - After `Timeouts.silence`, or another refusal, it begins anew, `Timeouts.attempts` times.
       UNSUPPORTED changes to MISSION_REQUEST, once.
+
+    How long answers take is known from the pace of an upload `before`.
     """
 
     writes = False
@@ -59,6 +61,7 @@ class Download(Exchange):
         mission_type: MissionType = MissionType.MISSION,
         timeouts: Timeouts | None = None,
         budget: Budget | None = None,
+        before: Pace | None = None,
     ) -> None:
         super().__init__(peer, mission_type, timeouts, budget)
         self._attempts_done = 0
@@ -70,7 +73,7 @@ class Download(Exchange):
         self._next_sequence = 0
         self._presumed_lost: set[int] = set()
         self._in_order = True
-        self._pace = Pace(self._timeouts)
+        self._pace = Pace(self._timeouts, before=before)
         self._last_progress = 0.0
         # Transfers that late packets ended, requests in vain since the last sign of that, the
         # answers to the last item's request that may still come, and when it was sent last.

@@ -113,13 +113,20 @@ class Pace:
       question is answered at once (RFC 8961, 4).
     - An answer that comes twice tells it sooner: its question was repeated in vain, so that the
       first answer was to the first asking, and is measured after all (RFC 3708).
+
+    What was measured `before`, in another transfer over the link, holds until something else is.
     """
 
-    def __init__(self, timeouts: Timeouts, request_period: float = math.inf) -> None:
-        self.wait = timeouts.item
+    def __init__(
+        self,
+        timeouts: Timeouts,
+        request_period: float = math.inf,
+        before: "Pace | None" = None,
+    ) -> None:
         self._timeouts, self._request_period = timeouts, request_period
-        self._mean: float | None = None
-        self._deviation = 0.0
+        self._mean: float | None = None if before is None else before._mean
+        self._deviation: float = 0.0 if before is None else before._deviation
+        self.wait = timeouts.item if self._mean is None else self._shortest_wait()
         self._ambiguous_time: float | None = None
         self._ambiguous_in_a_row = 0
 

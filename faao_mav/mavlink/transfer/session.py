@@ -137,10 +137,11 @@ def _upload_part(
     """Return what became of a list, and whether the vehicle was armed when it was read back."""
     number, budget = _own_items(part, items, peer), Budget(timeouts)
     for attempt in range(1, timeouts.attempts + 1):
-        sent = yield Upload(items, peer, part, timeouts, budget)
+        uploading = Upload(items, peer, part, timeouts, budget)
+        sent = yield uploading
         report, armed, stop = _failed(part, number, sent, attempt), sent.armed, _is_final(sent)
         if sent.status in ("accepted", "unknown"):
-            read = yield Download(peer, part, timeouts, budget)
+            read = yield Download(peer, part, timeouts, budget, uploading.pace)
             armed, stop = armed or read.armed, _is_final(read)
             if read.status == "accepted":
                 differences = compare(items, read.items, part, peer.vehicle)

@@ -82,7 +82,7 @@ class Upload(Exchange):
         # The item asked for last, the items sent beyond it, and how many those may be.
         self._last_requested, self._ahead = -1, 0
         self._most_ahead, self._sent_unasked = _AHEAD, False
-        self._pace = Pace(self._timeouts, self._manners.request_period)
+        self.pace = Pace(self._timeouts, self._manners.request_period)
         self._unanswered = Question(0.0, 0.0)
         self._last_progress = 0.0
 
@@ -147,8 +147,8 @@ class Upload(Exchange):
             self._unanswered.send_again(now)
         else:
             if self._last_requested >= 0:
-                self._pace.answer(self._unanswered, now)
-            self._unanswered = self._pace.ask(now)
+                self.pace.answer(self._unanswered, now)
+            self._unanswered = self.pace.ask(now)
         self._last_requested, self._ahead, self._sent_unasked = seq, 0, False
         self._phase, self._last_progress, self._result = "items", now, None
         self._retries_done = 0
@@ -156,7 +156,7 @@ class Upload(Exchange):
         if self._all_sent():
             self._due = now + self._reminder_wait()
         elif self._may_repeat():
-            self._due = now + self._pace.wait
+            self._due = now + self.pace.wait
         else:
             self._due = now + self._timeouts.silence
         return [item]
@@ -188,22 +188,22 @@ class Upload(Exchange):
         if self._all_sent() and self._retries_done > 0:
             return [self._item(len(self._items) - 1)]
         if self._unanswered.repeats == 0:
-            self._pace.answer_again()
+            self.pace.answer_again()
             return ()
         if self._ahead == self._room():
             return ()
-        self._pace.answer(self._unanswered, now)
-        self._unanswered = self._pace.ask(now)
+        self.pace.answer(self._unanswered, now)
+        self._unanswered = self.pace.ask(now)
         self._ahead += 1
-        self._last_progress, self._due = now, now + self._pace.wait
+        self._last_progress, self._due = now, now + self.pace.wait
         return [self._item(self._current)]
 
     def _time_out_items(self, now: float) -> Sequence[Message]:
         if not self._all_sent():
             quiet = now - self._last_progress >= self._timeouts.silence
             if self._may_repeat() and not quiet and self._result is None:
-                self._pace.repeat(self._unanswered, now)
-                self._due = now + self._pace.wait
+                self.pace.repeat(self._unanswered, now)
+                self._due = now + self.pace.wait
                 return self._repetition()
             cancel = self._peer.ack(MavResult.OPERATION_CANCELLED, self._type)
             return [cancel, *self._give_up(now)]
@@ -257,7 +257,7 @@ class Upload(Exchange):
         """Return how long to wait for the last acknowledgement, before and after a reminder, s."""
         if self._reminder() is None:
             return 2 * self._timeouts.response
-        first = max(self._timeouts.item, self._pace.wait)
+        first = max(self._timeouts.item, self.pace.wait)
         return min(first * 2.0**self._retries_done, self._timeouts.response)
 
     def _item(self, seq: int) -> Message:
