@@ -27,7 +27,7 @@ from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
-from faao_mav.optimizer.search.multistart import improve_starts
+from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
@@ -59,8 +59,9 @@ up to the tolerance and to rounding, so that it differs from machine to machine.
 def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """Optimise trajectory and precoders of `problem` together.
 
-    The starts of `optimizer.starts` are improved roughly, the best of them to the end. The result
-    is never worse than any start. Raises `InfeasibleError` when there is no flight at all.
+    The starts of `optimizer.starts` are improved roughly where there are several, and the best of
+    them to the end. The result is never worse than any start. Raises `InfeasibleError` when there
+    is no flight at all.
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     scheme = design(problem.plan)
@@ -84,14 +85,12 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     if before is not None:
         routes[CUTOFF] = before.trajectory
     tell(1, "the starts", 0.0)
-    rough = improve_starts(
-        kin,
-        field,
-        routes,
-        tolerance=_ROUGH,
-        max_iterations=steps,
-        relay=relay,
-    )
+    if len(routes) > 1:
+        rough = improve_starts(
+            kin, field, routes, tolerance=_ROUGH, max_iterations=steps, relay=relay
+        )
+    else:  # a single start needs no comparison
+        rough = ImprovedStarts(routes, list(routes))
     flights = [*routes.values(), *rough.flights.values()]
     rates = field.value(np.stack([flight.w.T for flight in flights], axis=1))
     values = objectives(rates, kin, relay)

@@ -92,11 +92,10 @@ class Queue(Constraint):
 
     def begin(self, flight: ScaledFlight, start: Start) -> "QueueState":  # noqa: ARG002
         """Return the state at `start`: what is forwarded greedily there, and slacks widened."""
-        values = self.rewards.values
-        unit = self.rewards.unit
-        I_U, I_G = values.value / unit
+        scaled = self.rewards.in_units(self.rewards.values)
+        I_U, I_G = scaled.value
         x = np.full(I_U.shape, 0.5 if self.half else 1.0)
-        most = self.buffer / unit
+        most = self.buffer / self.rewards.unit
         relayed = [
             forward_greedily(arriving, leaving, float(room[0]))
             for arriving, leaving, room in zip(
@@ -115,10 +114,10 @@ class Queue(Constraint):
         if math.isfinite(self.buffer):
             on.append(inner)
         ones = np.stack(on)
-        scaled = _scaled(values, unit)
         state = QueueState(
-            ones, ones, ones, ones, self, start.own, unit, most, *scaled, r, f, q, 0.5 * outer, x
-        )
+            ones, ones, ones, ones, self, start.own, most,
+            scaled.value, scaled.gradient, scaled.hessian, r, f, q, 0.5 * outer, x,
+        )  # fmt: skip
         functions = state.functions()
         s = np.where(state.on > 0, functions + 2 * start.mu, 1.0)
         state = replace(state, s=s, margin=np.where(state.on > 0, s - functions, 0.0))
@@ -135,13 +134,12 @@ class QueueState(Slacks):
 
     Those on x only with shares, the last only with a buffer. `margin` is by how much a slack is
     larger than its function. `values` (2, flights, n), `gradients` (2, 2, flights, n) and
-    `hessians` (3, 2, flights, n) are those of both rates in `unit` (flights, 1), and r, f, q, x
-    too; `most` (flights, 1) is the buffer. p is the worth of what is received.
+    `hessians` (3, 2, flights, n) are those of both rates in the unit of the rewards, and r, f, q
+    and `most` (flights, 1), the buffer, too. p is the worth of what is received, x the shares.
     """
 
     constraint: Queue
     own: slice
-    unit: Real
     most: Real
     values: Real
     gradients: Real
@@ -249,27 +247,45 @@ class QueueState(Slacks):
             curvature=-(weighted * self.hessians).sum(axis=1),
         )
 
+    def _eliminated(
+        self, m: Any, t: Any, p: Any, left: Any, risen: Any, dx: Any, dq: Any
+    ) -> tuple[Real, Real, Real, Real]:
+        """Return ds, the new z, and the changes of r and f, which the system leaves out.
+
+        `m` are the margins, `t` the targets, `p` the worth of what is received and `left` 1 - p,
+        `risen` (2, flights, n) the linear changes of both rates; 0 for what has no part.
+        """
+        slot, (outer, inner) = self.slot, self.on[:2]
+        ds, z = np.zeros_like(self.s), np.zeros_like(self.s)
+        ds[0] = slot.loose_r * (t[0] - p)
+        apart = risen[1] - m[1] - dq + m[2]
+        exchanged = slot.by_q * t[1] - slot.by_G * t[2] - slot.series * apart
+        loose = slot.loose_f * (left - t[1] - t[2])
+        ds[1], ds[2] = slot.by_q * apart - loose, -slot.by_G * apart - loose
+        if self.constraint.half:
+            ds[3], ds[4] = dx - m[3], -dx - m[4]
+        if math.isfinite(self.constraint.buffer):
+            ds[-1] = -inner * dq - m[-1]
+        z[0], z[1], z[2] = p, slot.by_G * left + exchanged, slot.by_q * left - exchanged
+        z[3:] = t[3:] - slot.k[3:] * ds[3:]
+        dr = outer * (risen[0] - m[0] - ds[0])
+        df = inner * (loose + slot.by_G * (risen[1] - m[1]) + slot.by_q * (dq - m[2]))
+        return ds, z, dr, df
+
     def push(self, target: Real | None) -> Forces:
         """Return the forces and right-hand sides without a target, or what `target` adds."""
-        slot, half = self.slot, self.constraint.half
-        bounded = math.isfinite(self.constraint.buffer)
-        outer, inner = self.on[:2]
+        none = np.zeros_like(self.s)
         if target is None:
-            m = self.margin
-            apart = slot.series * (m[1] - m[2])
-            z_G, z_q = slot.by_G + apart, slot.by_q - apart
-            raised = slot.k * m
-            on_p = self._missed() - m[0] + slot.by_G * m[1] + slot.by_q * m[2] - slot.loose_f
+            _, z, dr, df = self._eliminated(self.margin, none, 0.0, 1.0, none, 0.0, 0.0)
+            dr = dr + self._missed()
         else:
-            raised = t = target
-            z_G = slot.by_q * t[1] - slot.by_G * t[2]
-            z_q = -z_G
-            on_p = slot.loose_f * (t[1] + t[2]) - slot.loose_r * t[0]
-        on_q = inner * (z_q - raised[-1] if bounded else z_q)
-        own = [on_q, outer * on_p]
-        if half:
-            own.insert(0, -self.values[1] * z_G + raised[3] - raised[4])
-        return Forces(w=slot.gradients[:, 1] * z_G, own=np.stack(own, axis=-1))
+            _, z, dr, df = self._eliminated(none, target, 0.0, 0.0, none, 0.0, 0.0)
+        outer, inner = self.on[:2]
+        on_q = z[2] - z[-1] if math.isfinite(self.constraint.buffer) else z[2]
+        own = [inner * on_q, outer * (dr - df)]
+        if self.constraint.half:
+            own.insert(0, z[3] - z[4] - self.values[1] * z[1])
+        return Forces(w=self.slot.gradients[:, 1] * z[1], own=np.stack(own, axis=-1))
 
     def target(self, mu: Real, ahead: Any, share: Real) -> Real:
         """Return (mu - ds dz) / s at `share` of the step `ahead`."""
@@ -277,30 +293,15 @@ class QueueState(Slacks):
 
     def solved(self, move: Move, target: Real | None, rest: Forces) -> tuple[Any, Forces]:  # noqa: ARG002
         """Return the changes of slacks, multipliers, r, f, q, p and x along `move`."""
-        slot, half, (outer, inner) = self.slot, self.constraint.half, self.on[:2]
-        m, t = self.margin, np.zeros_like(self.s) if target is None else target
         own = move.unknowns[..., self.own].transpose(2, 0, 1)
-        dx = own[0] if half else np.zeros_like(own[0])
-        dq, p = inner * own[-2], outer * own[-1]
-        risen = (slot.gradients * move.w[:, None]).sum(axis=0)
-        if half:
-            risen = risen + np.stack([dx, -dx]) * self.values
-        ds, z = np.zeros_like(self.s), np.zeros_like(self.s)
-        z[0] = p
-        ds[0] = slot.loose_r * (t[0] - p)
-        dr = outer * (risen[0] - m[0] - ds[0])
-        apart = risen[1] - m[1] - dq + m[2]
-        z[1] = slot.by_q * t[1] - slot.by_G * t[2] + slot.by_G * (1 - p) - slot.series * apart
-        z[2] = slot.by_G * t[2] - slot.by_q * t[1] + slot.by_q * (1 - p) + slot.series * apart
-        left = slot.loose_f * (1 - p - t[1] - t[2])
-        ds[1], ds[2] = slot.by_q * apart - left, -slot.by_G * apart - left
-        df = inner * (left + slot.by_G * (risen[1] - m[1]) + slot.by_q * (dq - m[2]))
-        if half:
-            ds[3], ds[4] = dx - m[3], -dx - m[4]
-        if math.isfinite(self.constraint.buffer):
-            ds[-1] = -inner * dq - m[-1]
-        z[3:] = t[3:] - slot.k[3:] * ds[3:]
-        force = Forces(w=(slot.gradients * z[:2]).sum(axis=1))
+        dx = own[0] if self.constraint.half else np.zeros_like(own[0])
+        dq, p = self.on[1] * own[-2], self.on[0] * own[-1]
+        risen = (self.slot.gradients * move.w[:, None]).sum(axis=0)
+        if self.constraint.half:
+            risen += np.stack([dx, -dx]) * self.values
+        t = np.zeros_like(self.s) if target is None else target
+        ds, z, dr, df = self._eliminated(self.margin, t, p, 1 - p, risen, dx, dq)
+        force = Forces(w=(self.slot.gradients * z[:2]).sum(axis=1))
         return (ds, z - self.z, dr, df, dq, p - self.p, dx), force
 
     def curvature(self, step: Any) -> Real:
@@ -314,7 +315,8 @@ class QueueState(Slacks):
     def moved(self, w: Real, v: Real, share: Real, step: Any) -> "QueueState":  # noqa: ARG002
         """Return the state after `share` of `step`, with the rates at w."""
         ds, dz, *changes = step
-        values, gradients, hessians = _scaled(self.constraint.rewards.stage(w * LENGTH), self.unit)
+        rewards = self.constraint.rewards
+        rates = rewards.in_units(rewards.stage(w * LENGTH))
         names = ("r", "f", "q", "p", "x")
         now = {
             name: getattr(self, name) + share * change
@@ -322,7 +324,7 @@ class QueueState(Slacks):
         }
         then = replace(
             self, s=self.s + share * ds, z=self.z + share * dz,
-            values=values, gradients=gradients, hessians=hessians, **now,
+            values=rates.value, gradients=rates.gradient, hessians=rates.hessian, **now,
         )  # fmt: skip
         return replace(then, margin=np.where(self.on > 0, then.s - then.functions(), 0.0))
 
@@ -347,12 +349,3 @@ class Slot:
     loose_f: Real
     loose_r: Real
     gradients: Real
-
-
-def _scaled(values: StageValues, unit: Real) -> tuple[Real, Real, Real]:
-    """Return rates, gradients and Hessians in `unit` and by scaled w."""
-    return (
-        values.value / unit,
-        values.gradient * (LENGTH / unit),
-        values.hessian * (LENGTH**2 / unit),
-    )

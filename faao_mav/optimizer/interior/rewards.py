@@ -66,8 +66,13 @@ class ScaledRewards:
     def scaled(self, values: StageValues) -> tuple[Real, Real, Real]:
         """Return the same for `values`."""
         total = (values.value - self.base).sum(axis=-1, keepdims=True) / self.unit + self.offset
-        return (
-            total,
+        scaled = self.in_units(values)
+        return total, scaled.gradient, scaled.hessian
+
+    def in_units(self, values: StageValues) -> StageValues:
+        """Return `values` in the unit of each flight, with derivatives by scaled w."""
+        return StageValues(
+            values.value / self.unit,
             values.gradient * (LENGTH / self.unit),
             values.hessian * (LENGTH**2 / self.unit),
         )
