@@ -1,6 +1,7 @@
 """What a flight model is asked, what it answers, and the predicted flight of a whole mission."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +20,8 @@ class FlightPath:
     (m,), s, say how long the aircraft is told to wait at each point, as commanded: what the
     autopilot makes of fractions is the model's business. `delays` (m,), s, come on top: NAV_DELAY
     items after the point, which keep fractions. `splines` (m,) marks points that are spline
-    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own.
+    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own. A flight that turns
+    out to take more than `longest`, s, need not be followed to its end: `InputError`.
     """
 
     points: Real
@@ -28,6 +30,7 @@ class FlightPath:
     splines: NDArray[np.bool_]
     radii: Real
     delays: Real | float = 0.0
+    longest: float = inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,9 +18,10 @@ from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.vehicle.flight_path import FlightPath, Track
 from faao_mav.vehicle.vehicle import Vehicle
 
-LONGEST = 21_600.0
-"""The longest flight that is followed, s. Chosen: fuzzing took one of almost a day beyond 500 MB of
-memory, which six hours stay below."""
+LONGEST, LONGEST_COPTER = 21_600.0, 7_200.0
+"""The longest flights that are followed, s: of planes, and of what can hover. Chosen: fuzzing took
+one of almost a day beyond 500 MB of memory, which six hours stay below; few copters can stay up for
+two, in which the model of PX4 takes 72,000 steps and 4 s of processor time."""
 
 _MOST_STEPS = 2000
 """The largest number of items that are flown, repeats by DO_JUMP included. Chosen: a few seconds of
@@ -47,7 +48,8 @@ def predict(
     A mission without places gives an empty track.
 
     Raises `InputError` for places that cannot be flown to (NaN, altitudes above sea level
-    without a home), parameters that are useless, or a flight that takes more than six hours.
+    without a home), parameters that are useless, or a flight that takes more than
+    two hours, of a plane more than six.
     """
     start = _start(mission)
     if start is None:
@@ -138,6 +140,7 @@ class _Walk:
         self.speed = self.model.cruise_speed
         self.place = self.goal = self.home
         self.reached = np.full(len(self.mission.items), np.nan)
+        self.longest = LONGEST_COPTER if self.vehicle.type.hovers else LONGEST
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
@@ -187,6 +190,7 @@ class _Walk:
             splines=np.array([stop.spline for stop in stops]),
             radii=np.array([stop.radius for stop in stops]),
             delays=np.array([stop.delay for stop in stops]),
+            longest=self.longest - self.clock,
         )
         self._check_clock(self._at_least(path))
         flown = self.model.fly(path, self.step)
@@ -339,7 +343,8 @@ class _Walk:
         return np.array([place[0], place[1], height])
 
     def _check_clock(self, lasting: float) -> None:
-        if not self.clock + lasting <= LONGEST:
+        if not self.clock + lasting <= self.longest:
             raise InputError(
-                f"the flight would take more than {LONGEST / 3600:g} h and is not followed that far"
+                f"the flight would take more than {self.longest / 3600:g} h and is not followed "
+                "that far"
             )

@@ -105,7 +105,7 @@ def test_a_take_off_is_here_where_arducopter_gets_no_place() -> None:
     assert place(track, when(track, 0)) == pytest.approx([0, 0, 20], abs=0.1)
     unset = replace(here, x=math.nan, y=math.nan)
     assert flown(unset, vehicle=PX4).position[-1] == pytest.approx([0, 0, 20], abs=0.1)
-    with pytest.raises(InputError, match="more than 6 h"):  # PX4 sets out for 0, 0
+    with pytest.raises(InputError, match="more than 2 h"):  # PX4 sets out for 0, 0
         flown(here, vehicle=PX4)
 
 
@@ -333,8 +333,19 @@ def test_flights_without_end_are_refused(vehicle: Vehicle) -> None:
         waypoint(100, 0, hold=1e9),
         do(Command.NAV_DELAY, 1e9, -1, -1, -1),
     ):
-        with pytest.raises(InputError, match="more than 6 h"):
+        hours = "2" if vehicle.type.hovers else "6"
+        with pytest.raises(InputError, match=f"more than {hours} h"):
             flown(TAKEOFF, waypoint(50, 0), long, waypoint(60, 0), vehicle=vehicle)
+
+
+def test_a_flight_that_circles_for_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Legs of 12 m take 3 s, but PX4 circles for ten times that round ends with tiny radii."""
+    monkeypatch.setattr("faao_mav.vehicle.predict.LONGEST_COPTER", 120.0)
+    ends = [waypoint(10 * (k % 2), 10 * (k % 3)) for k in range(9)]
+    assert flown(*ends, vehicle=PX4).t[-1] < 120
+    ways = [replace(end, params=(0.0, 0.05, 0.0, 0.0)) for end in ends]
+    with pytest.raises(InputError, match=r"waypoints would take more than 0\.033 h"):
+        flown(*ways, vehicle=PX4)
 
 
 def test_useless_parameters_are_named() -> None:

@@ -38,7 +38,7 @@ class Px4(Px4Limits):
             return _standing(path.points[0], float(holds[0]), step)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
         speeds = np.minimum(speeds, self.max_speed)
-        log = simulate(self, path.points, radii, speeds, holds, beyond=step)
+        log = simulate(self, path.points, radii, speeds, holds, step, path.longest)
         return sampled(log, path.points[0, 2], step)
 
 

@@ -7,6 +7,7 @@ from math import inf, sqrt
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.errors import InputError
 from faao_mav.vehicle.px4.detour import Heading, excess, headed, heading
 from faao_mav.vehicle.px4.guidance import GuidedLeg, legs
 from faao_mav.vehicle.px4.parameters import Px4Limits
@@ -71,20 +72,33 @@ class FlightLog:
 
 
 def simulate(
-    limits: Px4Limits, points: Real, radii: Real, speeds: Real, holds: Real, beyond: float
+    limits: Px4Limits,
+    points: Real,
+    radii: Real,
+    speeds: Real,
+    holds: Real,
+    beyond: float,
+    longest: float = inf,
 ) -> FlightLog:
     """Return the flight along `points` (m, 3), m >= 2, and on for `beyond` s after its end.
 
-    `radii` (m,) m, `speeds` (m - 1,) m/s, `holds` (m,) s.
+    `radii` (m,) m, `speeds` (m - 1,) m/s, `holds` (m,) s. Raises `InputError` for a flight of more
+    than `longest` s: only flying tells how long it circles round a small radius.
     """
     radii = np.maximum(radii, _NEAREST)
     route = legs(limits, points, radii.tolist(), speeds.tolist(), holds.tolist())
     east, north, up = points[0].tolist()
     first = at_rest(complex(east, north), up if np.ptp(points[:, 2]) > 0 else None)
-    flown, state = list[FlownLeg](), first
+    flown, state, left = list[FlownLeg](), first, longest
     for leg in route:
-        flown.append(_fly(limits, leg, state))
+        flown.append(_fly(limits, leg, state, left))
         state = flown[-1].end
+        left -= flown[-1].departure
+        if left < 0:
+            raise InputError(
+                f"the waypoints would take more than {longest / 3600:.2g} h and are not followed "
+                "that far"
+            )
     flown.append(_stay(limits, route[-1], state, beyond))
     start = float(holds[0]) + SWITCH_DELAY if holds[0] > 0 else 0.0
     moving = start + START_LAG
@@ -98,8 +112,8 @@ def simulate(
     )
 
 
-def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
-    """Fly along `leg` until its end is left."""
+def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState, longest: float) -> FlownLeg:
+    """Fly along `leg` until its end is left, or until it has taken more than `longest` s."""
     times: list[float] = []
     states: list[FlightState] = []
     time, due, arrival = 0.0, inf, inf
@@ -107,6 +121,9 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState) -> FlownLeg:
     kind = heading(leg, state.level[0])
     aim = headed(limits, leg, kind, state.level[0])
     while due - time >= _TINY:
+        if time > longest:
+            due = time
+            break
         before, far = state, near
         dt = due - time
         if due == inf or not _stands(state):
