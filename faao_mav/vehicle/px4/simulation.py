@@ -190,9 +190,7 @@ def _is_steady(before: FlightState, state: FlightState, dt: float) -> bool:
     """Tell whether an aircraft flew like its trajectory in the last `dt` s, and will go on so."""
     velocity = state.level[1]
     shift = state.level[4] - before.level[4]
-    return (
-        abs(velocity - before.level[1]) <= _STEADY * dt and abs(velocity - shift / dt) <= _STEADY
-    )
+    return abs(velocity - before.level[1]) <= _STEADY * dt and abs(velocity - shift / dt) <= _STEADY
 
 
 def _carried_on(before: FlightState, state: FlightState, steps: int) -> FlightState:
