@@ -63,7 +63,7 @@ def moved(limits: Px4Limits, leg: GuidedLeg, state: FlightState, dt: float) -> F
 
 
 def _pace(limit: float, lag: complex, velocity: complex) -> float:
-    """Return how fast the trajectory's clock runs on average: 1 less the lag's share of the `limit`.
+    """Return the mean rate of the trajectory's clock: 1 less the lag's share of the `limit`.
 
     An aircraft ahead of its trajectory does not hold it up. How far it is behind wavers with the
     position estimate: by s along the way, normally distributed, where s² = s_0² r / (r + v / limit)
