@@ -12,7 +12,7 @@ from faao_mav.errors import InputError
 from faao_mav.mission.item import Mission
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
-from faao_mav.schedule.initial_route import Splines, initial_route
+from faao_mav.schedule.initial_route import Splines, initial_route, slowest_leg
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
@@ -158,7 +158,7 @@ def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     limits = plan.vehicle
     if vehicle.type.hovers:
         scheduler: type[Scheduler] = CopterScheduler
-        least, most = min(vehicle.legs.slowest, limits.max_speed), vehicle.type.fastest
+        least, most = slowest_leg(plan), vehicle.type.fastest
     else:
         scheduler = PlaneScheduler
         least = max(limits.min_speed, vehicle.value("min_speed"))

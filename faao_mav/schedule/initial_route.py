@@ -65,9 +65,9 @@ def initial_route(
     positions at those times, metres. Raises `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
-    legs = vehicle_of(plan).legs
+    legs, slowest = vehicle_of(plan).legs, slowest_leg(plan)
     tolerance = share * plan.mission.path_tolerance
-    fixed = hovers_and_ends(times, positions, tolerance, legs.slowest)
+    fixed = hovers_and_ends(times, positions, tolerance, slowest)
     waypoints, curved = [fixed[0]], [False]
     for start, stop in pairwise(fixed):
         stretch = slice(start.last, stop.first + 1)
@@ -80,7 +80,15 @@ def initial_route(
         waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
         curved += marked
-    return _timed(times, waypoints, curved, legs.slowest, plan.vehicle.max_speed)
+    return _timed(times, waypoints, curved, slowest, plan.vehicle.max_speed)
+
+
+def slowest_leg(plan: "Plan") -> float:
+    """Return the least speed that the plan's vehicle is commanded for a leg, m/s.
+
+    Where the plan is slower it waits. It is half of `max_speed` at most.
+    """
+    return min(vehicle_of(plan).legs.slowest, plan.vehicle.max_speed / 2)
 
 
 def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: float) -> Route:
@@ -111,8 +119,8 @@ def set_out(t: Real, w: Real, plan: "Plan") -> float:
 
     `t` (n,) s, `w` (n, 2) m.
     """
-    slowest = vehicle_of(plan).legs.slowest
-    return float(t[hovers_and_ends(t, w, plan.mission.path_tolerance, slowest)[0].last])
+    tolerance = plan.mission.path_tolerance
+    return float(t[hovers_and_ends(t, w, tolerance, slowest_leg(plan))[0].last])
 
 
 def begins_at_speed(t: Real, w: Real) -> bool:

@@ -13,12 +13,16 @@ from faao_mav.arrays import Flags, Real
 from faao_mav.vector import distances_to_segment, lengths
 
 # Shares of the path tolerance that together never exceed it: how far a sample may be from its leg,
-# a hover's radius (its samples are within two radii of its waypoint), and how far apart two hovers
-# may be that become one.
-LEG_SHARE, _HOVER_SHARE, _MERGE_SHARE = 0.9, 0.45, 0.05
+# a hover's radius, and how far apart two hovers may be that become one.
+LEG_SHARE, _HOVER_SHARE, _MERGE_SHARE = 0.9, 0.9, 0.05
 
 SLOWEST = 0.1  # the least speed, m/s, that any autopilot is commanded: a slower trajectory hovers
-_WIDEST_HOVER = 1.0  # the largest radius of a hover, m, however large the path tolerance
+
+# The largest radius of a hover, m, however large the path tolerance. Chosen: two hovers with a
+# metre's creep between them are flown by legs of 1 to 2 m and reversals, on which ArduCopter was up
+# to 0.8 s later than predicted.
+_WIDEST_HOVER = 1.5
+
 _SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
 _SPEED_WINDOW = 1.0  # s, over which a speed is averaged: it hides a trajectory's chatter
 _SAME_POINT = 1e-3  # the distance, m, within which both ends of a trajectory are one waypoint
@@ -41,9 +45,9 @@ def find_hovers(t: Real, w: Real, radius: float, slowest: float = SLOWEST) -> li
     """Return the hovers of the trajectory `t` (n,) s, `w` (n, 2) m, in order.
 
     A hover lasts 3 s at least, in which the aircraft is slower than `slowest` m/s throughout and
-    stays in a box with a half diagonal of at most `radius` (m). Its position is the median, so no
-    sample of a hover is farther than 2 `radius` from it. A creep through several boxes makes
-    several hovers, with 3 s between them to get on.
+    stays in a box with a half diagonal of at most `radius` (m). Its position is the median, or the
+    box's middle if a sample is farther than `radius` from the median. A creep through several boxes
+    makes several hovers, with 3 s between them to get on.
 
     >>> t = np.arange(0.0, 20.0)
     >>> w = np.column_stack([np.clip(t - 10, 0, None), 0 * t])
@@ -56,7 +60,7 @@ def find_hovers(t: Real, w: Real, radius: float, slowest: float = SLOWEST) -> li
         while first < end:
             last = _last_within(w[first : end + 1], radius) + first
             if t[last] - t[first] >= _SHORTEST_HOVER:
-                hovers.append(Waypoint(first, last, np.median(w[first : last + 1], axis=0)))
+                hovers.append(Waypoint(first, last, _middle(w[first : last + 1], radius)))
                 first = int(np.searchsorted(t, t[last] + _SHORTEST_HOVER))
             else:
                 first += 1
@@ -72,16 +76,17 @@ def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[
     """
     end = len(t) - 1
     closed = math.dist(w[0], w[end]) <= _SAME_POINT
-    hovers = find_hovers(t, w, min(_WIDEST_HOVER, _HOVER_SHARE * tolerance), slowest)
+    radius = _HOVER_SHARE * tolerance
+    hovers = find_hovers(t, w, min(_WIDEST_HOVER, radius), slowest)
     if hovers and hovers[0].first == 0:
-        last = hovers[0].last
+        last = _stay(w[: hovers[0].last + 1], radius) - 1
         if last == end and not closed:
             last -= 1  # two ends in one hover: leave a leg between them
         hovers[0] = Waypoint(0, last, w[0])
     else:
         hovers.insert(0, Waypoint(0, 0, w[0]))
     if hovers[-1].last == end:
-        hovers[-1] = Waypoint(hovers[-1].first, end, w[end])
+        hovers[-1] = Waypoint(end + 1 - _stay(w[hovers[-1].first :][::-1], radius), end, w[end])
     else:
         hovers.append(Waypoint(end, end, w[end]))
 
@@ -164,6 +169,22 @@ def _runs(mask: Flags) -> Iterator[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     for begin, end in edges.reshape(-1, 2):
         yield int(begin), int(end) - 1
+
+
+def _middle(w: Real, radius: float) -> Real:
+    """Return a place (2,), m, that all of `w` (n, 2), in a box of half diagonal `radius`, are near.
+
+    The median is where the plan stays longest.
+    """
+    median: Real = np.median(w, axis=0)
+    near = lengths(w - median).max() <= radius
+    return median if near else (w.min(axis=0) + w.max(axis=0)) / 2
+
+
+def _stay(w: Real, radius: float) -> int:
+    """Return how many samples from the first on are within `radius` m of the first."""
+    away = lengths(w - w[0]) > radius
+    return int(np.argmax(away)) if away.any() else len(w)
 
 
 def _last_within(w: Real, radius: float) -> int:

@@ -18,6 +18,10 @@ LATE, LATE_SHARE = 3.0, 0.05
 """By how many seconds, and by which share of the planned duration, a flight ends late that does not
 keep its plan: both are exceeded. Chosen."""
 
+APART = 2.5
+"""The rms distance from the plan at equal times that is reported, m: missions for plans that the
+vehicle can keep are predicted within 2.3 m."""
+
 PATH_ALLOWANCE = 0.2
 """How far beyond the plan's path_tolerance the predicted path may lie, m: predictions are no
 better."""
@@ -101,6 +105,23 @@ def _late(context: ValidationContext) -> Iterator[Issue]:
                 "load the parameters that the mission was made for, or make it anew for this "
                 "vehicle's",
             )
+
+
+@RULES.warning(
+    "link-apart",
+    f"the predicted aircraft is more than {APART:g} m rms from where the plan has it at the time",
+    _SOURCE,
+)
+def _apart(context: ValidationContext) -> Iterator[Issue]:
+    link = context.link
+    if link is not None and link.rms_position_error > APART:
+        yield Issue(
+            None,
+            f"at equal times the predicted aircraft is {link.rms_position_error:.1f} m rms from "
+            f"the plan, at most {link.max_position_error:.1f} m",
+            "plan with a lower vehicle.max_speed or vehicle.max_acceleration: near its greatest "
+            "speed a vehicle cannot make up for what corners cost",
+        )
 
 
 @RULES.warning(

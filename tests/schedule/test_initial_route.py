@@ -105,7 +105,7 @@ def test_any_polygon_keeps_to_its_path(
 def test_dash_hover_dash() -> None:
     t, w = dash_hover_dash(hover=40.0)
     route = check(t, w, plan_with())
-    assert route.waits.sum() == pytest.approx(40, abs=1)
+    assert route.waits.sum() == pytest.approx(42, abs=1)  # below 1.5 m/s for a second on each side
     assert np.count_nonzero(route.waits) == 1
     assert route.positions[np.argmax(route.waits)] == pytest.approx([150.0, 150.0], abs=0.05)
     assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1)
@@ -125,7 +125,7 @@ def test_hovers_at_both_ends_are_holds() -> None:
 
 
 def test_what_holds_lose_to_rounding_is_carried_on() -> None:
-    # Six hovers of 5.45 s each: 5 s every time would be 2.7 s early in the end.
+    # Six hovers of 5.45 s, and 2 s below 1.5 m/s: 7 s every time would be 2.7 s early.
     lasting = 60 / 5 + 5 / 1.5
     period = lasting + 5.45
     t = np.arange(0, 6 * period, 0.05)
@@ -133,15 +133,24 @@ def test_what_holds_lose_to_rounding_is_carried_on() -> None:
     route = check(t, np.outer(s, [0.0, 1.0]), plan_with())
     holds = route.waits[route.waits > 0]
     assert len(holds) == 6
-    assert set(holds) == {5.0, 6.0}
+    assert set(holds) <= {6.0, 7.0, 8.0}
     assert nominal(route) == pytest.approx(t[-1], abs=1)
 
 
-def test_a_creep_is_a_leg_and_no_hover() -> None:
+def test_a_creep_is_short_ways_and_waits() -> None:
     t = np.arange(0, 60, STEP)
-    route = check(t, np.outer(0.25 * t, [0.0, 1.0]), plan_with())
+    w = np.outer(0.25 * t, [0.0, 1.0])
+    route = check(t, w, plan_with())
+    assert 3 <= np.count_nonzero(route.waits) <= 6
+    assert (route.speeds >= 1.5).all()
+    at = np.stack([np.interp(t, route.departures, x) for x in route.positions.T], axis=-1)
+    assert lengths(at - w).max() <= 2.5
+
+
+def test_a_slow_vehicle_flies() -> None:
+    t = np.arange(0, 60, STEP)
+    route = check(t, np.outer(0.8 * t, [0.0, 1.0]), plan_with(max_speed=1.0))
     assert len(route.positions) == 2
-    assert route.speeds == pytest.approx([0.25])
     assert route.waits.sum() == 0
 
 
@@ -202,7 +211,7 @@ def test_a_speed_is_rounded_down_at_the_limit() -> None:
     t = np.arange(0, 20, STEP)
     route = initial_route(t, np.outer(7.9999 * t, [1.0, 0.0]), plan_with(max_speed=7.9999))
     assert route.speeds == pytest.approx([7.999], abs=1e-12)
-    route = initial_route(t, np.outer(t, [1.0, 0.0]), plan_with(max_speed=0.0004))
+    route = initial_route(t, np.outer(2 * t, [1.0, 0.0]), plan_with(max_speed=0.0004))
     assert route.speeds == pytest.approx([0.0004])
 
 

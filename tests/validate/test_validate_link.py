@@ -46,6 +46,12 @@ CASES = [
         Given(flown(), link=replace(LINK, planned_duration=20, predicted_duration=22.9)),
     ),
     (
+        "link-apart",
+        Given(flown(), link=replace(LINK, rms_position_error=2.6)),
+        None,
+        Given(flown(), link=replace(LINK, rms_position_error=2.4)),
+    ),
+    (
         "link-altitude",
         Given(flown(), link=replace(LINK, altitude_error=2.1)),
         None,

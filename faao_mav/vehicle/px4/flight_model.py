@@ -19,7 +19,8 @@ class Px4(Px4Limits):
     within jerk and acceleration, a clock that runs slower while the aircraft lags behind, a
     cascaded controller and an aircraft with lag and drag; see the modules of this package for the
     equations. Four constants are fitted to recorded flights (`response.ATTITUDE_LAG`,
-    `step.WANDER`, `simulation.START_LAG`, `simulation.SWITCH_DELAY`), the rest is PX4's. Limits are
+    how its position estimate strays in `step`, `simulation.START_LAG`,
+    `simulation.SWITCH_DELAY`), the rest is PX4's. Limits are
     SI: m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
     """
 

@@ -1,6 +1,6 @@
 """One step of a flight along a leg."""
 
-from math import hypot
+from math import erf, exp, hypot, pi, sqrt
 from typing import NamedTuple
 
 from faao_mav.vehicle.px4.guidance import GuidedLeg, climb_setpoint, level_setpoint
@@ -8,8 +8,12 @@ from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.response import Motion, Number, advance, step_of
 from faao_mav.vehicle.px4.smoothing import Axis, follow, soon_there
 
-WANDER = 0.14
-"""How far the position estimate strays from the trajectory all the time, m. Fitted to recorded
+_ESTIMATE_ALONG, _ESTIMATE_ACROSS = 0.8, 0.1
+"""How far the position estimate strays from the trajectory along the way and across it, m rms, were
+the trajectory not to wait. Fitted to recorded flights."""
+
+_ESTIMATE_RATE = 0.05
+"""The rate, 1/s, at which the estimate's error along the way is forgotten. Fitted to recorded
 flights."""
 
 _TINY = 1e-9
@@ -59,12 +63,21 @@ def moved(limits: Px4Limits, leg: GuidedLeg, state: FlightState, dt: float) -> F
 
 
 def _pace(limit: float, lag: complex, velocity: complex) -> float:
-    """Return how fast the trajectory's clock runs: 1 less the lag's share of the `limit`.
+    """Return the mean rate of the trajectory's clock: 1 less the lag's share of the `limit`.
 
-    Being ahead does not count; the estimate's wander makes that a gradual affair.
+    An aircraft ahead of its trajectory does not hold it up. How far it is behind wavers with the
+    position estimate: by s along the way, normally distributed, where s² = s_0² r / (r + v / limit)
+    with the rate r of forgetting, for waiting takes away what the estimate strays.
     """
-    ahead = (lag * velocity.conjugate()).real / (abs(velocity) + _TINY)
-    behind = hypot(abs(lag), WANDER) * (1 + ahead / hypot(ahead, WANDER)) / 2
+    speed = abs(velocity)
+    if speed < _TINY:
+        return 1.0
+    lag = lag * velocity.conjugate() / speed
+    wander = _ESTIMATE_ALONG * sqrt(_ESTIMATE_RATE / (_ESTIMATE_RATE + speed / limit))
+    score = lag.real / wander
+    share = (1 + erf(score / sqrt(2))) / 2
+    along = lag.real * share + wander * exp(-score * score / 2) / sqrt(2 * pi)
+    behind = hypot(along, share * hypot(lag.imag, _ESTIMATE_ACROSS))
     return 1 - min(behind / limit, 1.0)
 
 
