@@ -47,9 +47,9 @@ CASES = [
     ),
     (
         "link-apart",
-        Given(flown(), link=replace(LINK, rms_position_error=2.6)),
+        Given(flown(), link=replace(LINK, rms_position_error=3.1)),
         None,
-        Given(flown(), link=replace(LINK, rms_position_error=2.4)),
+        Given(flown(), link=replace(LINK, rms_position_error=2.9)),
     ),
     (
         "link-altitude",
