@@ -8,6 +8,7 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError
+from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
@@ -154,6 +155,12 @@ class Problem:
     kinematics: Kinematics
     bs_uav: Link
     uav_user: Link
+
+    @cached_property
+    def free_area(self) -> FreeArea | None:
+        """Where the fence and its margin let the path be, local metres; None without a fence."""
+        fence, area = self.plan.fence, self.plan.keep_in
+        return None if fence is None or area is None else area.inside(fence.margin)
 
     @property
     def maximised_queue(self) -> RelayQueue | None:

@@ -1,0 +1,122 @@
+"""The fence of a plan: its zones in degrees, and whether a flight can keep inside."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from faao_mav.errors import InputError, PlanError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
+from faao_mav.mission.fence_area import FreeArea
+from faao_mav.plan.fields import Vector
+from faao_mav.plan.sections import CircleZone, FenceOptions, Plan, PlanFile, PolygonZone
+
+
+def geofence(contents: PlanFile, source: str) -> Fence:
+    """Return the zones of `fence` and of its file, which lies beside the plan's file `source`.
+
+    Raises `PlanError` for a fence without zones and a file that cannot be read.
+    """
+    options = contents.fence
+    if options is None:
+        return Fence()
+    of_file = _read(options, source)
+    origin = contents.site.origin
+    frame = LocalFrame(origin.latitude, origin.longitude)
+    zones = [
+        *((zone, True) for zone in options.inclusion),
+        *((zone, False) for zone in options.exclusion),
+    ]
+    polygons = [
+        Polygon(_degrees(frame, zone.polygon), inclusion)
+        for zone, inclusion in zones
+        if isinstance(zone, PolygonZone)
+    ]
+    circles = [
+        Circle(_degrees(frame, [zone.center])[0], zone.radius, inclusion)
+        for zone, inclusion in zones
+        if isinstance(zone, CircleZone)
+    ]
+    fence = Fence(
+        (*polygons, *of_file.polygons), (*circles, *of_file.circles), of_file.breach_return
+    )
+    if not fence:
+        raise PlanError(f"{source}: fence: has no zones; give inclusion, exclusion or file")
+    return fence
+
+
+def _read(options: FenceOptions, source: str) -> Fence:
+    if options.file is None:
+        return Fence()
+    from faao_mav.mission.formats.fence_file import read_fence  # plans rarely have one
+
+    path = Path(source).parent / options.file
+    try:
+        return read_fence(path)
+    except InputError as error:
+        raise PlanError(f"{source}: fence.file: {error}") from None
+
+
+def _degrees(frame: LocalFrame, places: Sequence[Vector]) -> tuple[LatLon, ...]:
+    latitude, longitude = frame.to_geodetic(places)
+    return tuple(zip(latitude.tolist(), longitude.tolist(), strict=True))
+
+
+def fence_problems(plan: Plan) -> Iterator[str]:
+    """Yield why no flight of `plan` can keep `fence.margin` from the edge of the fence."""
+    area = plan.keep_in
+    if plan.fence is None or area is None:
+        return
+    for part in plan.zones:
+        if part.crosses_itself:
+            yield f"fence: {part.name} crosses or touches itself; put its corners in order"
+    margin = plan.fence.margin
+    if area.empty:
+        yield "fence: leaves no place; the inclusions do not overlap, or exclusions cover them"
+    kept = area.inside(margin)
+    if kept.empty:
+        yield f"fence.margin: {margin:g} m: no place is that far from the edge; give less"
+    if plan.optimizer.method == "algorithm1":
+        yield "fence: algorithm1 (optimizer.method) plans without one; give method direct"
+    ends = {"start": plan.flight.start, "end": plan.flight.end}
+    for name, place in ends.items():
+        if not kept.covers(np.array([place])).all():
+            yield f"flight.{name}: {list(place)} is {_trouble(plan, area, place)}"
+    yield from _way_problems(plan, kept)
+
+
+def _way_problems(plan: Plan, kept: FreeArea) -> Iterator[str]:
+    """Yield why the way from start to end cannot be flown."""
+    flight, margin = plan.flight, plan.fence.margin if plan.fence else 0.0
+    way = kept.shortest_way(np.array(flight.start), np.array(flight.end))
+    if way is None:
+        yield (
+            f"fence: no way leads from flight.start {list(flight.start)} to flight.end "
+            f"{list(flight.end)} that keeps {margin:g} m (fence.margin) from the edge"
+        )
+        return
+
+
+def _trouble(plan: Plan, area: FreeArea, place: Vector) -> str:
+    """Return where a `place` is that lies outside the fence or near its edge."""
+    import shapely
+
+    point, margin = shapely.Point(place), plan.fence.margin if plan.fence else 0.0
+    clearance = area.clearance(np.array([place]))
+    for part in plan.zones:
+        if not part.inclusion and part.shape.distance(point) < margin:
+            depth = part.shape.boundary.distance(point)
+            if part.shape.contains(point):
+                return f"{depth:.1f} m inside {part.name} of the fence; move it out"
+            return _near(depth, part.name, margin)
+    if clearance < 0:
+        return f"{-clearance:.1f} m outside the inclusions of the fence; move it inside"
+    return _near(clearance, "the edge of the fence", margin)
+
+
+def _near(distance: float, what: str, margin: float) -> str:
+    return (
+        f"{distance:.1f} m from {what}, less than fence.margin ({margin:g} m); "
+        "move it, or give a smaller margin"
+    )
