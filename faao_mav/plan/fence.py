@@ -82,7 +82,7 @@ def fence_problems(plan: Plan) -> Iterator[str]:
     ends = {"start": plan.flight.start, "end": plan.flight.end}
     for name, place in ends.items():
         if not kept.covers(np.array([place])).all():
-            yield f"flight.{name}: {list(place)} is {_trouble(plan, area, place)}"
+            yield f"flight.{name}: {list(place)} is {trouble(plan, place)}"
     yield from _way_problems(plan, kept)
 
 
@@ -98,10 +98,12 @@ def _way_problems(plan: Plan, kept: FreeArea) -> Iterator[str]:
         return
 
 
-def _trouble(plan: Plan, area: FreeArea, place: Vector) -> str:
-    """Return where a `place` is that lies outside the fence or near its edge."""
+def trouble(plan: Plan, place: Vector) -> str:
+    """Return where a `place`, m, is that lies outside the fence of `plan` or near its edge."""
     import shapely
 
+    area = plan.keep_in
+    assert area is not None
     point, margin = shapely.Point(place), plan.fence.margin if plan.fence else 0.0
     clearance = area.clearance(np.array([place]))
     for part in plan.zones:

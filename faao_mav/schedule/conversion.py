@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError
+from faao_mav.errors import InfeasibleError, InputError
+from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
@@ -17,6 +18,7 @@ from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
+from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
 from faao_mav.vehicle.recommend import candidates
@@ -31,6 +33,7 @@ _SPLINE_TIMES = (2.0, 3.0)  # least times between spline waypoints to try, s
 _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the acceleration
 _PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
+_FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
 _GOOD_COST = 1.5  # the `Schedule.cost`, m, from which nothing better is looked for
 
 
@@ -60,8 +63,10 @@ def check_vehicle(plan: "Plan") -> None:
     """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
 
     That is one with useless parameters, one of a speed that no mission commands, or a plane that
-    does not fly the plan's least or greatest speed.
+    does not fly the plan's least or greatest speed. Likewise for a fence around which there is no
+    way from home and back: see `check_transit`.
     """
+    check_transit(plan)
     vehicle = vehicle_of(plan)
     vehicle.legs  # noqa: B018
     vehicle.flight_model()
@@ -126,13 +131,44 @@ def _vehicles(plan: "Plan") -> list[Vehicle]:
 def convert(solution: "Solution") -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
+    A route whose legs or predicted flight leave the plan's fence is made anew with half the path
+    tolerance, again and again down to 0.25 m; if none keeps inside, it is the one that leaves the
+    fence the least. The rest is as in `_convert`.
+    """
+    plan, area = solution.plan, solution.plan.keep_in
+    best = _convert(solution, plan)
+    if area is None or area.clearance(solution.w) < 0:
+        return best
+    clearance, tolerance = _clearance(best, area), plan.mission.path_tolerance
+    while clearance < 0 and tolerance > _FINEST_TOLERANCE:
+        tolerance /= 2
+        finer = replace(plan, mission=replace(plan.mission, path_tolerance=tolerance))
+        try:
+            tried = _convert(solution, finer)
+        except InfeasibleError:  # too many items
+            break
+        if _clearance(tried, area) > clearance:
+            best, clearance = tried, _clearance(tried, area)
+    return best
+
+
+def _clearance(conversion: Conversion, area: FreeArea) -> float:
+    """Return how near, m, legs and predicted flight come to the fence's edge; < 0 outside."""
+    schedule = conversion.schedule
+    paths = (schedule.route.positions, schedule.track()["predicted_w"])
+    return min(map(area.clearance, paths))
+
+
+def _convert(solution: "Solution", plan: "Plan") -> Conversion:
+    """Return the mission for `solution` within the path tolerance of `plan`.
+
     The sets of parameters that are recommended for the vehicle are compared by the error of the
     first schedule, and refined in that order until one is good. If none is, a vehicle that flies
     splines may do so with the liveliest: everywhere, or where legs are too short for their speed.
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
-    plan, t, w = solution.plan, solution.t, np.round(solution.w, _DECIMALS)
+    t, w = solution.t, np.round(solution.w, _DECIMALS)
     given, sets = vehicle_of(plan), candidates(plan)
     schedulers = [_scheduler(plan, t, w, vehicle) for vehicle in _vehicles(plan)]
     straight = initial_route(t, w, plan, share=1.0 if given.type.hovers else _PLANE_SHARE)
