@@ -70,7 +70,7 @@ def _ahead(context: ValidationContext) -> Iterator[Issue]:
     import shapely
 
     moving = speed > _STILL
-    tested = positions[moving] + velocity[moving] * (ahead / speed)[moving, None]
+    tested = positions[moving] + velocity[moving] * (ahead[moving] / speed[moving])[:, None]
     outside = np.zeros(len(speed), dtype=bool)
     outside[moving] = fence.broken(shapely.points(tested)).any
     for index in np.unique(track.item[outside]).tolist():

@@ -153,8 +153,7 @@ def fence_map(
         return None
     import shapely
 
-    first = fence.polygons[0].vertices[0] if fence.polygons else fence.circles[0].center
-    frame = frame or LocalFrame(*first)
+    frame = frame or LocalFrame(*fence.place)
     areas = areas_of(fence, frame)
     free = free_area(areas, any_inclusion=any_inclusion)
     shapely.prepare([area.shape for area in areas])
