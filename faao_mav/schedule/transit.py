@@ -49,11 +49,14 @@ def way_home(plan: "Plan", last: Real) -> Real:
 
 def check_run_in(plan: "Plan", route: "Route") -> None:
     """Raise `InfeasibleError` where a leg before w_I or after w_F comes nearer to the edge."""
-    area, last = _area(plan), len(route.positions) - 1
+    fence, last = plan.keep_in, len(route.positions) - 1
+    if fence is None:
+        return
+    area = _kept(fence, _margin(plan))
     legs = ((0, route.first, "start"), (route.last, last, "end"))
     for begin, end, name in legs:
         leg = route.positions[begin : end + 1]
-        if area is not None and len(leg) > 1 and not area.covers_path(leg):
+        if len(leg) > 1 and not area.covers_path(leg):
             raise InfeasibleError(
                 f"fence: the aircraft takes {route.leg_lengths[begin]:.0f} m to get up to speed "
                 f"before flight.start, or to slow down after flight.end, and at flight.{name} that "
@@ -63,36 +66,41 @@ def check_run_in(plan: "Plan", route: "Route") -> None:
 
 
 def _corners(plan: "Plan", start: Real, end: Real, name: str) -> Real:
-    area = _area(plan)
-    if area is None:
+    fence, margin = plan.keep_in, _margin(plan)
+    if fence is None:
         return np.empty((0, 2))
-    if not area.covers(_HOME[None]).all():
+    if not _kept(fence, margin).covers(_HOME[None]).all():
         from faao_mav.plan.fence import trouble
 
         raise InputError(
             f"{plan.source}: site.origin: home, where the mission takes off, is "
             f"{trouble(plan, (0.0, 0.0))}"
         )
-    way = _way(area, start, end)
+    way = _way(fence, margin, start, end)
     if way is None:
         raise InfeasibleError(
-            f"fence: no way leads from {name} that keeps {_margin(plan):g} m (fence.margin) from "
+            f"fence: no way leads from {name} that keeps {margin:g} m (fence.margin) from "
             "the edge; give a smaller margin, move home, or change the fence"
         )
     return way[1:-1]
 
 
-def _way(area: FreeArea, start: Real, end: Real) -> Real | None:
-    """Return the corners of a short way with few of them: the aircraft stops at each."""
+def _way(fence: FreeArea, margin: float, start: Real, end: Real) -> Real | None:
+    """Return the corners (k, 2) of a short way with few of them: the aircraft stops at each.
+
+    It keeps the `margin`, m, from the edge of `fence`. None where there is no way.
+    """
     import shapely
 
+    area = _kept(fence, margin)
     for simpler in _SIMPLER:
-        coarse = FreeArea(area.inside(simpler).shape.simplify(simpler))
-        if coarse.empty:
+        offset = -(margin + simpler)
+        coarse = fence.shape.buffer(offset, join_style="mitre", mitre_limit=2).simplify(simpler)
+        if coarse.is_empty:
             continue
         places = shapely.points(np.array([start, end]))
-        links = shapely.get_coordinates(shapely.shortest_line(coarse.shape, places))[::2]
-        middle = coarse.shortest_way(*links)
+        links = shapely.get_coordinates(shapely.shortest_line(coarse, places))[::2]
+        middle = FreeArea(coarse).shortest_way(*links)
         if middle is not None and area.covers_path(np.vstack([start, middle, end])):
             return _straightened(area, np.vstack([start, middle, end]))
     return area.shortest_way(start, end)
@@ -107,10 +115,9 @@ def _straightened(area: FreeArea, way: Real) -> Real:
     return way[[*kept, -1]]
 
 
-def _area(plan: "Plan") -> FreeArea | None:
-    """Return where the fence and its margin let the aircraft be; None without a fence."""
-    area = plan.keep_in
-    return None if area is None else area.inside(max(_margin(plan) - _SPARE, 0.0))
+def _kept(fence: FreeArea, margin: float) -> FreeArea:
+    """Return where a `fence` and a `margin`, m, let the aircraft be."""
+    return fence.inside(max(margin - _SPARE, 0.0))
 
 
 def _margin(plan: "Plan") -> float:
