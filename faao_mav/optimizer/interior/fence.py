@@ -100,6 +100,11 @@ class KeepOut(HalfPlanes):
     room: Real
     quantity: ClassVar = "w"
 
+    @property
+    def turns(self) -> bool:
+        """True: where a flight slides along an obstacle every half-plane turns."""
+        return True
+
     def slack(self, x: Real) -> tuple[Real, Real]:
         """Return u . w - h(u) - room (2 P, flights, n) and u."""
         u, h = self.obstacles.separation(x[..., :-1], x[..., 1:], self.room)
