@@ -36,13 +36,17 @@ class FenceGeometry:
     offsets: Real
     margin: float
 
-    def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
-        """Return the constraints of the flights of `kin`."""
+    def room(self, kin: Kinematics) -> Real:
+        """Return margin and bulge (n - 1,) of the intervals of flights of `kin`, m."""
         bulge = kin.max_acceleration * kin.time_step**2 / 8
         bulges = np.full(kin.slots - 1, bulge)
         if not kin.bound_first_acceleration:  # both of its speeds are at most v_max
             bulges[0] = max(bulge, kin.max_speed * kin.time_step / 4)
-        room = (self.margin + bulges) / LENGTH
+        return self.margin + bulges
+
+    def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
+        """Return the constraints of the flights of `kin`."""
+        room = self.room(kin) / LENGTH
         kept: list[Constraint] = []
         if len(self.obstacles):
             kept.append(KeepOut(self, self.obstacles.scaled(LENGTH), room))

@@ -24,8 +24,9 @@ _FAR, _CLOSE = 30.0, 20.0
 """The distance, m, from which an obstacle is the disc about it, and that below which the direction
 is that of the barrier. Chosen: forces of obstacles so far away are next to nothing."""
 
-_ROUNDS = 5
-"""Newton steps to the direction of the barrier, which are enough for five digits."""
+_ROUNDS, _SHORTER = 5, 4
+"""Newton steps to the direction of the barrier, enough for five digits, and how often a step that
+leads away from it is quartered. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -86,26 +87,24 @@ class ConvexObstacles:
         least = np.minimum(u[0] * a[0] + u[1] * a[1], u[0] * b[0] + u[1] * b[1]) - h
         near = np.nonzero(least < _FAR / self.unit)
         piece, a, b = near[0], a[:, near[1], near[2]], b[:, near[1], near[2]]
-        turned, far = self._best(piece, a, b)
+        best = self._best(piece, a, b)
         if room is not None:
-            beyond = np.broadcast_to(room, least.shape)[near]
-            turned, far = self._centred(piece, a, b, beyond, turned, far)
-        u[0][near], u[1][near], h[near] = turned[0], turned[1], far
+            best = self._centred(piece, a, b, np.broadcast_to(room, least.shape)[near], best)
+        u[0][near], u[1][near] = best
+        h[near] = self._support(piece, best)[0]
         return u, h
 
-    def _best(self, piece: Integers, a: Real, b: Real) -> tuple[Real, Real]:
-        """Return the directions (2, m) of the greatest distances and h there, (m,).
+    def _best(self, piece: Integers, a: Real, b: Real) -> Real:
+        """Return the directions (2, m) of the greatest distances.
 
         Of m pairs: an obstacle `piece` (m,) and the straight from a to b (2, m).
         """
-        best, h = np.full(len(piece), -np.inf), np.zeros(len(piece))
-        u = np.zeros_like(a)
+        best, u = np.full(len(piece), -np.inf), np.zeros_like(a)
         for direction, far in self._candidates(piece, a, b):
             value = np.minimum(_dot(direction, a), _dot(direction, b)) - far
             better = value > best
-            best, h = np.where(better, value, best), np.where(better, far, h)
-            u = np.where(better, direction, u)
-        return u, h
+            best, u = np.where(better, value, best), np.where(better, direction, u)
+        return u
 
     def _candidates(self, piece: Integers, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
         for normals, offsets in zip(*self._sides, strict=True):
@@ -123,57 +122,57 @@ class ConvexObstacles:
             yield u, self._support(piece, u)[0]
 
     def _support(self, piece: Integers, u: Real) -> tuple[Real, Real]:
-        """Return h(u) (m,) of the obstacles `piece`, and the corners p (2, m) with h = u . p + r."""
+        """Return h(u) (m,) of obstacles `piece` and the corners p (2, m) with h = u . p + r."""
         corners = self.corners[piece].transpose(2, 1, 0)
         along = corners[0] * u[0] + corners[1] * u[1]
         farthest, every = along.argmax(axis=0), np.arange(len(piece))
         return along[farthest, every] + self.radius[piece], corners[:, farthest, every]
 
-    def _centred(
-        self, piece: Integers, a: Real, b: Real, room: Real, u: Real, h: Real
-    ) -> tuple[Real, Real]:
-        """Return u and h with log(u . a - h - room) + log(u . b - h - room) at its maximum.
+    def _centred(self, piece: Integers, a: Real, b: Real, room: Real, u: Real) -> Real:
+        """Return u with log(u . a - h - room) + log(u . b - h - room) at its maximum, (2, m).
 
         It is concave in the angle of u; where an end has no room u stays.
         """
-        some = np.minimum(_dot(u, a), _dot(u, b)) - h - room
+        some = np.minimum(_dot(u, a), _dot(u, b)) - self._support(piece, u)[0] - room
         close = np.flatnonzero((some > 0) & (some < _CLOSE / self.unit))
-        piece, a, b, room = piece[close], a[:, close], b[:, close], room[close]
-        own, far = u[:, close], h[close]
-        step = np.zeros(len(close))
-        now = self._logs(piece, a, b, room, own)
+        piece, a, b, room, own = piece[close], a[:, close], b[:, close], room[close], u[:, close]
+        value, slope, bend = self._logs(piece, a, b, room, own)
         for _ in range(_ROUNDS):
-            _, slope, bend, _ = now
             step = np.clip(-slope / np.minimum(bend, -_SHORTEST), -0.5, 0.5)
-            for _ in range(4):
-                turned = np.cos(step) * own + np.sin(step) * np.stack([-own[1], own[0]])
-                then = self._logs(piece, a, b, room, turned)
-                worse = ~(then[0] >= now[0])
+            for _ in range(_SHORTER):
+                worse = ~(self._logs(piece, a, b, room, _turned(own, step))[0] >= value)
                 if not worse.any():
                     break
                 step = np.where(worse, step / 4, step)
-            step = np.where(worse, 0, step)
-            own = np.cos(step) * own + np.sin(step) * np.stack([-own[1], own[0]])
-            now = self._logs(piece, a, b, room, own)
-        u, h = u.copy(), h.copy()
-        u[:, close], h[close] = own, now[3]
-        return u, h
+            own = _turned(own, np.where(worse, 0, step))
+            value, slope, bend = self._logs(piece, a, b, room, own)
+        turned = u.copy()
+        turned[:, close] = own
+        return turned
 
     def _logs(
         self, piece: Integers, a: Real, b: Real, room: Real, u: Real
-    ) -> tuple[Real, Real, Real, Real]:
-        """Return the sum of logarithms, its first two derivatives by the angle of u, and h."""
+    ) -> tuple[Real, Real, Real]:
+        """Return the sum of the logarithms and its first two derivatives by the angle of u."""
         h, p = self._support(piece, u)
-        across = np.stack([-u[1], u[0]])
-        value = slope = bend = np.zeros(len(piece))
+        value, slope, bend = np.zeros((3, len(piece)))
         for end in (a, b):
             left = _dot(u, end) - h - room
-            rate, fall = _dot(across, end - p), -_dot(u, end - p)
             with np.errstate(divide="ignore", invalid="ignore"):
-                value = value + np.where(left > 0, np.log(left), -np.inf)
-                slope = slope + rate / left
-                bend = bend + fall / left - (rate / left) ** 2
-        return value, slope, bend, h
+                value += np.where(left > 0, np.log(left), -np.inf)
+                rate = _dot(_across(u), end - p) / left
+                slope += rate
+                bend -= _dot(u, end - p) / left + rate * rate
+        return value, slope, bend
+
+
+def _across(u: Real) -> Real:
+    """Return u, turned left by a right angle."""
+    return np.stack([-u[1], u[0]])
+
+
+def _turned(u: Real, angle: Real) -> Real:
+    return np.asarray(np.cos(angle) * u + np.sin(angle) * _across(u))
 
 
 def _dot(x: Real, y: Real) -> Real:
