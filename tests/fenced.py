@@ -30,6 +30,14 @@ def _random_polygons(count: int, seed: int) -> list[dict[str, Any]]:
     return zones
 
 
+FILE = "tests/data/missions/fence_and_rally.plan"
+ELSEWHERE = {
+    "site.origin": {"latitude": 47.396, "longitude": 8.543, "elevation": 400},
+    "flight.start": [20, 400],
+    "flight.end": [420, 30],
+}
+"""Where the fence of `FILE` lies: 453 m by 445 m, with a circle of 25.5 m in the middle."""
+
 FENCES: Mapping[str, dict[str, Any]] = {
     "a wall between the stations": {"exclusion": [_box(100, 140, 290, 150)]},
     "a gap 15 m wide": {
@@ -52,7 +60,7 @@ FENCES: Mapping[str, dict[str, Any]] = {
     "zones that touch": {
         "exclusion": [_box(120, 120, 180, 180), _box(180, 180, 240, 240), _box(180, 120, 240, 180)]
     },
-    "a fence from a file": {"file": "tests/data/missions/fence_and_rally.plan"},
+    "a fence from a file": {"file": str(MISSIONS.parent / FILE)},
     "forty random polygons": {"exclusion": _random_polygons(40, 7)},
 }  # fmt: skip
 
@@ -60,9 +68,9 @@ FENCES: Mapping[str, dict[str, Any]] = {
 def fenced(name: str, **changes: Any) -> Plan:
     """Return the sample plan of a copter, in steps of 0.5 s, with the fence of that name."""
     text = (MISSIONS / "copter_relay.yaml").read_text()
-    return parse_plan(
-        edited(text, {"flight.time_step": 0.5, "fence": FENCES[name], **changes}), "plan.yaml"
-    )
+    own = ELSEWHERE if "file" in FENCES[name] else {}
+    values = {"flight.time_step": 0.5, "fence": FENCES[name], **own, **changes}
+    return parse_plan(edited(text, values), "plan.yaml")
 
 
 def dense_path(w: Real, v: Real, a: Real, step: float, count: int = 20) -> Real:
