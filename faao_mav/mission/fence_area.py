@@ -26,6 +26,10 @@ _SIMPLER = (0.1, 0.01)
 """By how much, m, arcs may be simplified where a shortest way is searched. Chosen: with 0.1 m the
 search among 40 circles takes 0.2 s in place of 7 s, and the way is 0.01 % longer."""
 
+_BAR, _INTO = 0.01, 5.0
+"""Half the width of a bar across the area, and how far it begins inside the obstacle, m. Chosen:
+the bar has to meet the obstacle, from which a way may keep some metres."""
+
 _FARTHEST = 1e6
 """Half the side, m, of the square that stands for the plane where a fence has no inclusion."""
 
@@ -36,13 +40,15 @@ class Area:
 
     Circles become polygons, inside the circle for inclusions and outside for exclusions, so that
     what is found to stay within the fence does so. `crosses_itself`: its outline does; what counts
-    as inside is then what an odd number of outlines encloses, as the autopilots count.
+    as inside is then what an odd number of outlines encloses, as the autopilots count. `disc` is
+    the center and the radius of a circle.
     """
 
     name: str
     inclusion: bool
     shape: "BaseGeometry"
     crosses_itself: bool = False
+    disc: tuple[float, float, float] | None = None
 
 
 def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
@@ -56,10 +62,11 @@ def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
         name = f"{kind[polygon.inclusion]} polygon {n}"
         areas.append(Area(name, polygon.inclusion, shape, not shapely.is_valid(outline)))
     for n, circle in enumerate(fence.circles, start=1):
-        center = shapely.Point(frame.to_local(*circle.center))
+        east, north = map(float, frame.to_local(*circle.center))
         radius = circle.radius * (1.0 if circle.inclusion else _OUTSIDE)
-        shape = center.buffer(radius, quad_segs=_SEGMENTS)
-        areas.append(Area(f"{kind[circle.inclusion]} circle {n}", circle.inclusion, shape))
+        shape = shapely.Point(east, north).buffer(radius, quad_segs=_SEGMENTS)
+        name, disc = f"{kind[circle.inclusion]} circle {n}", (east, north, circle.radius)
+        areas.append(Area(name, circle.inclusion, shape, disc=disc))
     return tuple(areas)
 
 
@@ -156,6 +163,40 @@ class FreeArea:
         parts = shapely.get_parts(self.shape)
         found = np.flatnonzero(shapely.covers(parts, shapely.Point(point)))
         return int(found[0]) if found.size else None
+
+    def nearest(self, point: Real, start: Real) -> Real:
+        """Return the place nearest to `point` in the part of the area that `start` is in."""
+        import shapely
+
+        part = self.part_of(start)
+        shape = self.shape if part is None else shapely.get_parts(self.shape)[part]
+        line = shapely.shortest_line(shape, shapely.Point(point))
+        return np.asarray(shapely.get_coordinates(line)[0])
+
+    @cached_property
+    def holes(self) -> "list[BaseGeometry]":
+        """The obstacles that can be passed on two sides, as polygons."""
+        import shapely
+
+        rings = (ring for part in shapely.get_parts(self.shape) for ring in part.interiors)
+        return [shapely.Polygon(ring) for ring in rings]
+
+    def barred(self, corner: Real, outward: Real) -> "FreeArea | None":
+        """Return the area without a bar from the obstacle at `corner` outward to the next edge.
+
+        Ways in it pass that obstacle on its other side. `outward` is a direction (2,); None where
+        the bar would have no length.
+        """
+        import shapely
+
+        far = corner + 2 * _FARTHEST * outward
+        lines = shapely.get_parts(shapely.LineString([corner, far]) & self.shape)
+        first = [line for line in lines if line.distance(shapely.Point(corner)) < _BAR]
+        if not first or first[0].length < _BAR:
+            return None
+        end = shapely.get_coordinates(first[0])[-1]
+        bar = shapely.LineString([corner - _INTO * outward, end]).buffer(_BAR)
+        return FreeArea(_polygonal(self.shape - bar))
 
     def shortest_way(self, start: Real, end: Real) -> Real | None:
         """Return the corners (k, 2) of the shortest way from `start` to `end`, both (2,).

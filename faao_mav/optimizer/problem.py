@@ -9,6 +9,9 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError
 from faao_mav.mission.fence_area import FreeArea
+from faao_mav.optimizer.fence_geometry import fence_geometry
+from faao_mav.optimizer.interior.constraint import Constraint
+from faao_mav.optimizer.interior.fence import FenceGeometry
 from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
@@ -161,6 +164,15 @@ class Problem:
         """Where the fence and its margin let the path be, local metres; None without a fence."""
         fence, area = self.plan.fence, self.plan.keep_in
         return None if fence is None or area is None else area.inside(fence.margin)
+
+    @cached_property
+    def fence(self) -> FenceGeometry | None:
+        """What the path keeps its distance from; None without a fence."""
+        return fence_geometry(self.plan)
+
+    def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
+        """Return what flights of `kin` have to keep beside the limits of the aircraft."""
+        return () if self.fence is None else self.fence.constraints(kin)
 
     @property
     def maximised_queue(self) -> RelayQueue | None:

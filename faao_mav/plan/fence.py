@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -9,8 +10,11 @@ from faao_mav.errors import InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
 from faao_mav.mission.fence_area import FreeArea
-from faao_mav.plan.fields import Vector
+from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Vector
 from faao_mav.plan.sections import CircleZone, FenceOptions, Plan, PlanFile, PolygonZone
+
+_SHORTER_WAY = 2e-3
+"""By how much of its length a way may be longer than the shortest, which is found to 0.01 %."""
 
 
 def geofence(contents: PlanFile, source: str) -> Fence:
@@ -21,9 +25,9 @@ def geofence(contents: PlanFile, source: str) -> Fence:
     options = contents.fence
     if options is None:
         return Fence()
-    of_file = _read(options, source)
     origin = contents.site.origin
     frame = LocalFrame(origin.latitude, origin.longitude)
+    of_file = _read(options, source, frame)
     zones = [
         *((zone, True) for zone in options.inclusion),
         *((zone, False) for zone in options.exclusion),
@@ -38,24 +42,50 @@ def geofence(contents: PlanFile, source: str) -> Fence:
         for zone, inclusion in zones
         if isinstance(zone, CircleZone)
     ]
-    fence = Fence(
-        (*polygons, *of_file.polygons), (*circles, *of_file.circles), of_file.breach_return
-    )
+    fence = Fence((*polygons, *of_file.polygons), (*circles, *of_file.circles))
     if not fence:
         raise PlanError(f"{source}: fence: has no zones; give inclusion, exclusion or file")
     return fence
 
 
-def _read(options: FenceOptions, source: str) -> Fence:
+def written_out(fence: Fence, margin: float) -> dict[str, Any]:
+    """Return the section `fence` of a plan that has the zones of `fence` itself."""
+    zones: dict[str, Any] = {"margin": margin, "inclusion": [], "exclusion": []}
+    for polygon in fence.polygons:
+        zone: dict[str, Any] = {"polygon": [_place(vertex) for vertex in polygon.vertices]}
+        zones["inclusion" if polygon.inclusion else "exclusion"].append(zone)
+    for circle in fence.circles:
+        zone = {"center": _place(circle.center), "radius": circle.radius}
+        zones["inclusion" if circle.inclusion else "exclusion"].append(zone)
+    return {key: value for key, value in zones.items() if value != []}
+
+
+def _place(place: LatLon) -> dict[str, float]:
+    return {"latitude": place[0], "longitude": place[1]}
+
+
+def _read(options: FenceOptions, source: str, frame: LocalFrame) -> Fence:
+    """Return the fence in `fence.file`; raise `PlanError` where it lies far from the origin."""
     if options.file is None:
         return Fence()
     from faao_mav.mission.formats.fence_file import read_fence  # plans rarely have one
 
     path = Path(source).parent / options.file
     try:
-        return read_fence(path)
+        fence = read_fence(path)
     except InputError as error:
         raise PlanError(f"{source}: fence.file: {error}") from None
+    places = [vertex for polygon in fence.polygons for vertex in polygon.vertices]
+    places += [circle.center for circle in fence.circles]
+    away = frame.to_local(*np.transpose(places))
+    farthest = int(np.abs(away).max(axis=1).argmax())
+    distance = float(np.abs(away[farthest]).max())
+    if not distance <= MAX_LOCAL_DISTANCE:
+        raise PlanError(
+            f"{source}: fence.file: {path}: {places[farthest]} lies {distance / 1000:,.0f} km from "
+            f"site.origin; at most {MAX_LOCAL_DISTANCE / 1000:.0f} km is accepted"
+        )
+    return fence
 
 
 def _degrees(frame: LocalFrame, places: Sequence[Vector]) -> tuple[LatLon, ...]:
@@ -96,6 +126,14 @@ def _way_problems(plan: Plan, kept: FreeArea) -> Iterator[str]:
             f"{list(flight.end)} that keeps {margin:g} m (fence.margin) from the edge"
         )
         return
+    length = float(np.hypot(*np.diff(way, axis=0).T).sum())
+    most = plan.vehicle.max_speed * (flight.duration - flight.time_step)
+    if length > most * (1 + _SHORTER_WAY):
+        yield (
+            f"flight.duration: {flight.duration:g} s is too short: the shortest way from start to "
+            f"end inside the fence is {length:.0f} m, and {plan.vehicle.max_speed:g} m/s takes the "
+            f"aircraft {most:.0f} m"
+        )
 
 
 def trouble(plan: Plan, place: Vector) -> str:

@@ -12,7 +12,7 @@ FENCE_SUFFIXES = (".plan", ".kml", ".geojson", ".json")
 _MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
 
-_MAX_CORNERS = 10_000
+_MAX_CORNERS = 2_000
 """Corners of the largest fence that is read; chosen: autopilots store some hundred."""
 
 

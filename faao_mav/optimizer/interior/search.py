@@ -87,6 +87,13 @@ tolerance of 1e-4: 7 converge, 3 with the adaptive rule alone. From the first ce
 in half duplex take a third more iterations; with 1 or 10 in place of 3, up to four do not converge.
 """
 
+_SOLVED_TURNING = 30.0
+"""The same where the half-planes of a fence turn with the flight: mu is monotone from the start.
+
+Measured on two sample flights round obstacles: 134 and 95 iterations; with 100 or 300 in place of
+30 none to three times as many converge, and with the adaptive rule neither does in 300.
+"""
+
 _MU_PER_TOLERANCE = 1 / 20
 """The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
 
@@ -160,6 +167,7 @@ class Search:
     ) -> None:
         self.rewards, self.tolerance = rewards, tolerance
         self.flight = ScaledFlight(kin, constraints)
+        self.turning = any(constraint.turns for constraint in constraints)
         self.barrier_share = _BARRIER_SHARE * kin.slots
         flights = w.shape[1]
         self.rows = np.arange(flights)
@@ -265,9 +273,10 @@ class Search:
         keep = np.maximum((left / now) ** 3, slowest)
         least = self.tolerance * _MU_PER_TOLERANCE * control.steepness
         adaptive = np.fmin(control.mu, keep * now)
-        solved = slope * control.steepness < _SOLVED * control.mu
+        near = _SOLVED_TURNING if self.turning else _SOLVED
+        solved = slope * control.steepness < near * control.mu
         monotone = np.where(solved, _MONOTONE_FALL, 1.0) * control.mu
-        hugged = queued & (control.centrings >= _MONOTONE_AFTER)
+        hugged = (queued & (control.centrings >= _MONOTONE_AFTER)) | self.turning
         control.mu = np.fmax(np.where(hugged, monotone, adaptive), least)
         direction, reach = newton.corrector(control.mu, ahead, share)
         share = np.minimum(1, _TO_BOUNDARY * reach)
