@@ -1,9 +1,9 @@
 """From a trajectory to the mission whose predicted flight keeps it, in space and time."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import floor, inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -34,7 +34,11 @@ _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the accel
 _PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
-_GOOD_COST = 1.5  # the `Schedule.cost`, m, from which nothing better is looked for
+_GOOD = (0.0, 1.5)  # the rank, m, from which nothing better is looked for
+
+_Scheduled: TypeAlias = tuple[Schedule, Scheduler]
+_Rank: TypeAlias = tuple[float, float]
+"""How far a schedule gets out of the fence, m, and its `Schedule.cost`, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,26 +141,23 @@ def convert(solution: "Solution") -> Conversion:
     """
     plan, area = solution.plan, solution.plan.keep_in
     best = _convert(solution, plan)
-    if area is None or area.clearance(solution.w) < 0:
-        return best
-    clearance, tolerance = _clearance(best, area), plan.mission.path_tolerance
-    while clearance < 0 and tolerance > _FINEST_TOLERANCE:
+    outside, tolerance = _outside(best.schedule, area), plan.mission.path_tolerance
+    while outside > 0 and tolerance > _FINEST_TOLERANCE:
         tolerance /= 2
         finer = replace(plan, mission=replace(plan.mission, path_tolerance=tolerance))
         try:
             tried = _convert(solution, finer)
         except InfeasibleError:  # too many items
             break
-        if _clearance(tried, area) > clearance:
-            best, clearance = tried, _clearance(tried, area)
+        if _outside(tried.schedule, area) < outside:
+            best, outside = tried, _outside(tried.schedule, area)
     return best
 
 
-def _clearance(conversion: Conversion, area: FreeArea) -> float:
-    """Return how near, m, legs and predicted flight come to the fence's edge; < 0 outside."""
-    schedule = conversion.schedule
+def _outside(schedule: Schedule, area: FreeArea | None) -> float:
+    """Return how far, m, legs and predicted flight get out of the fence; 0 inside or without."""
     paths = (schedule.route.positions, schedule.track()["predicted_w"])
-    return min(map(area.clearance, paths))
+    return 0.0 if area is None else max(0.0, *(-area.clearance(path) for path in paths))
 
 
 def _convert(solution: "Solution", plan: "Plan") -> Conversion:
@@ -172,14 +173,19 @@ def _convert(solution: "Solution", plan: "Plan") -> Conversion:
     given, sets = vehicle_of(plan), candidates(plan)
     schedulers = [_scheduler(plan, t, w, vehicle) for vehicle in _vehicles(plan)]
     straight = initial_route(t, w, plan, share=1.0 if given.type.hovers else _PLANE_SHARE)
-    found = _refined((straight, scheduler) for scheduler in schedulers)
-    best = min(found, key=_cost)
-    if _cost(best) > _GOOD_COST and given.type.dialect.splines:
+
+    def rank(scheduled: _Scheduled) -> _Rank:
+        """Order schedules: inside the fence first, then by cost."""
+        return _outside(scheduled[0], plan.keep_in), scheduled[0].cost
+
+    found = _refined(((straight, scheduler) for scheduler in schedulers), rank)
+    best = min(found, key=rank)
+    if rank(best) > _GOOD and given.type.dialect.splines:
         liveliest = schedulers[-1]
         bent = [initial_route(t, w, plan, splines=splines) for splines in _splines(liveliest)]
         new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
-        found = _refined((route, liveliest) for route in new.values())
-        best = min([best, *found], key=_cost)
+        found = _refined(((route, liveliest) for route in new.values()), rank)
+        best = min([best, *found], key=rank)
     schedule, scheduler = best
     return Conversion(
         mission=assemble(schedule.route, plan),
@@ -210,19 +216,17 @@ def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     )
 
 
-def _refined(trials: Iterable[tuple[Route, Scheduler]]) -> list[tuple[Schedule, Scheduler]]:
+def _refined(
+    trials: Iterable[tuple[Route, Scheduler]], rank: Callable[[_Scheduled], _Rank]
+) -> list[_Scheduled]:
     """Return the schedules of the trials refined, the most promising first, up to a good one."""
     firsts = [(scheduler.first(route), scheduler) for route, scheduler in trials]
-    refined: list[tuple[Schedule, Scheduler]] = []
+    refined: list[_Scheduled] = []
     for first, scheduler in sorted(firsts, key=lambda each: each[0].error):
         refined.append((scheduler.refined(first), scheduler))
-        if _cost(refined[-1]) <= _GOOD_COST:
+        if rank(refined[-1]) <= _GOOD:
             break
     return refined
-
-
-def _cost(scheduled: tuple[Schedule, Scheduler]) -> float:
-    return scheduled[0].cost
 
 
 def _splines(scheduler: Scheduler) -> Iterator[Splines]:

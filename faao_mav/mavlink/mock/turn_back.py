@@ -1,8 +1,9 @@
 """What becomes of a mock autopilot's flight that leaves the fence.
 
-Measured in simulation: ArduCopter 4.7 (FENCE_ENABLE 1, FENCE_ACTION 1) and PX4 1.16.1 (GF_ACTION 2)
-turned 1 to 4 m outside, at 8 m/s, came to rest 15 and 10 m outside, and went home and landed, or
-stayed. This one acts as soon as it is outside, and brakes as gently as it speeds up.
+Measured in simulation, at 8 m/s: ArduCopter 4.7 (FENCE_ENABLE 1, FENCE_ACTION 1) changed to RTL
+1 m outside, got 15 m outside, went home and landed; PX4 1.16.1 (GF_ACTION 2) changed to hold 4 m
+outside and stayed 2 m outside. This one acts as soon as it is outside, and brakes as gently as it
+speeds up.
 """
 
 import math
