@@ -82,7 +82,7 @@ class ConvexObstacles:
         """
         center, size = self._discs
         away = (a + b)[:, None] / 2 - center
-        u = away / np.maximum(np.hypot(*away), _SHORTEST)
+        u = _unit(away)
         h = u[0] * center[0] + u[1] * center[1] + size
         least = np.minimum(u[0] * a[0] + u[1] * a[1], u[0] * b[0] + u[1] * b[1]) - h
         near = np.nonzero(least < _FAR / self.unit)
@@ -109,8 +109,7 @@ class ConvexObstacles:
     def _candidates(self, piece: Integers, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
         for normals, offsets in zip(*self._sides, strict=True):
             yield normals[:, piece], offsets[piece]
-        along = b - a
-        across = np.stack([along[1], -along[0]]) / np.maximum(np.hypot(*along), _SHORTEST)
+        across = _across(_unit(b - a))
         for side in (across, -across):
             yield side, self._support(piece, side)[0]
         corners = self.corners[piece].transpose(2, 1, 0)
@@ -118,7 +117,7 @@ class ConvexObstacles:
             square = (corners[0] - end[0]) ** 2 + (corners[1] - end[1]) ** 2
             nearest = square.argmin(axis=0)
             away = end - corners[:, nearest, np.arange(len(piece))]
-            u = away / np.maximum(np.hypot(*away), _SHORTEST)
+            u = _unit(away)
             yield u, self._support(piece, u)[0]
 
     def _support(self, piece: Integers, u: Real) -> tuple[Real, Real]:
@@ -164,6 +163,15 @@ class ConvexObstacles:
                 slope += rate
                 bend -= _dot(u, end - p) / left + rate * rate
         return value, slope, bend
+
+
+def _unit(vectors: Real) -> Real:
+    """Return `vectors` (2, ...) divided by their lengths, and east for those without one."""
+    length = np.hypot(*vectors)
+    unit = vectors / np.maximum(length, _SHORTEST)
+    unit[0] = np.where(length > _SHORTEST, unit[0], 1.0)
+    unit[1] = np.where(length > _SHORTEST, unit[1], 0.0)
+    return np.asarray(unit)
 
 
 def _across(u: Real) -> Real:
