@@ -2,9 +2,9 @@
 
 maximise t, t <= mean of each link's rates, under (11), (12), (13d)-(13f) as `Kinematics` has them,
 and the half-planes of a fence where there is one; or with a relay's queue t = mean of what is
-forwarded, with r, f, q and the shares as variables. Lengths in 100 m. The precoders enter through numbers c of every slot alone: with H = sqrt(g) H_r
-every exponent of (7), (8) is D_k = g(w) c_k, so that one model with c as its parameter serves all
-starts and all precoders.
+forwarded, with r, f, q and the shares as variables. Lengths in 100 m. The precoders enter through
+numbers c of every slot alone: with H = sqrt(g) H_r every exponent of (7), (8) is D_k = g(w) c_k, so
+that one model with c as its parameter serves all starts and all precoders.
 """
 
 from collections.abc import Sequence
