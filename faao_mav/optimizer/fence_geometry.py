@@ -1,14 +1,19 @@
 """The fence of a plan as convex pieces, for the interior-point method to keep out of."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.mission.convex_pieces import convex_pieces
-from faao_mav.mission.fence_area import free_area
+from faao_mav.mission.fence_area import OUTSIDE, free_area
 from faao_mav.optimizer.interior.fence import FenceGeometry
 from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.plan import Plan
 from faao_mav.plan.autopilots import VEHICLES
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
 
 _SIDES = 64
 """Sides of the polygon inside a circle that stands for an inclusion: 0.12 % of the radius is lost.
@@ -18,7 +23,8 @@ Chosen."""
 def fence_geometry(plan: Plan) -> FenceGeometry | None:
     """Return what the path of `plan` keeps `fence.margin` from; None without a fence.
 
-    Exclusions are cut into convex pieces, circles are discs. Areas to stay in are their convex
+    Exclusions are cut into convex pieces; circles are discs, as large as the polygons that other
+    checks have for them. Areas to stay in are their convex
     hulls, and what the hulls have beyond the areas is more pieces. Pieces that the flight cannot
     reach in the time it has are left out.
     """
@@ -28,7 +34,9 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
         return None
     zones = plan.zones
     inside = free_area(zones, any_inclusion=_any_inclusion(plan))
-    inclusions = [zone.shape for zone in zones if zone.inclusion]
+    inclusions = [
+        zone.shape if zone.disc is None else _disc(*zone.disc) for zone in zones if zone.inclusion
+    ]
     if _any_inclusion(plan) and inside is not None:
         inclusions = [inside.simplify(0.05)]
     pieces: list[Real] = []
@@ -45,7 +53,7 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
         if zone.disc is not None:
             east, north, radius = zone.disc
             pieces.append(np.array([[east, north]]))
-            radii.append(radius)
+            radii.append(radius * OUTSIDE)
         else:
             parts = convex_pieces(zone.shape)
             pieces += parts
@@ -61,6 +69,12 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
     offsets = np.concatenate([offset for _, offset in sides]) if sides else np.empty(0)
     obstacles = ConvexObstacles.of([pieces[k] for k in near], [radii[k] for k in near])
     return FenceGeometry(obstacles, normals, offsets, plan.fence.margin)
+
+
+def _disc(east: float, north: float, radius: float) -> "BaseGeometry":
+    import shapely
+
+    return shapely.Point(east, north).buffer(radius, quad_segs=_SIDES // 4)
 
 
 def _any_inclusion(plan: Plan) -> bool:
