@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _SEGMENTS = 64
 """Straights to a quarter of a circle: 0.075 mm of error a metre of radius."""
 
-_OUTSIDE = 1 / math.cos(math.pi / (4 * _SEGMENTS))
+OUTSIDE = 1 / math.cos(math.pi / (4 * _SEGMENTS))
 """The radius of the circle about a polygon of `_SEGMENTS`, in those of the circle inside it."""
 
 _SIMPLER = (0.1, 0.01)
@@ -63,7 +63,7 @@ def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
         areas.append(Area(name, polygon.inclusion, shape, not shapely.is_valid(outline)))
     for n, circle in enumerate(fence.circles, start=1):
         east, north = map(float, frame.to_local(*circle.center))
-        radius = circle.radius * (1.0 if circle.inclusion else _OUTSIDE)
+        radius = circle.radius * (1.0 if circle.inclusion else OUTSIDE)
         shape = shapely.Point(east, north).buffer(radius, quad_segs=_SEGMENTS)
         name, disc = f"{kind[circle.inclusion]} circle {n}", (east, north, circle.radius)
         areas.append(Area(name, circle.inclusion, shape, disc=disc))
@@ -135,7 +135,7 @@ class FreeArea:
 
     def inside(self, margin: float) -> "FreeArea":
         """Return the places at least `margin` metres from the edge, but for 0.1 mm a metre."""
-        return FreeArea(_polygonal(self.shape.buffer(-margin * _OUTSIDE, quad_segs=_SEGMENTS)))
+        return FreeArea(_polygonal(self.shape.buffer(-margin * OUTSIDE, quad_segs=_SEGMENTS)))
 
     def covers(self, points: Real) -> Flags:
         """Return which of `points` (n, 2) lie inside or on the edge, (n,)."""

@@ -9,8 +9,7 @@ from fenced import FENCES, dense_path, fenced
 from hypothesis import given
 
 from faao_mav.errors import InfeasibleError
-from faao_mav.mission.fence_area import FreeArea
-from faao_mav.optimizer.interior.fence import FenceGeometry
+from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
@@ -53,8 +52,9 @@ def test_separation_is_the_distance_of_shapely(
     u, h = obstacles.separation(ends[..., :-1], ends[..., 1:])
     apart = min(float(u[:, 0, 0, 0] @ end) for end in (a, b)) - float(h[0, 0, 0])
     distance = outline.distance(shapely.LineString([a, b])) - radius
-    if distance < 0:
-        assert apart <= 1e-9
+    assert np.hypot(*u[:, 0, 0, 0]) == pytest.approx(1)
+    if distance <= -radius:
+        assert apart <= distance + 1e-9
     elif distance < 20:  # farther than that a disc about the obstacle is told
         assert apart == pytest.approx(distance, abs=1e-9)
     else:
@@ -97,21 +97,20 @@ def test_clearance_is_that_of_the_continuous_path(
     kin = Kinematics(np.array(way[0]), np.array(way[-1]), n, 1.0, speed, speed, None, None, True)
     flight = kin.follow(np.array(way) * 0.3)
     corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
-    hull = shapely.box(-400, -400, 400, 400)
     fence = FenceGeometry(ConvexObstacles.of([corners], [0.0]), np.empty((0, 2)), np.empty(0), 5.0)
     path = dense_path(flight.w, flight.v, flight.a, 1.0, 200)
-    true = FreeArea(hull - outline).clearance(path)
-    told = fence.clearance(flight, 1.0)
-    if true > 0:
-        assert told <= shapely.LineString(path).distance(outline) + 1e-6
+    told, true = fence.clearance(flight, 1.0), shapely.LineString(path).distance(outline)
+    assert told <= true + 1e-6
+    if true == 0:
+        assert told <= 0
 
 
-@pytest.fixture(scope="module")
-def solved() -> dict[str, Solution]:
-    return {}
-
-
-QUICK = {"flight.time_step": 1.0, "radio.fading": "none", "optimizer.starts": ["straight", "user"]}
+QUICK = {
+    "flight.time_step": 1.5,
+    "radio.fading": "none",
+    "optimizer.starts": ["straight"],
+    "optimizer.max_iterations": 20,
+}
 
 
 @pytest.mark.parametrize("name", [name for name in FENCES if "forty" not in name])
@@ -120,12 +119,11 @@ def test_the_whole_path_keeps_the_margin(name: str) -> None:
     solution = optimize(plan)
     assert clearance(solution) >= margin(plan) - 1e-6
     assert solution.is_feasible()
-    assert solution.clearance() == pytest.approx(clearance(solution), abs=0.02)
-    assert solution.delivered_rate >= max(solution.starts.values()) - 1e-3
+    assert margin(plan) - 1e-6 <= (solution.clearance() or 0) <= clearance(solution) + 1e-6
 
 
 def test_forty_polygons_are_passed(tmp_path: object) -> None:
-    plan = fenced("forty random polygons", **QUICK, **{"optimizer.max_iterations": 3})
+    plan = fenced("forty random polygons", **{**QUICK, "optimizer.max_iterations": 2})
     assert clearance(optimize(plan)) >= margin(plan) - 1e-6
 
 
@@ -150,13 +148,15 @@ def test_a_fence_that_is_far_away_changes_nothing(small_plan: MakePlan) -> None:
 )
 def test_every_kind_of_plan_keeps_out(small_plan: MakePlan, changes: dict[str, object]) -> None:
     fence = {"margin": 1, "exclusion": [{"center": [22, 22], "radius": 8}]}
-    solution = optimize(small_plan({"fence": fence, **changes}))
+    starts = {"optimizer.starts": ["straight", "user"], "optimizer.max_iterations": 20}
+    solution = optimize(small_plan({"fence": fence, **starts, **changes}))
     assert clearance(solution) >= 1 - 1e-6
     assert solution.is_feasible()
 
 
 def test_a_fenced_solution_is_stationary_and_is_kept_in_a_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    solution = optimize(fenced("a fence from a file", **QUICK))
+    changes = {"flight.time_step": 3.0, "optimizer.max_iterations": 50}
+    solution = optimize(fenced("a fence from a file", **{**QUICK, **changes}))
     assert solution.converged
     assert solution.kkt_residual() < 1e-4
     save_solution(solution, tmp_path / "elsewhere.npz")
@@ -197,4 +197,4 @@ def test_a_path_that_ignores_dynamics_becomes_a_flight_on_its_side() -> None:
 
 def test_no_time_for_the_way_round_is_said() -> None:
     with pytest.raises(InfeasibleError, match="inside the fence"):
-        optimize(fenced("two ways round of different worth", **QUICK, **{"flight.duration": 68}))
+        optimize(fenced("two ways round of different worth", **QUICK, **{"flight.duration": 70.5}))

@@ -98,6 +98,10 @@ _MU_PER_TOLERANCE = 1 / 20
 """The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
 
 
+_MOST_PER_SLOT = 10.0
+"""The inequalities per slot from which the least mu is smaller: the gap is their sum. Chosen."""
+
+
 @dataclass(frozen=True, slots=True)
 class StartStrategy:
     """How a search begins: the first barrier parameter mu, and the margin of the limits.
@@ -271,7 +275,9 @@ class Search:
         queued = not len(at.total)
         slowest = _QUEUE_FALL if queued else np.where(slope < 1, 0.01, 0.1)
         keep = np.maximum((left / now) ** 3, slowest)
-        least = self.tolerance * _MU_PER_TOLERANCE * control.steepness
+        per_slot = sum(state.count() for state in at.states) / at.w.shape[-1]
+        fewer = np.minimum(1, _MOST_PER_SLOT / per_slot)
+        least = self.tolerance * _MU_PER_TOLERANCE * control.steepness * fewer
         adaptive = np.fmin(control.mu, keep * now)
         near = _SOLVED_TURNING if self.turning else _SOLVED
         solved = slope * control.steepness < near * control.mu

@@ -28,6 +28,9 @@ _ROUNDS, _SHORTER = 5, 4
 """Newton steps to the direction of the barrier, enough for five digits, and how often a step that
 leads away from it is quartered. Chosen."""
 
+_TURN, _STILL = 0.5, 1e-6
+"""The largest turn of such a step, and the one below which none is taken, radians. Chosen."""
+
 
 @dataclass(frozen=True)
 class ConvexObstacles:
@@ -82,7 +85,7 @@ class ConvexObstacles:
         """
         center, size = self._discs
         away = (a + b)[:, None] / 2 - center
-        u = away / np.maximum(np.hypot(*away), _SHORTEST)
+        u = _unit(away)
         h = u[0] * center[0] + u[1] * center[1] + size
         least = np.minimum(u[0] * a[0] + u[1] * a[1], u[0] * b[0] + u[1] * b[1]) - h
         near = np.nonzero(least < _FAR / self.unit)
@@ -109,8 +112,7 @@ class ConvexObstacles:
     def _candidates(self, piece: Integers, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
         for normals, offsets in zip(*self._sides, strict=True):
             yield normals[:, piece], offsets[piece]
-        along = b - a
-        across = np.stack([along[1], -along[0]]) / np.maximum(np.hypot(*along), _SHORTEST)
+        across = _across(_unit(b - a))
         for side in (across, -across):
             yield side, self._support(piece, side)[0]
         corners = self.corners[piece].transpose(2, 1, 0)
@@ -118,7 +120,7 @@ class ConvexObstacles:
             square = (corners[0] - end[0]) ** 2 + (corners[1] - end[1]) ** 2
             nearest = square.argmin(axis=0)
             away = end - corners[:, nearest, np.arange(len(piece))]
-            u = away / np.maximum(np.hypot(*away), _SHORTEST)
+            u = _unit(away)
             yield u, self._support(piece, u)[0]
 
     def _support(self, piece: Integers, u: Real) -> tuple[Real, Real]:
@@ -136,24 +138,25 @@ class ConvexObstacles:
         some = np.minimum(_dot(u, a), _dot(u, b)) - self._support(piece, u)[0] - room
         close = np.flatnonzero((some > 0) & (some < _CLOSE / self.unit))
         piece, a, b, room, own = piece[close], a[:, close], b[:, close], room[close], u[:, close]
-        value, slope, bend = self._logs(piece, a, b, room, own)
+        now = self._logs(piece, a, b, room, own)
         for _ in range(_ROUNDS):
-            step = np.clip(-slope / np.minimum(bend, -_SHORTEST), -0.5, 0.5)
+            _, slope, bend = now
+            step = np.clip(-slope / np.minimum(bend, -_SHORTEST), -_TURN, _TURN)
+            if not (np.abs(step) > _STILL).any():
+                break
             for _ in range(_SHORTER):
-                worse = ~(self._logs(piece, a, b, room, _turned(own, step))[0] >= value)
-                if not worse.any():
+                then = self._logs(piece, a, b, room, _turned(own, step))
+                better = then[0] >= now[0]
+                if better.all():
                     break
-                step = np.where(worse, step / 4, step)
-            own = _turned(own, np.where(worse, 0, step))
-            value, slope, bend = self._logs(piece, a, b, room, own)
+                step = np.where(better, step, step / 4)
+            own, now = np.where(better, _turned(own, step), own), np.where(better, then, now)
         turned = u.copy()
         turned[:, close] = own
         return turned
 
-    def _logs(
-        self, piece: Integers, a: Real, b: Real, room: Real, u: Real
-    ) -> tuple[Real, Real, Real]:
-        """Return the sum of the logarithms and its first two derivatives by the angle of u."""
+    def _logs(self, piece: Integers, a: Real, b: Real, room: Real, u: Real) -> Real:
+        """Return the sum of the logarithms (m,) and its first two derivatives by the angle of u."""
         h, p = self._support(piece, u)
         value, slope, bend = np.zeros((3, len(piece)))
         for end in (a, b):
@@ -163,7 +166,16 @@ class ConvexObstacles:
                 rate = _dot(_across(u), end - p) / left
                 slope += rate
                 bend -= _dot(u, end - p) / left + rate * rate
-        return value, slope, bend
+        return np.stack([value, slope, bend])
+
+
+def _unit(vectors: Real) -> Real:
+    """Return `vectors` (2, ...) divided by their lengths, and east for those without one."""
+    length = np.hypot(*vectors)
+    unit = vectors / np.maximum(length, _SHORTEST)
+    unit[0] = np.where(length > _SHORTEST, unit[0], 1.0)
+    unit[1] = np.where(length > _SHORTEST, unit[1], 0.0)
+    return np.asarray(unit)
 
 
 def _across(u: Real) -> Real:

@@ -20,7 +20,7 @@ from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 _TOLERANCE = 1e-3
 """Tolerance of the search: a start need not be the nearest flight to the last metre. Chosen."""
 
-_ALLOWED = 1e-9
+ALLOWED = 1e-9
 """The violation of a limit, in solver units, that counts as none: rounding."""
 
 _MAX_ITERATIONS = 200
@@ -61,4 +61,4 @@ def nearest_flight(
         if 0 in results:
             start = kin.follow(results[0].v.T * kin.max_speed)
     every = (*constraints_of(kin), *constraints)
-    return start if max(each.excess(kin, start) for each in every) <= _ALLOWED else None
+    return start if max(each.excess(kin, start) for each in every) <= ALLOWED else None

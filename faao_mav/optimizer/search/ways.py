@@ -11,7 +11,7 @@ from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.starts import straight_flight, with_stops
-from faao_mav.optimizer.search.track import nearest_flight
+from faao_mav.optimizer.search.track import ALLOWED, nearest_flight
 
 _ROOM = (2.0, 0.5, 0.0)
 """Room that ways leave beside the margin where they can, m: a start inside the limits. Chosen."""
@@ -40,7 +40,7 @@ def starts_inside(
         InfeasibleError: no flight is found.
     """
     found: dict[str, Trajectory] = {}
-    direct = _way(area, [kin.start, kin.end])
+    direct = shortest_by(area, [kin.start, kin.end])
     if direct is not None:
         for name in names:
             ways: Iterator[Real]
@@ -63,7 +63,7 @@ def starts_inside(
     return found
 
 
-def _way(area: FreeArea, points: Sequence[Real]) -> Real | None:
+def shortest_by(area: FreeArea, points: Sequence[Real]) -> Real | None:
     """Return the corners (k, 2) of the shortest way through `points`; None if there is none."""
     corners = [points[0][None]]
     for a, b in pairwise(points):
@@ -97,7 +97,7 @@ def _on_other_sides(area: FreeArea, way: Real) -> list[Real]:
         left.remove(hole)
         inward = sum((each - corner) / np.hypot(*(each - corner)) for each in (before, after))
         blocked = area.barred(corner, -inward / np.hypot(*inward))
-        other = None if blocked is None else _way(blocked, [way[0], way[-1]])
+        other = None if blocked is None else shortest_by(blocked, [way[0], way[-1]])
         if other is not None:
             others.append(other)
         if len(others) == _MOST_OTHERS:
@@ -116,7 +116,7 @@ def _by_way_of(
     for station in stations:
         stop = area.nearest(station, kin.start)
         anchor = shapely.get_coordinates(line.interpolate(line.project(shapely.Point(stop))))[0]
-        spur = _way(area, [anchor, stop])
+        spur = shortest_by(area, [anchor, stop])
         if spur is None:
             return
         spurs.append(shapely.LineString(spur))
@@ -124,7 +124,7 @@ def _by_way_of(
         stops = [
             shapely.get_coordinates(spur.interpolate(share, normalized=True))[0] for spur in spurs
         ]
-        way = _way(area, [kin.start, *stops, kin.end])
+        way = shortest_by(area, [kin.start, *stops, kin.end])
         if way is not None and _length(way) <= kin.max_speed * kin.time_step * (kin.slots - 1):
             yield way
 
@@ -134,18 +134,18 @@ def _flown(
 ) -> Iterator[Trajectory]:
     """Yield feasible flights along `ways`, with `first` that of the first way that has one."""
     for way in ways:
-        flight = _along(kin, way, constraints)
+        flight = along(kin, way, constraints)
         if flight is not None:
             yield flight
             if first:
                 return
 
 
-def _along(kin: Kinematics, way: Real, constraints: Sequence[Constraint]) -> Trajectory | None:
+def along(kin: Kinematics, way: Real, constraints: Sequence[Constraint]) -> Trajectory | None:
     """Return a flight that stops at the corners of `way`, else one that tracks it, or None."""
     if kin.min_speed == 0:
         flight = with_stops(kin, list(way[1:-1]))
-        if flight is not None and max(each.excess(kin, flight) for each in constraints) <= 1e-9:
+        if flight is not None and all(each.excess(kin, flight) <= ALLOWED for each in constraints):
             return flight
     steps = np.hypot(*np.diff(way, axis=0).T)
     gone = np.append(0, np.cumsum(steps))
