@@ -50,6 +50,11 @@ class KeepOut(HalfPlanes):
     quantity: ClassVar = "w"
 
     @property
+    def headroom(self) -> float:
+        """The slack, 100 m, that starts are given where they have less. Chosen."""
+        return 0.02
+
+    @property
     def turns(self) -> bool:
         """True: where a flight slides along an obstacle every half-plane turns."""
         return True
