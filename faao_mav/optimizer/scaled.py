@@ -13,7 +13,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
-from faao_mav.optimizer.interior.fence import FenceGeometry
+from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue

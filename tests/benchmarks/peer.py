@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.optimizer.interior.fence import FenceGeometry
+from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates.rate_model import CurveRate

@@ -17,78 +17,23 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.constraint import Constraint, ScaledFlight
 from faao_mav.optimizer.interior.half_planes import HalfPlanes
 from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 
-@dataclass(frozen=True)
-class FenceGeometry:
-    """What a flight keeps its distance from: metres of the plan's local frame.
-
-    `obstacles` are convex; `normals` (m, 2) and `offsets` (m,) are sides of convex areas to stay
-    in, normal . w <= offset. `margin` is the distance kept.
-    """
-
-    obstacles: ConvexObstacles
-    normals: Real
-    offsets: Real
-    margin: float
-
-    def room(self, kin: Kinematics) -> Real:
-        """Return margin and bulge (n - 1,) of the intervals of flights of `kin`, m."""
-        bulge = kin.max_acceleration * kin.time_step**2 / 8
-        bulges = np.full(kin.slots - 1, bulge)
-        if not kin.bound_first_acceleration:  # both of its speeds are at most v_max
-            bulges[0] = max(bulge, kin.max_speed * kin.time_step / 4)
-        return self.margin + bulges
-
-    def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
-        """Return the constraints of the flights of `kin`."""
-        room = self.room(kin) / LENGTH
-        kept: list[Constraint] = []
-        if len(self.obstacles):
-            kept.append(KeepOut(self, self.obstacles.scaled(LENGTH), room))
-        if len(self.offsets):
-            most = np.maximum(np.append(room, 0), np.insert(room, 0, 0))
-            kept.append(KeepIn(self, most))
-        return tuple(kept)
-
-    def clearance(self, flight: Trajectory, time_step: float) -> float:
-        """Return a lower bound of the distance of the continuous path of `flight`, m.
-
-        It is the distance itself but where a path that bends around a corner is nearest between
-        samples.
-        """
-        least = np.inf
-        w, v, a = (x[:, None] for x in (flight.w.T, flight.v.T, flight.a.T))
-        if len(self.obstacles):
-            u, h = self.obstacles.separation(w[..., :-1], w[..., 1:])
-            nearest = _least_along(u, w, v, a, time_step) - h
-            least = min(least, float(nearest.min()))
-        if len(self.offsets):
-            inward = -self.normals.T[:, :, None, None]
-            nearest = _least_along(inward, w, v, a, time_step) + self.offsets[:, None, None]
-            least = min(least, float(nearest.min()))
-        return least
-
-    def excess(self, kin: Kinematics, flight: Trajectory) -> float:
-        """Return by how much the path of `flight` comes too near, in solver units; 0 if nowhere."""
-        return max(0.0, self.margin - self.clearance(flight, kin.time_step)) / LENGTH
-
-
-def _least_along(u: Real, w: Real, v: Real, a: Real, dt: float) -> Real:
-    """Return the least u . w(t) on the parabola of every interval, exactly."""
-    along = [u[0] * x[0, ..., :-1] + u[1] * x[1, ..., :-1] for x in (w, v, a)]
-    end = u[0] * w[0, ..., 1:] + u[1] * w[1, ..., 1:]
-    place, speed, bend = along
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.where(bend > 0, -speed / bend, -1.0)
-    inside = (turn > 0) & (turn < dt)
-    turn = np.where(inside, turn, 0.0)
-    lowest = place + speed * turn + bend * turn * turn / 2
-    return np.asarray(np.minimum(np.minimum(place, end), lowest))
+def fence_constraints(fence: FenceGeometry, kin: Kinematics) -> tuple[Constraint, ...]:
+    """Return what the flights of `kin` have to keep of `fence`."""
+    room = fence.room(kin) / LENGTH
+    kept: list[Constraint] = []
+    if len(fence.obstacles):
+        kept.append(KeepOut(fence, fence.obstacles.scaled(LENGTH), room))
+    if len(fence.offsets):
+        most = np.maximum(np.append(room, 0), np.insert(room, 0, 0))
+        kept.append(KeepIn(fence, most))
+    return tuple(kept)
 
 
 @dataclass(frozen=True)
@@ -103,6 +48,11 @@ class KeepOut(HalfPlanes):
     obstacles: ConvexObstacles
     room: Real
     quantity: ClassVar = "w"
+
+    @property
+    def headroom(self) -> float:
+        """The slack, 100 m, that starts are given where they have less. Chosen."""
+        return 0.02
 
     @property
     def turns(self) -> bool:
