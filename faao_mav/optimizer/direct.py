@@ -96,7 +96,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         field,
         routes,
         tolerance=_ROUGH,
-        max_iterations=steps if problem.fence is None else min(steps, 2 * options.max_iterations),
+        max_iterations=steps,
         relay=relay,
         constraints=problem.constraints,
     )

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from faao_mav.arrays import Real
