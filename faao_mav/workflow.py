@@ -12,7 +12,8 @@ from typing import Any
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_together
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.formats import check_suffix, render_mission
+from faao_mav.mission.formats import fence_path, render_files
+from faao_mav.mission.formats.beside import check_replaceable, comment_for, remove_outdated
 from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.optimizer.pricing import (
     FreshRates,
@@ -41,9 +42,19 @@ DRAWING_START = datetime(2000, 1, 1, tzinfo=UTC)
 _DRAWING_STEP = 1.0
 """Seconds between the samples of a drawn flight; chosen: a drawing needs no more."""
 
-_HEADER = "for "
-"""How the comment begins that a file of parameters written by this program has in its first line,
-before the name of the mission."""
+
+@dataclass(frozen=True, slots=True)
+class FenceSummary:
+    """A fence of so many `areas`, and how near flights come to its edge, m; below 0 outside.
+
+    `margin` is what the plan is to keep, `planned_clearance` what it keeps, `predicted_clearance`
+    what the whole predicted flight keeps, None without one.
+    """
+
+    areas: int
+    margin: float
+    planned_clearance: float
+    predicted_clearance: float | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,44 +90,56 @@ class Result:
         return self.check.findings if self.check is not None else ()
 
     @property
+    def fence(self) -> "FenceSummary | None":
+        """How the flight keeps the plan's fence; None without one."""
+        plan, area = self.solution.plan, self.solution.plan.keep_in
+        if area is None or plan.fence is None:
+            return None
+        track = self.check.track if self.check is not None else None
+        return FenceSummary(
+            areas=len(plan.zones),
+            margin=plan.fence.margin,
+            planned_clearance=area.clearance(self.solution.w),
+            predicted_clearance=area.clearance(track.position[:, :2]) if track else None,
+        )
+
+    @property
     def flyable(self) -> bool:
         """Whether there is a mission, and validation found no error in it."""
         errors = any(finding.level is Level.ERROR for finding in self.findings)
         return self.conversion is not None and not errors
 
     def write(self, path: str | Path) -> tuple[Path, ...]:
-        """Write the mission to the file `path` and its parameters to the file beside it.
+        """Write the mission to the file `path`, its parameters and its fence to files beside it.
 
-        Both are written or neither; the paths of both are returned. The ending of `path` tells
-        the mission's format: see `faao_mav.mission.formats`. A mission that needs no parameters
-        has no second file. Files of parameters there that an earlier run wrote and that are not
-        this mission's are removed: validation and ground stations would take them for its own.
+        All are written or none; their paths are returned, that of the mission first. The ending of
+        `path` tells the mission's format: see `faao_mav.mission.formats`. A mission that needs no
+        parameters has no file of them, and a format that holds the fence no file of that. Files
+        there that an earlier run wrote and that are not this mission's are removed: validation and
+        ground stations would take them for its own.
         Raises the error that stood in the way of a mission, if there is none, and `InputError`
         where a file cannot be written or removed.
         """
-        if self.conversion is None:
+        conversion, plan = self.conversion, self.solution.plan
+        if conversion is None:
             raise self.no_mission or InputError("there is no mission: the plan was only optimised")
-        mission, *beside = mission_files(path, self.solution.plan)
-        contents: dict[str | Path, bytes] = {
-            file: render_parameters(
-                self.conversion.parameters,
-                self.conversion.vehicle.type.family.parameter_style,
-                header=f"{_HEADER}{mission.name}",
-            ).encode(errors="replace")  # the name of a mission may be no Unicode
-            for file in beside
-        }
+        mission, *beside = mission_files(path, plan)
         drawn = mission.suffix.lower() == ".kml"
-        contents[mission] = (
-            draw_mission(self.solution, self.conversion)
+        contents: dict[str | Path, bytes] = (
+            {mission: draw_mission(self.solution, conversion).encode()}
             if drawn
-            else render_mission(
-                self.conversion.mission, mission, plan_target(self.conversion.vehicle)
-            )
-        ).encode()
+            else render_files(conversion.mission, mission, plan_target(conversion.vehicle))
+        )
+        parameters = parameter_path(mission, plan.vehicle.autopilot)
+        if parameters in beside:
+            contents[parameters] = render_parameters(
+                conversion.parameters,
+                conversion.vehicle.type.family.parameter_style,
+                header=comment_for(mission),
+            ).encode(errors="replace")  # the name of a mission may be no Unicode
         write_together(contents)
-        if not drawn:
-            for parameters in {parameter_path(mission, each) for each in autopilots()} - {*beside}:
-                _remove_outdated(parameters)
+        for outdated in _may_lie_beside(mission) - {*beside}:
+            remove_outdated(outdated)
         return mission, *beside
 
     def as_dict(self) -> dict[str, Any]:
@@ -175,6 +198,7 @@ class Result:
             }
             if conversion and flown
             else None,
+            "fence": asdict(self.fence) if self.fence else None,
             "validation": [asdict(finding) for finding in self.findings],
         }
 
@@ -270,44 +294,31 @@ def _with_mission(result: Result) -> Result:
 
 
 def mission_files(path: str | Path, plan: Plan) -> tuple[Path, ...]:
-    """Return the files that `Result.write` writes for `plan`: the mission, and its parameters.
+    """Return the files that `Result.write` writes for `plan`: mission, then parameters and fence.
 
-    Raises `InputError` for one that cannot be written, and for parameters there that no run has
-    written: they are the vehicle's own, perhaps. To be asked before the work.
+    Raises `InputError` for one that cannot be written, and for parameters or a fence there that no
+    run has written: they are a user's own, perhaps. To be asked before the work.
     """
     mission = Path(path)
-    check_suffix(mission)
+    fence = fence_path(mission)
     check_writable(mission)
-    if not any(candidates(plan)):
-        return (mission,)
-    beside = parameter_path(mission, plan.vehicle.autopilot)
-    check_writable(beside)
-    if beside.exists() and not _is_of_a_run(beside):
-        raise InputError(
-            f"{beside}: the mission's parameters are to go there, but it is not of an earlier "
-            "run; rename it, or give the mission another name"
-        )
-    return mission, beside
+    beside = []
+    if any(candidates(plan)):
+        beside.append(parameter_path(mission, plan.vehicle.autopilot))
+        check_replaceable(beside[-1], "the mission's parameters are")
+    if fence is not None and plan.fence is not None:
+        beside.append(fence)
+        check_replaceable(fence, "the mission's fence is")
+    return mission, *beside
 
 
-def _remove_outdated(parameters: Path) -> None:
-    """Remove `parameters` if an earlier run wrote them: they belong to a mission that is gone."""
-    if _is_of_a_run(parameters):
-        try:
-            parameters.unlink()
-        except OSError as error:
-            raise InputError(
-                f"{parameters}: is of an earlier mission and cannot be removed: {error.strerror}"
-            ) from None
-
-
-def _is_of_a_run(parameters: Path) -> bool:
-    """Tell whether `parameters` is a file that `Result.write` wrote beside a mission."""
-    if not parameters.is_file():
-        return False
-    beginning = f"# {_HEADER}".encode()
-    with parameters.open("rb") as file:
-        return file.read(len(beginning)) == beginning
+def _may_lie_beside(mission: Path) -> set[Path]:
+    """Return the files that are taken for those of `mission`; none for a drawing."""
+    if mission.suffix.lower() == ".kml":
+        return set()
+    fence = fence_path(mission)
+    parameters = {parameter_path(mission, each) for each in autopilots()}
+    return parameters if fence is None else {fence, *parameters}
 
 
 def draw_mission(solution: Solution, conversion: Conversion) -> str:

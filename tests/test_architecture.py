@@ -15,9 +15,9 @@ PACKAGE = Path(faao_mav.__file__).parent
 FLOORS = (
     ("errors", "arrays"),
     ("vector", "files", "geodesy"),
-    ("radio", "plan"),
+    ("radio", "mission"),
+    ("plan",),
     ("optimizer",),
-    ("mission",),
     ("vehicle",),
     ("schedule",),
     ("validate",),

@@ -21,13 +21,14 @@ def test_a_plan_becomes_a_text_file_and_says_what_it_lost(tmp_path: Path) -> Non
     out = tmp_path / "m.waypoints"
     result = run(MISSIONS / "fence_and_rally.plan", "--out", out)
     assert result.exit_code == 0
-    assert result.stdout == f"5 items written to {out}\n"
+    fence = tmp_path / "m.fence.waypoints"
+    assert result.stdout == f"5 items written to {out} and {fence}\n"
     assert result.stderr.splitlines() == [
-        f"faao-mission: {out}: QGC WPL holds no fence: 2 areas left out",
         f"faao-mission: {out}: QGC WPL holds no rally points: 1 point left out",
         f"faao-mission: {out}: not set (NaN) becomes 0: item 1 param4, item 3 param4",
     ]
     assert [item.command for item in read_mission(out).items] == [22, 178, 16, 177, 20]
+    assert read_mission(out).fence == read_mission(MISSIONS / "fence_and_rally.plan").fence
 
 
 def test_there_and_back_is_the_same(tmp_path: Path) -> None:

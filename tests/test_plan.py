@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import MISSIONS, SMALL, edited
 from hypothesis import given
@@ -24,7 +25,9 @@ def refused(changes: dict[str, Any]) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["paper", "paper_active", "copter_relay", "plane_relay"])
+@pytest.mark.parametrize(
+    "name", ["paper", "paper_active", "copter_relay", "fenced_relay", "plane_relay"]
+)
 def test_sample_plans_are_valid(name: str) -> None:
     plan = read_plan(MISSIONS / f"{name}.yaml")
     assert plan.text == (MISSIONS / f"{name}.yaml").read_text()
@@ -184,8 +187,63 @@ def test_required_keys(key: str) -> None:
         parse_plan(dump_yaml(data))
 
 
-def test_what_does_not_work_yet_says_so() -> None:
-    assert "fence: does not work yet" in refused({"fence": {"inclusion": [[0, 0], [9, 0], [9, 9]]}})
+def _wall(west: float, east: float) -> dict[str, Any]:
+    return {"polygon": [[west, 20], [east, 20], [east, 25], [west, 25]]}
+
+
+@pytest.mark.parametrize(
+    ("fence", "told"),
+    [
+        ({}, "fence: has no zones; give inclusion, exclusion or file"),
+        ({"exclusion": [{"center": [0, 50], "radius": 9}]},
+         "flight.start: [0.0, 50.0] is 9.0 m inside exclusion circle 1"),
+        ({"exclusion": [{"center": [0, 62], "radius": 9}]},
+         "flight.start: [0.0, 50.0] is 3.0 m from exclusion circle 1, less than fence.margin"),
+        ({"inclusion": [{"center": [0, 50], "radius": 9}]},
+         "flight.end: [50.0, 0.0] is 61.7 m outside the inclusions"),
+        ({"inclusion": [[-9, -9], [59, -9], [59, 59], [-9, 59]], "exclusion": [_wall(-99, 99)]},
+         "fence: no way leads from flight.start [0.0, 50.0] to flight.end [50.0, 0.0]"),
+        ({"exclusion": [_wall(-900, 900)]}, "the shortest way from start to end inside the fence"),
+        ({"inclusion": [[0, 0], [60, 60], [60, 0], [0, 60]]}, "inclusion polygon 1 crosses"),
+        ({"inclusion": [{"center": [0, 0], "radius": 2}]}, "fence.margin: 5 m: no place is that"),
+        ({"inclusion": [{"center": [0, 0], "radius": 9}, {"center": [99, 0], "radius": 9}]},
+         "fence: leaves no place"),
+        ({"file": "no.kml"}, "fence.file: no.kml: cannot be read"),
+        ({"file": "no.shp"}, "expected a .plan, .kml or .geojson file"),
+        ({"file": "tests/data/missions/fence_and_rally.plan"}, "km from site.origin"),
+    ],
+)  # fmt: skip
+def test_a_fence_that_no_flight_can_keep_is_told(fence: dict[str, Any], told: str) -> None:
+    assert told in refused({"fence": fence})
+
+
+def test_algorithm_1_has_no_fence() -> None:
+    changes = {"fence": {"exclusion": [_wall(90, 99)]}, "optimizer.method": "algorithm1"}
+    assert "fence: algorithm1" in refused({**changes, "radio.fading": "none"})
+
+
+def test_several_inclusions_mean_what_the_autopilot_makes_of_them() -> None:
+    zones = [{"center": [0, 50], "radius": 40}, {"center": [50, 0], "radius": 40}]
+    fence = {"fence": {"inclusion": zones, "margin": 0}}
+    assert "outside the inclusions" in refused(fence)
+    plan = parse_plan(edited(SMALL, {**fence, "vehicle.autopilot": "px4"}))
+    assert plan.keep_in is not None
+    assert plan.keep_in.covers(np.array([[0.0, 50.0], [50.0, 0.0], [90.0, 90.0]])).tolist() == [
+        True, True, False,
+    ]  # fmt: skip
+
+
+def test_a_plan_stands_without_the_file_of_its_fence() -> None:
+    place = {"latitude": 47.3965, "longitude": 8.5435, "elevation": 0}
+    path = "tests/data/missions/fence_and_rally.plan"
+    plan = parse_plan(edited(SMALL, {"site.origin": place, "fence": {"file": path, "margin": 2}}))
+    again = parse_plan(plan.text, "elsewhere/plan.yaml")
+    assert "fence_and_rally" not in plan.text
+    assert again.fence is not None
+    assert again.fence.margin == 2
+    assert again.keep_in is not None
+    assert plan.keep_in is not None
+    assert again.keep_in.shape.symmetric_difference(plan.keep_in.shape).area < 1e-3
 
 
 def test_a_relay_is_causal_unless_the_plan_says_otherwise() -> None:
@@ -397,12 +455,13 @@ def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
         "site.origin.latitude", "site.origin.longitude", "vehicle.max_speed",
         "vehicle.max_acceleration", "flight.start", "flight.end", "flight.altitude",
         "flight.duration", "radio.base_station.position", "radio.ground_user.position",
+        "fence.inclusion.center", "fence.inclusion.radius", "fence.inclusion.polygon",
         "fence.exclusion.center", "fence.exclusion.radius", "fence.exclusion.polygon",
     ]  # fmt: skip
     written = {path: load_yaml(f"x: {key.default}", path)["x"] for path, key in keys.items()
                if key.default}  # fmt: skip
     plan = parse_plan(SMALL)
-    changed = {path for path in written if path in SMALL_KEYS}
+    changed = {path for path in written if path in SMALL_KEYS or "fence" in path}
     full = parse_plan(edited(SMALL, {k: v for k, v in written.items() if k not in changed}))
     assert replace(full, text="", study=None) == replace(plan, text="")
 

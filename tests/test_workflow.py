@@ -23,6 +23,7 @@ from faao_mav import (
 from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import running
+from faao_mav.report.summary import result_lines
 from faao_mav.workflow import Result, mission_files, optimize_plan
 
 QUICK = {"radio.fading": "none", "optimizer.starts": ["straight"]}
@@ -63,6 +64,85 @@ def test_what_is_written_is_in_time_and_goes_to_the_vehicle_whole(tmp_path: Path
     mock = MockAutopilot(behaviour_of("ardupilot"), beat=0.1)
     with running(mock, f"udpin:127.0.0.1:{port}"):
         assert upload(mission, f"udpout:127.0.0.1:{port}").verified
+
+
+FENCED = QUICK | {
+    "flight.start": [0, 60],
+    "flight.end": [60, 0],
+    "flight.duration": 30,
+    "vehicle.max_speed": 8,
+    "flight.start_velocity": "hover",
+    "flight.end_velocity": "hover",
+    "fence.margin": 3,
+    "fence.inclusion": [[-40, -40], [120, -40], [120, 120], [-40, 120]],
+    "fence.exclusion": [{"polygon": [[-10, 20], [10, 20], [10, 40], [-10, 40]]}],
+}
+"""A zone between home and the flight's start."""
+
+
+@pytest.fixture(scope="module")
+def fenced(small_plan: MakePlan) -> Result:
+    return plan_mission(small_plan(FENCED))
+
+
+def test_the_fence_goes_with_the_mission(fenced: Result, tmp_path: Path) -> None:
+    assert fenced.flyable
+    fence = fenced.solution.plan.geofence
+    in_plan, *_ = fenced.write(tmp_path / "m.plan")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.param", "m.plan"]
+    assert read_mission(in_plan).fence == fence
+    assert [path.name for path in fenced.write(tmp_path / "m.waypoints")] == [
+        "m.waypoints",
+        "m.param",
+        "m.fence.waypoints",
+    ]
+    read = read_mission(tmp_path / "m.waypoints")
+    assert read.fence == fence
+    port = free_port()
+    mock = MockAutopilot(behaviour_of("ardupilot"), beat=0.1)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        report = upload(read, f"udpout:127.0.0.1:{port}")
+    assert [(part.part.name, part.verdict) for part in report.parts] == [
+        ("MISSION", "verified"),
+        ("FENCE", "verified"),
+    ]
+    assert mock.mission().fence.polygons[1].inclusion is False
+
+
+def test_how_near_the_fence_the_flight_comes(fenced: Result) -> None:
+    told = fenced.as_dict()["fence"]
+    assert (told["areas"], told["margin"]) == (2, 3)
+    assert told["planned_clearance"] >= 3
+    assert told["planned_clearance"] > told["predicted_clearance"] > 1
+    (line,) = [text for label, text in result_lines(fenced) if label == "fence"]
+    kept = f"{told['planned_clearance']:.1f} m (margin 3 m)"
+    assert line.startswith(f"2 areas; the plan keeps {kept}")
+
+
+def test_a_fence_is_removed_with_its_mission(
+    result: Result, fenced: Result, tmp_path: Path
+) -> None:
+    beside = tmp_path / "m.fence.waypoints"
+    fenced.write(tmp_path / "m.waypoints")
+    assert beside.is_file()
+    result.write(tmp_path / "m.waypoints")
+    assert not beside.exists()
+    beside.write_text("QGC WPL 110\n")
+    with pytest.raises(InputError, match="fence is to go there, but it is not of an earlier run"):
+        fenced.write(tmp_path / "m.waypoints")
+    assert beside.read_text() == "QGC WPL 110\n"
+
+
+def test_a_narrow_margin_makes_a_finer_route(small_plan: MakePlan) -> None:
+    """A wall on the way, which the flight would cut within the path tolerance."""
+    wall = {"polygon": [[18, 22], [22, 22], [22, 60], [18, 60]]}
+    changes = {"fence.margin": 0.3, "fence.exclusion": [wall], "mission.path_tolerance": 3}
+    narrow = plan_mission(small_plan(FENCED | changes))
+    assert narrow.fence is not None
+    assert 0.3 <= narrow.fence.planned_clearance < 0.7
+    assert narrow.fence.predicted_clearance is not None
+    assert narrow.fence.predicted_clearance >= 0
+    assert "fence-leg" not in {finding.rule for finding in narrow.findings}
 
 
 def test_the_vehicles_own_parameters_are_not_replaced(result: Result, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from faao_mav.cli.shared import AsJson, Whose, check_known, exit_status, note, option
-from faao_mav.files import check_apart, check_writable, write_whole
+from faao_mav.files import check_apart, check_writable
 
 
 @exit_status()
@@ -21,6 +21,8 @@ def convert(
 ) -> None:
     """Write a mission in another format, and say what that cannot hold.
 
+    The fence of a .waypoints or .txt file is a second file, M.fence.waypoints of M.waypoints.
+
     Without --autopilot a .plan is for whom the mission that is read says it is for.
 
     Exit status: 0 done; 2 unusable arguments or input.
@@ -30,7 +32,7 @@ def convert(
         check_suffix,
         losses_in,
         read_mission_file,
-        render_mission,
+        write_mission,
     )
     from faao_mav.vehicle import Vehicle, kind_by_number
     from faao_mav.vehicle.files import plan_target, vehicle_in
@@ -45,11 +47,11 @@ def convert(
     vehicle = Vehicle(autopilot, kind) if autopilot else vehicle_in(read)
     target = plan_target(vehicle)
     lost = losses_in(read.mission, out, target)
-    write_whole(out, render_mission(read.mission, out, target).encode())
+    written = write_mission(read.mission, out, target)
     for line in (*read.warnings, *(f"{out}: {line}" for line in lost)):
         note(line)
     items = len(read.mission.items)
     if as_json:
         typer.echo(json.dumps({"items": items, "lost": lost, "written": str(out)}))
     else:
-        typer.echo(f"{items} items written to {out}")
+        typer.echo(f"{items} items written to {' and '.join(map(str, written))}")

@@ -35,9 +35,9 @@ def download(
     arguments.
     """
     from faao_mav.cli.progress import transfer_progress
-    from faao_mav.files import check_writable, write_whole
+    from faao_mav.files import check_writable
     from faao_mav.mavlink.client import holdings
-    from faao_mav.mission.formats import check_suffix, losses_in, render_mission
+    from faao_mav.mission.formats import check_suffix, losses_in, write_mission
     from faao_mav.vehicle import Vehicle
     from faao_mav.vehicle.files import plan_target
 
@@ -55,7 +55,7 @@ def download(
             note=note,
         )
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
-    write_whole(out, render_mission(mission, out, target).encode())
+    written = write_mission(mission, out, target)
     for line in losses_in(mission, out, target):
         note(f"{out}: {line}")
     fence = len(mission.fence.polygons) + len(mission.fence.circles)
@@ -64,4 +64,5 @@ def download(
         f"mission      {len(mission.items)} items, {fence} fence areas, "
         f"{len(mission.rally)} rally points"
     )
-    typer.echo(f"written      {out}")
+    for path in written:
+        typer.echo(f"written      {path}")

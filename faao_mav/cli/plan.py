@@ -118,13 +118,17 @@ def _checked_plan(
         check_vehicle(plan)
     else:
         vehicle_of(plan).flight_model()  # what is useless is refused, what is not flown is told
-    parameters = next(iter(mission_files(out, plan)[1:]), None) if out is not None else None
+    beside = mission_files(out, plan)[1:] if out is not None else ()
     endings = {"--save": (".npz",), "--report": PAGES, "--figure": FORMATS}
     for name, path in files.items():
         if path is not None:
             check_ending(path, name, endings.get(name))
             check_writable(path)
-    outputs = {"--out": out, "the parameters of --out,": parameters, **files}
+    of_out = {
+        f"the {'parameters' if path.suffix.startswith('.param') else 'fence'} of --out,": path
+        for path in beside
+    }
+    outputs = {"--out": out, **of_out, **files}
     check_apart(outputs, {"PLAN.yaml": plan_file})
     if upload is not None:
         from faao_mav.mavlink.transport import parse_connection

@@ -50,6 +50,7 @@ class MavSeverity(IntEnum):
 
     CRITICAL = 2
     WARNING = 4
+    NOTICE = 5
     INFO = 6
 
 

@@ -14,8 +14,9 @@ from faao_mav.errors import InputError
 from faao_mav.mavlink.manners import autopilot_name, manners_of
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mission.command import CIRCLE, FENCE_RETURN_POINT, POLYGON, RALLY_POINT, Frame
-from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon, RallyPoint, check_place
+from faao_mav.mission.command import Frame
+from faao_mav.mission.fence import RallyPoint, check_place
+from faao_mav.mission.fence_items import fence_items, fence_of, rally_items
 from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
 from faao_mav.vehicle import VehicleType
 
@@ -91,59 +92,7 @@ def mission_of(
     )
     mission = as_received(flown, home_row=bool(home_items(vehicle, MissionType.MISSION)))
     points = tuple(RallyPoint(item.x, item.y, item.z) for item in rally)
-    return replace(mission, fence=_fence_of(fence), rally=points)
-
-
-def fence_items(fence: Fence) -> tuple[MissionItem, ...]:
-    """Return `fence` as items: return point, polygons vertex by vertex, circles."""
-    items = []
-    if fence.breach_return is not None:
-        point = fence.breach_return
-        place = (point.latitude, point.longitude, point.altitude)
-        items.append(_place_item(FENCE_RETURN_POINT, Frame.GLOBAL_RELATIVE_ALT, 0.0, *place))
-    for polygon in fence.polygons:
-        command, count = POLYGON[polygon.inclusion], float(len(polygon.vertices))
-        items += [_place_item(command, Frame.GLOBAL, count, *v) for v in polygon.vertices]
-    for circle in fence.circles:
-        command = CIRCLE[circle.inclusion]
-        items.append(_place_item(command, Frame.GLOBAL, circle.radius, *circle.center))
-    return tuple(items)
-
-
-def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
-    """Return rally points as items."""
-    frame = Frame.GLOBAL_RELATIVE_ALT
-    return tuple(
-        _place_item(RALLY_POINT, frame, 0.0, point.latitude, point.longitude, point.altitude)
-        for point in points
-    )
-
-
-def _fence_of(items: Sequence[MissionItem]) -> Fence:
-    polygons, circles, breach_return = [], [], None
-    vertices: list[LatLon] = []
-    for number, item in enumerate(items):
-        if item.command in POLYGON.values():
-            vertices.append((item.x, item.y))
-            if len(vertices) == item.params[0]:
-                polygons.append(Polygon(tuple(vertices), item.command == POLYGON[True]))
-                vertices = []
-            continue
-        if vertices:
-            break
-        if item.command in CIRCLE.values():
-            inclusion = item.command == CIRCLE[True]
-            circles.append(Circle((item.x, item.y), item.params[0], inclusion))
-        elif item.command == FENCE_RETURN_POINT:
-            breach_return = RallyPoint(item.x, item.y, item.z)
-        else:
-            raise InputError(f"fence item {number}: command {item.command}; expected 5000 to 5004")
-    if vertices:
-        raise InputError(
-            f"fence: a polygon stops after {len(vertices)} of its vertices; expected as many as "
-            "its items say"
-        )
-    return Fence(tuple(polygons), tuple(circles), breach_return)
+    return replace(mission, fence=fence_of(fence), rally=points)
 
 
 def _check(item: WireItem, name: str) -> None:
@@ -152,12 +101,6 @@ def _check(item: WireItem, name: str) -> None:
         check_place((item.x / 1e7, item.y / 1e7), name)
     if any(map(math.isinf, (*item.params, item.z))):
         raise InputError(f"{name}: params {item.params}, z {item.z}; expected finite numbers")
-
-
-def _place_item(
-    command: int, frame: int, param1: float, x: float, y: float, z: float = 0.0
-) -> MissionItem:
-    return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), x, y, z)
 
 
 def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:

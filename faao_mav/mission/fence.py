@@ -88,3 +88,8 @@ class Fence:
 
     def __bool__(self) -> bool:
         return bool(self.polygons or self.circles)
+
+    @property
+    def place(self) -> LatLon:
+        """A place of the fence, to count metres from; raises IndexError without areas."""
+        return self.polygons[0].vertices[0] if self.polygons else self.circles[0].center

@@ -29,6 +29,7 @@ from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts
 from faao_mav.optimizer.search.starts import starts
+from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
 _LONG_SEARCH = 6
@@ -72,6 +73,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     # shares of half duplex are sought anew; with a queue both take more steps, and so does a buffer
     anew = kin.min_speed > 0 or (relay is not None and relay.half)
     long = relay is not None and (anew or math.isfinite(relay.buffer))
+    long = long or problem.fence is not None
     steps = options.max_iterations * (_LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
@@ -81,13 +83,24 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     tell(0, "rates over the map", 0.0)
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
-    routes = starts(kin, options.starts, stations)
+    kept = problem.constraints(kin)
+    routes = (
+        starts_inside(kin, options.starts, stations, problem.free_area, kept)
+        if problem.free_area
+        else starts(kin, options.starts, stations)
+    )
     if before is not None:
         routes[CUTOFF] = before.trajectory
     tell(1, "the starts", 0.0)
     if len(routes) > 1:
         rough = improve_starts(
-            kin, field, routes, tolerance=_ROUGH, max_iterations=steps, relay=relay
+            kin,
+            field,
+            routes,
+            tolerance=_ROUGH,
+            max_iterations=steps,
+            relay=relay,
+            constraints=problem.constraints,
         )
     else:  # a single start needs no comparison
         rough = ImprovedStarts(routes, list(routes))
@@ -106,6 +119,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             kin,
             field,
             flights,
+            constraints=kept,
             tolerance=options.tolerance,
             max_iterations=steps,
             strategy=COLD_START if cold else WARM_START,
@@ -172,6 +186,7 @@ def _at_exact_rates(
         problem.kinematics,
         RateField(field.links, tuple(held)),
         optimum.trajectory,
+        constraints=problem.constraints(problem.kinematics),
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=_EXACT_ITERATIONS,
         relay=problem.maximised_queue,

@@ -3,11 +3,14 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError
+from faao_mav.mission.fence_area import FreeArea
+from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
@@ -25,6 +28,9 @@ from faao_mav.radio.constellation import (
 )
 from faao_mav.radio.measure import Measure, best_precoders_for, draw_rates
 from faao_mav.radio.relay import RelayQueue
+
+if TYPE_CHECKING:
+    from faao_mav.optimizer.interior.constraint import Constraint
 
 MAX_DIFFERENCE_VECTORS = 5_000_000
 MAX_CHANNELS = 5_000_000
@@ -154,6 +160,25 @@ class Problem:
     kinematics: Kinematics
     bs_uav: Link
     uav_user: Link
+
+    @cached_property
+    def free_area(self) -> FreeArea | None:
+        """Where the fence and its margin let the path be, local metres; None without a fence."""
+        fence, area = self.plan.fence, self.plan.keep_in
+        return None if fence is None or area is None else area.inside(fence.margin)
+
+    @cached_property
+    def fence(self) -> FenceGeometry | None:
+        """What the path keeps its distance from; None without a fence."""
+        return fence_geometry(self.plan)
+
+    def constraints(self, kin: Kinematics) -> "tuple[Constraint, ...]":
+        """Return what flights of `kin` have to keep beside the limits of the aircraft."""
+        if self.fence is None:
+            return ()
+        from faao_mav.optimizer.interior.fence import fence_constraints  # brings scipy along
+
+        return fence_constraints(self.fence, kin)
 
     @property
     def maximised_queue(self) -> RelayQueue | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
+from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -147,6 +148,49 @@ def _forwarded(
     return forwarded, limits
 
 
+_NEAR = 3.0
+"""The distance beyond the margin, in moves, from which a part of the fence is not in the way."""
+
+
+def _apart(
+    fence: FenceGeometry, kin: Kinematics, w: Real, shift: cp.Variable, reach: float
+) -> list[Any]:
+    """Return that the ends of every chord stay apart from the fence, for moves `reach` `shift`.
+
+    For a chord and an obstacle near it, with the angle d by which its half-plane u turns,
+
+        u . (w + reach shift - p) + d u' . (w - p) >= radius + room  for both ends and all corners p
+    """
+    free = np.ones(kin.slots, dtype=np.bool_)
+    free[[0, -1]] = False
+    room, limits = fence.room(kin), []
+    obstacles = fence.obstacles
+    if len(obstacles):
+        u, h = obstacles.separation(w.T[:, None, :-1], w.T[:, None, 1:], room)
+        u, h = u[:, :, 0], h[:, 0]
+        left = np.minimum(*(np.einsum("cpn,nc->pn", u, end) for end in (w[:-1], w[1:]))) - h - room
+        piece, slot = np.nonzero(left < _NEAR * reach)
+        if piece.size:
+            u, angle = u[:, piece, slot].T, cp.Variable(len(piece))
+            across = np.stack([-u[:, 1], u[:, 0]], axis=1)
+            for end in (slot, slot + 1):
+                on = np.flatnonzero(free[end])
+                for corner in obstacles.corners[piece].transpose(1, 0, 2):
+                    away = w[end] - corner
+                    least = obstacles.radius[piece] + room[slot] - np.einsum("mc,mc->m", u, away)
+                    lever = np.einsum("mc,mc->m", across, away)
+                    moved = cp.sum(cp.multiply(u[on], shift[end[on]]), axis=1)
+                    turned = cp.multiply(lever[on] / reach, angle[on])
+                    limits.append(moved + turned >= least[on] / reach)
+    most = np.maximum(np.append(room, 0), np.insert(room, 0, 0))
+    for normal, offset in zip(fence.normals, fence.offsets, strict=True):
+        left = (offset - most - w @ normal) / reach
+        near = np.flatnonzero((left < _NEAR) & free)
+        if near.size:
+            limits.append(shift[near] @ normal <= left[near])
+    return limits
+
+
 def kkt_residual(
     kin: Kinematics,
     stage: Stage,
@@ -154,6 +198,7 @@ def kkt_residual(
     *,
     reach: float = 1.0,
     relay: RelayQueue | None = None,
+    fence: FenceGeometry | None = None,
 ) -> float:
     """Return the best first-order gain of min_j F_j per metre, in rewards per metre.
 
@@ -164,9 +209,12 @@ def kkt_residual(
     received, forwarded and held best after the move, and with other shares, whose product with the
     change of a rate is of second order and left out.
 
-    The feasible set is convex, so that this is zero exactly where the conditions of Karush, Kuhn
-    and Tucker hold. It is a convex problem: its optimum is that of Clarabel, to about 1e-8 of
-    the largest gradient. Raises `SolverError` where Clarabel finds none.
+    With `fence` the distances of the path from what it has to keep out of are linear in the move,
+    and in the turn of the half-planes that part it from them.
+
+    Linearised so, the feasible set is convex, and this is zero exactly where the conditions of
+    Karush, Kuhn and Tucker hold. It is a convex problem: its optimum is that of Clarabel, to about
+    1e-8 of the largest gradient. Raises `SolverError` where Clarabel finds none.
     """
     values = stage(trajectory.w.T)
     total = values.value.mean(axis=1)
@@ -188,6 +236,8 @@ def kkt_residual(
     else:
         forwarded, queue = _forwarded(relay, values.value, kin.time_step, unit * reach, moved)
         limits += [*queue, gain == cp.sum(forwarded) / slots]
+    if fence is not None:
+        limits += _apart(fence, kin, trajectory.w, shift, reach)
     problem = cp.Problem(cp.Maximize(gain), limits)
     if solve(problem) == cp.INFEASIBLE:
         raise SolverError("the flight given breaks its limits")

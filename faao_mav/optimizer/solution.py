@@ -128,6 +128,11 @@ class Solution:
         """w, v and a."""
         return Trajectory(self.w, self.v, self.a)
 
+    def clearance(self) -> float | None:
+        """Return the least distance of the continuous path from the fence, m; None without one."""
+        fence = build_problem(self.plan).fence
+        return None if fence is None else fence.clearance(self.trajectory, float(self.t[1]))
+
     def recomputed_slots(self, power: float = 1.0) -> tuple[Real, Real]:
         """Return I_U, I_G from w, the fading and the precoders alone, all powers times `power`."""
         problem, scale = build_problem(self.plan), np.sqrt(power)
@@ -144,12 +149,16 @@ class Solution:
     def residuals(self) -> dict[str, float]:
         """Return by how much each constraint of (13) is missed, computed from the arrays alone.
 
-        Metres, m/s, m/s²; the power limits (13b), (13c) relative to W; the fading relative to
-        what the plan's seed draws at w; the rates in bit/s/Hz. 0 where a constraint holds.
+        Metres, m/s, m/s²; `fence` is by how much the continuous path misses the margin; the power
+        limits (13b), (13c) relative to W; the fading relative to what the plan's seed draws at w;
+        the rates in bit/s/Hz. 0 where a constraint holds.
         """
         problem = build_problem(self.plan)
         again = self.recomputed()
         found = problem.kinematics.residuals(self.trajectory)
+        if problem.fence is not None:
+            clearance = problem.fence.clearance(self.trajectory, self.plan.flight.time_step)
+            found["fence"] = max(0.0, problem.fence.margin - clearance)
         found["(13b) power of the base station"] = _excess(self.P_B, problem.bs_uav.power)
         found["(13c) power of the relay"] = _excess(self.P_U, problem.uav_user.power)
         for name, link, H_r in zip(
@@ -180,7 +189,14 @@ class Solution:
         problem = build_problem(self.plan)
         rates = rate_field(problem, design(self.plan))
         relay = problem.maximised_queue
-        return kkt_residual(problem.kinematics, rates, self.trajectory, reach=reach, relay=relay)
+        return kkt_residual(
+            problem.kinematics,
+            rates,
+            self.trajectory,
+            reach=reach,
+            relay=relay,
+            fence=problem.fence,
+        )
 
 
 def _excess(P: Complex, power: float) -> float:

@@ -1,6 +1,6 @@
 """The vehicles that a plan can name: `vehicle.autopilot` and `vehicle.type`.
 
-The plan knows their names and the two facts that decide whether a plan makes sense for them. What
+The plan knows their names and the facts that decide whether a plan makes sense for them. What
 each vehicle is stands in `faao_mav.vehicle`, whose `register` adds to this table; a test holds both
 to the same facts.
 """
@@ -20,13 +20,16 @@ class PlannedVehicle:
     """A vehicle that a plan can name.
 
     `hovers`: it can fly at 0 m/s. `planned`: missions are made for it; the missions of the others
-    can be validated, converted and uploaded.
+    can be validated, converted and uploaded. `any_inclusion`: its fence asks for one of several
+    inclusions, not for all of them. ArduPilot's FENCE_OPTIONS may ask for one, too; a plan for it
+    keeps inside all, which is right either way.
     """
 
     autopilot: str
     type: str
     hovers: bool = True
     planned: bool = True
+    any_inclusion: bool = False
 
 
 VEHICLES: dict[tuple[str, str], PlannedVehicle] = {
@@ -34,8 +37,8 @@ VEHICLES: dict[tuple[str, str], PlannedVehicle] = {
     for vehicle in (
         PlannedVehicle("ardupilot", "copter"),
         PlannedVehicle("ardupilot", "plane", hovers=False),
-        PlannedVehicle("px4", "copter"),
-        PlannedVehicle("px4", "plane", hovers=False, planned=False),
+        PlannedVehicle("px4", "copter", any_inclusion=True),
+        PlannedVehicle("px4", "plane", hovers=False, planned=False, any_inclusion=True),
     )
 }
 """The vehicles by autopilot and type, in the order in which error messages list them."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from faao_mav.errors import quote
 from faao_mav.plan.autopilots import VEHICLES
+from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.sections import Flight, Plan, VehicleOptions
@@ -20,19 +21,13 @@ _SLACK = 1e-6
 
 def problems(plan: Plan) -> Iterator[str]:
     """Yield what is wrong with `plan`, key first; each may rest on those before it being right."""
-    yield from _not_yet(plan)
     yield from _vehicle(plan)
     yield from _speeds(plan)
     yield from _relay(plan)
     yield from _steps(plan.flight)
     yield from _distance(plan)
+    yield from fence_problems(plan)
     yield from _study(plan)
-
-
-def _not_yet(plan: Plan) -> Iterator[str]:
-    """Values that the keys accept and the program cannot make anything of."""
-    if plan.fence is not None:
-        yield "fence: does not work yet; leave it out"
 
 
 def _vehicle(plan: Plan) -> Iterator[str]:

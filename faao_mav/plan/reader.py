@@ -12,8 +12,9 @@ from pydantic import TypeAdapter, ValidationError
 from faao_mav.errors import PlanError, place_of, quote
 from faao_mav.files import read_text
 from faao_mav.plan.checks import problems
+from faao_mav.plan.fence import geofence, written_out
 from faao_mav.plan.keys import PlanKey, reference
-from faao_mav.plan.sections import Plan, PlanFile
+from faao_mav.plan.sections import CHOICES, Plan, PlanFile
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
 
 _MAX_LINES = 6
@@ -47,7 +48,12 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
     except ValidationError as error:
         raise PlanError(_describe(error, source)) from None
     held = {field.name: getattr(contents, field.name) for field in fields(contents)}
-    plan = Plan(**held, text=text, source=source)
+    fence = geofence(contents, source)
+    if contents.fence is not None and contents.fence.file is not None:
+        # a copy of the text, as beside a result, has to stand without the file
+        data["fence"] = written_out(fence, contents.fence.margin)
+        text = dump_yaml(data)
+    plan = Plan(**held, text=text, source=source, geofence=fence)
     for problem in problems(plan):
         raise PlanError(f"{source}: {problem}")
     return plan
@@ -70,12 +76,7 @@ def _describe(error: ValidationError, source: str) -> str:
 def _lines(error: ValidationError) -> Iterator[str]:
     known = reference()
     for detail in error.errors(include_url=False):
-        # a step in angle brackets in a list is pydantic's choice among several sections
-        steps = [
-            step
-            for before, step in zip((None, *detail["loc"]), detail["loc"], strict=False)
-            if not (isinstance(before, int) and str(step).startswith("<"))
-        ]
+        steps = [step for step in detail["loc"] if step not in CHOICES]
         value, kind = detail["input"], detail["type"]
         keys = [step for step in steps if isinstance(step, str)]
         accepted = _accepted(known, *keys)

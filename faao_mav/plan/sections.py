@@ -7,10 +7,15 @@ its limits. `fields` says how, `keys.reference` lists them all.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Tag, ValidationInfo
+from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
 
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import Area, FreeArea, areas_of
+from faao_mav.plan.autopilots import VEHICLES
 from faao_mav.plan.fields import (
     MAX_LOCAL_DISTANCE,
     Antennas,
@@ -23,6 +28,7 @@ from faao_mav.plan.fields import (
     Power,
     Text,
     TypeName,
+    Vector,
     Velocity,
     Whole,
     check_degrees,
@@ -293,7 +299,7 @@ class Optimizer(_Section):
 
 @dataclass(frozen=True, slots=True)
 class CircleZone(_Section):
-    """A circular exclusion zone of the fence."""
+    """A circle of the fence."""
 
     center: Annotated[Position, key("Centre of the circle.", "m")]
     radius: Annotated[Number, key("Radius of the circle.", "m", gt=0, le=MAX_LOCAL_DISTANCE)]
@@ -301,35 +307,69 @@ class CircleZone(_Section):
 
 @dataclass(frozen=True, slots=True)
 class PolygonZone(_Section):
-    """A polygonal exclusion zone of the fence."""
+    """A polygon of the fence."""
 
     polygon: Annotated[
         tuple[Position, ...], key("Corners.", "m", "three corners or more", min_length=3)
     ]
 
 
+CHOICES = ("<circle>", "<polygon>", "<corners>", "<zones>")
+"""What pydantic puts into the place of an error for the choice among several types."""
+
+
 def _zone(value: object) -> str:
     return "<polygon>" if isinstance(value, dict) and "polygon" in value else "<circle>"
+
+
+def _corners_or_zones(value: object) -> str:
+    zones = isinstance(value, list | tuple) and any(
+        isinstance(each, dict) and not {"latitude", "longitude"} & set(each) for each in value
+    )
+    return "<zones>" if zones else "<corners>"
+
+
+def _one_polygon(corners: tuple[Vector, ...]) -> tuple[PolygonZone, ...]:
+    return (PolygonZone(corners),) if corners else ()
 
 
 Zone: TypeAlias = Annotated[
     Annotated[CircleZone, Tag("<circle>")] | Annotated[PolygonZone, Tag("<polygon>")],
     Discriminator(_zone),
 ]
+Zones: TypeAlias = tuple[Zone, ...]
+_OnePolygon: TypeAlias = Annotated[
+    tuple[Position, ...], Field(min_length=3), AfterValidator(_one_polygon)
+]
 
 
 @dataclass(frozen=True, slots=True)
 class FenceOptions(_Section):
-    """Where the aircraft may be; does not work yet."""
+    """Where the aircraft may be: it stays inside the inclusions and out of the exclusions."""
 
     inclusion: Annotated[
-        tuple[Position, ...] | None,
-        key("Corners of the area to stay in.", "m", "three corners or more", min_length=3),
-    ] = None
+        Annotated[_OnePolygon, Tag("<corners>")] | Annotated[Zones, Tag("<zones>")],
+        Discriminator(_corners_or_zones),
+        key(
+            "Area to stay in; of several zones PX4 asks for any, ArduPilot for all.",
+            "m",
+            "three corners or more, or a list of {center, radius} and {polygon}",
+        ),
+    ] = ()
     exclusion: Annotated[
-        tuple[Zone, ...],
+        Zones,
         key("Zones to stay out of.", accepted="a list of {center, radius} and {polygon}"),
     ] = ()
+    file: Annotated[
+        Text | None,
+        key(
+            "File with more zones, beside the plan's file or by its whole path.",
+            accepted="the name of a .plan, .kml or .geojson file",
+        ),
+    ] = None
+    margin: Annotated[
+        Number, key("Distance from the edge that the planned path keeps.", "m", ge=0, le=10_000)
+    ] = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -400,15 +440,35 @@ class PlanFile(_Section):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan(PlanFile):
-    """A validated plan; `text` is the YAML that it was read from, `source` the name of its file."""
+    """A validated plan; `text` is the YAML that it was read from, `source` the name of its file.
+
+    `geofence` has the zones of `fence` and of its file, in degrees.
+    """
 
     text: str = ""
     source: str = "plan"
+    geofence: Fence = field(default_factory=Fence)
 
     @property
     def origin(self) -> Origin:
         """The point of local [0, 0]."""
         return self.site.origin
+
+    @property
+    def zones(self) -> tuple[Area, ...]:
+        """The zones of `geofence` in local metres."""
+        return _zones(self.geofence, LocalFrame(self.origin.latitude, self.origin.longitude))
+
+    @property
+    def keep_in(self) -> FreeArea | None:
+        """Where `geofence` lets the aircraft be, local metres; None without a fence.
+
+        `fence.margin` is not taken off. Of several inclusions PX4 asks for one, ArduPilot for all.
+        """
+        if not self.geofence:
+            return None
+        vehicle = VEHICLES[self.vehicle.autopilot, self.vehicle.type]
+        return _free_area(self.zones, vehicle.any_inclusion)
 
     def megabits(self, rate: float) -> float | None:
         """Return `rate`, bit/s/Hz, in Mbit/s; None without `radio.bandwidth_mhz`."""
@@ -419,3 +479,13 @@ class Plan(PlanFile):
         """Return what `rate`, bit/s/Hz, carries in the duration T, 10^6 bytes, as `megabits`."""
         megabits = self.megabits(rate)
         return None if megabits is None else megabits * self.flight.duration / 8
+
+
+@lru_cache(maxsize=16)
+def _zones(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
+    return areas_of(fence, frame)
+
+
+@lru_cache(maxsize=16)
+def _free_area(zones: tuple[Area, ...], any_inclusion: bool) -> FreeArea:
+    return FreeArea.of(zones, any_inclusion=any_inclusion)

@@ -12,6 +12,7 @@ from faao_mav.mission.command import FLOWN_TO, Command
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
 from faao_mav.report.style import (
     INK,
     MUTED,
@@ -24,6 +25,7 @@ from faao_mav.report.style import (
 )
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.schedule import positions_at
+from faao_mav.schedule.transit import way_home, way_out
 from faao_mav.vector import lengths
 from faao_mav.vehicle import Track
 
@@ -62,18 +64,22 @@ def route_map(
     radio, origin = solution.plan.radio, solution.plan.origin
     stations = np.array([radio.base_station.position, radio.ground_user.position])
     marked = zip(("base station", "user"), stations.tolist(), "s^", strict=True)
-    outlines: list[_Outline] = []
+    frame = LocalFrame(origin.latitude, origin.longitude)
+    fence = conversion.mission.fence if conversion is not None else solution.plan.geofence
+    outlines = list(_outlines_of(fence, frame))
     lines, places = [solution.w], np.empty((0, 2))
     numbers: list[int] = []
     if conversion is not None:
-        frame, mission = LocalFrame(origin.latitude, origin.longitude), conversion.mission
-        outlines = list(_outlines_of(mission.fence, frame))
-        numbers, places = _places_of(mission, frame, _WAYPOINTS)
+        numbers, places = _places_of(conversion.mission, frame, _WAYPOINTS)
         lines.append(conversion.schedule.track()["predicted_w"])
+        lines += _ways(solution.plan, conversion) if outlines else ()
     _draw_fence(plot, outlines)
+    _draw_margin(plot, solution.plan)
     _coloured(plot, solution)
     if conversion is not None:
         plot.plot(*lines[1].T, "--", color=INK, linewidth=0.9, label="predicted")
+        for way, name in zip(lines[2:], ("from and to home", None), strict=False):
+            plot.plot(*way.T, color=MUTED, linewidth=0.9, label=name)
         _draw_waypoints(plot, places, "waypoint")
     mark_stations(plot, list(marked))
     _show_all(plot, np.concatenate([*lines, stations, places]), outlines, title)
@@ -126,6 +132,29 @@ def _draw_fence(plot: "Axes", outlines: Sequence[_Outline]) -> None:
         plot.plot(*corners.T, style, color=colour, linewidth=1.2, label=name)
         if not inside:
             plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
+
+
+def _ways(plan: Plan, conversion: Conversion) -> Iterator[Real]:
+    """Yield the ways (k, 2), m, from home to the route, and back if the mission returns."""
+    home, route = np.zeros((1, 2)), conversion.schedule.route.positions
+    yield np.vstack([home, way_out(plan, route[0]), route[:1]])
+    if plan.mission.on_finish == "rtl":
+        yield np.vstack([route[-1:], way_home(plan, route[-1]), home])
+
+
+def _draw_margin(plot: "Axes", plan: Plan) -> None:
+    """Draw how far the plan keeps from the fence's edge: dotted, with its name in the legend."""
+    area, fence = plan.keep_in, plan.fence
+    if area is None or fence is None:
+        return
+    import shapely
+
+    name: str | None = f"margin {fence.margin:g} m"
+    for part in shapely.get_parts(area.inside(fence.margin).shape):
+        for ring in shapely.get_rings(part)[0 if any(z.inclusion for z in plan.zones) else 1 :]:
+            edge = shapely.get_coordinates(ring)
+            plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
+            name = None  # once in the legend
 
 
 def _show_all(plot: "Axes", seen: Real, outlines: Sequence[_Outline], title: str = "") -> None:

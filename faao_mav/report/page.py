@@ -125,6 +125,8 @@ def _plan_figures(result: Result) -> Iterator[str]:
     )
     if conversion:
         title += ", waypoints by item number and the predicted track"
+    if plan.fence:
+        title += "; zones of the fence, and the margin that the plan keeps"
     yield _figure("route", "Route", figures.route(solution, conversion), title)
     title = (
         f"Speed over time, limit {vehicle.max_speed:g} m/s, and acceleration over time, limit "

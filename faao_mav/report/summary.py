@@ -9,7 +9,7 @@ from typing import TypeAlias
 from faao_mav.plan import Plan
 from faao_mav.validate.check import Check
 from faao_mav.validate.finding import Finding, Level
-from faao_mav.workflow import Result
+from faao_mav.workflow import FenceSummary, Result
 
 Line: TypeAlias = tuple[str, str]
 """A label and a text; a line without a label goes on where the one before it ended."""
@@ -72,6 +72,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     steps = _count(solution.iterations, "iteration")
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
     yield from _flown(result)
+    yield from _fenced(result.fence)
 
 
 def _told_rate(rate: float, bandwidth_mhz: float | None) -> str:
@@ -173,6 +174,15 @@ def _flown(result: Result) -> Iterator[Line]:
     yield "", _apart(flown.rms_position_error, flown.max_position_error, flown.max_path_error)
     if doubt := conversion.vehicle.type.caveat:
         yield "", doubt
+
+
+def _fenced(fence: FenceSummary | None) -> Iterator[Line]:
+    if fence is None:
+        return
+    kept = f"the plan keeps {fence.planned_clearance:.1f} m (margin {fence.margin:g} m)"
+    if fence.predicted_clearance is not None:
+        kept += f", the predicted flight {fence.predicted_clearance:.1f} m"
+    yield "fence", f"{_count(fence.areas, 'area')}; {kept} from the edge"
 
 
 def _of_plan(rate: float, planned: float, bandwidth_mhz: float | None) -> str:

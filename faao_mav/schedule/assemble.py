@@ -2,11 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.schedule.route import Route
+from faao_mav.schedule.transit import check_run_in, way_home, way_out
 from faao_mav.vehicle import vehicle_of
 
 if TYPE_CHECKING:
@@ -14,6 +16,8 @@ if TYPE_CHECKING:
 
 _DECIMALS = 9  # of a latitude or longitude in degrees: 0.1 mm
 _PITCH = 15.0  # the least pitch of a plane's climb after take-off, degrees; chosen
+
+_STOP = 1.0  # the hold at a corner of the ways from and to home, s: the least that ArduPilot keeps
 
 # Types of DO_CHANGE_SPEED. ArduPlane takes the second for the least ground speed.
 _AIRSPEED, _GROUND_SPEED = 0.0, 1.0
@@ -26,18 +30,22 @@ def assemble(route: Route, plan: "Plan") -> Mission:
     at the vehicle's greatest speed, a plane's at the speed that it begins with; for each leg its
     waypoint, before it a DO_CHANGE_SPEED where the speed is another, after it a NAV_DELAY where
     the wait has a fraction that the autopilot would not keep; and what `plan.mission.on_finish`
-    says. Unused parameters are 0: ArduPilot refuses NaN.
+    says. Unused parameters are 0: ArduPilot refuses NaN. The fence is the plan's: the ways from
+    and to home go around it, and the aircraft stops at their corners, so as not to cut them.
 
-    Raises `InfeasibleError` if home and items are more than `plan.mission.max_items`.
+    Raises `InfeasibleError` if home and items are more than `plan.mission.max_items`, or where the
+    fence leaves no way.
     """
     origin, altitude = plan.origin, plan.flight.altitude
-    latitudes, longitudes = LocalFrame(origin.latitude, origin.longitude).to_geodetic(
-        route.positions
+    check_run_in(plan, route)
+    places, out, back = (
+        _places(each, plan)
+        for each in (
+            route.positions,
+            way_out(plan, route.positions[0]),
+            way_home(plan, route.positions[-1]),
+        )
     )
-    places = [
-        (round(float(x), _DECIMALS), round(float(y), _DECIMALS))
-        for x, y in zip(latitudes, longitudes, strict=True)
-    ]
 
     vehicle = vehicle_of(plan).type
     axis = _GROUND_SPEED if vehicle.hovers else _AIRSPEED
@@ -49,6 +57,8 @@ def assemble(route: Route, plan: "Plan") -> Mission:
     fastest = min(plan.vehicle.max_speed, vehicle.fastest)
     commanded = fastest if vehicle.hovers else float(route.speeds[0])
     items.append(_change_speed(commanded, axis))
+    stop = _STOP if vehicle.hovers else 0.0
+    items += [_at(Command.NAV_WAYPOINT, place, altitude, stop) for place in out]
     holds, delays = route.holds_and_delays(whole_seconds=vehicle.whole_second_holds)
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
@@ -60,6 +70,9 @@ def assemble(route: Route, plan: "Plan") -> Mission:
         if delays[k] > 0:
             params = (float(delays[k]), -1.0, -1.0, -1.0)
             items.append(MissionItem(Command.NAV_DELAY, Frame.MISSION, params))
+    if back and vehicle.hovers and commanded != fastest:
+        items.append(_change_speed(fastest, axis))
+    items += [_at(Command.NAV_WAYPOINT, place, altitude, stop) for place in back]
     items.append(_finish(plan, places[-1]))
 
     rows = len(items) + 1
@@ -69,7 +82,18 @@ def assemble(route: Route, plan: "Plan") -> Mission:
             f"{plan.mission.max_items}; raise mission.max_items (if the autopilot stores as many) "
             f"or mission.path_tolerance (now {plan.mission.path_tolerance:g} m)"
         )
-    return Mission(tuple(items), Home(origin.latitude, origin.longitude, origin.elevation))
+    home = Home(origin.latitude, origin.longitude, origin.elevation)
+    return Mission(tuple(items), home, plan.geofence)
+
+
+def _places(positions: Real, plan: "Plan") -> list[tuple[float, float]]:
+    """Return `positions` (k, 2), m, in degrees."""
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    latitudes, longitudes = frame.to_geodetic(positions)
+    return [
+        (round(float(x), _DECIMALS), round(float(y), _DECIMALS))
+        for x, y in zip(latitudes, longitudes, strict=True)
+    ]
 
 
 def _finish(plan: "Plan", place: tuple[float, float]) -> MissionItem:

@@ -1,14 +1,15 @@
 """From a trajectory to the mission whose predicted flight keeps it, in space and time."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import floor, inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError
+from faao_mav.errors import InfeasibleError, InputError
+from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
@@ -17,6 +18,7 @@ from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import Scheduler
+from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
 from faao_mav.vehicle.recommend import candidates
@@ -31,7 +33,12 @@ _SPLINE_TIMES = (2.0, 3.0)  # least times between spline waypoints to try, s
 _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the acceleration
 _PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
-_GOOD_COST = 1.5  # the `Schedule.cost`, m, from which nothing better is looked for
+_FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
+_GOOD = (0.0, 1.5)  # the rank, m, from which nothing better is looked for
+
+_Scheduled: TypeAlias = tuple[Schedule, Scheduler]
+_Rank: TypeAlias = tuple[float, float]
+"""How far a schedule gets out of the fence, m, and its `Schedule.cost`, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +67,10 @@ def check_vehicle(plan: "Plan") -> None:
     """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
 
     That is one with useless parameters, one of a speed that no mission commands, or a plane that
-    does not fly the plan's least or greatest speed.
+    does not fly the plan's least or greatest speed. Likewise for a fence around which there is no
+    way from home and back: see `check_transit`.
     """
+    check_transit(plan)
     vehicle = vehicle_of(plan)
     vehicle.legs  # noqa: B018
     vehicle.flight_model()
@@ -126,24 +135,57 @@ def _vehicles(plan: "Plan") -> list[Vehicle]:
 def convert(solution: "Solution") -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
+    A route whose legs or predicted flight leave the plan's fence is made anew with half the path
+    tolerance, again and again down to 0.25 m; if none keeps inside, it is the one that leaves the
+    fence the least. The rest is as in `_convert`.
+    """
+    plan, area = solution.plan, solution.plan.keep_in
+    best = _convert(solution, plan)
+    outside, tolerance = _outside(best.schedule, area), plan.mission.path_tolerance
+    while outside > 0 and tolerance > _FINEST_TOLERANCE:
+        tolerance /= 2
+        finer = replace(plan, mission=replace(plan.mission, path_tolerance=tolerance))
+        try:
+            tried = _convert(solution, finer)
+        except InfeasibleError:  # too many items
+            break
+        if _outside(tried.schedule, area) < outside:
+            best, outside = tried, _outside(tried.schedule, area)
+    return best
+
+
+def _outside(schedule: Schedule, area: FreeArea | None) -> float:
+    """Return how far, m, legs and predicted flight get out of the fence; 0 inside or without."""
+    paths = (schedule.route.positions, schedule.track()["predicted_w"])
+    return 0.0 if area is None else max(0.0, *(-area.clearance(path) for path in paths))
+
+
+def _convert(solution: "Solution", plan: "Plan") -> Conversion:
+    """Return the mission for `solution` within the path tolerance of `plan`.
+
     The sets of parameters that are recommended for the vehicle are compared by the error of the
     first schedule, and refined in that order until one is good. If none is, a vehicle that flies
     splines may do so with the liveliest: everywhere, or where legs are too short for their speed.
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
-    plan, t, w = solution.plan, solution.t, np.round(solution.w, _DECIMALS)
+    t, w = solution.t, np.round(solution.w, _DECIMALS)
     given, sets = vehicle_of(plan), candidates(plan)
     schedulers = [_scheduler(plan, t, w, vehicle) for vehicle in _vehicles(plan)]
     straight = initial_route(t, w, plan, share=1.0 if given.type.hovers else _PLANE_SHARE)
-    found = _refined((straight, scheduler) for scheduler in schedulers)
-    best = min(found, key=_cost)
-    if _cost(best) > _GOOD_COST and given.type.dialect.splines:
+
+    def rank(scheduled: _Scheduled) -> _Rank:
+        """Order schedules: inside the fence first, then by cost."""
+        return _outside(scheduled[0], plan.keep_in), scheduled[0].cost
+
+    found = _refined(((straight, scheduler) for scheduler in schedulers), rank)
+    best = min(found, key=rank)
+    if rank(best) > _GOOD and given.type.dialect.splines:
         liveliest = schedulers[-1]
         bent = [initial_route(t, w, plan, splines=splines) for splines in _splines(liveliest)]
         new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
-        found = _refined((route, liveliest) for route in new.values())
-        best = min([best, *found], key=_cost)
+        found = _refined(((route, liveliest) for route in new.values()), rank)
+        best = min([best, *found], key=rank)
     schedule, scheduler = best
     return Conversion(
         mission=assemble(schedule.route, plan),
@@ -174,19 +216,17 @@ def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     )
 
 
-def _refined(trials: Iterable[tuple[Route, Scheduler]]) -> list[tuple[Schedule, Scheduler]]:
+def _refined(
+    trials: Iterable[tuple[Route, Scheduler]], rank: Callable[[_Scheduled], _Rank]
+) -> list[_Scheduled]:
     """Return the schedules of the trials refined, the most promising first, up to a good one."""
     firsts = [(scheduler.first(route), scheduler) for route, scheduler in trials]
-    refined: list[tuple[Schedule, Scheduler]] = []
+    refined: list[_Scheduled] = []
     for first, scheduler in sorted(firsts, key=lambda each: each[0].error):
         refined.append((scheduler.refined(first), scheduler))
-        if _cost(refined[-1]) <= _GOOD_COST:
+        if rank(refined[-1]) <= _GOOD:
             break
     return refined
-
-
-def _cost(scheduled: tuple[Schedule, Scheduler]) -> float:
-    return scheduled[0].cost
 
 
 def _splines(scheduler: Scheduler) -> Iterator[Splines]:

@@ -6,6 +6,7 @@ from faao_mav.validate import (
     cages,
     delivery,
     extent,
+    fence_keeping,
     fences,
     items,
     px4_checks,
@@ -38,7 +39,7 @@ RULES: tuple[Rule, ...] = tuple(
     rule
     for module in (
         *(items, refusals, ardupilot, px4_checks, px4_flight, px4_radius, cages, speed_commands),
-        *(speeds, shape, extent, fences, delivery),
+        *(speeds, shape, extent, fences, fence_keeping, delivery),
     )
     for rule in module.RULES
 )

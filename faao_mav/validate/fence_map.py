@@ -1,7 +1,5 @@
-"""The fence in the plane: its areas, and what of mission and flight leaves it."""
+"""What of a mission and its flight leaves the fence."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,60 +10,11 @@ from numpy.typing import NDArray
 from faao_mav.arrays import Integers, Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import Area, areas_of, free_area
 from faao_mav.validate.straight import Straight
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
-
-_SEGMENTS = 64
-"""Straights to a quarter of a circle: 0.075 mm of error a metre of radius."""
-
-
-@dataclass(frozen=True, slots=True)
-class Area:
-    """One part of a fence, metres of a local frame; `name` is what people may call it.
-
-    Circles become polygons, inside the circle for inclusions and outside for exclusions, so that
-    what is found to stay within the fence does so. `crosses_itself`: its outline does; what counts
-    as inside is then what an odd number of outlines encloses, as the autopilots count.
-    """
-
-    name: str
-    inclusion: bool
-    shape: "BaseGeometry"
-    crosses_itself: bool = False
-
-
-def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
-    """Return the parts of `fence` in `frame`: polygons, then circles."""
-    import shapely
-
-    areas, kind = [], {True: "inclusion", False: "exclusion"}
-    for n, polygon in enumerate(fence.polygons, start=1):
-        outline = shapely.Polygon(frame.to_local(*np.transpose(polygon.vertices)))
-        shape = _polygonal(shapely.make_valid(outline))
-        name = f"{kind[polygon.inclusion]} polygon {n}"
-        areas.append(Area(name, polygon.inclusion, shape, not shapely.is_valid(outline)))
-    for n, circle in enumerate(fence.circles, start=1):
-        outside = 1.0 if circle.inclusion else 1 / math.cos(math.pi / (4 * _SEGMENTS))
-        center = shapely.Point(frame.to_local(*circle.center))
-        shape = center.buffer(circle.radius * outside, quad_segs=_SEGMENTS)
-        areas.append(Area(f"{kind[circle.inclusion]} circle {n}", circle.inclusion, shape))
-    return tuple(areas)
-
-
-def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | None":
-    """Return where the aircraft may be by the inclusions of `areas`, None if there are none.
-
-    Inside one of them with `any_inclusion`, else inside all.
-    """
-    import shapely
-
-    shapes = [area.shape for area in areas if area.inclusion]
-    if not shapes:
-        return None
-    joined = shapely.union_all(shapes) if any_inclusion else shapely.intersection_all(shapes)
-    return _polygonal(joined)
 
 
 def _lines(starts: Real, ends: Real) -> NDArray[np.object_]:
@@ -78,15 +27,6 @@ def _lines(starts: Real, ends: Real) -> NDArray[np.object_]:
     still = (starts == ends).all(axis=1)
     paths[still] = shapely.points(starts[still])
     return paths
-
-
-def _polygonal(shape: "BaseGeometry") -> "BaseGeometry":
-    """Return the part of `shape` that has an area."""
-    import shapely
-
-    parts = shapely.get_parts(shapely.get_parts(shape))
-    flat = [part for part in parts if part.geom_type == "Polygon"]
-    return shapely.union_all(flat) if flat else shapely.Polygon()
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,8 +153,7 @@ def fence_map(
         return None
     import shapely
 
-    first = fence.polygons[0].vertices[0] if fence.polygons else fence.circles[0].center
-    frame = frame or LocalFrame(*first)
+    frame = frame or LocalFrame(*fence.place)
     areas = areas_of(fence, frame)
     free = free_area(areas, any_inclusion=any_inclusion)
     shapely.prepare([area.shape for area in areas])

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from faao_mav.mission.fence_area import Area
 from faao_mav.validate.context import ValidationContext, number
-from faao_mav.validate.fence_map import Area
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME
 

@@ -3,11 +3,24 @@
 Another vehicle is one folder with one `VehicleType` and one call of `register`.
 """
 
+from dataclasses import dataclass
+
 from faao_mav.errors import InputError
 from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.vehicle.parameter import ParameterTable
 from faao_mav.vehicle.vehicle_type import AutopilotFamily, VehicleType
 
 _TYPES: dict[tuple[str, str], VehicleType] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class _Defaults:
+    """The default of every parameter of `table`."""
+
+    table: ParameterTable
+
+    def value(self, key: str) -> float:
+        return self.table[key].default
 
 
 def register(vehicle_type: VehicleType) -> VehicleType:
@@ -15,7 +28,8 @@ def register(vehicle_type: VehicleType) -> VehicleType:
     key = (vehicle_type.family.key, vehicle_type.kind)
     _TYPES[key] = vehicle_type
     planned = vehicle_type.legs is not None and vehicle_type.flight_model is not None
-    VEHICLES[key] = PlannedVehicle(*key, hovers=vehicle_type.hovers, planned=planned)
+    one = vehicle_type.fence_needs_one_inclusion(_Defaults(vehicle_type.parameters))
+    VEHICLES[key] = PlannedVehicle(*key, vehicle_type.hovers, planned, any_inclusion=one)
     return vehicle_type
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeAlias
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.vehicle.dialect import Dialect
@@ -52,6 +52,27 @@ class Ceiling:
     key: Literal["max_speed", "max_acceleration"]
     value: float
     parameter: str = ""
+
+
+FenceAction: TypeAlias = Literal["nothing", "report", "hold", "return", "land", "terminate"]
+"""What a vehicle does that leaves its fence: flies on, says so and flies on, and so forth."""
+
+
+@dataclass(frozen=True, slots=True)
+class FenceResponse:
+    """What a vehicle does that leaves the areas of its fence, and the parameter that decides.
+
+    `parameter` is the key of its table, `set_to` what would make it keep the fence, "" if it does.
+    """
+
+    action: FenceAction
+    parameter: str
+    set_to: str = ""
+
+    @property
+    def keeps(self) -> bool:
+        """Whether it does anything about it."""
+        return self.action not in ("nothing", "report")
 
 
 class LegLimits(Protocol):
@@ -107,6 +128,9 @@ class VehicleType:
         fence_needs_one_inclusion: being inside one of several inclusion areas is enough; else the
             vehicle has to be inside all.
         home_outside_fence: what it does with a mission where home lies outside the fence.
+        at_fence: what it does when it leaves the areas of its fence.
+        fence_ahead: how far ahead, m, it looks for its fence at a speed, m/s; 0: it acts when it is
+            outside.
         legs: how it flies a leg; None if missions are not made for it.
         flight_model: how it flies a mission, with the latitude in degrees if that is known; None if
             `unmodelled` says why there is no model.
@@ -131,6 +155,8 @@ class VehicleType:
     fastest: float = 20.0
     fence_needs_one_inclusion: Callable[[ParameterValues], bool] = lambda _: True
     home_outside_fence: str = ""
+    at_fence: Callable[[ParameterValues], FenceResponse] = lambda _: FenceResponse("nothing", "")
+    fence_ahead: Callable[[ParameterValues, Real], Real] = lambda _, speed: 0 * speed
     legs: Callable[[ParameterValues], LegLimits] | None = None
     flight_model: Callable[[ParameterValues, float | None], FlightModel] | None = None
     unmodelled: str = ""

@@ -1,10 +1,10 @@
 """The peer: CasADi + IPOPT (MUMPS, exact Hessian) on the problem of the direct method.
 
-maximise t, t <= mean of each link's rates, under (11), (12), (13d)-(13f) as `Kinematics` has them;
-or with a relay's queue t = mean of what is forwarded, with r, f, q and the shares as variables.
-Lengths in 100 m. The precoders enter through numbers c of every slot alone: with H = sqrt(g) H_r
-every exponent of (7), (8) is D_k = g(w) c_k, so that one model with c as its parameter serves all
-starts and all precoders.
+maximise t, t <= mean of each link's rates, under (11), (12), (13d)-(13f) as `Kinematics` has them,
+and the half-planes of a fence where there is one; or with a relay's queue t = mean of what is
+forwarded, with r, f, q and the shares as variables. Lengths in 100 m. The precoders enter through
+numbers c of every slot alone: with H = sqrt(g) H_r every exponent of (7), (8) is D_k = g(w) c_k, so
+that one model with c as its parameter serves all starts and all precoders.
 """
 
 from collections.abc import Sequence
@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates.rate_model import CurveRate
@@ -99,6 +100,26 @@ def _rate(rate: ClassRate | Curve, w: Any, c: Any) -> Any:
     return rate.offset - rate.factor * ca.log(total) / np.log(2.0)
 
 
+def _apart(fence: FenceGeometry, kin: Kinematics, w: Any, angle: Any) -> list[Any]:
+    """What is at most 0 where every chord keeps margin and bulge, w (2, n) scaled.
+
+    One angle (P, n - 1) per obstacle and interval is a variable: half-planes part both ends of the
+    chord from all corners.
+    """
+    room = fence.room(kin) / LENGTH
+    east, north, parts = ca.cos(angle), ca.sin(angle), []
+    for k, (corners, radius) in enumerate(
+        zip(fence.obstacles.corners / LENGTH, fence.obstacles.radius / LENGTH, strict=True)
+    ):
+        for corner in np.unique(corners, axis=0):
+            for end in (w[:, :-1], w[:, 1:]):
+                along = east[k, :] * (end[0, :] - corner[0]) + north[k, :] * (end[1, :] - corner[1])
+                parts.append(radius + ca.DM(room).T - along)
+    for normal, offset in zip(fence.normals, fence.offsets / LENGTH, strict=True):
+        parts.append(normal[0] * w[0, 1:-1] + normal[1] * w[1, 1:-1] - offset + ca.DM(room[1:]).T)
+    return parts
+
+
 class Model:
     """The nonlinear program for given kinematics and kinds of rates, built once."""
 
@@ -108,9 +129,10 @@ class Model:
         rates: Sequence[ClassRate | Curve],
         max_seconds: float,
         relay: RelayQueue | None = None,
+        fence: FenceGeometry | None = None,
     ) -> None:
         self.kin, n = kin, kin.slots
-        self.relay = relay
+        self.relay, self.fence = relay, fence
         dt, speed = kin.time_step, kin.max_speed
         # v in v_max, a in a_max, w in LENGTH
         step = dt * speed / LENGTH
@@ -138,6 +160,10 @@ class Model:
             moved = q[1:] - q[:-1] - r[:-1] + f[:-1]
             parts = [t - ca.sum2(f) / n, r - x * each[0], f - share * each[1], f - q, moved, -moved]
             below = [ca.vec(part) for part in parts]
+        if fence is not None:
+            angle = cls.sym("angle", len(fence.obstacles), n - 1)
+            variables.append(ca.vec(angle))
+            below += [ca.vec(part) for part in _apart(fence, kin, w, angle)]
         g = [ca.vec(position), ca.vec(velocity), ca.vec(speeds), ca.vec(bounded), *below]
         sizes = [int(part.numel()) for part in g]
         self.lower_g = np.concatenate(
@@ -165,6 +191,10 @@ class Model:
             least = np.concatenate([np.zeros(3 * n), np.full(n, 0.0 if relay.half else 1.0)])
             self.lower = np.concatenate([self.lower, least])
             self.upper = np.concatenate([self.upper, np.full(2 * n, np.inf), room, np.ones(n)])
+        if fence is not None:
+            turns = np.full(len(fence.obstacles) * (n - 1), np.inf)
+            self.lower = np.concatenate([self.lower, -turns])
+            self.upper = np.concatenate([self.upper, turns])
         options: dict[str, Any] = {
             "print_time": False,
             "ipopt": {
@@ -195,6 +225,10 @@ class Model:
             least = relayed.rate
             more = [relayed.received, relayed.forwarded, relayed.queue]
             more.append(np.ones(n) if shares is None else shares)
+        if self.fence is not None and len(self.fence.obstacles):
+            ends = start.w.T[:, None]
+            u, _ = self.fence.obstacles.separation(ends[..., :-1], ends[..., 1:])
+            more.append(np.arctan2(u[1, :, 0], u[0, :, 0]).ravel(order="F"))
         x0 = np.concatenate(
             [
                 (start.w / LENGTH).ravel(),

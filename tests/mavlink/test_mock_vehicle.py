@@ -2,7 +2,8 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import Any, TypeVar, cast
 
 import pytest
 from mock_flights import fly
@@ -26,12 +27,13 @@ from faao_mav.mavlink.messages import (
     ParamSet,
     ParamValue,
     SetMode,
+    Statustext,
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
-from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence import Circle, Fence
 
 T = TypeVar("T", bound=Message)
 
@@ -268,6 +270,95 @@ def test_commands_to_others_are_not_obeyed() -> None:
     assert desk.tell(CommandLong(Address(2, 1), 400, 0, 1.0)) == []
     assert desk.tell(CommandLong(Address(1, 154), 400, 0, 1.0)) == []
     assert not desk.machine.armed
+
+
+HEIGHT = 20.0
+OUT = Mission(
+    (
+        MissionItem(22, 3, x=HOME.latitude, y=HOME.longitude, z=HEIGHT),
+        MissionItem(16, 3, x=HOME.latitude + 0.002, y=HOME.longitude, z=HEIGHT),
+        MissionItem(20, 2),
+    ),
+    HOME,
+    Fence(circles=(Circle((HOME.latitude, HOME.longitude), 100.0, inclusion=True),)),
+)
+"""To a place 222 m to the north of home, with a fence at 100 m."""
+
+
+def breach(kind: MockKind, **parameters: float) -> Desk:
+    """Fly `OUT` for five minutes."""
+    desk = desk_for(kind, OUT, rate=4.0, parameters=parameters)
+    rows = wire_items(OUT, MissionType.FENCE, vehicle_of(kind))
+    desk.machine.lists.replace(MissionType.FENCE, rows)
+    take_off(desk, kind)
+    desk.wait(300.0)
+    return desk
+
+
+def farthest_and_last(desk: Desk) -> tuple[float, float, float]:
+    """Return how far north it got, m, and where it ended, metres north and up."""
+    places = only(desk.sent, GlobalPositionInt)
+    north = [(place.lat * 1e-7 - HOME.latitude) * 111_000 for place in places]
+    return max(north), north[-1], places[-1].relative_alt / 1000
+
+
+def test_ardupilot_goes_home_from_its_fence() -> None:
+    desk = breach("ardupilot", FENCE_ENABLE=1)
+    north, end, height = farthest_and_last(desk)
+    assert 100 < north < 125
+    assert (end, height) == pytest.approx((0, 0), abs=0.1)
+    assert not desk.machine.armed
+    modes = [beat.custom_mode for beat in only(desk.sent, Heartbeat)]
+    assert list(dict.fromkeys(modes)) == [0, 3, 6]
+    texts = [text.text for text in only(desk.sent, Statustext)]
+    assert texts == ["Polygon fence breached", "Landed, disarming"]
+
+
+def test_px4_holds_at_its_fence() -> None:
+    desk = breach("px4")
+    north, end, height = farthest_and_last(desk)
+    assert 100 < north < 125
+    assert (end, height) == pytest.approx((north, HEIGHT))
+    assert desk.machine.armed
+    assert only(desk.sent, Heartbeat)[-1].custom_mode == 4 << 16 | 3 << 24
+
+
+def test_px4_may_be_told_to_return_or_land() -> None:
+    _, end, height = farthest_and_last(breach("px4", GF_ACTION=3))
+    assert (end, height) == pytest.approx((0, 0), abs=0.1)
+    north, end, height = farthest_and_last(breach("px4", GF_ACTION=5))
+    assert (end, height) == pytest.approx((north, 0), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters"),
+    [
+        ("ardupilot", {}),
+        ("ardupilot", {"FENCE_ENABLE": 1, "FENCE_ACTION": 0}),
+        ("px4", {"GF_ACTION": 0}),
+        ("px4", {"GF_ACTION": 1}),
+    ],
+)
+def test_a_fence_that_is_not_to_be_kept(kind: MockKind, parameters: dict[str, float]) -> None:
+    desk = breach(kind, **parameters)
+    north, end, height = farthest_and_last(desk)
+    assert north == pytest.approx(222, abs=1)
+    assert (end, height) == pytest.approx((0, 0), abs=0.1)
+    told = any("ence" in text.text for text in only(desk.sent, Statustext))
+    assert told == (parameters in ({"FENCE_ENABLE": 1, "FENCE_ACTION": 0}, {"GF_ACTION": 1}))
+
+
+def test_ardupilot_does_not_arm_outside_its_fence() -> None:
+    away = Fence(circles=(Circle((HOME.latitude + 0.01, HOME.longitude), 100.0, inclusion=True),))
+    for kind, parameters, expected in (
+        ("ardupilot", {"FENCE_ENABLE": 1}, 1),
+        ("ardupilot", {}, 0),
+        ("px4", {}, 0),
+    ):
+        desk = desk_for(cast(MockKind, kind), OUT, parameters=parameters)
+        rows = wire_items(replace(OUT, fence=away), MissionType.FENCE, vehicle_of(kind))
+        desk.machine.lists.replace(MissionType.FENCE, rows)
+        assert result(desk.tell(command(400, 1))) == expected
 
 
 def test_what_it_holds_as_a_mission() -> None:

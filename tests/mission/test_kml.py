@@ -125,8 +125,7 @@ def test_what_kml_cannot_hold_is_told() -> None:
     mission = Mission((nan, ABSOLUTE), HOME, Fence(circles=(Circle((0.0, 0.0), 1.0, True),)))
     told = losses_in(mission, "x.kml")
     assert told == [
-        "KML holds no fence: 1 area left out",
-        "KML holds the route alone: no commands, speeds or holds, and cannot be read back",
+        "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back",
         "heights above terrain are drawn above Google Earth's own",
         "spline waypoints are joined by straight lines",
     ]

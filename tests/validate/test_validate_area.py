@@ -24,8 +24,8 @@ from judged import (
 )
 
 from faao_mav.mission.command import Command
+from faao_mav.mission.fence_area import areas_of, free_area
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.fence_map import areas_of, free_area
 
 metres = st.floats(-500, 500)
 places = st.tuples(metres, metres)

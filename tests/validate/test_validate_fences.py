@@ -104,6 +104,44 @@ CASES = [
         2,
         Given(flown(at(0, 60, 30), fence=fence(square(100)))),
     ),
+    (
+        "fence-not-kept",
+        Given(flown(fence=fence(square(100)))),
+        None,
+        Given(flown(fence=fence(square(100))), having(COPTER, FENCE_ENABLE=1)),
+    ),
+    (
+        "fence-not-kept",
+        Given(flown(fence=fence(square(100))), having(COPTER, FENCE_ENABLE=1, FENCE_TYPE=3)),
+        None,
+        Given(flown(), COPTER),
+    ),
+    (
+        "fence-not-kept",
+        Given(flown(fence=fence(square(100))), having(PX4, GF_ACTION=1)),
+        None,
+        Given(flown(fence=fence(square(100))), PX4),
+    ),
+    (
+        "ardupilot-fence-margin",
+        Given(flown(at(0, 48.1, 30), fence=fence(square(100)))),
+        2,
+        Given(flown(at(0, 48.1, 30), fence=fence(square(100))), having(COPTER, FENCE_MARGIN=1.8)),
+    ),
+    (
+        "fence-ahead",
+        Given(
+            flown(at(0, 100, 30), fence=fence(square(240))),
+            having(PX4, GF_PREDICT=1),
+            track(OUT_AND_BACK, [0, 1, 2], 5),
+        ),
+        2,
+        Given(
+            flown(at(0, 100, 30), fence=fence(square(260))),
+            having(PX4, GF_PREDICT=1),
+            track(OUT_AND_BACK, [0, 1, 2], 5),
+        ),
+    ),
 ]
 
 

@@ -134,7 +134,8 @@ def test_plans_know_the_vehicles_of_the_registry() -> None:
     for each in vehicle_types():
         key = (each.family.key, each.kind)
         made = each.legs is not None and each.flight_model is not None
-        assert VEHICLES[key] == PlannedVehicle(*key, hovers=each.hovers, planned=made)
+        one = each.fence_needs_one_inclusion(Vehicle(*key))
+        assert VEHICLES[key] == PlannedVehicle(*key, each.hovers, made, any_inclusion=one)
         assert vehicle_type(*key) is each
         assert (each.flight_model is None) == bool(each.unmodelled)
         for number in each.mav_types:

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from faao_mav.mavlink.manners import manners_of
-from faao_mav.mavlink.messages import CommandLong, Envelope, Message, WireItem
+from faao_mav.mavlink.messages import CommandLong, Envelope, Message, Statustext, WireItem
 from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.wire_items import home_items, mission_item, wire_item
 from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.vehicle import AutopilotFamily, VehicleType
 from faao_mav.vehicle.dialect import BESIDE
+from faao_mav.vehicle.vehicle_type import FenceAction
 
 COUNT = -1
 """In `Behaviour.refusals`: instead of an item, the announcement of the list."""
@@ -106,6 +107,9 @@ class MockFirmware(ABC):
         misplaced: the answer to an item of a fence, or a rally point, in a mission.
         nonsense: the answer to commands 0 and 1.
         silent_at_boot: it answers nothing about lists before it is ready.
+        fence_modes: its custom modes after a breach of the fence, by the type of vehicle.
+        fence_texts: what it says when it leaves the fence.
+        armed_inside_only: it does not arm where home lies outside the fence.
     """
 
     family: ClassVar[AutopilotFamily]
@@ -115,6 +119,9 @@ class MockFirmware(ABC):
     misplaced: ClassVar[MavResult]
     nonsense: ClassVar[MavResult]
     silent_at_boot: ClassVar[bool] = False
+    fence_modes: ClassVar[Mapping[str, Mapping[FenceAction, int]]]
+    fence_texts: ClassVar[tuple[Statustext, ...]]
+    armed_inside_only: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -145,6 +152,10 @@ class MockFirmware(ABC):
     @abstractmethod
     def tick(self, now: float) -> list[Message]:
         """Ask again, or give up."""
+
+    def fence_mode(self, kind: str, action: FenceAction) -> int | None:
+        """Return the custom mode in which a vehicle of that `kind` does `action`, None if none."""
+        return self.fence_modes[kind].get(action)
 
     def requested_mode(self, command: CommandLong) -> int:
         """Return the custom mode that DO_SET_MODE asks for."""

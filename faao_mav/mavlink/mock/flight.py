@@ -14,6 +14,7 @@ from faao_mav.mavlink.messages import (
     Message,
     MissionItemReached,
 )
+from faao_mav.mavlink.mock.turn_back import Breach
 from faao_mav.mission.item import Home, MissionItem
 from faao_mav.vehicle import Track
 
@@ -31,12 +32,22 @@ class Posture:
 
 
 class MockFlight:
-    """One flight along `track`, begun at `started`, flown `speedup` times as fast as predicted."""
+    """One flight along `track`, begun at `started`, flown `speedup` times as fast as predicted.
+
+    `breach` is where it leaves the fence.
+    """
 
     def __init__(
-        self, track: Track, items: Sequence[MissionItem], started: float, speedup: float
+        self,
+        track: Track,
+        items: Sequence[MissionItem],
+        started: float,
+        speedup: float,
+        breach: Breach | None = None,
     ) -> None:
         self._track, self._started, self._speedup = track, started, speedup
+        self._breach = breach
+        self._over = False
         self._pending = sorted(
             (float(time), _reached_number(items, index))
             for index, time in enumerate(track.reached)
@@ -50,10 +61,26 @@ class MockFlight:
 
     @property
     def next_event(self) -> float:
-        """When the next item is reached, or the track ends."""
-        if not self._pending:
-            return self.end
-        return min(self._started + self._pending[0][0] / self._speedup, self.end)
+        """When the next item is reached, the fence is left, or the track ends; inf after that."""
+        if self._over:
+            return math.inf
+        times = [time for time, _ in self._pending[:1]]
+        times += [self._breach.time] if self._breach is not None else []
+        return min([self._started + time / self._speedup for time in times] + [self.end])
+
+    def breached(self, now: float) -> Breach | None:
+        """Return the breach of the fence since the last call, if there is one."""
+        breach = self._breach
+        # A little early rather than a tick late, as in `reached`.
+        if breach is None or (now - self._started) * self._speedup < breach.time - 1e-6:
+            return None
+        self._breach = None
+        return breach
+
+    def ended(self, now: float) -> bool:
+        """Tell whether the track has ended, which is no event any more then."""
+        self._over = now >= self.end
+        return self._over
 
     @property
     def lands(self) -> bool:

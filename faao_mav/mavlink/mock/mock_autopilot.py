@@ -29,6 +29,7 @@ from faao_mav.mavlink.messages import (
 from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
 from faao_mav.mavlink.mock.flight import MockFlight, Posture, telemetry
 from faao_mav.mavlink.mock.parameter_protocol import ParameterServer
+from faao_mav.mavlink.mock.turn_back import home_outside, kept_inside
 from faao_mav.mavlink.protocol import (
     ARMED,
     GROUND_STATION,
@@ -41,7 +42,7 @@ from faao_mav.mavlink.protocol import (
 )
 from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.item import Home, Mission
-from faao_mav.vehicle import Track, vehicle_type
+from faao_mav.vehicle import Track, Vehicle, vehicle_type
 
 Fly: TypeAlias = Callable[[Mission], Track]
 
@@ -57,7 +58,7 @@ _CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
 
 # MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
 _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
-_AT_REST = Posture(np.zeros(3), np.zeros(3), 0)
+_AT_HOME = Posture(np.zeros(3), np.zeros(3), 0)
 
 
 class MockAutopilot(Machine[None]):
@@ -104,6 +105,7 @@ class MockAutopilot(Machine[None]):
         self.armed = False
         self._current = 0
         self._flight: MockFlight | None = None
+        self._rest = _AT_HOME
 
     @property
     def deadline(self) -> float | None:
@@ -227,7 +229,7 @@ class MockAutopilot(Machine[None]):
         if not wanted:
             self.armed, self._flight = False, None
             return ACCEPTED
-        if not self._is_ready():
+        if not self._is_ready() or self._is_kept_on_ground():
             return REJECTED
         self.armed = True
         return self._begin(now) if self._is_mission else ACCEPTED
@@ -261,26 +263,44 @@ class MockAutopilot(Machine[None]):
                 track = self._fly(mission)
             except InputError:
                 return DENIED
-            self._flight = MockFlight(track, mission.items, now, self._speedup)
+            track, breach = kept_inside(track, mission.fence, self._vehicle_now())
+            self._flight = MockFlight(track, mission.items, now, self._speedup, breach)
         return ACCEPTED
 
     def _follow(self, flight: MockFlight, now: float) -> list[Message]:
         out = flight.reached(now, self._first_number())
+        if (breach := flight.breached(now)) is not None:
+            self._mode = self._firmware.fence_mode(self.vehicle.kind, breach.action) or self._mode
+            out += [*self._firmware.fence_texts, self._heartbeat()]
         current = flight.at(now).item + self._first_number()
         if current != self._current:
             self._current = current
             out.append(self._mission_current())
-        if now >= flight.end and flight.lands:
-            self._flight, self.armed = None, False
+        if flight.ended(now) and flight.lands:
+            self._rest, self._flight, self.armed = flight.at(now), None, False
             out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
             out.append(self._heartbeat())
         return out
+
+    def _is_kept_on_ground(self) -> bool:
+        """Tell whether it does not arm because of its fence."""
+        try:
+            fence = self.mission().fence
+        except InputError:  # peers store what they like
+            return False
+        inside_only = self._firmware.armed_inside_only
+        return inside_only and home_outside(fence, self.home, self._vehicle_now())
+
+    def _vehicle_now(self) -> Vehicle:
+        """Return the vehicle with the parameters that it has been given; useless ones count not."""
+        family = self.vehicle.family.key
+        return Vehicle(family, self.vehicle.kind, self.parameters.values).usable()
 
     def _first_number(self) -> int:
         return home_items(self.vehicle, MissionType.MISSION)
 
     def _posture(self, now: float) -> Posture:
-        return _AT_REST if self._flight is None else self._flight.at(now)
+        return self._rest if self._flight is None else self._flight.at(now)
 
     def _set_current(self, seq: int) -> list[Message]:
         if not 0 <= seq < len(self.lists.items(MissionType.MISSION)):

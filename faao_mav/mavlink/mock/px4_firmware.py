@@ -1,6 +1,8 @@
 """How PX4 takes and gives lists."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 from faao_mav.mavlink.messages import (
@@ -28,6 +30,7 @@ from faao_mav.mavlink.protocol import (
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, POLYGON, Command, Frame
 from faao_mav.mission.item import Mission
 from faao_mav.vehicle.px4 import PX4
+from faao_mav.vehicle.vehicle_type import FenceAction
 
 _POSITIONS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
 """Commands that PX4 counts as positions."""
@@ -55,12 +58,26 @@ def _packed_mode(main: int, sub: int) -> int:
     return main << 16 | sub << 24
 
 
+def _said(text: str) -> Statustext:
+    return Statustext(MavSeverity.CRITICAL, f"{text}\t")
+
+
+_FENCE_MODES: Mapping[FenceAction, int] = MappingProxyType(
+    {"hold": _packed_mode(4, 3), "return": _packed_mode(4, 5), "land": _packed_mode(4, 6)}
+)
+
+
 class Px4Firmware(MockFirmware):
     """PX4: one transfer at a time, and a new list replaces the old as a whole."""
 
     family = PX4
     mission_limit = 1000
     modes = dict.fromkeys(("copter", "plane"), (_packed_mode(4, 3), _packed_mode(4, 4)))
+    fence_modes = dict.fromkeys(("copter", "plane"), _FENCE_MODES)
+    fence_texts = (
+        Statustext(MavSeverity.CRITICAL, "Geofence: approaching or outside geofence"),
+        _said("Failsafe activated"),
+    )
     misplaced = MavResult.ERROR
     nonsense = MavResult.UNSUPPORTED
     silent_at_boot = True
@@ -258,7 +275,3 @@ class Px4Firmware(MockFirmware):
             if mission_type in (part, ALL_TYPES):
                 self._lists.clear(part)
         return [MissionAck(sender, mission_type, MavResult.ACCEPTED)]
-
-
-def _said(text: str) -> Statustext:
-    return Statustext(MavSeverity.CRITICAL, f"{text}\t")

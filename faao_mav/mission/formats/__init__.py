@@ -1,16 +1,18 @@
 """Mission files, by the ending of their name."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
 from faao_mav.errors import MissionFileError
-from faao_mav.files import read_text
+from faao_mav.files import read_text, write_together
+from faao_mav.mission.fence_items import fence_items
+from faao_mav.mission.formats.beside import check_replaceable, comment_for, remove_outdated
 from faao_mav.mission.formats.losses import kml_losses, plan_losses, wpl_losses
 from faao_mav.mission.formats.mission_file import MissionFile, PlanTarget
 from faao_mav.mission.formats.qgc_plan_writer import write_qgc_plan
-from faao_mav.mission.formats.wpl import read_wpl, write_wpl
+from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, write_wpl, write_wpl_fence
 from faao_mav.mission.item import Mission
 
 __all__ = [
@@ -19,11 +21,14 @@ __all__ = [
     "PlanTarget",
     "check_readable",
     "check_suffix",
+    "fence_path",
     "losses_in",
     "read_mission",
     "read_mission_file",
     "read_wpl",
+    "render_files",
     "render_mission",
+    "write_mission",
     "write_qgc_plan",
     "write_wpl",
 ]
@@ -38,12 +43,14 @@ class Format:
     `read(text, source)` is None for a format that only draws a mission. `write(mission, target,
     name)` returns the text of a file with that name, and raises `MissionFileError` for a mission
     that the format cannot hold at all; `losses(mission, target)` says what it leaves out, one line
-    each. Another format is one file beside this one and one entry of `_FORMATS`.
+    each. `fence_beside`: the fence is a file of its own beside the mission's. Another format is one
+    file beside this one and one entry of `_FORMATS`.
     """
 
     read: Callable[[str, str], MissionFile] | None
     write: Callable[[Mission, Target, str], str]
     losses: Callable[[Mission, Target], list[str]]
+    fence_beside: bool = False
 
 
 def _read_plan(text: str, source: str) -> MissionFile:
@@ -58,7 +65,7 @@ def _write_kml(mission: Mission, name: str) -> str:
     return write_kml(mission, name=name)
 
 
-_WPL = Format(read_wpl, lambda mission, _, __: write_wpl(mission), wpl_losses)
+_WPL = Format(read_wpl, lambda mission, _, __: write_wpl(mission), wpl_losses, fence_beside=True)
 _FORMATS = {
     ".waypoints": _WPL,
     ".txt": _WPL,
@@ -81,19 +88,71 @@ def read_mission(path: str | Path) -> Mission:
 def read_mission_file(path: str | Path) -> MissionFile:
     """Return what the file `path` tells, whose format its name's ending tells.
 
-    Raises `MissionFileError` if the ending is unknown or that of a format for drawing only, or
-    the file cannot be opened, is not UTF-8 text, is larger than `MAX_BYTES` or is not a mission.
+    A format that holds no fence has it in the file `fence_path`, if that is there. Raises
+    `MissionFileError` if the ending is unknown or that of a format for drawing only, or a file
+    cannot be opened, is not UTF-8 text, is larger than `MAX_BYTES` or is not what it should be.
     """
     path = Path(path)
     read = check_readable(path)
-    return read(read_text(path, MAX_BYTES, "a mission", MissionFileError), str(path))
+    file = read(read_text(path, MAX_BYTES, "a mission", MissionFileError), str(path))
+    beside = fence_path(path)
+    if beside is None or not beside.is_file():
+        return file
+    text = read_text(beside, MAX_BYTES, "a fence", MissionFileError)
+    taken = f"{beside}: the fence beside {path.name}, taken with it"
+    return replace(
+        file,
+        mission=replace(file.mission, fence=read_wpl_fence(text, str(beside))),
+        warnings=(*file.warnings, taken),
+    )
+
+
+def fence_path(mission: Path) -> Path | None:
+    """Return the file of the fence beside `mission`; None for a format that holds it, or no fence.
+
+    >>> fence_path(Path("flight.waypoints")).name
+    'flight.fence.waypoints'
+    """
+    if not check_suffix(mission).fence_beside:
+        return None
+    return mission.with_name(f"{mission.stem}.fence{mission.suffix}")
+
+
+def render_files(mission: Mission, path: Path, target: Target = None) -> dict[str | Path, bytes]:
+    """Return what is to be written, by file: `path`, and the fence beside it if it has to be.
+
+    Arguments and errors as in `render_mission`.
+    """
+    files: dict[str | Path, bytes] = {path: render_mission(mission, path, target).encode()}
+    beside = fence_path(path)
+    if beside is not None and fence_items(mission.fence):
+        # the name of a mission may be no Unicode
+        files[beside] = write_wpl_fence(mission, comment_for(path)).encode(errors="replace")
+    return files
+
+
+def write_mission(mission: Mission, path: Path, target: Target = None) -> tuple[Path, ...]:
+    """Write the files of `render_files`, all or none, and return their paths.
+
+    The fence of an earlier mission beside `path` is removed; one of other origin is not replaced.
+    Raises `InputError`.
+    """
+    files = render_files(mission, path, target)
+    beside = fence_path(path)
+    if beside is not None and beside in files:
+        check_replaceable(beside, "the mission's fence is")
+    write_together(files)
+    if beside is not None and beside not in files:
+        remove_outdated(beside)
+    return tuple(map(Path, files))
 
 
 def render_mission(mission: Mission, path: str | Path, target: Target = None) -> str:
     """Return the text to write to the file `path`, in the format that its name's ending tells.
 
     `target` is whom a `.plan` is for, which says so and holds what that autopilot takes. Raises
-    `MissionFileError` if the ending is unknown or the format cannot hold the mission at all.
+    `MissionFileError` if the ending is unknown or the format cannot hold the mission at all. For
+    the fence of a format that does not hold it see `render_files`.
 
     >>> render_mission(Mission(()), "flight.waypoints").splitlines()[0]
     'QGC WPL 110'
@@ -107,7 +166,7 @@ def render_mission(mission: Mission, path: str | Path, target: Target = None) ->
 
 
 def losses_in(mission: Mission, path: str | Path, target: Target = None) -> list[str]:
-    """Return what of `mission` the text of `render_mission` does not hold, one line each.
+    """Return what of `mission` the files of `render_files` do not hold, one line each.
 
     >>> losses_in(Mission(()), "flight.waypoints")
     ['no home is known: the file says 0, 0, 0, which means none']

@@ -12,7 +12,10 @@ from typing import Literal, TypeAlias
 from xml.etree import ElementTree as Xml
 
 from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import areas_of
 from faao_mav.mission.item import Home, Mission, MissionItem
 
 AltitudeMode: TypeAlias = Literal["absolute", "relativeToGround"]
@@ -21,11 +24,16 @@ Spot: TypeAlias = tuple[float, float, float]
 
 _KML = "http://www.opengis.net/kml/2.2"
 _GX = "http://www.google.com/kml/ext/2.2"
-_LINE_COLOR = "ff00a5ff"
-"""Opacity, blue, green and red of the route; chosen: orange shows on fields, towns and water."""
+_STYLES = (
+    ("route", "ff00a5ff", None),
+    ("inclusion", "ffffffff", "00ffffff"),
+    ("exclusion", "ff3232dc", "403232dc"),
+)
+"""Styles by name: opacity, blue, green and red of the lines and of what fills areas; chosen: orange
+shows on fields, towns and water, and so do a white edge and a red one."""
 
 _LINE_WIDTH = 3
-"""Width of the route in pixels; chosen by eye."""
+"""Width of lines in pixels; chosen by eye."""
 
 _DECIMALS = 9
 """Decimals of a degree: 0.1 mm."""
@@ -69,7 +77,7 @@ def write_kml(
     stations: Sequence[Station] = (),
     track: TimedTrack | None = None,
 ) -> str:
-    """Return a KML document of `mission`: its route, numbered waypoints, stations, a flight.
+    """Return a KML document of `mission`: route, numbered waypoints, fence, stations, a flight.
 
     The route is a line through the places that items fly to, the waypoints are numbered as the
     items are, from 1. Heights above home become heights above mean sea level by the mission's
@@ -81,10 +89,13 @@ def write_kml(
     root = Xml.Element(_tag("kml"))
     document = _add(root, "Document")
     _add(document, "name", name)
-    style = _add(document, "Style", id="route")
-    line = _add(style, "LineStyle")
-    _add(line, "color", _LINE_COLOR)
-    _add(line, "width", str(_LINE_WIDTH))
+    for name, color, filling in _STYLES:
+        style = _add(document, "Style", id=name)
+        line = _add(style, "LineStyle")
+        _add(line, "color", color)
+        _add(line, "width", str(_LINE_WIDTH))
+        if filling is not None:
+            _add(_add(style, "PolyStyle"), "color", filling)
 
     waypoints = list(_waypoints(mission))
     mode = _mode(mission)
@@ -95,6 +106,8 @@ def write_kml(
         _add(folder, "name", "Waypoints")
         for number, item, spot in waypoints:
             _add_point(folder, str(number), spot, mode, _description(item))
+    if mission.fence:
+        _add_fence(document, mission.fence)
     for station in stations:
         spot = (station.latitude, station.longitude, station.altitude)
         _add_point(document, station.name, spot, "absolute")
@@ -136,19 +149,19 @@ def _description(item: MissionItem) -> str:
 
 
 def _placemark(
-    parent: Xml.Element, name: str, *, styled: bool = False, description: str | None = None
+    parent: Xml.Element, name: str, *, style: str | None = None, description: str | None = None
 ) -> Xml.Element:
     placemark = _add(parent, "Placemark")
     _add(placemark, "name", name)
-    if styled:
-        _add(placemark, "styleUrl", "#route")
+    if style is not None:
+        _add(placemark, "styleUrl", f"#{style}")
     if description is not None:
         _add(placemark, "description", description)
     return placemark
 
 
 def _add_line(document: Xml.Element, spots: Sequence[Spot], mode: AltitudeMode) -> None:
-    line = _add(_placemark(document, "Route", styled=True), "LineString")
+    line = _add(_placemark(document, "Route", style="route"), "LineString")
     _add(line, "tessellate", "1")
     _add(line, "altitudeMode", mode)
     _add(line, "coordinates", " ".join(_coordinates(spot, ",") for spot in spots))
@@ -162,8 +175,28 @@ def _add_point(
     _add(point, "coordinates", _coordinates(spot, ","))
 
 
+def _add_fence(document: Xml.Element, fence: Fence) -> None:
+    """Add the areas of `fence`, on the ground, each with its kind in its name; circles too."""
+    import shapely
+
+    folder = _add(document, "Folder")
+    _add(folder, "name", "Fence")
+    frame = LocalFrame(*fence.place)
+    for area in areas_of(fence, frame):
+        kind = "inclusion" if area.inclusion else "exclusion"
+        for part in shapely.get_parts(area.shape):
+            polygon = _add(_placemark(folder, area.name, style=kind), "Polygon")
+            _add(polygon, "tessellate", "1")
+            for n, ring in enumerate(shapely.get_rings(part)):
+                boundary = _add(polygon, "innerBoundaryIs" if n else "outerBoundaryIs")
+                latitudes, longitudes = frame.to_geodetic(shapely.get_coordinates(ring))
+                spots = zip(latitudes.tolist(), longitudes.tolist(), strict=True)
+                places = " ".join(_coordinates((*spot, 0.0), ",") for spot in spots)
+                _add(_add(boundary, "LinearRing"), "coordinates", places)
+
+
 def _add_track(document: Xml.Element, track: TimedTrack) -> None:
-    placemark = _placemark(document, "Flight", styled=True)
+    placemark = _placemark(document, "Flight", style="route")
     line = Xml.SubElement(placemark, f"{{{_GX}}}Track")
     _add(line, "altitudeMode", "absolute")
     for seconds in track.t:

@@ -15,7 +15,7 @@ _SHOWN_ITEMS = 5
 def wpl_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
     """Return what of `mission` a QGC WPL file does not hold, one line each."""
     del target
-    return [*_beside(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
+    return [*_rally(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
 
 
 def plan_losses(mission: Mission, target: PlanTarget | None) -> list[str]:
@@ -29,8 +29,8 @@ def kml_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
     """Return what of `mission` a KML file does not hold or show, one line each."""
     del target
     found = [
-        *_beside(mission, "KML"),
-        "KML holds the route alone: no commands, speeds or holds, and cannot be read back",
+        *_rally(mission, "KML"),
+        "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back",
     ]
     frames = {item.frame for item in mission.items}
     if mission.home is None and frames & ABOVE_HOME:
@@ -42,17 +42,10 @@ def kml_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
     return found
 
 
-def _beside(mission: Mission, name: str) -> list[str]:
-    found = []
-    fence = mission.fence
-    if fence or fence.breach_return is not None:
-        count = _count(len(fence.polygons) + len(fence.circles), "area")
-        found.append(f"{name} holds no fence: {count} left out")
-    if mission.rally:
-        found.append(
-            f"{name} holds no rally points: {_count(len(mission.rally), 'point')} left out"
-        )
-    return found
+def _rally(mission: Mission, name: str) -> list[str]:
+    if not mission.rally:
+        return []
+    return [f"{name} holds no rally points: {_count(len(mission.rally), 'point')} left out"]
 
 
 def _not_set(mission: Mission) -> list[str]:

@@ -4,10 +4,9 @@ JSON with a mission, a geofence and rally points. Sources: QGroundControl's deve
 File Format", and what QGroundControl and MAVSDK accept. Importing this brings pydantic along.
 """
 
-import json
 import math
-from collections.abc import Callable, Iterable, Iterator
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -23,6 +22,7 @@ from faao_mav.errors import InputError, MissionFileError, place_of, quote
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats.mission_file import MissionFile
+from faao_mav.mission.formats.strict_json import parse_json
 from faao_mav.mission.item import Home, Mission, MissionItem
 
 _AGAIN = "open the file in a current QGroundControl and save it again"
@@ -148,7 +148,7 @@ def read_qgc_plan(text: str, source: str) -> MissionFile:
     names key, value and what is expected.
     """
     try:
-        file = _File.model_validate(_parse(text))
+        file = _File.model_validate(parse_json(text))
         read = _mission(file)
     except ValidationError as error:
         raise MissionFileError(f"{source}: {_describe(error)}") from None
@@ -178,56 +178,6 @@ def _describe(error: ValidationError) -> str:
         "an object" if kind.startswith("model_") else detail["msg"].removeprefix("Input should be ")
     )
     return f"{where}: {quote(detail['input'])}; expected {words}{hint}".removeprefix(": ")
-
-
-class _Odd(NamedTuple):
-    """What stands in the tree for a value that no JSON can have."""
-
-    problem: str
-
-
-def _parse(text: str) -> Any:
-    """Return the JSON `text` as plain data.
-
-    Raises `MissionFileError` for what is no JSON or more than one meaning could be given to: a
-    key that an object has twice, NaN and Infinity, nesting beyond any use.
-    """
-    odd: list[_Odd] = []
-
-    def mark(problem: str) -> _Odd:
-        odd.append(_Odd(problem))
-        return odd[-1]
-
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        made: dict[str, Any] = {}
-        for key, value in pairs:
-            made[key] = mark("is there twice; remove one") if key in made else value
-        return made
-
-    def constant(word: str) -> _Odd:
-        return mark(f"{word}; expected a finite number or null (not set): JSON has no such number")
-
-    try:
-        tree = json.loads(text, object_pairs_hook=unique, parse_constant=constant)
-        for steps, problem in _odd_in([], tree) if odd else ():
-            raise MissionFileError(f"{place_of(steps)}: {problem}".removeprefix(": "))
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        raise MissionFileError(f"{where}: not JSON: {error.msg}") from None
-    except RecursionError:
-        raise MissionFileError("nested too deep for a plan") from None
-    except ValueError:  # an integer of thousands of digits
-        raise MissionFileError("a number of thousands of digits") from None
-    return tree
-
-
-def _odd_in(steps: list[str | int], value: Any) -> Iterator[tuple[list[str | int], str]]:
-    """Yield the places below `steps` where something odd stands, and what is wrong with it."""
-    if isinstance(value, _Odd):
-        yield steps, value.problem
-    inside = value.items() if isinstance(value, dict) else ()
-    for key, below in enumerate(value) if isinstance(value, list) else inside:
-        yield from _odd_in([*steps, key], below)
 
 
 def _mission(file: _File) -> Mission:

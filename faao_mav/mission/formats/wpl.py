@@ -6,6 +6,10 @@ the home position: QGroundControl drops it, ArduPilot replaces it. A DO_JUMP's t
 of a row in the file, row 0 being home: its index, where indexes count up. Source: MAVLink developer
 guide, "File formats".
 
+A fence is a file of its own, as Mission Planner saves it from its fence screen: the home row, then
+the rows of `faao_mav.mission.fence_items`. Mission Planner drops the first row of a fence that it
+loads (its pull request 2739), MAVProxy writes none.
+
 Read, but not written: `QGC WPL 120`, QGroundControl's rows without a home row, and `QGC WPL 100`,
 thirteen fields in another order with command numbers of MAVLink before 1.0, as pymavlink reads it.
 """
@@ -17,8 +21,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from faao_mav.errors import MissionFileError, quote
-from faao_mav.mission.command import ABOVE_HOME, Command, Frame
+from faao_mav.errors import InputError, MissionFileError, quote
+from faao_mav.mission.command import ABOVE_HOME, CIRCLE, FENCE_RETURN_POINT, POLYGON, Command, Frame
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_items import fence_items, fence_of
 from faao_mav.mission.formats.mission_file import MissionFile
 from faao_mav.mission.item import Home, Mission, MissionItem, home_item, jump_moved
 
@@ -57,6 +63,7 @@ _LAYOUTS = {
     "QGC WPL 120": _Layout(_FIELDS, home_row=False),
     "QGC WPL 100": _Layout(_FIELDS_100, commands=_COMMANDS_100),
 }
+_FENCE = frozenset({FENCE_RETURN_POINT, *POLYGON.values(), *CIRCLE.values()})
 _INTEGER_LIMITS = {
     "index": 65_535,
     "current": 1,
@@ -75,12 +82,23 @@ def write_wpl(mission: Mission) -> str:
 
     Lines end in LF, row 0 is home and alone is current; a mission without home gets a row 0 of
     zeros, because readers take whatever is there for home. Numbers have at least 8 decimals and
-    as many more as they need to be read back bit for bit. NaN is written as 0, and the fence and
-    the rally points are left out: `losses` tells.
+    as many more as they need to be read back bit for bit. NaN is written as 0, and the rally
+    points are left out: `losses` tells. The fence is another file: `write_wpl_fence`.
     """
-    items = (home_item(mission.home), *mission.items)
-    rows = [_row(index, item) for index, item in enumerate(items)]
-    return "\n".join([HEADER, *rows, ""])
+    return _text(mission.home, mission.items)
+
+
+def write_wpl_fence(mission: Mission, comment: str) -> str:
+    """Return the fence of `mission` as the text of a QGC WPL 110 file, with a `comment`.
+
+    Numbers are those of `write_wpl`.
+    """
+    return _text(mission.home, fence_items(mission.fence), f"# {comment}")
+
+
+def _text(home: Home | None, items: Sequence[MissionItem], *comments: str) -> str:
+    rows = [_row(index, item) for index, item in enumerate((home_item(home), *items))]
+    return "\n".join([HEADER, *comments, *rows, ""])
 
 
 def read_wpl(text: str, source: str) -> MissionFile:
@@ -94,12 +112,7 @@ def read_wpl(text: str, source: str) -> MissionFile:
     the file's name, for messages. Raises `MissionFileError` for anything else; it names line,
     field, value and what is expected.
     """
-    lines = _lines(text)
-    layout = _layout(next(lines, None), source)
-    rows = [_Line(source, number, line, layout) for number, line in lines]
-    if not rows:
-        first = "row 0, the home position, and the items" if layout.home_row else "items"
-        raise MissionFileError(f"{source}: a header but no items; expected {first}")
+    layout, rows = _rows(text, source)
     current = None
     for row in rows:
         if row.integer("current"):
@@ -111,6 +124,35 @@ def read_wpl(text: str, source: str) -> MissionFile:
     else:
         mission = Mission(tuple(jump_moved(row.item(), 1) for row in rows))
     return MissionFile(mission, warnings=tuple(_oddities(rows, layout, mission)))
+
+
+def read_wpl_fence(text: str, source: str) -> Fence:
+    """Return the fence that `text`, the content of a QGC WPL file of fence items, describes.
+
+    A first row that is no fence item is the home row. What is tolerated is as in `read_wpl`.
+    """
+    _, rows = _rows(text, source)
+    if rows[0].command() not in _FENCE:
+        rows[0].home()
+        rows = rows[1:]
+    for row in rows:
+        if row.command() not in _FENCE:
+            raise row.error("command", "expected 5000 to 5004: a file of a fence holds no others")
+    try:
+        return fence_of([row.item() for row in rows])
+    except InputError as error:
+        raise MissionFileError(f"{source}: {error}") from None
+
+
+def _rows(text: str, source: str) -> "tuple[_Layout, list[_Line]]":
+    """Return the layout that the header names, and the rows under it: one at least."""
+    lines = _lines(text)
+    layout = _layout(next(lines, None), source)
+    rows = [_Line(source, number, line, layout) for number, line in lines]
+    if not rows:
+        first = "row 0, the home position, and the items" if layout.home_row else "items"
+        raise MissionFileError(f"{source}: a header but no items; expected {first}")
+    return layout, rows
 
 
 def _oddities(rows: "Sequence[_Line]", layout: _Layout, mission: Mission) -> Iterator[str]:

@@ -26,7 +26,8 @@ slots and divided by the largest gradient at the start.
 To add a constraint, write one file here and hand its objects to `maximize(constraints=...)`:
 
 - on every slot's position, speed or acceleration: a subclass of `half_planes.HalfPlanes` that says
-  which (`quantity`) and what g(x) >= 0 is (`slack`); see `min_speed`, 40 lines.
+  which (`quantity`) and what g(x) >= 0 is (`slack`); see `min_speed`, 40 lines, and `fence`, which
+  has several inequalities in every slot.
 - anything else, with unknowns of its own too: a `constraint.Constraint` and its `State`. `unknowns`
   says how many a slot has, `entries` what never changes of their rows in the banded matrix,
   `State.stiffness` what does, `State.push` their right-hand sides. tests/optimizer/

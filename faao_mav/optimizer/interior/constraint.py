@@ -182,6 +182,11 @@ class Constraint(ABC):
         """How often a direction of a search with this constraint is corrected at most."""
         return 0
 
+    @property
+    def turns(self) -> bool:
+        """Whether its half-planes turn so fast that mu has to wait for the iterates."""
+        return False
+
     def entries(self, slots: int, first: int) -> Sequence[Entry]:  # noqa: ARG002
         """Return what never changes of the rows of its own unknowns, which count from `first`."""
         return ()

@@ -102,7 +102,7 @@ class Slacks(State):
 
 @dataclass(frozen=True)
 class HalfPlanesState(Slacks):
-    """A constraint g(x_n) >= 0 at an iterate: s = g + margin, its gradient u (2, flights, n)."""
+    """A constraint g(x_n) >= 0 at an iterate: s = g + margin, its gradient u, shaped (2, *s)."""
 
     constraint: "HalfPlanes"
     flight: ScaledFlight
@@ -115,7 +115,7 @@ class HalfPlanesState(Slacks):
     def stiffness(self) -> Stiffness:
         """Return z / s u u^T."""
         x, y = self.u
-        packed = self.z / self.s * np.stack([x * x, x * y, y * y])
+        packed: Any = _per_slot(self.z / self.s * np.stack([x * x, x * y, y * y]))
         return Stiffness(**{self.constraint.quantity: packed})
 
     def push(self, target: Real | None) -> Forces:
@@ -130,7 +130,7 @@ class HalfPlanesState(Slacks):
     ) -> tuple[tuple[Real, Real], Forces]:
         """Return the change of the linear slack along `move`, with that of its multiplier."""
         dx = self.constraint.bounded(self.flight, move.w, move.v)
-        ds = np.asarray((self.u * dx).sum(axis=0) - self.margin)
+        ds = np.asarray(self.u[0] * dx[0] + self.u[1] * dx[1] - self.margin)
         z = self.raised(ds, target)
         return (ds, z - self.z), self._on_quantity(z)
 
@@ -148,7 +148,13 @@ class HalfPlanesState(Slacks):
         return replace(self, z=mu * self.on / self.s)
 
     def _on_quantity(self, z: Real) -> Forces:
-        return Forces(**{self.constraint.quantity: self.u * z})
+        forces = _per_slot(self.u * z)
+        return Forces(**{self.constraint.quantity: forces})
+
+
+def _per_slot(parts: Real) -> Real:
+    """Return the sum of `parts` (k, [rows,] flights, n) over the rows, (k, flights, n)."""
+    return parts if parts.ndim == 3 else np.asarray(parts.sum(axis=1))
 
 
 class HalfPlanes(Constraint):
@@ -172,21 +178,28 @@ class HalfPlanes(Constraint):
 
     @abstractmethod
     def slack(self, x: Real) -> tuple[Real, Real]:
-        """Return g (flights, n) and its gradient (2, flights, n) at x (2, flights, n)."""
+        """Return g (flights, n) and its gradient (2, flights, n) at x (2, flights, n).
+
+        With several inequalities per slot g is (rows, flights, n) and its gradient (2, *g).
+        """
 
     def bounded(self, flight: ScaledFlight, w: Real, v: Real) -> Real:
         """Return x (2, flights, n) at scaled w and v, or its change at changes of them."""
         return {"w": w, "v": v}[self.quantity] if self.quantity != "a" else flight.accelerations(v)
 
+    def held(self, flight: ScaledFlight, shape: tuple[int, ...]) -> Real:
+        """Return one where the inequalities, in the `shape` of g, hold: where x is free; else 0."""
+        matrix = flight.matrix
+        free = {"w": matrix.moves_w, "v": matrix.moves_v, "a": 1.0 * (flight.gains > 0)}
+        return np.broadcast_to(free[self.quantity], shape)
+
     def begin(self, flight: ScaledFlight, start: Start) -> HalfPlanesState:
         """Return the centred state at `start`, widened where g is less than `headroom`."""
         x = self.bounded(flight, start.w, start.v)
-        matrix = flight.matrix
-        moves = {"w": matrix.moves_w, "v": matrix.moves_v, "a": 1.0 * (flight.gains > 0)}
-        on = np.broadcast_to(moves[self.quantity], x.shape[1:])
-        none = np.zeros(x.shape[1:])
-        margin = on * np.maximum(0, self.inside + self.headroom - self.slack(x)[0])
-        unset = HalfPlanesState(on, none, none, margin, self, flight, np.zeros(x.shape))
+        g, u = self.slack(x)
+        on, none = self.held(flight, g.shape), np.zeros(g.shape)
+        margin = on * np.maximum(0, self.inside + self.headroom - g)
+        unset = HalfPlanesState(on, none, none, margin, self, flight, u)
         return unset.moved(start.w, start.v, 0.0, (none, none)).centred(start.mu)
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:

@@ -87,8 +87,19 @@ tolerance of 1e-4: 7 converge, 3 with the adaptive rule alone. From the first ce
 in half duplex take a third more iterations; with 1 or 10 in place of 3, up to four do not converge.
 """
 
+_SOLVED_TURNING = 30.0
+"""The same where the half-planes of a fence turn with the flight: mu is monotone from the start.
+
+Measured on two sample flights round obstacles, by a gap and by zones that touch: 134 and 95
+iterations. With 100 in place of 30 neither converges in 300, with 300 one does, in 294.
+"""
+
 _MU_PER_TOLERANCE = 1 / 20
 """The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
+
+
+_MOST_PER_SLOT = 10.0
+"""The inequalities per slot from which the least mu is smaller: the gap is their sum. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +171,7 @@ class Search:
     ) -> None:
         self.rewards, self.tolerance = rewards, tolerance
         self.flight = ScaledFlight(kin, constraints)
+        self.turning = any(constraint.turns for constraint in constraints)
         self.barrier_share = _BARRIER_SHARE * kin.slots
         flights = w.shape[1]
         self.rows = np.arange(flights)
@@ -263,11 +275,14 @@ class Search:
         queued = not len(at.total)
         slowest = _QUEUE_FALL if queued else np.where(slope < 1, 0.01, 0.1)
         keep = np.maximum((left / now) ** 3, slowest)
-        least = self.tolerance * _MU_PER_TOLERANCE * control.steepness
+        per_slot = sum(state.count() for state in at.states) / at.w.shape[-1]
+        fewer = np.minimum(1, _MOST_PER_SLOT / per_slot)
+        least = self.tolerance * _MU_PER_TOLERANCE * control.steepness * fewer
         adaptive = np.fmin(control.mu, keep * now)
-        solved = slope * control.steepness < _SOLVED * control.mu
+        near = _SOLVED_TURNING if self.turning else _SOLVED
+        solved = slope * control.steepness < near * control.mu
         monotone = np.where(solved, _MONOTONE_FALL, 1.0) * control.mu
-        hugged = queued & (control.centrings >= _MONOTONE_AFTER)
+        hugged = (queued & (control.centrings >= _MONOTONE_AFTER)) | self.turning
         control.mu = np.fmax(np.where(hugged, monotone, adaptive), least)
         direction, reach = newton.corrector(control.mu, ahead, share)
         share = np.minimum(1, _TO_BOUNDARY * reach)

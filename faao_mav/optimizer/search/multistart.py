@@ -3,13 +3,14 @@
 Long flights are improved on a coarse copy with fewer slots, which costs a fraction of the time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.maximize import feasible, maximize_all
+from faao_mav.optimizer.interior.constraint import Constraint
+from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize_all
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -75,6 +76,7 @@ def improve_starts(
     tolerance: float,
     max_iterations: int,
     relay: RelayQueue | None = None,
+    constraints: Callable[[Kinematics], Sequence[Constraint]] = lambda _: (),
 ) -> ImprovedStarts:
     """Improve the feasible `flights` to `tolerance` and compare them.
 
@@ -89,6 +91,7 @@ def improve_starts(
         tolerance: relative tolerance of the search, at least 3e-3 on a coarse copy.
         max_iterations: steps of each search at most.
         relay: the queue whose delivered rate is maximised instead of the smaller mean.
+        constraints: what flights of given kinematics keep beside their limits.
     """
     copy, reward, on_copy = kin, stage, list(flights.values())
     if len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
@@ -96,7 +99,13 @@ def improve_starts(
         tolerance = max(tolerance, _COARSE_TOLERANCE)
         on_copy = [copy.follow(_resampled(kin, flight, copy)) for flight in on_copy]
     solved = maximize_all(
-        copy, reward, on_copy, tolerance=tolerance, max_iterations=max_iterations, relay=relay
+        copy,
+        reward,
+        on_copy,
+        constraints=constraints(copy),
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        relay=relay,
     )
     optima = dict(zip(flights, solved, strict=True))
     ranked = sorted(optima, key=lambda name: -round(optima[name].value, _DECIMALS))
@@ -110,8 +119,9 @@ def improve_starts(
             promising.append(name)
     ends = {name: optimum.trajectory for name, optimum in optima.items()}
     if copy is not kin:
+        kept = (*constraints_of(kin), *constraints(kin))
         ends = {
-            name: feasible(kin, flights[name], _resampled(copy, end, kin))
+            name: feasible(kin, flights[name], _resampled(copy, end, kin), kept)
             for name, end in ends.items()
         }
     return ImprovedStarts(ends, promising)

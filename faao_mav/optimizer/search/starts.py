@@ -203,6 +203,14 @@ def _by_way_of(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
     return _joined(kin, best) if best is not None and low >= _LEAST_SHARE else None
 
 
+def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
+    """Return the flight that stops at `stops`, straight between them; None if the time is short."""
+    if not stops:
+        return straight_flight(kin)
+    parts = _parts(kin, stops)
+    return None if parts is None else _joined(kin, parts)
+
+
 def _nearest_on_line(a: Real, b: Real, p: Real) -> Real:
     """Return the point nearest to p between a and b, (2,)."""
     line = b - a

@@ -1,7 +1,9 @@
 """ArduPilot: what ArduCopter and ArduPlane share."""
 
+from collections.abc import Callable, Mapping
+
 from faao_mav.vehicle.parameter import Parameter, ParameterValues
-from faao_mav.vehicle.vehicle_type import AutopilotFamily
+from faao_mav.vehicle.vehicle_type import AutopilotFamily, FenceAction, FenceResponse
 
 ARDUPILOT = AutopilotFamily(
     key="ardupilot",
@@ -24,6 +26,28 @@ def needs_one_inclusion(vehicle: ParameterValues) -> bool:
     return bool(int(vehicle.value("fence_options")) & _UNION)
 
 
+_AREAS = 4
+"""The bit of FENCE_TYPE by which the areas of a fence count."""
+
+
+def at_fence(actions: Mapping[int, FenceAction]) -> Callable[[ParameterValues], FenceResponse]:
+    """Return what a vehicle does at its fence that takes FENCE_ACTION for `actions`.
+
+    Numbers that are not among them make it return: each has that in its name.
+    """
+
+    def response(vehicle: ParameterValues) -> FenceResponse:
+        if vehicle.value("fence_enable") == 0:
+            return FenceResponse("nothing", "fence_enable", "1")
+        kinds = int(vehicle.value("fence_type"))
+        if not kinds & _AREAS:
+            return FenceResponse("nothing", "fence_type", f"{kinds | _AREAS}")
+        action = actions.get(int(vehicle.value("fence_action")), "return")
+        return FenceResponse(action, "fence_action", "1" if action == "report" else "")
+
+    return response
+
+
 SOURCE = "ArduPilot 4.7: parameter lists of Copter and Plane"
 
 
@@ -35,6 +59,8 @@ def switch(key: str, default: float, name: str, unit: str = "") -> Parameter:
 SHARED = (
     switch("arming_items", 0, "ARMING_MIS_ITEMS"),
     switch("fence_enable", 0, "FENCE_ENABLE"),
+    switch("fence_action", 1, "FENCE_ACTION"),
+    switch("fence_margin", 2.0, "FENCE_MARGIN", "m"),
     switch("fence_ceiling", 100.0, "FENCE_ALT_MAX", "m"),
     switch("fence_floor", -10.0, "FENCE_ALT_MIN", "m"),
     switch("fence_radius", 300.0, "FENCE_RADIUS", "m"),

@@ -36,6 +36,8 @@ _SHARED = (
     _parameter("takeoff_land_required", "", 0, "MIS_TKO_LAND_REQ"),
     _parameter("first_waypoint_distance", "m", 10_000.0, "MIS_DIST_1WP"),
     _parameter("takeoff_height", "m", 2.5, "MIS_TAKEOFF_ALT"),
+    _parameter("fence_action", "", 2, "GF_ACTION"),
+    _parameter("fence_predict", "", 0, "GF_PREDICT"),
     _parameter("fence_distance", "m", 0.0, "GF_MAX_HOR_DIST"),
     _parameter("fence_height", "m", 0.0, "GF_MAX_VER_DIST"),
     _parameter("return_height", "m", 60.0, "RTL_RETURN_ALT", 0.0),
@@ -46,6 +48,7 @@ COPTER_TABLE = table(
     _parameter("cruise_speed", "m/s", 5.0, "MPC_XY_CRUISE", 0.1, capped_by="max_speed"),
     _parameter("max_speed", "m/s", 12.0, "MPC_XY_VEL_MAX", 0.1),
     _parameter("acceleration", "m/s^2", 3.0, "MPC_ACC_HOR", 0.1, documented=(2.0, 15.0)),
+    _parameter("greatest_acceleration", "m/s^2", 5.0, "MPC_ACC_HOR_MAX", 0.1),
     _parameter("jerk", "m/s^3", 4.0, "MPC_JERK_AUTO", 0.1),
     _parameter(
         "lean_angle", "rad", radians(45), "MPC_TILTMAX_AIR", radians(20), radians(89), radians(1)

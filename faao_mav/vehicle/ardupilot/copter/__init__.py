@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, needs_one_inclusion
+from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
@@ -73,6 +73,7 @@ ARDUCOPTER = VehicleType(
     fastest=_FASTEST,
     fence_needs_one_inclusion=needs_one_inclusion,
     home_outside_fence=HOME_OUTSIDE_FENCE,
+    at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
     legs=ArduCopterLegs.from_vehicle,
     flight_model=ArduCopter.from_vehicle,
     calibrated=True,

@@ -1,6 +1,6 @@
 """ArduPlane: what it is, and how it flies a mission."""
 
-from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, needs_one_inclusion
+from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane, ArduPlaneLegs
 from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
@@ -49,6 +49,7 @@ ARDUPLANE = VehicleType(
     vertical=_vertical,
     fence_needs_one_inclusion=needs_one_inclusion,
     home_outside_fence=HOME_OUTSIDE_FENCE,
+    at_fence=at_fence({0: "report"}),
     legs=ArduPlaneLegs.from_vehicle,
     flight_model=_model,
     ceilings=_ceilings,

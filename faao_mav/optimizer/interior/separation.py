@@ -1,0 +1,191 @@
+"""How far a straight is from convex obstacles, and in which direction: vectorised.
+
+The distance of the straight from a to b and a convex obstacle O is the largest
+
+    d(u) = min(u . a, u . b) - h(u),   h(u) = max u . p over p in O,   over the directions |u| = 1
+
+and where they overlap that maximum is below 0: minus the least way by which they come apart. It is
+attained at the normal of a side of O, at one of the straight, or from a corner of O to a or b.
+Source: Boyd and Vandenberghe, "Convex Optimization", 2004, 8.2; Gottschalk's separating axes.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from faao_mav.arrays import Integers, Real
+
+_SHORTEST = 1e-12
+"""The least length that a direction is divided by; far below a rounding error of positions."""
+
+_FAR, _CLOSE = 30.0, 20.0
+"""The distance, m, from which an obstacle is the disc about it, and that below which the direction
+is that of the barrier. Chosen: forces of obstacles so far away are next to nothing."""
+
+_ROUNDS, _SHORTER = 5, 4
+"""Newton steps to the direction of the barrier, enough for five digits, and how often a step that
+leads away from it is quartered. Chosen."""
+
+_TURN, _STILL = 0.5, 1e-6
+"""The largest turn of such a step, and the one below which none is taken, radians. Chosen."""
+
+
+@dataclass(frozen=True)
+class ConvexObstacles:
+    """P convex polygons, each with all that is nearer than its `radius` (P,).
+
+    `corners` (P, V, 2) go around counterclockwise; where there are fewer than V the last is
+    repeated. A disc is one corner with a radius. `unit` is the unit of length, m.
+    """
+
+    corners: Real
+    radius: Real
+    unit: float = 1.0
+
+    @classmethod
+    def of(cls, pieces: Sequence[Real], radii: Sequence[float]) -> "ConvexObstacles":
+        """Return the obstacles with these corners, (k, 2) each, and radii, m."""
+        most = max(map(len, pieces), default=1)
+        padded = [np.vstack([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in pieces]
+        return cls(np.array(padded).reshape(-1, most, 2), np.array(radii, dtype=np.float64))
+
+    def scaled(self, unit: float) -> "ConvexObstacles":
+        """Return the same in another unit of length."""
+        share = self.unit / unit
+        return replace(self, corners=self.corners * share, radius=self.radius * share, unit=unit)
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    @cached_property
+    def _sides(self) -> tuple[Real, Real]:
+        """The outward normals (V, 2, P) of the sides, and h there; h is infinite without a side."""
+        along = np.roll(self.corners, -1, axis=1) - self.corners
+        out = np.stack([along[..., 1], -along[..., 0]])
+        length = np.hypot(*out)
+        out = out / np.maximum(length, _SHORTEST)
+        offset = np.einsum("cpv,pvc->vp", out, self.corners) + self.radius
+        return out.transpose(2, 0, 1), np.where(length.T > _SHORTEST, offset, np.inf)
+
+    @cached_property
+    def _discs(self) -> tuple[Real, Real]:
+        """Centers (2, P, 1, 1) and radii (P, 1, 1) of the discs about the obstacles."""
+        center = (self.corners.min(axis=1) + self.corners.max(axis=1)) / 2
+        radius = np.hypot(*(self.corners - center[:, None]).transpose(2, 0, 1)).max(axis=1)
+        return center.T[..., None, None], (radius + self.radius)[:, None, None]
+
+    def separation(self, a: Real, b: Real, room: Real | float | None = None) -> tuple[Real, Real]:
+        """Return directions u (2, P, flights, n) and h(u) there, of the straights from a to b.
+
+        a and b are (2, flights, n). The directions are those of the greatest distance; with `room`
+        (n,), where both ends are farther than that, those that maximise the product of what both
+        have beyond it. Of obstacles farther than `_FAR` both are those of a disc about them.
+        """
+        center, size = self._discs
+        away = (a + b)[:, None] / 2 - center
+        u = _unit(away)
+        h = u[0] * center[0] + u[1] * center[1] + size
+        least = np.minimum(u[0] * a[0] + u[1] * a[1], u[0] * b[0] + u[1] * b[1]) - h
+        near = np.nonzero(least < _FAR / self.unit)
+        piece, a, b = near[0], a[:, near[1], near[2]], b[:, near[1], near[2]]
+        best = self._best(piece, a, b)
+        if room is not None:
+            best = self._centred(piece, a, b, np.broadcast_to(room, least.shape)[near], best)
+        u[0][near], u[1][near] = best
+        h[near] = self._support(piece, best)[0]
+        return u, h
+
+    def _best(self, piece: Integers, a: Real, b: Real) -> Real:
+        """Return the directions (2, m) of the greatest distances.
+
+        Of m pairs: an obstacle `piece` (m,) and the straight from a to b (2, m).
+        """
+        best, u = np.full(len(piece), -np.inf), np.zeros_like(a)
+        for direction, far in self._candidates(piece, a, b):
+            value = np.minimum(_dot(direction, a), _dot(direction, b)) - far
+            better = value > best
+            best, u = np.where(better, value, best), np.where(better, direction, u)
+        return u
+
+    def _candidates(self, piece: Integers, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
+        for normals, offsets in zip(*self._sides, strict=True):
+            yield normals[:, piece], offsets[piece]
+        across = _across(_unit(b - a))
+        for side in (across, -across):
+            yield side, self._support(piece, side)[0]
+        corners = self.corners[piece].transpose(2, 1, 0)
+        for end in (a, b):
+            square = (corners[0] - end[0]) ** 2 + (corners[1] - end[1]) ** 2
+            nearest = square.argmin(axis=0)
+            away = end - corners[:, nearest, np.arange(len(piece))]
+            u = _unit(away)
+            yield u, self._support(piece, u)[0]
+
+    def _support(self, piece: Integers, u: Real) -> tuple[Real, Real]:
+        """Return h(u) (m,) of obstacles `piece` and the corners p (2, m) with h = u . p + r."""
+        corners = self.corners[piece].transpose(2, 1, 0)
+        along = corners[0] * u[0] + corners[1] * u[1]
+        farthest, every = along.argmax(axis=0), np.arange(len(piece))
+        return along[farthest, every] + self.radius[piece], corners[:, farthest, every]
+
+    def _centred(self, piece: Integers, a: Real, b: Real, room: Real, u: Real) -> Real:
+        """Return u with log(u . a - h - room) + log(u . b - h - room) at its maximum, (2, m).
+
+        It is concave in the angle of u; where an end has no room u stays.
+        """
+        some = np.minimum(_dot(u, a), _dot(u, b)) - self._support(piece, u)[0] - room
+        close = np.flatnonzero((some > 0) & (some < _CLOSE / self.unit))
+        piece, a, b, room, own = piece[close], a[:, close], b[:, close], room[close], u[:, close]
+        now = self._logs(piece, a, b, room, own)
+        for _ in range(_ROUNDS):
+            _, slope, bend = now
+            step = np.clip(-slope / np.minimum(bend, -_SHORTEST), -_TURN, _TURN)
+            if not (np.abs(step) > _STILL).any():
+                break
+            for _ in range(_SHORTER):
+                then = self._logs(piece, a, b, room, _turned(own, step))
+                better = then[0] >= now[0]
+                if better.all():
+                    break
+                step = np.where(better, step, step / 4)
+            own, now = np.where(better, _turned(own, step), own), np.where(better, then, now)
+        turned = u.copy()
+        turned[:, close] = own
+        return turned
+
+    def _logs(self, piece: Integers, a: Real, b: Real, room: Real, u: Real) -> Real:
+        """Return the sum of the logarithms (m,) and its first two derivatives by the angle of u."""
+        h, p = self._support(piece, u)
+        value, slope, bend = np.zeros((3, len(piece)))
+        for end in (a, b):
+            left = _dot(u, end) - h - room
+            with np.errstate(divide="ignore", invalid="ignore"):
+                value += np.where(left > 0, np.log(left), -np.inf)
+                rate = _dot(_across(u), end - p) / left
+                slope += rate
+                bend -= _dot(u, end - p) / left + rate * rate
+        return np.stack([value, slope, bend])
+
+
+def _unit(vectors: Real) -> Real:
+    """Return `vectors` (2, ...) divided by their lengths, and east for those without one."""
+    length = np.hypot(*vectors)
+    unit = vectors / np.maximum(length, _SHORTEST)
+    unit[0] = np.where(length > _SHORTEST, unit[0], 1.0)
+    unit[1] = np.where(length > _SHORTEST, unit[1], 0.0)
+    return np.asarray(unit)
+
+
+def _across(u: Real) -> Real:
+    """Return u, turned left by a right angle."""
+    return np.stack([-u[1], u[0]])
+
+
+def _turned(u: Real, angle: Real) -> Real:
+    return np.asarray(np.cos(angle) * u + np.sin(angle) * _across(u))
+
+
+def _dot(x: Real, y: Real) -> Real:
+    return np.asarray(x[0] * y[0] + x[1] * y[1])

@@ -1,0 +1,64 @@
+"""Phase 1: the feasible flight nearest to a path that knows no dynamics, or that breaks the fence.
+
+A path r_n may come from a search over a map, or be a polyline flown at an even speed. The flight
+minimises sum_n ||w_n - r_n||^2 under (11)-(13f), then under the fence too: from a flight that is
+near the path each obstacle is left on the path's side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.interior.constraint import Constraint
+from faao_mav.optimizer.interior.maximize import constraints_of
+from faao_mav.optimizer.interior.rewards import ScaledRewards, StageValues
+from faao_mav.optimizer.interior.search import COLD_START, Search
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+
+_TOLERANCE = 1e-3
+"""Tolerance of the search: a start need not be the nearest flight to the last metre. Chosen."""
+
+ALLOWED = 1e-9
+"""The violation of a limit, in solver units, that counts as none: rounding."""
+
+_MAX_ITERATIONS = 200
+
+
+@dataclass(frozen=True)
+class _Closeness:
+    """-||w_n - r_n||^2 in units of `LENGTH`, r (n, 2)."""
+
+    path: Real
+
+    def __call__(self, w: Real) -> StageValues:
+        away = (w - self.path.T.reshape(2, *[1] * (w.ndim - 2), -1))[:, None] / LENGTH
+        value = -(away * away).sum(axis=0)
+        hessian = np.broadcast_to(
+            np.array([-2.0, 0.0, -2.0]).reshape(3, *[1] * value.ndim), (3, *value.shape)
+        )
+        return StageValues(value, -2 * away / LENGTH, hessian / LENGTH**2)
+
+
+def nearest_flight(
+    kin: Kinematics,
+    path: Real,
+    start: Trajectory,
+    constraints: Sequence[Constraint] = (),
+) -> Trajectory | None:
+    """Return the flight nearest to `path` (n, 2) m that keeps the limits of `kin`.
+
+    None where none is found that keeps `constraints` too. `start` is any flight of `kin`.
+    """
+    for kept in ((), tuple(constraints)) if constraints else ((),):
+        every = (*constraints_of(kin), *kept)
+        w, v = start.w.T[:, None], start.v.T[:, None]
+        rewards = ScaledRewards(_Closeness(path), w)
+        search = Search(kin, every, rewards, w, v, tolerance=_TOLERANCE, strategy=COLD_START)
+        with np.errstate(all="ignore"):
+            results = search.run(_MAX_ITERATIONS)
+        if 0 in results:
+            start = kin.follow(results[0].v.T * kin.max_speed)
+    every = (*constraints_of(kin), *constraints)
+    return start if max(each.excess(kin, start) for each in every) <= ALLOWED else None

@@ -1,0 +1,162 @@
+"""The fence of a plan: its zones in degrees, and whether a flight can keep inside."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from faao_mav.errors import InputError, PlanError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
+from faao_mav.mission.fence_area import FreeArea
+from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Vector
+from faao_mav.plan.sections import CircleZone, FenceOptions, Plan, PlanFile, PolygonZone
+
+_SHORTER_WAY = 2e-3
+"""By how much of its length a way may be longer than the shortest, which is found to 0.01 %."""
+
+
+def geofence(contents: PlanFile, source: str) -> Fence:
+    """Return the zones of `fence` and of its file, which lies beside the plan's file `source`.
+
+    Raises `PlanError` for a fence without zones and a file that cannot be read.
+    """
+    options = contents.fence
+    if options is None:
+        return Fence()
+    origin = contents.site.origin
+    frame = LocalFrame(origin.latitude, origin.longitude)
+    of_file = _read(options, source, frame)
+    zones = [
+        *((zone, True) for zone in options.inclusion),
+        *((zone, False) for zone in options.exclusion),
+    ]
+    polygons = [
+        Polygon(_degrees(frame, zone.polygon), inclusion)
+        for zone, inclusion in zones
+        if isinstance(zone, PolygonZone)
+    ]
+    circles = [
+        Circle(_degrees(frame, [zone.center])[0], zone.radius, inclusion)
+        for zone, inclusion in zones
+        if isinstance(zone, CircleZone)
+    ]
+    fence = Fence((*polygons, *of_file.polygons), (*circles, *of_file.circles))
+    if not fence:
+        raise PlanError(f"{source}: fence: has no zones; give inclusion, exclusion or file")
+    return fence
+
+
+def written_out(fence: Fence, margin: float) -> dict[str, Any]:
+    """Return the section `fence` of a plan that has the zones of `fence` itself."""
+    zones: dict[str, Any] = {"margin": margin, "inclusion": [], "exclusion": []}
+    for polygon in fence.polygons:
+        zone: dict[str, Any] = {"polygon": [_place(vertex) for vertex in polygon.vertices]}
+        zones["inclusion" if polygon.inclusion else "exclusion"].append(zone)
+    for circle in fence.circles:
+        zone = {"center": _place(circle.center), "radius": circle.radius}
+        zones["inclusion" if circle.inclusion else "exclusion"].append(zone)
+    return {key: value for key, value in zones.items() if value != []}
+
+
+def _place(place: LatLon) -> dict[str, float]:
+    return {"latitude": place[0], "longitude": place[1]}
+
+
+def _read(options: FenceOptions, source: str, frame: LocalFrame) -> Fence:
+    """Return the fence in `fence.file`; raise `PlanError` where it lies far from the origin."""
+    if options.file is None:
+        return Fence()
+    from faao_mav.mission.formats.fence_file import read_fence  # plans rarely have one
+
+    path = Path(source).parent / options.file
+    try:
+        fence = read_fence(path)
+    except InputError as error:
+        raise PlanError(f"{source}: fence.file: {error}") from None
+    places = [vertex for polygon in fence.polygons for vertex in polygon.vertices]
+    places += [circle.center for circle in fence.circles]
+    away = frame.to_local(*np.transpose(places))
+    farthest = int(np.abs(away).max(axis=1).argmax())
+    distance = float(np.abs(away[farthest]).max())
+    if not distance <= MAX_LOCAL_DISTANCE:
+        raise PlanError(
+            f"{source}: fence.file: {path}: {places[farthest]} lies {distance / 1000:,.0f} km from "
+            f"site.origin; at most {MAX_LOCAL_DISTANCE / 1000:.0f} km is accepted"
+        )
+    return fence
+
+
+def _degrees(frame: LocalFrame, places: Sequence[Vector]) -> tuple[LatLon, ...]:
+    latitude, longitude = frame.to_geodetic(places)
+    return tuple(zip(latitude.tolist(), longitude.tolist(), strict=True))
+
+
+def fence_problems(plan: Plan) -> Iterator[str]:
+    """Yield why no flight of `plan` can keep `fence.margin` from the edge of the fence."""
+    area = plan.keep_in
+    if plan.fence is None or area is None:
+        return
+    for part in plan.zones:
+        if part.crosses_itself:
+            yield f"fence: {part.name} crosses or touches itself; put its corners in order"
+    margin = plan.fence.margin
+    if area.empty:
+        yield "fence: leaves no place; the inclusions do not overlap, or exclusions cover them"
+    kept = area.inside(margin)
+    if kept.empty:
+        yield f"fence.margin: {margin:g} m: no place is that far from the edge; give less"
+    if plan.optimizer.method == "algorithm1":
+        yield "fence: algorithm1 (optimizer.method) plans without one; give method direct"
+    ends = {"start": plan.flight.start, "end": plan.flight.end}
+    for name, place in ends.items():
+        if not kept.covers(np.array([place])).all():
+            yield f"flight.{name}: {list(place)} is {trouble(plan, place)}"
+    yield from _way_problems(plan, kept)
+
+
+def _way_problems(plan: Plan, kept: FreeArea) -> Iterator[str]:
+    """Yield why the way from start to end cannot be flown."""
+    flight, margin = plan.flight, plan.fence.margin if plan.fence else 0.0
+    way = kept.shortest_way(np.array(flight.start), np.array(flight.end))
+    if way is None:
+        yield (
+            f"fence: no way leads from flight.start {list(flight.start)} to flight.end "
+            f"{list(flight.end)} that keeps {margin:g} m (fence.margin) from the edge"
+        )
+        return
+    length = float(np.hypot(*np.diff(way, axis=0).T).sum())
+    most = plan.vehicle.max_speed * (flight.duration - flight.time_step)
+    if length > most * (1 + _SHORTER_WAY):
+        yield (
+            f"flight.duration: {flight.duration:g} s is too short: the shortest way from start to "
+            f"end inside the fence is {length:.0f} m, and {plan.vehicle.max_speed:g} m/s takes the "
+            f"aircraft {most:.0f} m"
+        )
+
+
+def trouble(plan: Plan, place: Vector) -> str:
+    """Return where a `place`, m, is that lies outside the fence of `plan` or near its edge."""
+    import shapely
+
+    area = plan.keep_in
+    assert area is not None
+    point, margin = shapely.Point(place), plan.fence.margin if plan.fence else 0.0
+    clearance = area.clearance(np.array([place]))
+    for part in plan.zones:
+        if not part.inclusion and part.shape.distance(point) < margin:
+            depth = part.shape.boundary.distance(point)
+            if part.shape.contains(point):
+                return f"{depth:.1f} m inside {part.name} of the fence; move it out"
+            return _near(depth, part.name, margin)
+    if clearance < 0:
+        return f"{-clearance:.1f} m outside the inclusions of the fence; move it inside"
+    return _near(clearance, "the edge of the fence", margin)
+
+
+def _near(distance: float, what: str, margin: float) -> str:
+    return (
+        f"{distance:.1f} m from {what}, less than fence.margin ({margin:g} m); "
+        "move it, or give a smaller margin"
+    )

@@ -1,0 +1,123 @@
+"""Plans with a fence: the direct method beside CasADi + IPOPT from random starts, in one run.
+
+    pip install -e '.[bench]'
+    python tests/benchmarks/fences.py [--starts N] [--step S] [NAME ...]
+
+The scenarios are those of the tests (tests/fenced.py). IPOPT has the same constraints: an angle for
+every obstacle and interval, whose half-plane parts both ends of the chord from the obstacle. Its
+starts fly the shortest way by a random place. Rates are delivered rates in bit/s/Hz, of both by the
+same function from the positions alone; times are seconds of the processor. Everything printed is
+measured in the run; a flight of the peer counts where it keeps every limit to 1e-4.
+"""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+from fenced import FENCES, dense_path, fenced
+from peer import Model, at_best, curve
+
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.kinematics import LENGTH, Trajectory
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import RateField, rate_field
+from faao_mav.optimizer.rates.rate_model import CurveRate
+from faao_mav.optimizer.search.ways import along, shortest_by
+
+PATIENCE = 60.0
+"""Processor seconds that the peer may take for one start."""
+
+_KEPT = 1e-4
+"""Violation of a limit, in its SI unit, that a flight of the peer may have."""
+
+
+def random_starts(problem: Problem, count: int, rng: np.random.Generator) -> list[Trajectory]:
+    """Feasible flights, each by way of a place at random that time allows."""
+    area, kin = problem.free_area, problem.kinematics
+    assert area is not None
+    places = np.stack([kin.start, kin.end, *(link.station for link in problem.links)])
+    low, high = places.min(axis=0) - 60, places.max(axis=0) + 60
+    flights: list[Trajectory] = []
+    for _ in range(20 * count):
+        place = rng.uniform(low, high)
+        way = (
+            shortest_by(area, [kin.start, place, kin.end]) if area.covers(place[None])[0] else None
+        )
+        flight = None if way is None else along(kin, way, problem.constraints(kin))
+        if flight is not None:
+            flights.append(flight)
+        if len(flights) == count:
+            break
+    return flights
+
+
+def by_ipopt(problem: Problem, field: RateField, flights: list[Trajectory]) -> tuple[float, int]:
+    """Return the best that IPOPT delivers, and from how many starts it ends within the limits."""
+    kin, relay, fence = problem.kinematics, problem.relay, problem.fence
+    assert fence is not None
+    model, best, kept = None, 0.0, 0
+    for flight in flights:
+        rates = [
+            curve(link, rate, k) if isinstance(rate, CurveRate) else at_best(link, flight.w)
+            for k, (link, rate) in enumerate(zip(field.links, field.rates, strict=True))
+        ]
+        model = model or Model(kin, rates, PATIENCE, relay, fence)
+        found = model.solve(rates, flight)
+        missed = max(*kin.residuals(found).values(), LENGTH * fence.excess(kin, found))
+        if missed < _KEPT:
+            kept += 1
+            values = field.value(found.w.T[:, None])
+            best = max(best, float(objectives(values, kin, relay)[0]))
+    return best, kept
+
+
+def main() -> None:
+    """Print the table, then which claims hold."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="parts of the names of scenarios")
+    parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--step", type=float, default=1.5)
+    given = parser.parse_args()
+    print(
+        f"{'fence':36}{'direct':>9}{'s':>7}{'clear':>8}{'IPOPT':>9}{'s':>8}{'kept':>6}{'ratio':>9}"
+    )
+    least, nearest = np.inf, np.inf
+    for name in FENCES:
+        if given.names and not any(part in name for part in given.names):
+            continue
+        plan = fenced(name, **{"flight.time_step": given.step})
+        problem = build_problem(plan)
+        began = time.process_time()
+        ours = optimize(plan)
+        took = time.process_time() - began
+        area = plan.keep_in
+        assert area is not None
+        clear = area.clearance(dense_path(ours.w, ours.v, ours.a, given.step))
+        nearest = min(nearest, clear)
+        flights = random_starts(problem, given.starts, np.random.default_rng(0))
+        began = time.process_time()
+        best, kept = by_ipopt(problem, rate_field(problem, design(plan)), flights)
+        seconds = time.process_time() - began
+        least = min(least, ours.delivered_rate / best) if kept else least
+        print(
+            f"{name:36}{ours.delivered_rate:9.4f}{took:7.1f}{clear:8.3f}{best:9.4f}{seconds:8.1f}"
+            f"{kept:3}/{len(flights)}{ours.delivered_rate / best if kept else np.nan:9.5f}",
+            flush=True,
+        )
+    for claim, met, figure in (
+        ("the margin of 5 m is kept", nearest >= 5 - 1e-6, f"least {nearest:.4f} m"),
+        ("at least IPOPT's best less 0.1 %", least >= 0.999, f"least ratio {least:.5f}"),
+    ):
+        print(f"{'met' if met else 'MISSED':8}{claim}: {figure}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,200 @@
+"""Flights inside a fence: shapely says how far the continuous path stays from the edge."""
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+import shapely
+from conftest import MakePlan
+from fenced import FENCES, dense_path, fenced
+from hypothesis import given
+
+from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer.fence_geometry import FenceGeometry
+from faao_mav.optimizer.interior.separation import ConvexObstacles
+from faao_mav.optimizer.kinematics import Kinematics
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.track import nearest_flight
+from faao_mav.optimizer.search.ways import starts_inside
+from faao_mav.optimizer.solution import Solution, load_solution, save_solution
+from faao_mav.plan import Plan
+
+coordinates = st.floats(-100, 100, allow_subnormal=False)
+places = st.tuples(coordinates, coordinates)
+outlines = st.lists(places, min_size=3, max_size=9).map(
+    lambda points: shapely.MultiPoint(points).convex_hull
+)
+
+
+def clearance(solution: Solution) -> float:
+    """The least distance of the path from the edge, by shapely, at 20 points a slot."""
+    area = solution.plan.keep_in
+    assert area is not None
+    step = solution.plan.flight.time_step
+    return area.clearance(dense_path(solution.w, solution.v, solution.a, step))
+
+
+def margin(plan: Plan) -> float:
+    assert plan.fence is not None
+    return plan.fence.margin
+
+
+@given(outline=outlines, radius=st.floats(0, 50), a=places, b=places)
+def test_separation_is_the_distance_of_shapely(
+    outline: shapely.Polygon, radius: float, a: tuple[float, float], b: tuple[float, float]
+) -> None:
+    if outline.geom_type != "Polygon" or outline.area < 1:
+        return
+    corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
+    obstacles = ConvexObstacles.of([corners], [radius])
+    ends = np.array([a, b]).T[:, None]
+    u, h = obstacles.separation(ends[..., :-1], ends[..., 1:])
+    apart = min(float(u[:, 0, 0, 0] @ end) for end in (a, b)) - float(h[0, 0, 0])
+    distance = outline.distance(shapely.LineString([a, b])) - radius
+    assert np.hypot(*u[:, 0, 0, 0]) == pytest.approx(1)
+    if distance <= -radius:
+        assert apart <= distance + 1e-9
+    elif distance < 20:  # farther than that a disc about the obstacle is told
+        assert apart == pytest.approx(distance, abs=1e-9)
+    else:
+        assert 0 < apart <= distance + 1e-9
+
+
+@given(outline=outlines, a=places, b=places, room=st.floats(0.1, 10))
+def test_centred_half_planes_part_what_can_be_parted(
+    outline: shapely.Polygon, a: tuple[float, float], b: tuple[float, float], room: float
+) -> None:
+    if outline.geom_type != "Polygon" or outline.area < 1:
+        return
+    corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
+    obstacles = ConvexObstacles.of([corners], [0.0])
+    ends = np.array([a, b]).T[:, None]
+    nearest, centred = (
+        [float(u[:, 0, 0, 0] @ end) - float(h[0, 0, 0]) - room for end in (a, b)]
+        for u, h in (
+            obstacles.separation(ends[..., :-1], ends[..., 1:]),
+            obstacles.separation(ends[..., :-1], ends[..., 1:], np.array([room])),
+        )
+    )
+    assert (min(nearest) > 0) == (min(centred) > 0)
+    if min(nearest) > 0:
+        assert np.prod(centred) >= np.prod(nearest) * (1 - 1e-9)
+
+
+@given(
+    outline=outlines,
+    way=st.lists(places, min_size=4, max_size=8),
+    speed=st.floats(1, 50),
+)
+def test_clearance_is_that_of_the_continuous_path(
+    outline: shapely.Polygon, way: list[tuple[float, float]], speed: float
+) -> None:
+    """A parabola from sample to sample, however large the steps."""
+    if outline.geom_type != "Polygon" or outline.area < 1:
+        return
+    n = len(way)
+    kin = Kinematics(np.array(way[0]), np.array(way[-1]), n, 1.0, speed, speed, None, None, True)
+    flight = kin.follow(np.array(way) * 0.3)
+    corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
+    fence = FenceGeometry(ConvexObstacles.of([corners], [0.0]), np.empty((0, 2)), np.empty(0), 5.0)
+    path = dense_path(flight.w, flight.v, flight.a, 1.0, 200)
+    told, true = fence.clearance(flight, 1.0), shapely.LineString(path).distance(outline)
+    assert told <= true + 1e-6
+    if true == 0:
+        assert told <= 0
+
+
+QUICK = {
+    "flight.time_step": 1.5,
+    "radio.fading": "none",
+    "optimizer.starts": ["straight"],
+    "optimizer.max_iterations": 20,
+}
+
+
+@pytest.mark.parametrize("name", [name for name in FENCES if "forty" not in name])
+def test_the_whole_path_keeps_the_margin(name: str) -> None:
+    plan = fenced(name, **QUICK)
+    solution = optimize(plan)
+    assert clearance(solution) >= margin(plan) - 1e-6
+    assert solution.is_feasible()
+    assert margin(plan) - 1e-6 <= (solution.clearance() or 0) <= clearance(solution) + 1e-6
+
+
+def test_forty_polygons_are_passed(tmp_path: object) -> None:
+    plan = fenced("forty random polygons", **{**QUICK, "optimizer.max_iterations": 2})
+    assert clearance(optimize(plan)) >= margin(plan) - 1e-6
+
+
+def test_a_fence_that_is_far_away_changes_nothing(small_plan: MakePlan) -> None:
+    free = optimize(small_plan())
+    fence = {"exclusion": [{"center": [-200, -200], "radius": 20}]}
+    kept = optimize(small_plan({"fence": fence}))
+    assert kept.rates.R_avg == pytest.approx(free.rates.R_avg, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"radio.causal": True},
+        {"radio.causal": True, "radio.duplex": "half"},
+        {"radio.fading": "realization"},
+        {"flight.start_velocity": "free", "flight.end_velocity": "free"},
+        {"flight.bound_first_acceleration": False},
+        {"vehicle.max_speed": 100},
+    ],
+)
+def test_every_kind_of_plan_keeps_out(small_plan: MakePlan, changes: dict[str, object]) -> None:
+    fence = {"margin": 1, "exclusion": [{"center": [22, 22], "radius": 8}]}
+    starts = {"optimizer.starts": ["straight", "user"], "optimizer.max_iterations": 20}
+    solution = optimize(small_plan({"fence": fence, **starts, **changes}))
+    assert clearance(solution) >= 1 - 1e-6
+    assert solution.is_feasible()
+
+
+def test_a_fenced_solution_is_stationary_and_is_kept_in_a_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    changes = {"flight.time_step": 3.0, "optimizer.max_iterations": 50}
+    solution = optimize(fenced("a fence from a file", **{**QUICK, **changes}))
+    assert solution.converged
+    assert solution.kkt_residual() < 1e-4
+    save_solution(solution, tmp_path / "elsewhere.npz")
+    again = load_solution(tmp_path / "elsewhere.npz")
+    assert again.is_feasible()
+    assert again.residuals()["fence"] == 0
+
+
+def test_both_ways_round_are_starts() -> None:
+    problem = build_problem(fenced("a circle on the straight line", **QUICK))
+    assert problem.free_area is not None
+    kin = problem.kinematics
+    flights = starts_inside(kin, ["straight"], {}, problem.free_area, problem.constraints(kin))
+    sides = {
+        float(np.sign((flight.w.sum(axis=1) - 340)[len(flight.w) // 2]))
+        for flight in flights.values()
+    }
+    assert sides == {-1.0, 1.0}
+    for flight in flights.values():
+        assert max(kin.residuals(flight).values()) < 1e-6
+
+
+def test_a_path_that_ignores_dynamics_becomes_a_flight_on_its_side() -> None:
+    problem = build_problem(fenced("a circle on the straight line", **QUICK))
+    kin = problem.kinematics
+    corner = np.array([260.0, 260.0])
+    half = kin.slots // 2
+    path = np.vstack([
+        np.linspace(kin.start, corner, half), np.linspace(corner, kin.end, kin.slots - half)
+    ])  # fmt: skip
+    flight = nearest_flight(kin, path, straight_flight(kin), problem.constraints(kin))
+    assert flight is not None
+    assert max(kin.residuals(flight).values()) < 1e-6
+    assert problem.fence is not None
+    assert problem.fence.excess(kin, flight) == 0
+    assert (flight.w.sum(axis=1) > 330).all()
+
+
+def test_no_time_for_the_way_round_is_said() -> None:
+    with pytest.raises(InfeasibleError, match="inside the fence"):
+        optimize(fenced("two ways round of different worth", **QUICK, **{"flight.duration": 70.5}))
