@@ -1,6 +1,5 @@
 """Fences in the plane, against plain distances."""
 
-import functools
 import math
 from itertools import pairwise
 
@@ -25,6 +24,7 @@ from judged import (
     square,
     track,
 )
+from shapely.geometry.base import BaseGeometry
 
 from faao_mav.mission.command import Command
 from faao_mav.mission.fence_area import areas_of, free_area
@@ -129,8 +129,9 @@ def test_what_outlines_that_cross_themselves_enclose(corners: list[tuple[float, 
     drawn = fence(polygon(*corners))
     (area,) = areas_of(drawn, FRAME)
     first, *others = FRAME.to_local(*np.transpose(drawn.polygons[0].vertices))
-    triangles = [shapely.Polygon([first, *edge]) for edge in pairwise(others)]
-    odd = functools.reduce(shapely.symmetric_difference, triangles)
+    odd: BaseGeometry = shapely.Polygon()
+    for edge in pairwise(others):
+        odd = odd.symmetric_difference(shapely.Polygon([first, *edge]))
     assert area.shape.is_valid
     assert shapely.symmetric_difference(area.shape, odd).area < 1e-3
 
