@@ -76,8 +76,9 @@ def _describe(error: ValidationError, source: str) -> str:
 def _lines(error: ValidationError) -> Iterator[str]:
     known = reference()
     for detail in error.errors(include_url=False):
-        steps = [step for step in detail["loc"] if step not in CHOICES]
-        value, kind = detail["input"], detail["type"]
+        value, kind, loc = detail["input"], detail["type"], detail["loc"]
+        own = loc[-1:] if kind == "unexpected_keyword_argument" else ()  # may be any text
+        steps = [step for step in loc[: len(loc) - len(own)] if step not in CHOICES] + [*own]
         keys = [step for step in steps if isinstance(step, str)]
         accepted = _accepted(known, *keys)
         if kind == "missing":

@@ -10,7 +10,10 @@ from harness import Target
 
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import MissionFileError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.formats import losses_in, read_mission_file, render_mission
+from faao_mav.mission.formats.fence_file import read_fence
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import read_plan
@@ -37,6 +40,16 @@ _PARAMETERS = (
     b"# Vehicle-Id Component-Id Name Value Type\n1\t1\tMPC_XY_CRUISE\t5.000\t9\n1\t1\tNAV\t3\t6\n",
 )
 
+_FENCED = (
+    SMALL
+    + """
+fence:
+  inclusion: [[-50, -50], [120, -50], [120, 120], [-50, 120]]
+  exclusion: [{center: [30, 30], radius: 4}, {polygon: [[20, 5], [25, 5], [25, 9]]}]
+  margin: 2
+"""
+)
+
 _LARGEST_SEED = 5_000
 """Bytes of a mission that is mutated; chosen: small ones are read often."""
 
@@ -58,6 +71,10 @@ def targets(directory: Path) -> dict[str, Target]:
 
     plans = [path.read_bytes() for path in sorted(MISSIONS.glob("*.yaml"))]
     add("plan", "plan.yaml", read_plan, SMALL.encode(), _STUDY.encode(), *plans)
+    add("fenced_plan", "fenced.yaml", read_plan, _FENCED.encode())
+    zones = _DATA / "fences" / "zones"
+    for ending in ("kml", "geojson"):
+        add(ending, f"fence.{ending}", _fence, zones.with_suffix(f".{ending}").read_bytes())
     add("wpl", "mission.waypoints", _mission, *_missions("*.waypoints", "*.txt"))
     add("qgc_plan", "mission.plan", _mission, *_missions("*.plan"))
     add("parameters", "vehicle.param", read_parameters, *_PARAMETERS)
@@ -96,6 +113,13 @@ def _mission(path: Path) -> object:
         (render_mission(mission, f"out{ending}"), losses_in(mission, f"out{ending}"))
         for ending in (".waypoints", ".plan", ".kml")
     ]
+
+
+def _fence(path: Path) -> object:
+    """Read a fence and find the area that it leaves."""
+    fence = read_fence(path)
+    home = fence.polygons[0].vertices[0] if fence.polygons else (47.4, 8.5)
+    return FreeArea.of(areas_of(fence, LocalFrame(*home)), any_inclusion=True)
 
 
 def _vary(content: bytes) -> object:

@@ -4,7 +4,8 @@ import pytest
 from harness import Target, fuzz, outcome
 from targets import targets
 
-NAMES = ("plan", "wpl", "qgc_plan", "parameters", "npz", "rows", "vary")
+_FENCES = ("fenced_plan", "kml", "geojson")
+NAMES = ("plan", *_FENCES, "wpl", "qgc_plan", "parameters", "npz", "rows", "vary")
 CASES = 300
 """Cases of each target in the suite; chosen: half a second."""
 

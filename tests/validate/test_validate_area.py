@@ -1,10 +1,12 @@
 """Fences in the plane, against plain distances."""
 
 import math
+from itertools import pairwise
 
 import hypothesis.strategies as st
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from judged import (
     COPTER,
@@ -22,6 +24,7 @@ from judged import (
     square,
     track,
 )
+from shapely.geometry.base import BaseGeometry
 
 from faao_mav.mission.command import Command
 from faao_mav.mission.fence_area import areas_of, free_area
@@ -118,6 +121,27 @@ def test_a_bow_tie_keeps_both_halves() -> None:
     (area,) = areas_of(fence(polygon((0, 0), (100, 100), (100, 0), (0, 100))), FRAME)
     assert area.crosses_itself
     assert area.shape.area == pytest.approx(5000, rel=1e-3)
+
+
+@given(st.lists(places, min_size=3, max_size=9, unique=True))
+def test_what_outlines_that_cross_themselves_enclose(corners: list[tuple[float, float]]) -> None:
+    """An odd number of turns encloses what an odd number of triangles to one corner covers."""
+    drawn = fence(polygon(*corners))
+    (area,) = areas_of(drawn, FRAME)
+    first, *others = FRAME.to_local(*np.transpose(drawn.polygons[0].vertices))
+    odd: BaseGeometry = shapely.Polygon()
+    for edge in pairwise(others):
+        odd = odd.symmetric_difference(shapely.Polygon([first, *edge]))
+    assert area.shape.is_valid
+    assert shapely.symmetric_difference(area.shape, odd).area < 1e-3
+
+
+@pytest.mark.parametrize("inclusion", [True, False])
+def test_an_outline_that_crosses_itself_everywhere_counts_on_the_safe_side(inclusion: bool) -> None:
+    corners = [(100 * math.cos(2.4 * k), 100 * math.sin(2.4 * k)) for k in range(3000)]
+    (area,) = areas_of(fence(polygon(*corners, inclusion=inclusion)), FRAME)
+    assert area.crosses_itself
+    assert area.shape.area == pytest.approx(0 if inclusion else math.pi * 100**2, rel=1e-3)
 
 
 def test_a_polygon_without_an_area_lets_nothing_in() -> None:
