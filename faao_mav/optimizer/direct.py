@@ -28,6 +28,7 @@ from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.multistart import improve_starts
+from faao_mav.optimizer.search.routes import global_flights
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
@@ -81,6 +82,8 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
+    if "global" in options.starts:
+        routes |= global_flights(kin, field, relay, next(iter(routes.values())))
     if before is not None:
         routes[CUTOFF] = before.trajectory
     tell(1, "the starts", 0.0)
