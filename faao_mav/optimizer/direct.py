@@ -83,7 +83,8 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
     if "global" in options.starts:
-        routes |= global_flights(kin, field, relay, next(iter(routes.values())))
+        first = next(iter(routes.values()))
+        routes |= global_flights(kin, field, relay, first, free=problem.free_area)
     if before is not None:
         routes[CUTOFF] = before.trajectory
     tell(1, "the starts", 0.0)

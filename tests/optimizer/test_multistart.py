@@ -23,16 +23,19 @@ from faao_mav.optimizer.search.multistart import (
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan, parse_plan
 
-
 NAMED = ["straight", "bs", "user", "bs-user", "user-bs"]
 
 
 def long_plan(power: int, starts: list[str]) -> Plan:
     """Return the paper's plan at T = 100 s: 500 slots, several local optima at low power."""
-    changes: dict[str, Any] = {f"radio.{name}.power_dbm": power for name in ("base_station", "relay")}
+    changes: dict[str, Any] = {
+        f"radio.{name}.power_dbm": power for name in ("base_station", "relay")
+    }
     changes["optimizer.starts"] = starts
     text = (MISSIONS / "paper_active.yaml").read_text()
-    return parse_plan(edited(text, changes | {"flight.duration": 100, "optimizer.method": "direct"}))
+    return parse_plan(
+        edited(text, changes | {"flight.duration": 100, "optimizer.method": "direct"})
+    )
 
 
 def starts_of(problem: Problem) -> dict[str, Trajectory]:

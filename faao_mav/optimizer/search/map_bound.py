@@ -24,11 +24,12 @@ _DIRECTIONS = 3
 """Velocities between 0 and v_max along each axis that a run of slots is flown at. Chosen: with 2
 the bound of `copter_relay.yaml` is 0.1 % higher."""
 
-_COARSE, _FINE = (500, 5.0), (30_000, 9.0)
-"""Cells of the map and reach of a step, in cells, for the search of prices and for the bound.
+_COARSE_CELLS, _COARSE_REACH = 500, 5.0
+"""Cells of the map and reach of a step, in cells, where prices are searched. Chosen."""
 
-Measured on `copter_relay.yaml`: 2.4 % above the plan's R_avg; a fourth of the cells gives 3.0 %.
-"""
+FINE_CELLS, _REACH = 30_000, 9.0
+"""The same for the bound. Measured on `copter_relay.yaml`: 2.0 % above the plan's R_avg with these,
+2.4 % and 3.0 % with sides of 2 and 4 m and a single price."""
 
 _MOST_INSTANTS = 100
 """Instants of a flight at most, which limits time and memory. Chosen."""
@@ -48,7 +49,7 @@ _DIGITS = 3
 
 _APART = 0.01
 """By how much the prices of the bound lie apart: a place at which one of them is high has another
-that is low. Measured on `copter_relay.yaml`, half duplex: see `docs/benchmarks.md`."""
+that is low. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +76,20 @@ class MapBound:
     problem: Problem
     rates: RadialRates
     sweep: Sweep
+
+    @classmethod
+    def over(cls, problem: Problem, rates: RadialRates, cells: int, reach: float) -> "MapBound":
+        """Return the bound of `problem` over a map of so many cells, and steps of `reach` cells."""
+        sweep = sweep_over(
+            problem.kinematics,
+            np.array([link.station for link in problem.links]),
+            cells=cells,
+            reach=reach,
+            most_instants=_MOST_INSTANTS,
+            free=problem.free_area,
+            outward=True,
+        )
+        return cls(problem, rates, sweep)
 
     @property
     def _half(self) -> bool:
@@ -215,25 +230,14 @@ class MapBound:
         return float((received - forwarded).sum())
 
 
-def map_bound(problem: Problem, rates: RadialRates) -> float:
+def map_bound(problem: Problem, rates: RadialRates, *, cells: int = FINE_CELLS) -> float:
     """Return an upper bound on what `problem` maximises, bit/s/Hz, over all flights.
 
-    `rates` are upper bounds on the best rates by distance.
+    `rates` are upper bounds on the best rates by distance. With more `cells` of the map the bound
+    is tighter; it takes as many times longer.
     """
-
-    def over(cells: int, reach: float) -> MapBound:
-        sweep = sweep_over(
-            problem.kinematics,
-            np.array([link.station for link in problem.links]),
-            cells=cells,
-            reach=reach,
-            most_instants=_MOST_INSTANTS,
-            free=problem.free_area,
-            outward=True,
-        )
-        return MapBound(problem, rates, sweep)
-
-    coarse, fine = over(*_COARSE), over(*_FINE)
+    coarse = MapBound.over(problem, rates, _COARSE_CELLS, _COARSE_REACH)
+    fine = MapBound.over(problem, rates, cells, _REACH)
     prices = coarse.best_prices()
     prices = prices[np.abs(fine.sweep.instants[:, None] - coarse.sweep.instants).argmin(axis=1)]
     apart = prices + np.array([[-_APART], [0.0], [_APART]])

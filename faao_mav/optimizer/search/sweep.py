@@ -19,6 +19,10 @@ from faao_mav.optimizer.kinematics import Kinematics
 CORNER = np.sqrt(0.5)
 """Distance of a cell's corners from its centre, in sides of the cell."""
 
+_FENCED_REACH = 4.0
+"""Cells that a step reaches beside a fence, about: what is thinner may be passed through. Chosen.
+Fewer make flights faster in a map that is rounded outwards, by a cell for each stage."""
+
 _THINNEST = 0.02
 """Least width of the map, in its length: stations and ends may lie on one line. Chosen."""
 
@@ -29,8 +33,10 @@ class Sweep:
 
     `x` (2, i, j) are the centres of the cells, m, `side` theirs; `blocks` the K runs of slots
     between the first and the last, which are at given places, and `instants` (K,) their mean times,
-    s. `alive` (K, i, j) tells where a flight can be at an instant, `rows` what one step reaches: by
-    how many rows to either side, and how many columns to either side there.
+    s. `alive` (K, i, j) tells where a flight can be at an instant, `free` (i, j) where the fence
+    lets it be. A step from one instant to the next has `stages`, which all end where the fence lets them;
+    `rows` is what one of these reaches: by how many rows to either side, and how many columns to
+    either side there.
     """
 
     x: Real
@@ -39,6 +45,8 @@ class Sweep:
     instants: Real
     alive: Flags
     rows: list[tuple[int, int]]
+    stages: int
+    free: Flags
 
     def backward(self, rewards: Real) -> Real:
         """Return U (K, ..., i, j): the best sum from each instant on, its own reward included.
@@ -59,6 +67,17 @@ class Sweep:
 
     def reached(self, values: Real) -> Real:
         """Return the largest of `values` (..., i, j) in reach of one step."""
+        return self._near(self._stages(values)[-1])
+
+    def _stages(self, values: Real) -> list[Real]:
+        """Return the largest of `values` in reach after 0, 1, ... `stages` - 1 stages of a step."""
+        after = [values]
+        for _ in range(self.stages - 1):
+            after.append(np.where(self.free, self._near(after[-1]), -np.inf))
+        return after
+
+    def _near(self, values: Real) -> Real:
+        """Return the largest of `values` (..., i, j) in reach of one stage."""
         from scipy.ndimage import maximum_filter1d  # with the optimiser, not before
 
         best = np.full_like(values, -np.inf)
@@ -84,11 +103,14 @@ class Sweep:
         cells[..., 0] = np.divmod(values[0].reshape(count, -1).argmax(axis=-1), height)
         each = np.arange(count)
         for k in range(1, len(values)):
-            i, j = cells[:, :, k - 1, None] + step[:, None]
-            inside = (i >= 0) & (i < width) & (j >= 0) & (j < height)
-            i, j = np.where(inside, i, 0), np.where(inside, j, 0)
-            near = np.where(inside, values[k, each[:, None], i, j], -np.inf).argmax(axis=-1)
-            cells[:, :, k] = i[each, near], j[each, near]
+            here = cells[:, :, k - 1]
+            for after in reversed(self._stages(values[k])):
+                i, j = here[..., None] + step[:, None]
+                inside = (i >= 0) & (i < width) & (j >= 0) & (j < height)
+                i, j = np.where(inside, i, 0), np.where(inside, j, 0)
+                best = np.where(inside, after[each[:, None], i, j], -np.inf).argmax(axis=-1)
+                here = np.stack([i[each, best], j[each, best]])
+            cells[:, :, k] = here
         return cells
 
 
@@ -143,11 +165,14 @@ def sweep_over(
         # the way is convex in time up to v_max and straight beyond: never above its chords
         way = np.interp(instants, t, ways) + CORNER * side
         alive &= np.hypot(*(x - end[:, None, None])) <= way[:, None, None]
+    inside = np.ones(x.shape[1:], dtype=np.bool_)
     if free is not None:
         area = FreeArea(free.shape.buffer(CORNER * side)) if outward else free
-        alive &= area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
+        inside = area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
     step = kin.max_speed * float(np.diff(instants).max(initial=0.0))
-    return Sweep(x, side, blocks, instants, alive, _disc(step / side, outward=outward))
+    stages = 1 if free is None else max(1, round(reach / _FENCED_REACH))
+    rows = _disc(step / side / stages, outward=outward)
+    return Sweep(x, side, blocks, instants, alive & inside, rows, stages, inside)
 
 
 def _edges(free: FreeArea, kin: Kinematics, reach: float) -> Real:
