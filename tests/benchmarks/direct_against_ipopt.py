@@ -239,7 +239,9 @@ def bound(quick: bool) -> None:
     """What no route can exceed."""
     print(f"\n{'bound':40}{'rate':>9}{'bound':>9}{'gap %':>7}{'s':>7}")
     gaps = []
-    rows = [("paper_active", {"T": T, "W": W}) for T in (50, 150) for W in (20, 10)]
+    rows: list[tuple[str, dict[str, Any]]] = [
+        ("paper_active", {"T": T, "W": W}) for T in (50, 150) for W in (20, 10)
+    ]
     rows += [("copter_relay", {"causal": causal}) for causal in (False, True)]
     rows.append(("copter_relay", {"causal": True, "duplex": "half"}))
     for name, changes in rows[:1] if quick else rows:

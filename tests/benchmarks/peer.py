@@ -64,7 +64,9 @@ def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
     A plan that names its own starts is taken at its word.
     """
     named = problem.plan.optimizer.starts
-    names = ["straight", "bs", "user", "bs-user", "user-bs"] if "global" in named else [*named]
+    names: list[str] = (
+        ["straight", "bs", "user", "bs-user", "user-bs"] if "global" in named else [*named]
+    )
     places = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     rng, kin = np.random.default_rng(0), problem.kinematics
     corners = np.stack([*places.values(), kin.start, kin.end])

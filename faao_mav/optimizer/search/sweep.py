@@ -34,7 +34,7 @@ class Sweep:
     `x` (2, i, j) are the centres of the cells, m, `side` theirs; `blocks` the K runs of slots
     between the first and the last, which are at given places, and `instants` (K,) their mean times,
     s. `alive` (K, i, j) tells where a flight can be at an instant, `free` (i, j) where the fence
-    lets it be. A step from one instant to the next has `stages`, which all end where the fence lets them;
+    lets it be. A step from one instant to the next has `stages`, which all end in `free`;
     `rows` is what one of these reaches: by how many rows to either side, and how many columns to
     either side there.
     """
