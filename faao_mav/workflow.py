@@ -264,7 +264,8 @@ def plan_mission(
     if bound:
         from faao_mav.optimizer.search.bound import upper_bound
 
-        ceiling = upper_bound(build_problem(plan), solution.rates.R_avg)
+        reached = solution.delivered_rate if plan.radio.causal else solution.rates.R_avg
+        ceiling = upper_bound(build_problem(plan), reached, observe=observe)
     return replace(
         result,
         fresh=fresh_rates(solution),

@@ -36,7 +36,7 @@ _MOST_CROSSING = 100
 """The corners of the largest outline that may cross itself, an error in any case. Chosen: each pair
 of edges may cross, and the parts that 100 make take 0.2 s, those of 400 two seconds and 190 MB."""
 
-_FARTHEST = 1e6
+FARTHEST = 1e6
 """Half the side, m, of the square that stands for the plane where a fence has no inclusion."""
 
 
@@ -146,7 +146,7 @@ class FreeArea:
 
         free = free_area(areas, any_inclusion=any_inclusion)
         if free is None:
-            free = shapely.box(-_FARTHEST, -_FARTHEST, _FARTHEST, _FARTHEST)
+            free = shapely.box(-FARTHEST, -FARTHEST, FARTHEST, FARTHEST)
         out = shapely.union_all([area.shape for area in areas if not area.inclusion])
         return cls(_polygonal(free - out))
 
@@ -218,7 +218,7 @@ class FreeArea:
         """
         import shapely
 
-        far = corner + 2 * _FARTHEST * outward
+        far = corner + 2 * FARTHEST * outward
         lines = shapely.get_parts(shapely.LineString([corner, far]) & self.shape)
         first = [line for line in lines if line.distance(shapely.Point(corner)) < _BAR]
         if not first or first[0].length < _BAR:

@@ -28,6 +28,7 @@ from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts
+from faao_mav.optimizer.search.routes import global_flights
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
@@ -89,6 +90,9 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         if problem.free_area
         else starts(kin, options.starts, stations)
     )
+    if "global" in options.starts:
+        first = next(iter(routes.values()))
+        routes |= global_flights(kin, field, relay, first, free=problem.free_area, kept=kept)
     if before is not None:
         routes[CUTOFF] = before.trajectory
     tell(1, "the starts", 0.0)

@@ -57,6 +57,28 @@ class Kinematics:
         """The least n for which (13f) holds."""
         return 0 if self.bound_first_acceleration else 1
 
+    def longest_ways(self) -> tuple[Real, Real]:
+        """Return the longest ways (N + 2,), m, from w_I until each slot, and from there to w_F.
+
+        >>> kin = Kinematics(np.zeros(2), np.zeros(2), 5, 1.0, 3.0, 2.0, np.zeros(2), None, True)
+        >>> [way.tolist() for way in kin.longest_ways()]
+        [[0.0, 1.0, 3.5, 6.5, 9.5], [12.0, 9.0, 6.0, 3.0, 0.0]]
+        """
+        n, gain = np.arange(self.slots), self.max_acceleration * self.time_step
+        ways = []
+        for velocity, bounded in (
+            (self.start_velocity, self.bound_first_acceleration),
+            (self.end_velocity, True),
+        ):
+            speed = np.full(self.slots, self.max_speed)
+            if velocity is not None:
+                given = float(np.linalg.norm(velocity))
+                speed = np.minimum(speed, given + gain * n) if bounded else speed
+                speed[0] = given
+            both = (speed[1:] + speed[:-1]) / 2
+            ways.append(self.time_step * np.concatenate([[0.0], np.cumsum(both)]))
+        return ways[0], ways[1][::-1]
+
     def residuals(self, trajectory: Trajectory) -> dict[str, float]:
         """Return the largest violation of each constraint, in its own unit; 0 where it holds."""
         w, v, a, dt = trajectory.w, trajectory.v, trajectory.a, self.time_step

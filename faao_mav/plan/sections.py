@@ -47,7 +47,7 @@ Method: TypeAlias = Literal["direct", "algorithm1"]
 PrecoderScheme: TypeAlias = Literal["faao", "mmse", "mrt", "zf", "waterfilling"]
 Inputs: TypeAlias = Literal["alphabet", "gaussian"]
 Rate: TypeAlias = Literal["cutoff", "mutual_information"]
-Start: TypeAlias = Literal["straight", "bs", "user", "bs-user", "user-bs"]
+Start: TypeAlias = Literal["straight", "global", "bs", "user", "bs-user", "user-bs"]
 OnFinish: TypeAlias = Literal["rtl", "land", "hover"]
 MissionParameters: TypeAlias = Literal["recommend", "keep"]
 StudyScheme: TypeAlias = Literal[
@@ -276,7 +276,7 @@ class Optimizer(_Section):
     ] = "cutoff"
     starts: Annotated[
         tuple[Start, ...], key("Routes that the direct method starts from.", min_length=1)
-    ] = ("straight", "bs", "user", "bs-user", "user-bs")
+    ] = ("straight", "global")
     tolerance: Annotated[
         Number,
         key(

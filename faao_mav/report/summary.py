@@ -55,8 +55,6 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
             f"{_told_rate(bound.value, plan.radio.bandwidth_mhz)}"
             f"{'' if bound.exact else ' (numerical)'}",
         )
-        if causal:
-            yield "", "it is a bound of R_avg, and no relay delivers more than that"
     if limit is not None and limit.saturated:
         yield (
             "saturated",

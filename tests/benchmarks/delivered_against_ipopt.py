@@ -1,11 +1,12 @@
 """What is delivered: the direct method beside CasADi + IPOPT with the same queue, in one run.
 
     pip install -e '.[bench]'
-    python tests/benchmarks/delivered_against_ipopt.py [--quick]
+    python tests/benchmarks/delivered_against_ipopt.py [--quick] [--random 20]
 
-Both start from the same five routes. Rates are delivered rates in bit/s/Hz, computed for both by
-the same function from the positions alone; times are seconds of the processor, with the building of
-the model and the table of the rates, which both need.
+The peer starts from five routes by way of the stations, and `--random` ones. Rates are
+delivered rates in bit/s/Hz, computed for both by the same function from the positions alone; times
+are seconds of the processor, with the building of the model and the table of the rates, which both
+need.
 Everything printed is measured in the run.
 """
 
@@ -18,7 +19,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 import numpy as np
-from peer import Model, at_best, curve
+from peer import Model, at_best, curve, peer_starts
 
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.maximize import objectives
@@ -26,7 +27,6 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.rate_model import CurveRate
-from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
@@ -75,11 +75,10 @@ def plan(name: str, changes: dict[str, Any]) -> Plan:
     return parse_plan(dump_yaml(data))
 
 
-def by_ipopt(problem: Problem, field: RateField) -> tuple[float, list[float]]:
+def by_ipopt(problem: Problem, field: RateField, random: int) -> tuple[float, list[float]]:
     """Return the best that IPOPT delivers over the starts, and the seconds of each."""
     kin, relay = problem.kinematics, problem.relay
-    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
-    flights = starts(kin, problem.plan.optimizer.starts, stations)
+    flights = peer_starts(problem, random)
     model, best, seconds = None, 0.0, []
     for flight in flights.values():
         began = time.process_time()
@@ -100,7 +99,9 @@ def main() -> None:
     """Print the table, then which claims hold."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="the first three rows")
-    rows = PLANS[:3] if parser.parse_args().quick else PLANS
+    parser.add_argument("--random", type=int, default=0, help="random starts of the peer")
+    options = parser.parse_args()
+    rows, random = PLANS[:3] if options.quick else PLANS, options.random
     print(f"{'plan':68}{'direct':>9}{'s':>7}{'IPOPT':>9}{'s':>8}{'ratio':>7}")
     above, ratios = np.inf, []
     for name, changes in rows:
@@ -113,7 +114,7 @@ def main() -> None:
         began = time.process_time()
         field = rate_field(problem, design(read))
         tabled = time.process_time() - began
-        peer, seconds = by_ipopt(problem, field)
+        peer, seconds = by_ipopt(problem, field, random)
         seconds.append(tabled)
         above = min(above, ours - peer)
         ratios.append(sum(seconds) / took)

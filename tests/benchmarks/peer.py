@@ -17,8 +17,9 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.problem import Link
+from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.rate_model import CurveRate
+from faao_mav.optimizer.search.starts import starts
 from faao_mav.radio.relay import RelayQueue
 
 LENGTH = 100.0
@@ -56,6 +57,25 @@ class Curve:
     value: Any
     c: Real
     gain: float = 1.0
+
+
+def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
+    """The flights that the peer starts from: by way of the stations, and of random places.
+
+    A plan that names its own starts is taken at its word.
+    """
+    named = problem.plan.optimizer.starts
+    names: list[str] = (
+        ["straight", "bs", "user", "bs-user", "user-bs"] if "global" in named else [*named]
+    )
+    places = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    rng, kin = np.random.default_rng(0), problem.kinematics
+    corners = np.stack([*places.values(), kin.start, kin.end])
+    low, high = corners.min(axis=0) - 50, corners.max(axis=0) + 50
+    for k in range(random if len(named) > 1 else 0):
+        places |= {f"a{k}": rng.uniform(low, high), f"b{k}": rng.uniform(low, high)}
+        names.append(f"a{k}-b{k}")
+    return starts(kin, names, places)
 
 
 def curve(link: Link, rate: CurveRate, number: int) -> Curve:

@@ -1,5 +1,7 @@
 """Starts are compared on a coarse copy of the flight, and the one that would win is kept."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from conftest import MISSIONS, MakePlan, edited
@@ -21,12 +23,19 @@ from faao_mav.optimizer.search.multistart import (
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan, parse_plan
 
+NAMED = ["straight", "bs", "user", "bs-user", "user-bs"]
 
-def long_plan(power: int) -> Plan:
+
+def long_plan(power: int, starts: list[str]) -> Plan:
     """Return the paper's plan at T = 100 s: 500 slots, several local optima at low power."""
-    powers = {f"radio.{name}.power_dbm": power for name in ("base_station", "relay")}
+    changes: dict[str, Any] = {
+        f"radio.{name}.power_dbm": power for name in ("base_station", "relay")
+    }
+    changes["optimizer.starts"] = starts
     text = (MISSIONS / "paper_active.yaml").read_text()
-    return parse_plan(edited(text, powers | {"flight.duration": 100, "optimizer.method": "direct"}))
+    return parse_plan(
+        edited(text, changes | {"flight.duration": 100, "optimizer.method": "direct"})
+    )
 
 
 def starts_of(problem: Problem) -> dict[str, Trajectory]:
@@ -54,7 +63,7 @@ def test_a_block_has_the_mean_of_its_slots() -> None:
 
 @pytest.mark.parametrize("power", [0, 10])
 def test_what_is_rejected_would_not_have_won(power: int) -> None:
-    plan = long_plan(power)
+    plan = long_plan(power, NAMED)
     solution = optimize(plan)
     names = plan.optimizer.starts
     assert tuple(solution.starts) == names

@@ -2,10 +2,13 @@
 
 The problem is not concave: the interior-point method finds the local optimum near its start.
 
+- `sweep`: dynamic programming over the map, by position alone; `routes`: the flights that it finds,
+  the start `global`.
 - `starts`: feasible flights to start from, straight and by way of the stations; `cruise` makes them
   for aircraft with a least speed. A new start is a name in the plan's `optimizer.starts` and a
   branch of `starts.starts`.
 - `multistart`: improves all of them roughly and chooses those to improve to the end.
-- `bound`: an upper bound on R_avg over all flights and precoders, by a convex relaxation. Its
-  distance to a solution's R_avg is what a better local optimum could gain at most.
+- `bound`: an upper bound on what is maximised, over all flights and precoders: the smaller of
+  `map_bound` (prices on both hops and a sweep) and `relaxation` (a convex relaxation of R_avg). Its
+  distance to a solution's rate is what a better local optimum could gain at most.
 """

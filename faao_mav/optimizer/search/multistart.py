@@ -95,9 +95,9 @@ def improve_starts(
     """
     copy, reward, on_copy = kin, stage, list(flights.values())
     if len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
-        copy, reward = _coarse(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
+        copy, reward = coarse_copy(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
         tolerance = max(tolerance, _COARSE_TOLERANCE)
-        on_copy = [copy.follow(_resampled(kin, flight, copy)) for flight in on_copy]
+        on_copy = [copy.follow(resampled(kin, flight, copy)) for flight in on_copy]
     solved = maximize_all(
         copy,
         reward,
@@ -121,13 +121,13 @@ def improve_starts(
     if copy is not kin:
         kept = (*constraints_of(kin), *constraints(kin))
         ends = {
-            name: feasible(kin, flights[name], _resampled(copy, end, kin), kept)
+            name: feasible(kin, flights[name], resampled(copy, end, kin), kept)
             for name, end in ends.items()
         }
     return ImprovedStarts(ends, promising)
 
 
-def _coarse(kin: Kinematics) -> Kinematics:
+def coarse_copy(kin: Kinematics) -> Kinematics:
     """Return the feasible set `kin` in `COARSE_SLOTS` slots.
 
     Where a(0) has no bound, v(0) does not limit v(1). The first slot of the copy stands for several
@@ -143,7 +143,7 @@ def _coarse(kin: Kinematics) -> Kinematics:
     )
 
 
-def _resampled(kin: Kinematics, flight: Trajectory, other: Kinematics) -> Real:
+def resampled(kin: Kinematics, flight: Trajectory, other: Kinematics) -> Real:
     """Return the velocities of `flight`, one of `kin`, at the slots of `other`, (slots, 2)."""
     now, then = (k.time_step * np.arange(k.slots) for k in (kin, other))
     velocities = np.stack([np.interp(then, now, v) for v in flight.v.T], axis=1)

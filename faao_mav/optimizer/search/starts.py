@@ -25,7 +25,8 @@ def starts(
 ) -> dict[str, Trajectory]:
     """Return the flights named in the plan's `optimizer.starts`.
 
-    A name is `straight` or the stations in the order of the visit, as in `bs-user`. A flight by way
+    A name is `straight` or the stations in the order of the visit, as in `bs-user`; `global` is not
+    for this function. A flight by way
     of stations goes as far towards them as the time allows, and hovers there for what time is left;
     with a least speed it goes all the way and circles there. Flights that do not exist (no time at
     all, or end velocities across the way) are left out. If none is left, the result is the straight
@@ -47,6 +48,8 @@ def starts(
     """
     found = {}
     for name in names:
+        if name == "global":
+            continue
         if name == "straight":
             found[name] = straight_flight(kin)
             continue

@@ -27,12 +27,13 @@ _MAX_ITERATIONS = 200
 
 
 @dataclass(frozen=True)
-class _Closeness:
-    """-||w_n - r_n||^2 in units of `LENGTH`, r (n, 2)."""
+class Closeness:
+    """The reward of being near a path r: -||w_n - r_n||^2 in units of `LENGTH`, r (n, 2) in m."""
 
     path: Real
 
     def __call__(self, w: Real) -> StageValues:
+        """Return the rewards at w (2, ..., n), m."""
         away = (w - self.path.T.reshape(2, *[1] * (w.ndim - 2), -1))[:, None] / LENGTH
         value = -(away * away).sum(axis=0)
         hessian = np.broadcast_to(
@@ -54,7 +55,7 @@ def nearest_flight(
     for kept in ((), tuple(constraints)) if constraints else ((),):
         every = (*constraints_of(kin), *kept)
         w, v = start.w.T[:, None], start.v.T[:, None]
-        rewards = ScaledRewards(_Closeness(path), w)
+        rewards = ScaledRewards(Closeness(path), w)
         search = Search(kin, every, rewards, w, v, tolerance=_TOLERANCE, strategy=COLD_START)
         with np.errstate(all="ignore"):
             results = search.run(_MAX_ITERATIONS)

@@ -1,0 +1,220 @@
+"""Dynamic programming over the map: against all pairs of cells, and against flights."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import MISSIONS, MakePlan, edited
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_flights import random_flight
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.kinematics import Kinematics
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import RateField, rate_field
+from faao_mav.optimizer.search.bound import radial_rates
+from faao_mav.optimizer.search.map_bound import MapBound, RadialRates, map_bound
+from faao_mav.optimizer.search.routes import best_paths
+from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.sweep import Sweep, sweep_over
+from faao_mav.plan import parse_plan
+
+WALL = {
+    "fence.margin": 3,
+    "fence.exclusion": [{"polygon": [[13, 12], [42, 12], [42, 56], [13, 56]]}],
+}
+KINDS: dict[str, dict[str, Any]] = {
+    "R_avg": {},
+    "delivered": {"radio.causal": True},
+    "half duplex": {"radio.causal": True, "radio.duplex": "half"},
+    "unknown fading": {"radio.fading": "ergodic", "radio.fading_samples": 3},
+    "known draws": {"radio.fading": "realization", "radio.causal": True},
+    "buffer": {
+        "radio.causal": True, "radio.bandwidth_mhz": 1, "radio.relay.buffer_mbytes": 0.2,
+    },
+    "free ends": {
+        "flight.start_velocity": "free",
+        "flight.end_velocity": "free",
+        "flight.bound_first_acceleration": False,
+    },
+    "fence": WALL | {"radio.causal": True},
+}  # fmt: skip
+
+
+def sweep_of(kin: Kinematics, outward: bool, cells: int = 150) -> Sweep:
+    stations = np.array([[0.0, 0.0], [60.0, 60.0]])
+    return sweep_over(kin, stations, cells=cells, reach=2.5, most_instants=40, outward=outward)
+
+
+@pytest.mark.parametrize("outward", [False, True])
+def test_a_sweep_is_the_best_over_all_sequences_of_cells(
+    small_plan: MakePlan, outward: bool
+) -> None:
+    kin = build_problem(small_plan()).kinematics
+    sweep = sweep_of(kin, outward)
+    rng = np.random.default_rng(0)
+    shape = sweep.alive.shape
+    rewards = np.where(sweep.alive[:, None], rng.random((shape[0], 2, *shape[1:])), -np.inf)
+    step = kin.max_speed * float(np.diff(sweep.instants).max())
+    flat = sweep.x.reshape(2, -1)
+    apart = np.abs(flat[:, :, None] - flat[:, None])
+    if outward:
+        apart = np.maximum(0.0, apart - sweep.side)
+    reached = np.hypot(*apart) <= step * (1 + 1e-12)
+    best = rewards.reshape(*rewards.shape[:2], -1).copy()
+    for k in range(len(best) - 2, -1, -1):
+        best[k] += np.where(reached, best[k + 1][:, None], -np.inf).max(axis=-1)
+    values = sweep.backward(rewards)
+    assert values.reshape(best.shape) == pytest.approx(best)
+    cells = sweep.paths(values)
+    for b in range(2):
+        i, j = cells[:, b]
+        path = sweep.x[:, i, j]
+        assert rewards[np.arange(len(i)), b, i, j].sum() == pytest.approx(values[0, b].max())
+        gaps = np.abs(np.diff(path, axis=1))
+        if outward:
+            gaps = np.maximum(0.0, gaps - sweep.side)
+        assert (np.hypot(*gaps) <= step * (1 + 1e-12)).all()
+    through = sweep.through(rewards)
+    assert through.max(axis=(-2, -1)) == pytest.approx(
+        np.broadcast_to(values[0].max(axis=(-2, -1)), through.shape[:2])
+    )
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**31))
+def test_an_outward_map_misses_no_flight(small_plan: MakePlan, seed: int) -> None:
+    kin = build_problem(small_plan(KINDS["free ends"] if seed % 2 else {})).kinematics
+    sweep = sweep_of(kin, outward=True)
+    flight = random_flight(kin, seed)
+    t = kin.time_step * np.arange(kin.slots)
+    n = np.minimum((sweep.instants / kin.time_step).astype(int), kin.slots - 2)
+    tau = (sweep.instants - t[n])[:, None]
+    w = flight.w[n] + tau * flight.v[n] + tau**2 / 2 * flight.a[n]
+    low, high = sweep.x[:, 0, 0], sweep.x[:, -1, -1]
+    cell = np.rint((np.clip(w, low, high) - low) / sweep.side).astype(int)
+    assert sweep.alive[np.arange(len(cell)), *cell.T].all()
+    reached = {
+        (s * row, column)
+        for row, most in sweep.rows
+        for s in (1, -1)
+        for column in range(-most, most + 1)
+    }
+    assert {tuple(step) for step in np.diff(cell, axis=0).tolist()} <= reached
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A problem, its rates, those of the bound by distance, and its bound on a coarse map."""
+
+    problem: Problem
+    field: RateField
+    radial: RadialRates
+    bound: float
+
+    def value(self, w: Real) -> float:
+        """What the best precoders make of the positions w (n, 2): the rate that is maximised."""
+        rates = self.field.value(w.T[:, None])
+        return float(objectives(rates, self.problem.kinematics, self.problem.maximised_queue)[0])
+
+
+@pytest.fixture(scope="module")
+def bounded(small_plan: MakePlan) -> dict[str, Bounded]:
+    found = {}
+    for kind, changes in KINDS.items():
+        faint = {"radio.base_station.power_dbm": 3, "radio.fading": "none"}
+        problem = build_problem(small_plan(faint | changes))
+        radial = radial_rates(problem)[0]
+        field = rate_field(problem, design(problem.plan))
+        found[kind] = Bounded(
+            problem,
+            field,
+            radial,
+            map_bound(problem, radial, cells=2000 if kind == "fence" else 300),
+        )
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**31))
+def test_no_flight_is_above_the_map_s_bound(
+    bounded: dict[str, Bounded], kind: str, seed: int
+) -> None:
+    one = bounded[kind]
+    flight, free = random_flight(one.problem.kinematics, seed), one.problem.free_area
+    if free is None or free.clearance(flight.w) >= 0:
+        assert one.value(flight.w) <= one.bound
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "fence"])
+def test_no_optimised_flight_is_above_the_map_s_bound(
+    bounded: dict[str, Bounded], kind: str
+) -> None:
+    one = bounded[kind]
+    for starts in (["global"], ["user-bs"]):
+        plan = parse_plan(edited(one.problem.plan.text, {"optimizer.starts": starts}))
+        reached = one.value(optimize(plan).w)
+        assert reached <= one.bound <= 1.6 * reached
+
+
+@pytest.mark.parametrize("kind", ["delivered", "half duplex"])
+@settings(max_examples=20)
+@given(drawn=st.lists(st.floats(0, 1), min_size=18, max_size=18))
+def test_all_falling_prices_bound_what_is_delivered(
+    bounded: dict[str, Bounded], kind: str, drawn: list[float]
+) -> None:
+    one = bounded[kind]
+    over = MapBound.over(one.problem, one.radial, 200, 5.0)
+    prices = -np.sort(-np.array(drawn))[: len(over.sweep.instants)]
+    straight = straight_flight(one.problem.kinematics)
+    assert over.bound(prices[None]) >= one.value(straight.w)
+
+
+def test_a_wall_lowers_the_bound(bounded: dict[str, Bounded]) -> None:
+    assert bounded["fence"].bound < bounded["delivered"].bound - 1e-3
+
+
+def test_the_copter_s_plan_is_within_three_hundredths_of_the_bound() -> None:
+    plan = parse_plan((MISSIONS / "copter_relay.yaml").read_text())
+    problem, reached = build_problem(plan), optimize(plan).delivered_rate
+    assert reached < map_bound(problem, radial_rates(problem)[0], cells=15_000) < 1.03 * reached
+
+
+def test_paths_visit_the_stations_in_an_order_and_keep_out_of_the_fence(
+    small_plan: MakePlan,
+) -> None:
+    problem = build_problem(
+        small_plan(WALL | {"flight.duration": 40, "radio.causal": True, "radio.fading": "none"})
+    )
+    field = rate_field(problem, design(problem.plan))
+    free = problem.free_area
+    assert free is not None
+    paths = best_paths(problem.kinematics, field, problem.relay, free=free)
+    assert paths
+    for path in paths:
+        assert path[0] == pytest.approx(problem.kinematics.start)
+        assert path[-1] == pytest.approx(problem.kinematics.end)
+        assert (
+            free.clearance(path) > -10
+        )  # corners are cut between instants; through the zone it would be -17
+        near = [np.hypot(*(path - link.station).T).argmin() for link in problem.links]
+        assert near[0] < near[1]  # what is forwarded has been received
+
+
+def test_the_global_start_finds_what_named_ones_find() -> None:
+    text = (MISSIONS / "paper_active.yaml").read_text()
+    changes = {
+        "flight.duration": 100,
+        "radio.base_station.power_dbm": 10,
+        "radio.relay.power_dbm": 10,
+        "optimizer.method": "direct",
+    }
+    named = {"optimizer.starts": ["straight", "bs", "user", "bs-user", "user-bs"]}
+    best = optimize(parse_plan(edited(text, changes | named))).rates.R_avg
+    assert optimize(parse_plan(edited(text, changes))).rates.R_avg >= best - 1e-4
