@@ -20,6 +20,9 @@ class FlightPath:
     autopilot makes of fractions is the model's business. `delays` (m,), s, come on top: NAV_DELAY
     items after the point, which keep fractions. `splines` (m,) marks points that are spline
     waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own.
+
+    Heights count from `elevation`, m above sea level. An aeroplane comes over the first point at
+    the velocity `entry` (3,), m/s, where one is given.
     """
 
     points: Real
@@ -28,6 +31,8 @@ class FlightPath:
     splines: NDArray[np.bool_]
     radii: Real
     delays: Real | float = 0.0
+    elevation: float = 0.0
+    entry: Real | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
