@@ -21,7 +21,7 @@ class ArduPlaneLegs(ArduPlaneLimits):
 
     least: ClassVar[float] = 0.0
     slowest: ClassVar[float] = 0.1
-    run_in: ClassVar[float] = 6.0  # with 4 missions were still 5 m off their track at w_I
+    run_in: ClassVar[float] = 8.0  # with 4 missions were still 5 m off their track at w_I
 
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg flown at `speed`, m: one look-ahead; same shape."""

@@ -46,7 +46,7 @@ _POWER_RANGE = (-6.4, 12.0)
 _TURN_POWER = 4.73
 """The power that a turn is given beyond its drag, m/s, over the load factor's square less 1."""
 
-_PITCH = (0.358, 0.0134, 0.88)
+_PITCH = (0.358, 0.03, 0.88)
 """The climb, m/s, that pitch is given: for each metre by which more potential than kinetic energy
 is missing, 1/s, for the integral of that, 1/s², and for each m/s at which kinetic energy is to
 grow."""
