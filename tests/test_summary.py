@@ -11,6 +11,7 @@ from faao_mav.optimizer.pricing import MutualInformation
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import summary
 from faao_mav.schedule import Conversion
+from faao_mav.vehicle import ARDUCOPTER
 from faao_mav.workflow import Result, plan_mission
 
 
@@ -35,14 +36,14 @@ def conversion(result: Result) -> Conversion:
 
 
 def test_a_prediction_that_no_flight_has_confirmed_says_so(
-    result: Result, conversion: Conversion
+    result: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    vehicle = replace(conversion.vehicle, kind="plane")
-    plane = replace(result, conversion=replace(conversion, vehicle=vehicle))
-    assert "not compared with recorded flights" in summary(plane)
-    assert plane.as_dict()["predicted"]["calibrated"] is False
     assert "not compared" not in summary(result)
     assert result.as_dict()["predicted"]["calibrated"] is True
+    uncompared = replace(ARDUCOPTER, calibrated=False)
+    monkeypatch.setattr("faao_mav.vehicle.vehicle.vehicle_type", lambda *_: uncompared)
+    assert "not compared with recorded flights" in summary(result)
+    assert result.as_dict()["predicted"]["calibrated"] is False
 
 
 def test_it_says_what_was_found(result: Result) -> None:

@@ -81,14 +81,15 @@ def check_vehicle(plan: "Plan") -> None:
         )
     if vehicle.type.hovers:
         return
-    least, most = vehicle.value("min_speed"), vehicle.value("max_speed")
+    ratio = _true_over_commanded(plan)
+    least, most = (ratio * vehicle.value(key) for key in ("min_speed", "max_speed"))
     names = f"{vehicle.name_of('min_speed')}; {vehicle.name_of('max_speed')}"
     for key in ("min_speed", "max_speed"):
         speed = getattr(plan.vehicle, key)
         if not least <= speed <= most:
             raise InputError(
-                f"{plan.source}: vehicle.{key}: {speed:g} m/s; the plane flies {least:g} to "
-                f"{most:g} m/s ({names}; vehicle.parameters may say otherwise)"
+                f"{plan.source}: vehicle.{key}: {speed:g} m/s; the plane flies {least:.4g} to "
+                f"{most:.4g} m/s ({names}; vehicle.parameters may say otherwise)"
             )
 
 
@@ -201,19 +202,32 @@ def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     if vehicle.type.hovers:
         scheduler: type[Scheduler] = CopterScheduler
         least, most = slowest_leg(plan), vehicle.type.fastest
+        fastest = limits.max_speed
     else:
-        scheduler = PlaneScheduler
-        least = max(limits.min_speed, vehicle.value("min_speed"))
-        most = vehicle.value("max_speed")
+        scheduler, ratio = PlaneScheduler, _true_over_commanded(plan)
+        least = max(limits.min_speed / ratio, vehicle.value("min_speed"))
+        most, fastest = vehicle.value("max_speed"), limits.max_speed / ratio
     return scheduler(
         t=t,
         w=w,
         vehicle=vehicle,
         model=vehicle.flight_model(plan.origin.latitude),
         min_speed=least,
-        max_speed=min(limits.max_speed, most),
+        max_speed=min(fastest, most),
         tolerance=plan.mission.path_tolerance,
+        altitude=_altitude(plan),
     )
+
+
+def _altitude(plan: "Plan") -> float:
+    """Return the height of the flight above sea level, m."""
+    return plan.origin.elevation + plan.flight.altitude
+
+
+def _true_over_commanded(plan: "Plan") -> float:
+    """Return true over commanded airspeed at the height of the flight."""
+    vehicle = vehicle_of(plan)
+    return vehicle.type.true_over_commanded(vehicle, _altitude(plan))
 
 
 def _refined(

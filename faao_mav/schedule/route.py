@@ -79,8 +79,8 @@ class Route:
         holds = np.floor(self.waits) if whole_seconds else self.waits
         return holds, np.round(self.waits - holds, 9)
 
-    def path(self, *, whole_seconds: bool) -> FlightPath:
-        """Return the legs as a flight model takes them, all at height 0."""
+    def path(self, *, whole_seconds: bool, altitude: float = 0.0) -> FlightPath:
+        """Return the legs as a flight model takes them, all at `altitude`, m above sea level."""
         holds, delays = self.holds_and_delays(whole_seconds=whole_seconds)
         return FlightPath(
             points=np.column_stack([self.positions, np.zeros(len(self.positions))]),
@@ -89,6 +89,7 @@ class Route:
             delays=delays,
             splines=self.splines,
             radii=self.radii,
+            elevation=altitude,
         )
 
     def insert(self, at: Integers, positions: Real, times: Real, speeds: Real) -> "Route":

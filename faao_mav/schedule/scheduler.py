@@ -36,7 +36,7 @@ class Scheduler(ABC):
 
     The plan is at `w` (n, 2), m, at `t` (n,), s. `model` predicts the flights of `vehicle`. Speeds
     are within `min_speed` and `max_speed`, m/s. The flight is over when the aircraft is within
-    `tolerance` m of w_F.
+    `tolerance` m of w_F. It is flown `altitude` m above sea level.
     """
 
     t: Real
@@ -46,6 +46,7 @@ class Scheduler(ABC):
     min_speed: float
     max_speed: float
     tolerance: float
+    altitude: float = 0.0
 
     def first(self, route: Route) -> Schedule:
         """Return `route`, with the run-in that the plan needs, in its first fit to the plan."""
@@ -61,7 +62,8 @@ class Scheduler(ABC):
     def flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`, which is rounded for it."""
         route = self._with_radii(route.rounded())
-        path = route.path(whole_seconds=self.vehicle.type.whole_second_holds)
+        whole_seconds = self.vehicle.type.whole_second_holds
+        path = route.path(whole_seconds=whole_seconds, altitude=self.altitude)
         return Schedule(route, self.model.fly(path), self._clock(route))
 
     def fitted(

@@ -22,6 +22,9 @@ class FlightPath:
     items after the point, which keep fractions. `splines` (m,) marks points that are spline
     waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own. A flight that turns
     out to take more than `longest`, s, need not be followed to its end: `InputError`.
+
+    Heights count from `elevation`, m above sea level. An aeroplane comes over the first point at
+    the velocity `entry` (3,), m/s, where one is given.
     """
 
     points: Real
@@ -31,6 +34,8 @@ class FlightPath:
     radii: Real
     delays: Real | float = 0.0
     longest: float = inf
+    elevation: float = 0.0
+    entry: Real | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

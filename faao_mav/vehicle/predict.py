@@ -148,7 +148,9 @@ class _Walk:
         match item.command:
             case Command.NAV_TAKEOFF | Command.NAV_VTOL_TAKEOFF:
                 self._take_off(index, item)
-            case Command.NAV_WAYPOINT | Command.NAV_SPLINE_WAYPOINT | Command.NAV_LOITER_TIME:
+            case Command.NAV_WAYPOINT | Command.NAV_SPLINE_WAYPOINT:
+                self._waypoint(index, item, max(hold, 0.0) if self.vehicle.type.hovers else 0.0)
+            case Command.NAV_LOITER_TIME:
                 self._waypoint(index, item, max(hold, 0.0))
             case Command.NAV_LOITER_UNLIM:
                 self._waypoint(index, item, 0.0)
@@ -157,7 +159,7 @@ class _Walk:
                 self._land(index, item)
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
-            case Command.NAV_DELAY:
+            case Command.NAV_DELAY if self.vehicle.type.hovers:
                 self._delay(index, max(hold, 0.0))
             case Command.DO_CHANGE_SPEED:
                 self._change_speed(item)
@@ -191,6 +193,8 @@ class _Walk:
             radii=np.array([stop.radius for stop in stops]),
             delays=np.array([stop.delay for stop in stops]),
             longest=self.longest - self.clock,
+            elevation=self.mission.home.altitude if self.mission.home is not None else 0.0,
+            entry=None if self.vehicle.type.hovers or not self.parts else self.parts[-1][2][-1],
         )
         self._check_clock(self._at_least(path))
         flown = self.model.fly(path, self.step)

@@ -139,6 +139,8 @@ class VehicleType:
         calibrated: the flight model is compared with recorded flights.
         ceilings: how far a plan may go for the vehicle to keep it, beside `fastest`; the least of
             those with one key counts.
+        true_over_commanded: true airspeed over the one that a mission commands, at a height in m
+            above sea level; 1 where missions command ground speeds.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
             radians; None if no such law is known.
     """
@@ -163,6 +165,7 @@ class VehicleType:
     calibrated: bool = False
     recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
     ceilings: Callable[[ParameterValues], Sequence[Ceiling]] = lambda _: ()
+    true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
     corner_speed: Callable[[ParameterValues, float], float] | None = None
 
     @property

@@ -1,6 +1,6 @@
 """Missions that real autopilots flew in their simulators, beside their plans, without wind.
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/flown.py [ardupilot | px4] [PLAN ...]
+    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/flown.py [ardupilot | px4 | plane] [PLAN ...]
 
 One row for each plan: rms position error at equal times (m), how much later than planned the flight
 is over (s), the delivered rate over the planned one; each as predicted and as flown.
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import record_plane
 
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
@@ -26,6 +27,7 @@ from missions import PLANS, plan_of
 RUNNERS = {
     "ardupilot": ("fly_arducopter.py", ["--speedup", "20"]),
     "px4": ("fly_px4.py", ["--speedup", "10", "--params", "SIH_KDV=0.2"]),
+    "plane": ("fly_arducopter.py", ["--speedup", "20", "--vehicle", "plane", "--tail", "5"]),
 }
 """The runner of each autopilot, with its options: little air drag for PX4's aircraft."""
 
@@ -59,6 +61,34 @@ FLOWN: dict[str, dict[str, Any]] = {
         "radio.ground_user.position": [400, 250],
     },
 }
+
+
+PLANES: dict[str, tuple[dict[str, Any], float]] = {
+    "plane_relay, 180 s, 13-16 m/s": ({}, 584.0),
+    "the same at sea level": ({}, 0.0),
+    "plane, 150 s, 14-18 m/s": (record_plane.PLANS["plan-150-18"], 0.0),
+    "plane, 120 s, 14-15 m/s": (record_plane.PLANS["plan-120-15"], 584.0),
+    "plane, 240 s, 12-20 m/s": (
+        {
+            "flight.duration": 240,
+            "vehicle.min_speed": 12,
+            "vehicle.max_speed": 20,
+            "flight.end": [-400, -200],
+        },
+        0.0,
+    ),
+    "plane, 90 s, 16-22 m/s": (
+        {
+            "flight.duration": 90,
+            "vehicle.min_speed": 16,
+            "vehicle.max_speed": 22,
+            "vehicle.max_acceleration": 4,
+            "flight.start": [-600, 0],
+        },
+        584.0,
+    ),
+}
+"""Plans for planes, as changes of `missions/plane_relay.yaml`, and the elevation of home, m."""
 
 
 def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Prediction:
@@ -101,7 +131,10 @@ def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
 
 def row(name: str, autopilots: Path, autopilot: str) -> str:
     """Plan, fly and compare."""
-    plan = plan_of(FLOWN[name], autopilot, "recommend")
+    if autopilot == "plane":
+        plan = record_plane.plan_of(*PLANES[name])
+    else:
+        plan = plan_of(FLOWN[name], autopilot, "recommend")
     result = plan_mission(plan)
     assert result.prediction is not None
     with tempfile.TemporaryDirectory() as folder:
@@ -119,7 +152,8 @@ def main() -> None:
     chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
     print(f"{'':<41}{'predicted: m, s late, rate':<27}flown")
     for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
-        for name in [each for each in FLOWN if each in chosen] or FLOWN:
+        plans = PLANES if autopilot == "plane" else FLOWN
+        for name in [each for each in plans if each in chosen] or plans:
             print(row(name, autopilots, autopilot), flush=True)
 
 

@@ -79,5 +79,5 @@ def test_what_is_accepted_is_accepted(
 def test_a_plane_turns_no_tighter_than_its_bank_allows(small_plan: MakePlan) -> None:
     plane = {"type": "plane", "min_speed": 12, "parameters": {"ROLL_LIMIT_DEG": 30}}
     (line,) = beyond_vehicle(limited(small_plan, 16, 7, **plane))
-    assert line.endswith("ArduPlane keeps plans of at most 5.6 m/s^2 (ROLL_LIMIT_DEG)")
-    assert beyond_vehicle(limited(small_plan, 16, 5.6, **plane)) == []
+    assert line.endswith("ArduPlane keeps plans of at most 4 m/s^2 (ROLL_LIMIT_DEG)")
+    assert beyond_vehicle(limited(small_plan, 16, 4, **plane)) == []

@@ -14,11 +14,15 @@ from faao_mav.schedule import Conversion
 from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.initial_route import initial_route, with_run_in
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
+from faao_mav.vector import distances_to_path
 from faao_mav.vehicle import Track, vehicle_of
 from faao_mav.vehicle.ardupilot.plane import ArduPlane
+from faao_mav.vehicle.atmosphere import density_ratio
 from faao_mav.vehicle.predict import predict
 
 STEP = 0.2
+RATIO = 1 / density_ratio(684.0)
+"""True over commanded airspeed, as in ArduPilot's simulator, where the plans are flown."""
 
 
 def plane_plan(**changes: float) -> Plan:
@@ -74,7 +78,11 @@ def test_the_path_is_kept_where_plain_waypoints_would_lose_it(
 def test_the_whole_mission_flies_like_its_schedule(
     flight: tuple[Conversion, Trajectory],
 ) -> None:
-    """Take-off and the way to the run-in are over before w_I: the run-in is long enough."""
+    """Take-off and the way to the run-in are over before w_I: the run-in is long enough.
+
+    The track is the schedule's; what the model's speed still makes up for after the turn into the
+    run-in is below 1.5 s in the end.
+    """
     conversion, (t, _) = flight
     plan = plane_plan()
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
@@ -87,7 +95,9 @@ def test_the_whole_mission_flies_like_its_schedule(
     clock = schedule.clock
     start = passed + clock.start(schedule.flown) - schedule.flown.arrivals[schedule.route.first]
     at = np.stack([np.interp(t + start, track.t, x) for x in track.position.T[:2]], axis=-1)
-    assert np.hypot(*(at - schedule.positions(t)).T).max() < 3
+    planned = schedule.positions(t)
+    assert distances_to_path(at, planned)[t < t[-1] - 2].max() < 3
+    assert np.hypot(*(at - planned).T).max() < 1.5 * 15
 
 
 def test_items_are_an_aeroplanes(flight: tuple[Conversion, Trajectory]) -> None:
@@ -96,7 +106,7 @@ def test_items_are_an_aeroplanes(flight: tuple[Conversion, Trajectory]) -> None:
     assert items[0].params[0] == 15
     speeds = [item.params for item in items if item.command == Command.DO_CHANGE_SPEED]
     assert {params[0] for params in speeds} == {0.0}
-    assert all(12 <= params[1] <= 16 for params in speeds)
+    assert all(12 <= RATIO * params[1] + 0.001 <= 16.002 for params in speeds)
     waypoints = [item for item in items if item.command == Command.NAV_WAYPOINT]
     assert all(item.params == (0, 0, 0, 0) for item in waypoints)
     kinds = {item.command for item in items}
@@ -112,8 +122,8 @@ def test_items_are_an_aeroplanes(flight: tuple[Conversion, Trajectory]) -> None:
 @pytest.mark.parametrize(
     ("parameters", "key"),
     [
-        ({"AIRSPEED_MIN": 12.5}, "min_speed: 12 m/s; the plane flies 12.5 to 22 m/s"),
-        ({"AIRSPEED_MAX": 15}, "max_speed: 16 m/s; the plane flies 9 to 15 m/s"),
+        ({"AIRSPEED_MIN": 12.5}, r"min_speed: 12 m/s; the plane flies 13.36 to 23.51 m/s"),
+        ({"AIRSPEED_MAX": 14.5}, r"max_speed: 16 m/s; the plane flies 9.616 to 15.49 m/s"),
         ({"NAVL1_PERIOD": 0}, "NAVL1_PERIOD: 0"),
     ],
 )
@@ -125,4 +135,5 @@ def test_a_plane_that_cannot_fly_the_plans_speeds_is_refused(
 
 
 def test_a_plane_at_its_limits_is_taken() -> None:
-    check_vehicle(plane_plan(AIRSPEED_MIN=12, AIRSPEED_MAX=16))
+    limits = {"AIRSPEED_MIN": 12 / RATIO, "AIRSPEED_MAX": 16 / RATIO * (1 + 1e-12)}
+    check_vehicle(plane_plan(**limits))

@@ -327,11 +327,11 @@ def test_a_mission_without_places_has_no_track(home: Home | None) -> None:
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_flights_without_end_are_refused(vehicle: Vehicle) -> None:
+    waits = (waypoint(100, 0, hold=1e9), do(Command.NAV_DELAY, 1e9, -1, -1, -1))
     for long in (
         waypoint(5_000_000, 0),
         waypoint(100, 0, up=1e7),
-        waypoint(100, 0, hold=1e9),
-        do(Command.NAV_DELAY, 1e9, -1, -1, -1),
+        *(waits if vehicle.type.hovers else ()),
     ):
         hours = "1.5" if vehicle.type.hovers else "6"
         with pytest.raises(InputError, match=f"more than {hours} h"):
@@ -346,6 +346,15 @@ def test_a_flight_that_circles_for_too_long_is_refused(monkeypatch: pytest.Monke
     ways = [replace(end, params=(0.0, 0.05, 0.0, 0.0)) for end in ends]
     with pytest.raises(InputError, match=r"waypoints would take more than 0\.033 h"):
         flown(*ways, vehicle=PX4)
+
+
+def test_a_plane_neither_holds_nor_delays() -> None:
+    plane = Vehicle("ardupilot", "plane")
+    plain, waiting = (
+        flown(TAKEOFF, waypoint(500, 0, hold=hold), *delay, waypoint(900, 0), vehicle=plane)
+        for hold, delay in ((0, ()), (60, (do(Command.NAV_DELAY, 60, -1, -1, -1),)))
+    )
+    assert waiting.t[-1] == plain.t[-1]
 
 
 def test_useless_parameters_are_named() -> None:

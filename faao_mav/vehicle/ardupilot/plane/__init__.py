@@ -3,7 +3,8 @@
 from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane, ArduPlaneLegs
-from faao_mav.vehicle.ardupilot.plane.parameters import TABLE
+from faao_mav.vehicle.ardupilot.plane.motion import SIDESLIP
+from faao_mav.vehicle.ardupilot.plane.parameters import TABLE, true_over_commanded
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType, lean_acceleration
@@ -32,9 +33,13 @@ def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # 
     return ArduPlane.from_vehicle(vehicle)
 
 
+def _true_over_commanded(vehicle: ParameterValues, altitude: float) -> float:
+    return true_over_commanded(vehicle.value("simulated_pitot"), altitude)
+
+
 def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
-    """A coordinated turn accelerates by what the bank gives; airspeeds have limits of their own."""
-    bank = lean_acceleration(vehicle.value("roll_limit"))
+    """A turn accelerates by what the bank and sideslip give; airspeeds have limits of their own."""
+    bank = (1 - SIDESLIP) * lean_acceleration(vehicle.value("roll_limit"))
     return (Ceiling("max_acceleration", bank, "roll_limit"),)
 
 
@@ -53,6 +58,8 @@ ARDUPLANE = VehicleType(
     legs=ArduPlaneLegs.from_vehicle,
     flight_model=_model,
     ceilings=_ceilings,
+    calibrated=True,
+    true_over_commanded=_true_over_commanded,
 )
-"""ArduPlane 4.7, by its documents. How it turns and how fast it may fly is tuned on each aircraft:
-no parameters are recommended."""
+"""ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are
+recommended."""

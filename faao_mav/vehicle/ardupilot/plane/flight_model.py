@@ -1,14 +1,17 @@
-"""How an ArduPlane flies a mission: from its documentation, not compared with flights."""
+"""How an ArduPlane flies a mission."""
 
+import cmath
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.vehicle.ardupilot.plane.motion import Motion
+from faao_mav.vehicle.ardupilot.plane.motion import STEP, Motion
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
+from faao_mav.vehicle.atmosphere import density_ratio
 from faao_mav.vehicle.flight_path import FlightPath, Flown
 
 
@@ -18,7 +21,7 @@ class ArduPlaneLegs(ArduPlaneLimits):
 
     least: ClassVar[float] = 0.0
     slowest: ClassVar[float] = 0.1
-    run_in: ClassVar[float] = 4.0  # chosen: room to come onto a track, whatever its course
+    run_in: ClassVar[float] = 8.0  # with 4 missions were still 5 m off their track at w_I
 
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg flown at `speed`, m: one look-ahead; same shape."""
@@ -36,35 +39,33 @@ class ArduPlaneLegs(ArduPlaneLimits):
 _HEADED = math.radians(10)
 """A loiter is left when the course is this close to the next waypoint."""
 
+_NOTICED = 0.12
+"""How long after it is passed a waypoint counts as reached, s. Fitted as `motion`'s constants."""
+
 
 @dataclass(frozen=True, slots=True)
 class ArduPlane(ArduPlaneLimits):
-    """How ArduPlane flies plain waypoints in AUTO, without wind. Not calibrated against flights.
+    """How ArduPlane flies plain waypoints in AUTO, without wind.
 
-    After ArduPilot's documentation (Plane: navigation tuning, parameter list): lateral guidance
-    `NAVL1` in coordinated turns within the roll limit, airspeed within AIRSPEED_MIN and
-    AIRSPEED_MAX, heights along the leg within TECS_CLMB_MAX and, with an idling engine,
-    TECS_SINK_MIN. A waypoint is reached within its acceptance radius or on passing the
-    perpendicular through it. Where the waypoint gives no radius it is the least of WP_RADIUS and
-    the guidance's look-ahead, for turns below 90 degrees in proportion to the turn. Holds are
-    loiters: ArduPlane has no hold at a plain waypoint. Limits are SI, angles radians; a negative
-    `loiter_radius` turns left.
+    After ArduPilot's documentation (Plane: navigation tuning, parameter list), with constants from
+    flights of its simulator: lateral guidance `NAVL1` within the roll limit, airspeed and height by
+    total energy control. A waypoint is reached within its acceptance radius or on passing the
+    perpendicular through it. Where the waypoint gives no radius it is the least of WP_RADIUS, over
+    the density's ratio, and the guidance's look-ahead, for turns below 90 degrees in proportion to
+    the turn. Commanded speeds are equivalent airspeeds. Holds are loiters: ArduPlane has no hold at
+    a plain waypoint. Limits are SI, angles radians; a negative `loiter_radius` turns left.
     """
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
 
-        An aeroplane is never at rest: it starts over the first point at the first leg's speed and
-        course. A hold counts from when the circle is reached, and ends when the course is within
-        10 degrees of the next waypoint. Speeds of 0 or less mean `cruise_speed`.
+        An aeroplane is never at rest: it starts over the first point at the path's `entry`
+        velocity, as after a take-off, and then flies straight to the second point; without one, at
+        the first leg's speed and course. A hold counts from when the circle is reached, and ends
+        when the course is within 10 degrees of the next waypoint. Speeds of 0 or less mean
+        `cruise_speed`.
         """
-        flight = _Flight(self, path)
-        return flight.flown(step)
-
-    def airspeed(self, command: float) -> float:
-        """Return the airspeed flown for a commanded one, m/s."""
-        wanted = command if command > 0 else self.cruise_speed
-        return min(max(wanted, self.min_speed), self.max_speed)
+        return _Flight(self, path).flown(step)
 
 
 class _Flight:
@@ -73,10 +74,21 @@ class _Flight:
     def __init__(self, plane: ArduPlane, path: FlightPath) -> None:
         self._plane, self._path = plane, path
         self._places = [complex(east, north) for east, north in path.points[:, :2]]
-        speed = plane.airspeed(float(path.speeds[0]) if len(path.speeds) else 0.0)
-        moves = [b - a for a, b in zip(self._places, self._places[1:], strict=False) if b != a]
-        course = math.atan2(moves[0].imag, moves[0].real) if moves else math.pi / 2
-        self._motion = Motion(plane, self._places[0], float(path.points[0, 2]), course, speed)
+        altitude = path.elevation + float(path.points[:, 2].max())
+        commands = path.speeds.tolist() or [0.0]
+        self._speeds = [plane.true_airspeed(command, altitude) for command in commands]
+        self._full_radius = plane.waypoint_radius / density_ratio(altitude)
+        height = float(path.points[0, 2])
+        if path.entry is None:
+            moves = [b - a for a, b in pairwise(self._places) if b != a]
+            course = moves[0] / abs(moves[0]) if moves else 1j
+            velocity, climb, demanded = course * self._speeds[0], 0.0, None
+        else:
+            east, north, climb = path.entry.tolist()
+            velocity, demanded = complex(east, north), plane.true_airspeed(0.0, altitude)
+        self._motion = Motion(
+            plane, altitude, self._places[0], height, velocity, climb, speed=demanded
+        )
         self._track = [self._motion.sample()]
 
     def flown(self, step: float) -> Flown:
@@ -92,45 +104,43 @@ class _Flight:
                 departures[k] = self._loiter(k, arrivals[k] + float(self._path.holds[k]))
         t = np.arange(math.ceil(departures[-1] / step - 1e-9) + 1, dtype=float) * step
         while self._motion.time < t[-1]:
-            self._step_on(count - 1)
+            self._step_on(count - 1, STEP)
         return self._sampled(arrivals, departures, t)
 
     def _fly_leg(self, k: int) -> float:
         """Fly to point `k` and return when it is reached; a loiter's point is only approached."""
+        motion = self._motion
         if self._path.holds[k] > 0:
-            return self._motion.time
-        start, end = self._places[k - 1], self._places[k]
-        length = abs(end - start)
-        while True:
-            radius = self._radius(k)
-            passed = self._passed(start, end, length)
-            near = radius - abs(end - self._motion.place)
-            before = self._motion.time
-            if max(passed, near) >= 0:
-                return before
-            self._step_on(k)
-            after = max(
-                self._passed(start, end, length), self._radius(k) - abs(end - self._motion.place)
-            )
-            if after >= 0:
-                share = -max(passed, near) / (after - max(passed, near))
-                return before + share * (self._motion.time - before)
+            return motion.time
+        turn = self._turn(k)
+        before = self._beyond(k, turn)
+        due = motion.time + _NOTICED if before >= 0 else math.inf
+        while motion.time < due - 1e-9:
+            step = min(STEP, due - motion.time)
+            self._step_on(k, step)
+            if due == math.inf and (after := self._beyond(k, turn)) >= 0:
+                due = motion.time - step * after / (after - before) + _NOTICED
+            elif due == math.inf:
+                before = after
+        return due
 
-    def _passed(self, start: complex, end: complex, length: float) -> float:
-        """Return how far past the perpendicular through `end` the aircraft is, m."""
-        if length == 0:
-            return 0.0
-        return ((self._motion.place - end) * (end - start).conjugate()).real / length
+    def _beyond(self, k: int, turn: float) -> float:
+        """Return how far beyond where point `k` is reached the aircraft is, m, below 0 before it.
 
-    def _radius(self, k: int) -> float:
-        if self._path.radii[k] > 0:
-            return float(self._path.radii[k])
-        full = min(self._plane.waypoint_radius, self._motion.look_ahead())
+        `turn` is the angle there over 90 degrees, at most 1.
+        """
+        start, end, place = self._places[k - 1], self._places[k], self._motion.place
+        given = float(self._path.radii[k])
+        radius = given if given > 0 else min(self._full_radius, self._motion.look_ahead()) * turn
+        leg, left = end - start, place - end
+        passed = (left * leg.conjugate()).real / abs(leg) if leg else 0.0
+        return max(passed, radius - abs(left))
+
+    def _turn(self, k: int) -> float:
         if k + 1 == len(self._places):
-            return full
+            return 1.0
         here, onward = self._places[k] - self._places[k - 1], self._places[k + 1] - self._places[k]
-        turn = abs(math.atan2((here.conjugate() * onward).imag, (here.conjugate() * onward).real))
-        return full * min(turn / (math.pi / 2), 1.0)
+        return min(abs(cmath.phase(here.conjugate() * onward)) / (math.pi / 2), 1.0)
 
     def _circle(self, k: int) -> float:
         """Fly to the circle about point `k` and return when it is reached."""
@@ -156,27 +166,24 @@ class _Flight:
                 self._step_round(k)
         return max(until, self._motion.time)
 
-    def _step_on(self, k: int) -> None:
-        """Go on by one step along the leg that ends at point `k`."""
+    def _step_on(self, k: int, step: float) -> None:
+        """Go on by `step` seconds along the leg that ends at point `k`."""
         if k == 0 or self._path.holds[k] > 0:
             self._step_round(k)
             return
-        begin, end = self._path.points[k - 1], self._path.points[k]
-        speed = self._plane.airspeed(float(self._path.speeds[k - 1]))
-        self._motion.along(
-            self._places[k - 1], self._places[k], (float(begin[2]), float(end[2])), speed
-        )
+        begin, end = float(self._path.points[k - 1, 2]), float(self._path.points[k, 2])
+        if k == 1 and self._path.entry is not None:
+            self._motion.towards(self._places[1], end, self._speeds[0], step)
+        else:
+            self._motion.along(
+                self._places[k - 1], self._places[k], (begin, end), self._speeds[k - 1], step
+            )
         self._track.append(self._motion.sample())
 
     def _step_round(self, k: int) -> bool:
         """Go on by one step round point `k` and return whether the circle is being flown."""
-        command = self._path.speeds[max(k - 1, 0)] if len(self._path.speeds) else 0.0
-        circling = self._motion.round(
-            self._places[k],
-            self._plane.loiter_radius,
-            float(self._path.points[k, 2]),
-            self._plane.airspeed(float(command)),
-        )
+        height, speed = float(self._path.points[k, 2]), self._speeds[max(k - 1, 0)]
+        circling = self._motion.round(self._places[k], height, speed, STEP)
         self._track.append(self._motion.sample())
         return circling
 

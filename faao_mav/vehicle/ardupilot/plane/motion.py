@@ -1,24 +1,58 @@
-"""An aeroplane as a point in coordinated turns, and the guidance that banks it."""
+"""An aeroplane with the guidance that banks it and the energy that carries it.
+
+Constants that say no other are fitted to eleven flights of ArduPilot's simulator from sea level
+(`tests/benchmarks/flights_arduplane.py`): they are its aircraft's.
+"""
 
 import cmath
 import math
 
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
+from faao_mav.vehicle.atmosphere import density_ratio
 
 STEP = 0.1
-"""The step of the simulation, s. Chosen; what a change costs is not measured."""
+"""The longest step of the simulation, s. Chosen; what a change costs is not measured."""
+
+SIDESLIP = 0.284
+"""The share of a coordinated turn's acceleration that sideslip takes, at sea level's density: the
+simulator's aircraft turns without enough rudder."""
 
 _GRAVITY = 9.80665
 """Standard gravity, m/s²."""
 
-_ROLL_LAG = 0.5
-"""Time constant of the bank, s: ArduPlane's default RLL2SRV_TCONST."""
-
-_ENERGY_LAG = 5.0
-"""Time constant of airspeed and height, s: ArduPlane's default TECS_TIME_CONST."""
+_ROLL_TURN = 0.019
+"""How far the course turns while the aircraft banks, over the change of bank."""
 
 _INTERCEPT = math.radians(45)
-"""Steepest angle at which a track is approached."""
+"""The steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
+
+_RISE = 0.5
+"""The greatest growth of kinetic energy demanded, over that of height's at `climb_speed`."""
+
+_FALL = 12.5
+"""The greatest loss of kinetic energy demanded, m²/s³ for one kilogram."""
+
+_POWER = (2.03, 0.464, 2.35)
+"""The power, m/s, that thrust is given: for each metre of total energy that is missing, 1/s, for
+the integral of that, 1/s², and for each m/s at which kinetic energy is to grow. All for one newton
+of weight."""
+
+_POWER_LAG = 0.85
+"""The time constant of that power, s."""
+
+_POWER_RANGE = (-6.4, 12.0)
+"""The least and greatest power that thrust is given, m/s: for one newton of weight."""
+
+_TURN_POWER = 4.73
+"""The power that a turn is given beyond its drag, m/s, over the load factor's square less 1."""
+
+_PITCH = (0.358, 0.03, 0.88)
+"""The climb, m/s, that pitch is given: for each metre by which more potential than kinetic energy
+is missing, 1/s, for the integral of that, 1/s², and for each m/s at which kinetic energy is to
+grow."""
+
+_PITCH_LAG = 0.668
+"""The time constant of the climb, s."""
 
 
 class Motion:
@@ -26,47 +60,67 @@ class Motion:
 
     Guidance is Park, Deyst and How's (AIAA 2004-4900) in ArduPilot's form: with damping ζ and
     period T the aircraft aims at a point L = ζ T V / π ahead on its track, by the lateral
-    acceleration 4 ζ² V² / L sin η, η the angle from its course to that point.
+    acceleration 4 ζ² V² / L sin η, η the angle from its course to that point. It banks for that
+    as in a coordinated turn.
+
+    Speed and height are held by total energy control (Lambregts, AIAA 83-2239): thrust by the sum
+    of the errors of kinetic and potential energy, pitch by their difference, both for a demanded
+    speed that changes no faster than the aircraft may gain and lose energy.
+
+    Places are complex, east + i north, m; `climb` is m/s, angles are rad, positive to the left.
     """
 
     def __init__(
-        self, limits: ArduPlaneLimits, place: complex, height: float, course: float, speed: float
+        self,
+        limits: ArduPlaneLimits,
+        altitude: float,
+        place: complex,
+        height: float,
+        course: complex,
+        climb: float = 0.0,
+        speed: float | None = None,
     ) -> None:
+        """Start at `place` and `height` with the ground velocity `course` and a `climb`, m/s.
+
+        `altitude`, m above sea level, is that of the air. `speed` is the true airspeed that is
+        demanded so far, m/s; the flown one if it is not given.
+        """
         self.time = 0.0
-        self.place = place
-        self.course = course
-        self._limits, self._height, self._speed = limits, height, speed
-        self._bank = self._climb = 0.0
+        self.place, self.course = place, cmath.phase(course)
+        self._limits, self._height = limits, height
+        self._level = height  # the demanded height
+        self._speed = math.hypot(abs(course), climb)
+        self._demand = self._speed if speed is None else speed
+        self._bank, self._climb = 0.0, climb
+        # A climb is flown at full power: twice what it takes (fitted).
+        self._power, self._held_power, self._held_climb = 2 * climb, climb, 0.0
+        self._turning = 1 - SIDESLIP * density_ratio(altitude)
 
     def sample(self) -> tuple[float, ...]:
         """Return time, place (east, north, up) and velocity, SI."""
-        velocity = cmath.rect(self._ground_speed(), self.course)
-        place = self.place
-        return (
-            self.time,
-            place.real,
-            place.imag,
-            self._height,
-            velocity.real,
-            velocity.imag,
-            self._climb,
-        )
+        velocity = cmath.rect(self.ground_speed(), self.course)
+        place = (self.place.real, self.place.imag, self._height)
+        return (self.time, *place, velocity.real, velocity.imag, self._climb)
+
+    def ground_speed(self) -> float:
+        """Return the speed over ground, m/s, in calm."""
+        return math.sqrt(max(self._speed**2 - self._climb**2, 1.0))
 
     def look_ahead(self) -> float:
         """Return L, m."""
-        return self._limits.look_ahead * self._speed
+        return self._limits.look_ahead * self.ground_speed()
 
     def bearing_to(self, place: complex) -> float:
-        """Return the angle from the course to `place`, rad, positive to the left."""
+        """Return the angle from the course to `place`."""
         return cmath.phase((place - self.place) * cmath.rect(1.0, -self.course))
 
     def along(
-        self, start: complex, end: complex, heights: tuple[float, float], speed: float
+        self, start: complex, end: complex, heights: tuple[float, float], speed: float, step: float
     ) -> None:
-        """Go on by one step along the track from `start` to `end`, between `heights`, m."""
+        """Go on by `step` seconds along the track from `start` to `end`, between `heights`, m."""
         leg = end - start
         if leg == 0:
-            self._go(self._towards(end), heights[1], 0.0, speed)
+            self.towards(end, heights[1], speed, step)
             return
         track = leg / abs(leg)
         offset = (self.place - start) * track.conjugate()
@@ -74,57 +128,85 @@ class Motion:
         approach = math.asin(min(max(offset.imag / self.look_ahead(), -limit), limit))
         eta = cmath.phase(track * cmath.rect(1.0, -approach - self.course))
         done = min(max(offset.real / abs(leg), 0.0), 1.0)
-        slope = (heights[1] - heights[0]) / abs(leg) if 0 < done < 1 else 0.0
         height = heights[0] + done * (heights[1] - heights[0])
-        self._go(self._lateral(eta), height, slope * self._speed, speed)
+        self._go(self._lateral(eta), height, speed, step)
 
-    def round(self, centre: complex, radius: float, height: float, speed: float) -> bool:
-        """Go on by one step towards and round the circle; return whether it is being flown.
+    def towards(self, end: complex, height: float, speed: float, step: float) -> None:
+        """Go on by `step` seconds straight to `end`."""
+        self._go(self._lateral(self.bearing_to(end)), height, speed, step)
 
-        The circle's acceleration is V²/d plus a spring and damper on d - R with the guidance's
-        period and damping, d the distance from `centre`; a negative `radius` turns left. From
-        outside, the straight way to the centre is flown until that asks for less of a turn.
+    def round(self, centre: complex, height: float, speed: float, step: float) -> bool:
+        """Go on by `step` seconds towards and round a circle; return whether it is being flown.
+
+        The circle has the vehicle's `loiter_radius` R. Its acceleration is V²/d plus a spring and
+        damper on d - R with the guidance's period and damping, d the distance from `centre`; a
+        negative R turns left. From outside, the straight way to the centre is flown until that asks
+        for less of a turn.
         """
-        side = -math.copysign(1.0, radius)
-        offset = self.place - centre
-        distance = max(abs(offset), abs(radius) / 2)
-        velocity = cmath.rect(self._speed, self.course)
+        limits = self._limits
+        side = -math.copysign(1.0, limits.loiter_radius)
+        offset, radius = self.place - centre, abs(limits.loiter_radius)
+        distance = max(abs(offset), radius / 2)
+        velocity = cmath.rect(self.ground_speed(), self.course)
         outward = (velocity * offset.conjugate()).real / distance
-        stiffness = 2 * math.pi / self._limits.period
-        excess = abs(offset) - abs(radius)
-        inward = (
-            self._speed**2 / distance
-            + stiffness**2 * excess
-            + 2 * self._limits.damping * stiffness * outward
-        )
-        straight = self._towards(centre)
+        stiffness = 2 * math.pi / limits.period
+        excess = abs(offset) - radius
+        inward = abs(velocity) ** 2 / distance + stiffness**2 * excess
+        inward += 2 * limits.damping * stiffness * outward
+        straight = self._lateral(self.bearing_to(centre))
         circling = excess <= 0 or side * straight >= inward
-        self._go(side * inward if circling else straight, height, 0.0, speed)
+        self._go(side * inward if circling else straight, height, speed, step)
         return circling
 
-    def _towards(self, place: complex) -> float:
-        return self._lateral(self.bearing_to(place))
-
     def _lateral(self, eta: float) -> float:
-        """Return the acceleration to the left that turns the course by `eta` rad."""
+        """Return the acceleration to the left that turns the course by `eta`, m/s²."""
         bounded = min(max(eta, -math.pi / 2), math.pi / 2)
         gain = 4 * self._limits.damping**2
-        return gain * self._speed**2 / self.look_ahead() * math.sin(bounded)
+        return gain * self.ground_speed() ** 2 / self.look_ahead() * math.sin(bounded)
 
-    def _go(self, lateral: float, height: float, climb: float, speed: float) -> None:
-        """Move on for one step with `lateral` acceleration to the left, m/s², as far as it goes."""
+    def _go(self, lateral: float, height: float, speed: float, step: float) -> None:
+        """Move on with `lateral` acceleration to the left, m/s², as far as it goes."""
+        before = self._climb
+        self._hold(height, speed, step)
         limits = self._limits
         bank = math.atan2(lateral, _GRAVITY)
         bank = min(max(bank, -limits.roll_limit), limits.roll_limit)
-        self._bank += (bank - self._bank) * (1 - math.exp(-STEP / _ROLL_LAG))
-        self._speed += (speed - self._speed) * (1 - math.exp(-STEP / _ENERGY_LAG))
-        rate = climb + (height - self._height) / _ENERGY_LAG
-        self._climb = min(max(rate, -limits.descent_speed), limits.climb_speed)
-        turn = _GRAVITY * math.tan(self._bank) / self._speed * STEP
-        self.place += cmath.rect(self._ground_speed() * STEP, self.course + turn / 2)
+        change = (bank - self._bank) * -math.expm1(-step / limits.roll_time)
+        self._bank += change
+        ground = self.ground_speed()
+        lift = _GRAVITY + (self._climb - before) / step
+        turn = self._turning * lift * math.tan(self._bank) / ground * step + _ROLL_TURN * change
+        self.place += cmath.rect(ground * step, self.course + turn / 2)
         self.course += turn
-        self._height += self._climb * STEP
-        self.time += STEP
+        self.time += step
 
-    def _ground_speed(self) -> float:
-        return math.sqrt(max(self._speed**2 - self._climb**2, 0.0))
+    def _hold(self, height: float, speed: float, step: float) -> None:
+        """Hold `height`, m, and the true airspeed `speed`, m/s, for `step` seconds."""
+        limits, flown = self._limits, self._speed
+        climb, sink = limits.climb_speed * step, limits.descent_speed * step
+        self._level += min(max(height - self._level, -sink), climb)
+        rise = _RISE * limits.climb_speed * _GRAVITY / flown * step
+        change = min(max(speed - self._demand, -_FALL / flown * step), rise)
+        self._demand += change
+        growth = change / step * flown / _GRAVITY
+        kinetic = (self._demand**2 - flown**2) / (2 * _GRAVITY)
+        potential = self._level - self._height
+
+        total, held, ahead = _POWER
+        load = 1 / math.cos(self._bank) ** 2 - 1
+        power = total * (potential + kinetic) + self._held_power
+        power += ahead * growth + _TURN_POWER * load
+        least, greatest = _POWER_RANGE
+        if least < power < greatest:
+            self._held_power += held * (potential + kinetic) * step
+        power = min(max(power, least), greatest)
+        self._power += (power - self._power) * -math.expm1(-step / _POWER_LAG)
+
+        difference, held, ahead = _PITCH
+        wanted = difference * (potential - kinetic) + self._held_climb + ahead * growth
+        if flown < limits.min_speed:  # speed before height
+            wanted = min(wanted, self._power - 2 * (limits.min_speed - flown))
+        self._held_climb += held * (potential - kinetic) * step
+        self._climb += (wanted - self._climb) * -math.expm1(-step / _PITCH_LAG)
+        self._speed = max(flown + _GRAVITY * (self._power - self._climb) / flown * step, 1.0)
+        self._height += self._climb * step

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import pi, radians
 
 from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.atmosphere import density_ratio
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, table
 
 
@@ -26,6 +27,7 @@ TABLE = table(
         radians(85),
         source=SOURCE,
     ),
+    _parameter("roll_time", "s", 0.5, {"RLL2SRV_TCONST": 1.0}, 0.05),
     _parameter("waypoint_radius", "m", 90.0, {"WP_RADIUS": 1.0}, 1.0),
     Parameter(
         "loiter_radius", "m", 60.0, {"WP_LOITER_RAD": 1.0}, 1.0, either_sign=True, source=SOURCE
@@ -35,6 +37,7 @@ TABLE = table(
     _parameter("period", "s", 17.0, {"NAVL1_PERIOD": 1.0}, 1.0),
     _parameter("damping", "", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1),
     _parameter("return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0),
+    _parameter("simulated_pitot", "", 2.0, {"SIM_ARSPD_RATIO": 1.0}, 0.0),
     *SHARED,
     switch("fence_options", 1, "FENCE_OPTIONS"),
     switch("fence_type", 4, "FENCE_TYPE"),
@@ -42,7 +45,12 @@ TABLE = table(
     rally_limit(5000.0),
 )
 """ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate
-with an idling engine; a `return_height` below 0 keeps the height at which the return begins."""
+with an idling engine; a `return_height` below 0 keeps the height at which the return begins.
+
+`simulated_pitot` is above 0 in ArduPilot's simulator only. Up to July 2026 its airspeed sensor
+takes the density out twice (ArduPilot's issue 31004), and it flies faster for it. That is the
+default, as all that is measured of how a plane flies is measured there; a real aircraft, and a
+newer simulator, has 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +61,32 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
     min_speed: float = TABLE["min_speed"].default
     max_speed: float = TABLE["max_speed"].default
     roll_limit: float = TABLE["roll_limit"].default
+    roll_time: float = TABLE["roll_time"].default
     waypoint_radius: float = TABLE["waypoint_radius"].default
     loiter_radius: float = TABLE["loiter_radius"].default
     climb_speed: float = TABLE["climb_speed"].default
     descent_speed: float = TABLE["descent_speed"].default
     period: float = TABLE["period"].default
     damping: float = TABLE["damping"].default
+    simulated_pitot: float = TABLE["simulated_pitot"].default
 
     @property
     def look_ahead(self) -> float:
         """How far ahead the guidance aims, s: ζ T / π."""
         return self.damping * self.period / pi
+
+    def true_airspeed(self, commanded: float, altitude: float) -> float:
+        """Return the true airspeed, m/s, at which a `commanded` one is flown.
+
+        The equivalent airspeed is within `min_speed` and `max_speed`; 0 or less is `cruise_speed`.
+        `altitude` is m above sea level.
+        """
+        wanted = commanded if commanded > 0 else self.cruise_speed
+        held = min(max(wanted, self.min_speed), self.max_speed)
+        return held * true_over_commanded(self.simulated_pitot, altitude)
+
+
+def true_over_commanded(simulated_pitot: float, altitude: float) -> float:
+    """Return true over commanded airspeed at `altitude`, m above sea level."""
+    density = density_ratio(altitude)
+    return 1 / density if simulated_pitot > 0 else density**-0.5
