@@ -37,7 +37,7 @@ TABLE = table(
     _parameter("period", "s", 17.0, {"NAVL1_PERIOD": 1.0}, 1.0),
     _parameter("damping", "", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1),
     _parameter("return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0),
-    _parameter("simulated_pitot", "", 2.0, {"SIM_ARSPD_RATIO": 1.0}, 0.0),
+    _parameter("simulated_pitot", "", 0.0, {"SIM_ARSPD_RATIO": 1.0}, 0.0),
     *SHARED,
     switch("fence_options", 1, "FENCE_OPTIONS"),
     switch("fence_type", 4, "FENCE_TYPE"),
@@ -48,9 +48,8 @@ TABLE = table(
 with an idling engine; a `return_height` below 0 keeps the height at which the return begins.
 
 `simulated_pitot` is above 0 in ArduPilot's simulator only. Up to July 2026 its airspeed sensor
-takes the density out twice (ArduPilot's issue 31004), and it flies faster for it. That is the
-default, as all that is measured of how a plane flies is measured there; a real aircraft, and a
-newer simulator, has 0."""
+takes the density out twice (ArduPilot's issue 31004), and it flies faster for it. A real aircraft
+has no such parameter, and a newer simulator does not need it."""
 
 
 @dataclass(frozen=True, slots=True)
