@@ -82,7 +82,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     routes = starts(kin, options.starts, stations)
-    if "global" in options.starts:
+    if "global" in options.starts and kin.min_speed == 0:
         first = next(iter(routes.values()))
         routes |= global_flights(kin, field, relay, first, free=problem.free_area)
     if before is not None:
