@@ -11,8 +11,8 @@ from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.cruise import cruise, cruise_by
 
 BY_STATIONS = ("straight", "bs", "user", "bs-user", "user-bs")
-"""What `global` stands for with a least speed: paths over the map do not circle. Measured: they lead
-`plane_relay.yaml` to 1.6281 bit/s/Hz, these to 1.6401."""
+"""What `global` stands for with a least speed: paths over the map do not circle. Measured: they
+lead `plane_relay.yaml` to 1.6281 bit/s/Hz, these to 1.6401."""
 
 _BISECTIONS = 12
 """Bisections of the share of the way to the stations: it is found to 1 / 4096. Chosen."""
