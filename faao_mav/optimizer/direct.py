@@ -29,7 +29,7 @@ from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts
 from faao_mav.optimizer.search.routes import global_flights
-from faao_mav.optimizer.search.starts import starts
+from faao_mav.optimizer.search.starts import split_names, starts
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
@@ -85,12 +85,13 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     kept = problem.constraints(kin)
+    names, over_the_map = split_names(kin, options.starts)
     routes = (
-        starts_inside(kin, options.starts, stations, problem.free_area, kept)
+        starts_inside(kin, names, stations, problem.free_area, kept)
         if problem.free_area
-        else starts(kin, options.starts, stations)
+        else starts(kin, names, stations)
     )
-    if "global" in options.starts:
+    if over_the_map:
         first = next(iter(routes.values()))
         routes |= global_flights(kin, field, relay, first, free=problem.free_area, kept=kept)
     if before is not None:

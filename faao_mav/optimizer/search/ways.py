@@ -42,7 +42,7 @@ def starts_inside(
     found: dict[str, Trajectory] = {}
     direct = shortest_by(area, [kin.start, kin.end])
     if direct is not None:
-        for name in (each for each in names if each != "global"):
+        for name in names:
             ways: Iterator[Real]
             if name == "straight":
                 ways = iter([direct, *_on_other_sides(area, direct)])
