@@ -108,7 +108,7 @@ def test_upload_after_writing(plan: Path, out: Path) -> None:
     assert [item.command for item in found.items] == [i.command for i in read_mission(out).items]
 
 
-def test_a_download_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
+def test_a_download_brings_the_fence_in_a_file_of_its_own(tmp_path: Path) -> None:
     port, out = free_port(), tmp_path / "back.waypoints"
     sent = Mission(
         (MissionItem(16, 3, x=-35.36, y=149.16, z=50),),
@@ -121,7 +121,7 @@ def test_a_download_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
         result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out)
         again = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", tmp_path / "b.plan")
     assert result.exit_code == 0, result.output
-    assert f"{out}: QGC WPL holds no fence: 1 area left out" in result.stderr
+    assert "5003" in (tmp_path / "back.fence.waypoints").read_text()
     assert "vehicle      PX4 copter (system 1, component 1, disarmed)" in again.stdout
     assert json.loads((tmp_path / "b.plan").read_text())["mission"]["firmwareType"] == 12
 

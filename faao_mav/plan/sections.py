@@ -276,7 +276,7 @@ class Optimizer(_Section):
     ] = "cutoff"
     starts: Annotated[
         tuple[Start, ...], key("Routes that the direct method starts from.", min_length=1)
-    ] = ("straight", "global")
+    ] = ("straight", "bs", "user", "bs-user", "user-bs", "global")
     tolerance: Annotated[
         Number,
         key(

@@ -15,6 +15,6 @@ def density_ratio(altitude: float) -> float:
     count as 11 km, those below sea level as they are.
 
     >>> round(density_ratio(684.0) ** -0.5, 4)
-    1.0337
+    1.0336
     """
     return math.pow(1 - _LAPSE * min(altitude, _TROPOPAUSE), _EXPONENT)

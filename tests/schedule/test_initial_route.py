@@ -142,7 +142,7 @@ def test_a_creep_is_short_ways_and_waits() -> None:
     w = np.outer(0.25 * t, [0.0, 1.0])
     route = check(t, w, plan_with())
     assert 3 <= np.count_nonzero(route.waits) <= 6
-    assert (route.speeds >= 1.5).all()
+    assert (route.speeds >= 0.75).all()
     at = np.stack([np.interp(t, route.departures, x) for x in route.positions.T], axis=-1)
     assert lengths(at - w).max() <= 2.5
 

@@ -21,8 +21,8 @@ from faao_mav.vehicle.atmosphere import density_ratio
 from faao_mav.vehicle.predict import predict
 
 STEP = 0.2
-RATIO = 1 / density_ratio(684.0)
-"""True over commanded airspeed, as in ArduPilot's simulator, where the plans are flown."""
+RATIO = density_ratio(684.0) ** -0.5
+"""True over commanded airspeed."""
 
 
 def plane_plan(**changes: float) -> Plan:
@@ -122,8 +122,8 @@ def test_items_are_an_aeroplanes(flight: tuple[Conversion, Trajectory]) -> None:
 @pytest.mark.parametrize(
     ("parameters", "key"),
     [
-        ({"AIRSPEED_MIN": 12.5}, r"min_speed: 12 m/s; the plane flies 13.36 to 23.51 m/s"),
-        ({"AIRSPEED_MAX": 14.5}, r"max_speed: 16 m/s; the plane flies 9.616 to 15.49 m/s"),
+        ({"AIRSPEED_MIN": 12.5}, r"min_speed: 12 m/s; the plane flies 12.92 to 22.74 m/s"),
+        ({"AIRSPEED_MAX": 14.5}, r"max_speed: 16 m/s; the plane flies 9.303 to 14.99 m/s"),
         ({"NAVL1_PERIOD": 0}, "NAVL1_PERIOD: 0"),
     ],
 )
