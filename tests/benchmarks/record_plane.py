@@ -42,6 +42,7 @@ PARAMETERS = {
     "NAVL1_PERIOD": 15.0,
     "WP_RADIUS": 50.0,
     "WP_LOITER_RAD": 80.0,
+    "SIM_ARSPD_RATIO": 2.0,
 }
 """What the simulator's plane has that is not ArduPlane's default."""
 
