@@ -11,7 +11,6 @@ from faao_mav.mission.fence_area import OUTSIDE, free_area
 from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.plan import Plan
-from faao_mav.plan.autopilots import VEHICLES
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
 _SIDES = 64
 """Sides of the polygon inside a circle that stands for an inclusion: 0.12 % of the radius is lost.
 Chosen."""
-
 
 _SIMPLER = 0.05
 """By how much, m, arcs are simplified where one of several inclusions is enough. Chosen."""
@@ -94,11 +92,11 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
     if plan.fence is None or not plan.geofence:
         return None
     zones = plan.zones
-    inside = free_area(zones, any_inclusion=_any_inclusion(plan))
+    inside = free_area(zones, any_inclusion=plan.any_inclusion)
     inclusions = [
         zone.shape if zone.disc is None else _disc(*zone.disc) for zone in zones if zone.inclusion
     ]
-    if len(inclusions) > 1 and inside is not None and _any_inclusion(plan):
+    if len(inclusions) > 1 and inside is not None and plan.any_inclusion:
         inclusions = [inside.buffer(-_SIMPLER).simplify(_SIMPLER)]
     pieces: list[Real] = []
     radii: list[float] = []
@@ -136,10 +134,6 @@ def _disc(east: float, north: float, radius: float) -> "BaseGeometry":
     import shapely
 
     return shapely.Point(east, north).buffer(radius, quad_segs=_SIDES // 4)
-
-
-def _any_inclusion(plan: Plan) -> bool:
-    return VEHICLES[plan.vehicle.autopilot, plan.vehicle.type].any_inclusion
 
 
 def _sides(corners: Real) -> tuple[Real, Real]:

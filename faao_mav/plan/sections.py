@@ -460,15 +460,19 @@ class Plan(PlanFile):
         return _zones(self.geofence, LocalFrame(self.origin.latitude, self.origin.longitude))
 
     @property
+    def any_inclusion(self) -> bool:
+        """Whether the vehicle's fence asks for one of several inclusions, not for all of them."""
+        return VEHICLES[self.vehicle.autopilot, self.vehicle.type].any_inclusion
+
+    @property
     def keep_in(self) -> FreeArea | None:
         """Where `geofence` lets the aircraft be, local metres; None without a fence.
 
-        `fence.margin` is not taken off. Of several inclusions PX4 asks for one, ArduPilot for all.
+        `fence.margin` is not taken off.
         """
         if not self.geofence:
             return None
-        vehicle = VEHICLES[self.vehicle.autopilot, self.vehicle.type]
-        return _free_area(self.zones, vehicle.any_inclusion)
+        return _free_area(self.zones, self.any_inclusion)
 
     def megabits(self, rate: float) -> float | None:
         """Return `rate`, bit/s/Hz, in Mbit/s; None without `radio.bandwidth_mhz`."""

@@ -8,16 +8,13 @@ Its track is kept every half second and at each change of the current item, from
 take-off is over.
 """
 
-import csv
 import os
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from record_px4 import Leg, legs, thinned
+from record_px4 import Leg, flown_by, keep, legs
 from recorded import FLIGHTS
 
 from faao_mav.geodesy import LocalFrame
@@ -150,24 +147,11 @@ def record(name: str, runner: Path) -> None:
     """Fly the mission called `name` and keep its track; again if the simulator fails."""
     target = FOLDER / f"{name}.waypoints"
     target.write_text(write_wpl(made(name)))
-    with tempfile.TemporaryDirectory() as folder:
-        track = Path(folder) / "track.csv"
-        command = [sys.executable, str(runner), str(target), "--out", str(track), "--hz", "20"]
-        command += ["--vehicle", "plane", "--speedup", "20", "--tail", "3"]
-        for _ in range(4):
-            if subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0:
-                break
-        else:
-            raise SystemExit(f"{name}: not flown")
-        with track.open() as file:
-            rows = list(csv.DictReader(file))
+    options = ["--vehicle", "plane", "--speedup", "20", "--tail", "3"]
+    rows = flown_by(runner, target, options)
     taken_off = next(float(row["t_s"]) for row in rows if int(row["seq"]) > 1)
     rows = [row for row in rows if float(row["t_s"]) >= taken_off - 1]
-    keys = ("t_s", "lat", "lon", "alt_rel_m", "vx", "vy", "vz", "seq")
-    with target.with_suffix(".csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, keys, extrasaction="ignore", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(thinned(rows))
+    keep(rows, target, ("t_s", "lat", "lon", "alt_rel_m", "vx", "vy", "vz", "seq"))
 
 
 def main() -> None:

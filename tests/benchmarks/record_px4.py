@@ -11,7 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -183,18 +183,27 @@ def record(name: str, runner: Path) -> None:
     target.write_text(write_wpl(mission))
     values = target.with_suffix(".params")
     values.write_text(render_parameters(settings, PX4_COPTER.family.parameter_style))
+    options = ["--param-file", str(values), "--params", "SIH_KDV=0.2", "--speedup", "10"]
+    keep(flown_by(runner, target, options), target, ("t_s", "lat", "lon", "alt_rel_m", "seq"))
+
+
+def flown_by(runner: Path, mission: Path, options: list[str]) -> list[dict[str, str]]:
+    """Fly the file `mission` by `runner` and return the rows of its track, 20 a second."""
     with tempfile.TemporaryDirectory() as folder:
         track = Path(folder) / "track.csv"
-        command = [sys.executable, str(runner), str(target), "--out", str(track), "--hz", "20"]
-        command += ["--param-file", str(values), "--params", "SIH_KDV=0.2", "--speedup", "10"]
+        command = [sys.executable, str(runner), str(mission), "--out", str(track), "--hz", "20"]
         for _ in range(4):
-            if subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0:
+            done = subprocess.run([*command, *options], stdout=subprocess.DEVNULL, check=False)
+            if done.returncode == 0:
                 break
         else:
-            raise SystemExit(f"{name}: not flown")
+            raise SystemExit(f"{mission.stem}: not flown")
         with track.open() as file:
-            rows = list(csv.DictReader(file))
-    keys = ("t_s", "lat", "lon", "alt_rel_m", "seq")
+            return list(csv.DictReader(file))
+
+
+def keep(rows: list[dict[str, str]], target: Path, keys: Sequence[str]) -> None:
+    """Write the columns `keys` of the thinned track beside the mission `target`."""
     with target.with_suffix(".csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, keys, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()

@@ -51,7 +51,10 @@ class KeepOut(HalfPlanes):
 
     @property
     def headroom(self) -> float:
-        """The slack, 100 m, that starts are given where they have less. Chosen."""
+        """The slack, in 100 m, that starts are given where they have less.
+
+        Of 0.1, 0.02 and 0.005 it led a start among forty polygons farthest.
+        """
         return 0.02
 
     @property
