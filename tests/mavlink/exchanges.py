@@ -111,7 +111,7 @@ def played(lines: list[str], talk: Talk, vehicle: Address) -> list[str]:
             expected += 1
         out.append(line)
         if line.startswith("~"):
-            answers = talk([], float(line[2:]), 1000)
+            answers = talk([], float(line[2:]), expected)
         else:
             answers = talk([_parsed(line[2:].split(), vehicle)], PATIENCE, expected)
         out += [f"< {_written(answer)}" for answer in answers]
@@ -193,7 +193,8 @@ def renewed(kind: str, autopilots: Path, where: Path) -> str:
         (found,) = link.run(Discovery(patience=20.0))
 
         def talk(messages: list[Message], patience: float, expected: int) -> list[Message]:
-            return link.run(Conversation(messages, patience, expected))
+            # What is said late, on a busy machine, is waited for.
+            return link.run(Conversation(messages, max(patience, PATIENCE), expected))
 
         return "\n\n".join(
             "\n".join([f"# {name}", *played(lines, talk, found.address)])
