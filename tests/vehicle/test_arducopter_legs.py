@@ -43,7 +43,7 @@ def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(
     bounds: LegBounds, length: float
 ) -> None:
     leg = planned(length, bounds)
-    t = np.linspace(0, leg.duration, 4001)
+    t = np.linspace(0, leg.duration, 2001)
     s, v, a = np.array([leg.at(x) for x in t]).T
     h = t[1]
     slack = bounds.jerk * h * h  # of the trapezoidal rule
