@@ -6,12 +6,10 @@ from faao_mav.validate import (
     cages,
     delivery,
     extent,
-    fence_keeping,
     fences,
     items,
     px4_checks,
     px4_flight,
-    px4_radius,
     refusals,
     shape,
     speed_commands,
@@ -19,8 +17,7 @@ from faao_mav.validate import (
 )
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.demands import Limits, LinkCheck, Stretch
-from faao_mav.validate.finding import Finding, Level
-from faao_mav.validate.rule import Rule
+from faao_mav.validate.rule import Finding, Level, Rule
 from faao_mav.vehicle import Track, Vehicle
 
 __all__ = [
@@ -38,8 +35,8 @@ __all__ = [
 RULES: tuple[Rule, ...] = tuple(
     rule
     for module in (
-        *(items, refusals, ardupilot, px4_checks, px4_flight, px4_radius, cages, speed_commands),
-        *(speeds, shape, extent, fences, fence_keeping, delivery),
+        *(items, refusals, ardupilot, px4_checks, px4_flight, cages, speed_commands),
+        *(speeds, shape, extent, fences, delivery),
     )
     for rule in module.RULES
 )

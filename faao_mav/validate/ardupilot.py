@@ -6,8 +6,7 @@ from itertools import pairwise
 
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
-from faao_mav.validate.finding import Level
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.rule import Issue, Level, Rules
 from faao_mav.vehicle import ARDUCOPTER, ARDUPLANE
 from faao_mav.vehicle.dialect import name_of
 

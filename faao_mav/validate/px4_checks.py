@@ -5,8 +5,7 @@ from collections.abc import Iterator
 
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, number
-from faao_mav.validate.finding import Level
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.rule import Issue, Level, Rules
 from faao_mav.validate.straight import PlacedItem
 from faao_mav.vehicle import PX4_COPTER
 from faao_mav.vehicle.dialect import name_of

@@ -1,17 +1,45 @@
-"""What a rule is, and how the modules of rules list theirs."""
+"""What a rule is and finds, and how the modules of rules list theirs."""
 
 from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import partialmethod
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.mission.item import MissionItem
-from faao_mav.validate.finding import Finding, Level
 from faao_mav.vehicle import AutopilotFamily, Vehicle
 from faao_mav.vehicle.dialect import name_of
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
+
+
+class Level(StrEnum):
+    """How bad it is.
+
+    `ERROR`: the autopilot refuses the mission, or the flight is dangerous or breaks a limit that
+    was set. `WARNING`: it will not fly as it is written. `NOTE`: worth knowing.
+    """
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that a rule found.
+
+    `item` is the number that people see: the row of a `.waypoints` file, where row 0 is home, and
+    the item's number in QGroundControl and Mission Planner; None if it is about no single item.
+    `message` says what is the context, with the value and the limit; `action` what to do about it.
+    """
+
+    level: Level
+    rule: str
+    item: int | None
+    message: str
+    action: str
 
 
 @dataclass(frozen=True, slots=True)

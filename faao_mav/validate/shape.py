@@ -41,16 +41,7 @@ def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, f
         item = context.items[before.index]
         passed = item.command == Command.NAV_WAYPOINT and not item.params[0] > 0
         if passed and after.start == before.end and not after.spline:
-            yield before, after, math.degrees(abs(_turn(before, after)))
-
-
-def _turn(before: Straight, after: Straight) -> float:
-    angle = _heading(after) - _heading(before)
-    return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
-def _heading(leg: Straight) -> float:
-    return math.atan2(leg.end.east - leg.start.east, leg.end.north - leg.start.north)
+            yield before, after, math.degrees(before.turn(after))
 
 
 @RULES.note(
