@@ -32,8 +32,9 @@ def _what(part: Area | None) -> str:
     return f"{'outside' if part.inclusion else 'inside'} {part.name}"
 
 
-@RULES.error("fence-crosses-itself", "a fence polygon crosses itself", _GEOMETRY)
+@RULES.error("fence-crosses-itself", _GEOMETRY)
 def _crosses(context: ValidationContext) -> Iterator[Issue]:
+    """A fence polygon crosses itself."""
     for area in context.fence.areas if context.fence else ():
         if area.crosses_itself:
             yield Issue(
@@ -43,16 +44,18 @@ def _crosses(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error("fence-home", "home lies outside the fence", _GEOMETRY)
+@RULES.error("fence-home", _GEOMETRY)
 def _home(context: ValidationContext) -> Iterator[Issue]:
+    """Home lies outside the fence."""
     if context.home is not None:
         for issue in _points(context, [("home", (0.0, 0.0))], "move home or the fence"):
             then = context.vehicle.type.home_outside_fence
             yield replace(issue, message="; ".join(filter(None, (issue.message, then))))
 
 
-@RULES.error("fence-rally", "a rally point lies outside the fence", _GEOMETRY)
+@RULES.error("fence-rally", _GEOMETRY)
 def _rally(context: ValidationContext) -> Iterator[Issue]:
+    """A rally point lies outside the fence."""
     if context.fence is not None:
         points = [
             (f"rally point {n}", context.fence.frame.to_local(point.latitude, point.longitude))
@@ -61,8 +64,9 @@ def _rally(context: ValidationContext) -> Iterator[Issue]:
         yield from _points(context, points, "move the rally point or the fence")
 
 
-@RULES.error("fence-return", "the breach return point lies outside the fence", _GEOMETRY)
+@RULES.error("fence-return", _GEOMETRY)
 def _return(context: ValidationContext) -> Iterator[Issue]:
+    """The breach return point lies outside the fence."""
     point = context.mission.fence.breach_return
     if context.fence is not None and point is not None:
         local = context.fence.frame.to_local(point.latitude, point.longitude)
@@ -81,8 +85,9 @@ def _points(
         yield Issue(None, f"{points[k][0]} is {' and '.join(map(_what, broken.parts(k)))}", action)
 
 
-@RULES.error("fence-leg", "a leg leaves the fence", _GEOMETRY)
+@RULES.error("fence-leg", _GEOMETRY)
 def _legs(context: ValidationContext) -> Iterator[Issue]:
+    """A leg leaves the fence."""
     fence = context.fence
     if fence is None or not context.legs:
         return
@@ -105,8 +110,9 @@ def _legs(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.error("fence-flight", "the predicted flight leaves the fence", _GEOMETRY)
+@RULES.error("fence-flight", _GEOMETRY)
 def _flight(context: ValidationContext) -> Iterator[Issue]:
+    """The predicted flight leaves the fence."""
     fence, track = context.fence, context.track
     if fence is None or track is None or not len(fence.flight):
         return
@@ -124,7 +130,7 @@ def _flight(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning("fence-close", f"less than {LEAST_MARGIN:g} m from the fence", _GEOMETRY)
+@RULES.warning("fence-close", _GEOMETRY, summary=f"less than {LEAST_MARGIN:g} m from the fence")
 def _close(context: ValidationContext) -> Iterator[Issue]:
     nearest = context.fence.nearest if context.fence else None
     if nearest is not None and nearest[0] < LEAST_MARGIN:
@@ -136,8 +142,9 @@ def _close(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.note("fence-margin", "how near the mission comes to the fence", _GEOMETRY)
+@RULES.note("fence-margin", _GEOMETRY)
 def _margin(context: ValidationContext) -> Iterator[Issue]:
+    """How near the mission comes to the fence."""
     nearest = context.fence.nearest if context.fence else None
     if nearest is not None and nearest[0] >= LEAST_MARGIN:
         yield Issue(
@@ -148,11 +155,10 @@ def _margin(context: ValidationContext) -> Iterator[Issue]:
 
 
 @RULES.note(
-    "fence-not-kept",
-    "the vehicle's parameters let it fly on where it leaves the fence",
-    "FENCE_ENABLE, FENCE_TYPE, FENCE_ACTION (ArduPilot 4.7); GF_ACTION (PX4 1.16)",
+    "fence-not-kept", "FENCE_ENABLE, FENCE_TYPE, FENCE_ACTION (ArduPilot 4.7); GF_ACTION (PX4 1.16)"
 )
 def _not_kept(context: ValidationContext) -> Iterator[Issue]:
+    """The vehicle's parameters let it fly on where it leaves the fence."""
     response = context.vehicle.type.at_fence(context.vehicle)
     if context.fence is None or response.keeps or not response.parameter:
         return
@@ -168,10 +174,10 @@ def _not_kept(context: ValidationContext) -> Iterator[Issue]:
 
 @_ARDUPILOT.note(
     "ardupilot-fence-margin",
-    "the mission comes nearer to the fence than FENCE_MARGIN",
     "measured on ArduCopter 4.7: in AUTO it flies on, at 1 m with FENCE_MARGIN 2 too",
 )
 def _fence_margin(context: ValidationContext) -> Iterator[Issue]:
+    """The mission comes nearer to the fence than FENCE_MARGIN."""
     nearest = context.fence.nearest if context.fence else None
     margin = context.vehicle.value("fence_margin")
     if nearest is not None and nearest[0] < margin:
@@ -186,10 +192,10 @@ def _fence_margin(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.error(
     "fence-ahead",
-    "the vehicle takes a flight towards the fence for one that leaves it",
     "GF_PREDICT: PX4 1.16 GeofenceBreachAvoidance; measured: at 7 m/s it stopped 32 m before",
 )
 def _ahead(context: ValidationContext) -> Iterator[Issue]:
+    """The vehicle takes a flight towards the fence for one that leaves it."""
     vehicle, fence, track = context.vehicle, context.fence, context.track
     if fence is None or track is None or context.track_positions is None:
         return

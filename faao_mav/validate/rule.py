@@ -100,12 +100,16 @@ class Rules(list[Rule]):
         self._family = family
 
     def add(
-        self, level: Level, name: str, summary: str, source: str, kind: str | None = None
+        self, level: Level, name: str, source: str, *, summary: str = "", kind: str | None = None
     ) -> Decorator:
-        """Return a decorator that makes a rule of a check; for the arguments see `Rule`."""
+        """Return a decorator that makes a rule of a check; for the arguments see `Rule`.
+
+        Without a `summary` the check's docstring is it.
+        """
 
         def register(check: Check) -> Check:
-            self.append(Rule(name, level, summary, source, check, self._family, kind))
+            told = summary or _summary_of(check)
+            self.append(Rule(name, level, told, source, check, self._family, kind))
             return check
 
         return register
@@ -138,4 +142,11 @@ class Rules(list[Rule]):
                     told = {"name": name_of(item.command), "kind": context.vehicle.kind}
                     yield Issue(index, message.format(item=item, **told), action)
 
-        self.add(level, name, summary, source, kind)(check)
+        self.add(level, name, source, summary=summary, kind=kind)(check)
+
+
+def _summary_of(check: Check) -> str:
+    """Return the docstring of `check` as the end of a sentence: "A leg." becomes "a leg"."""
+    told = (check.__doc__ or "").removesuffix(".")
+    first = told.partition(" ")[0]
+    return told[:1].lower() + told[1:] if first[1:].islower() or len(first) == 1 else told
