@@ -15,22 +15,14 @@ from faao_mav.validate import (
     speed_commands,
     speeds,
 )
-from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.demands import Limits, LinkCheck, Stretch
-from faao_mav.validate.rule import Finding, Level, Rule
+from faao_mav.validate.context import ValidationContext as ValidationContext
+from faao_mav.validate.demands import Limits as Limits
+from faao_mav.validate.demands import LinkCheck as LinkCheck
+from faao_mav.validate.demands import Stretch as Stretch
+from faao_mav.validate.rule import Finding as Finding
+from faao_mav.validate.rule import Level as Level
+from faao_mav.validate.rule import Rule as Rule
 from faao_mav.vehicle import Track, Vehicle
-
-__all__ = [
-    "RULES",
-    "Finding",
-    "Level",
-    "Limits",
-    "LinkCheck",
-    "Rule",
-    "Stretch",
-    "ValidationContext",
-    "validate",
-]
 
 RULES: tuple[Rule, ...] = tuple(
     rule

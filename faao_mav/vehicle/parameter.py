@@ -87,7 +87,6 @@ class ParameterValues(Protocol):
 
     def value(self, key: str) -> float:
         """Return the value of the parameter `key` in the unit of its table."""
-        ...
 
 
 class ParameterRecord:
