@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from faao_mav.vehicle.parameter import Parameter
-from faao_mav.vehicle.registry import vehicle_type
+from faao_mav.vehicle.vehicle import vehicle_type
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
