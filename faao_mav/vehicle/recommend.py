@@ -7,20 +7,17 @@ a waypoint's altitude.
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from faao_mav.plan import Plan
 from faao_mav.vehicle.parameter import Parameter
 from faao_mav.vehicle.vehicle import vehicle_type
-
-if TYPE_CHECKING:
-    from faao_mav.plan import Plan
 
 _GENTLE = (1.35, 2.0)
 """The gentle accelerations to try, as multiples of a_max: 1.35 makes up for the time that
 a jerk-limited ramp loses (measured: 1.3 to 1.4 on near-straight plans); 2 is chosen."""
 
 
-def candidates(plan: "Plan") -> tuple[Mapping[str, float], ...]:
+def candidates(plan: Plan) -> tuple[Mapping[str, float], ...]:
     """Return the sets of parameters to try for `plan`, the gentlest first.
 
     One empty set if the plan keeps its vehicle's own, or if they are tuned on each vehicle, as an

@@ -5,15 +5,12 @@ Another vehicle is one folder with one `VehicleType` and one call of `register`.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
+from faao_mav.plan import Plan
 from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.vehicle_type import AutopilotFamily, LegLimits, VehicleType
-
-if TYPE_CHECKING:
-    from faao_mav.plan import Plan
 
 _TYPES: dict[tuple[str, str], VehicleType] = {}
 """The vehicle types that are known, by the names of autopilot and type."""
@@ -113,7 +110,7 @@ class Vehicle:
         return self.type.flight_model(self, latitude)
 
 
-def vehicle_of(plan: "Plan") -> Vehicle:
+def vehicle_of(plan: Plan) -> Vehicle:
     """Return the vehicle of `plan`."""
     given = plan.vehicle
     return Vehicle(
