@@ -23,7 +23,7 @@ from faao_mav.schedule.scheduler import Scheduler
 from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
-from faao_mav.vehicle.recommend import candidates
+from faao_mav.vehicle.vehicle import candidates
 
 # Chosen; what a change costs is not measured.
 _SPLINE_SPACING = 10.0  # the least distance of spline waypoints, m

@@ -118,6 +118,20 @@ def vehicle_of(plan: Plan) -> Vehicle:
     )
 
 
+def candidates(plan: Plan) -> tuple[Mapping[str, float], ...]:
+    """Return the sets of parameters to try for `plan`, the gentlest first.
+
+    An autopilot whose ramps take longer than the plan's falls behind at every one; one that turns
+    corners at a crawl does so in every curve. Few parameters decide that. One empty set if the plan
+    keeps its vehicle's own, or if they are tuned on each vehicle, as an aeroplane's are.
+    """
+    given = plan.vehicle
+    if plan.mission.parameters == "keep":
+        return ({},)
+    recommended = vehicle_type(given.autopilot, given.type).recommended
+    return tuple(recommended(given.max_speed, given.max_acceleration))
+
+
 def register(vehicle_type: VehicleType) -> VehicleType:
     """Make `vehicle_type` known by its names, to plans as well, and return it."""
     key = (vehicle_type.family.key, vehicle_type.kind)

@@ -8,8 +8,7 @@ from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs as ArduCopterLe
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.vehicle.flight_path import VerticalProfile
-from faao_mav.vehicle.parameter import ParameterValues
-from faao_mav.vehicle.recommend import accelerations_to_try
+from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
 from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType
 
 _FASTEST = 20.0
