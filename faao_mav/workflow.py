@@ -34,7 +34,7 @@ from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.vehicle.files import parameter_path, plan_target
 from faao_mav.vehicle.predict import predict
-from faao_mav.vehicle.recommend import candidates
+from faao_mav.vehicle.vehicle import candidates
 
 DRAWING_START = datetime(2000, 1, 1, tzinfo=UTC)
 """When the flight in a drawing (.kml) begins: a plan says how long it takes, not when it is."""

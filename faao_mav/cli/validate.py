@@ -78,7 +78,7 @@ def validate(
     Exit status: 0 nothing is wrong; 1 errors, with --strict also warnings; 2 unusable arguments
     or a file that cannot be read.
     """
-    from faao_mav.validate.finding import Level
+    from faao_mav.validate import Level
 
     if rules:
         _list_rules(as_json)

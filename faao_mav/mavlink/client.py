@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from faao_mav.errors import InputError, LinkError
-from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
+from faao_mav.mavlink.discover import AskAlive, AskHome, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.link import Observe, WireLink
-from faao_mav.mavlink.liveness import AskAlive
 from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.signing import Verdict, read_signing, remember

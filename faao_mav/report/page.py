@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from faao_mav.report.style import inline_svg
 from faao_mav.report.summary import Line, by_rule, check_lines, result_lines, said_of
+from faao_mav.validate import Finding
 from faao_mav.validate.check import Check
-from faao_mav.validate.finding import Finding
 from faao_mav.workflow import Result
 
 if TYPE_CHECKING:

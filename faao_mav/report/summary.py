@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from faao_mav.plan import Plan
+from faao_mav.validate import Finding, Level
 from faao_mav.validate.check import Check
-from faao_mav.validate.finding import Finding, Level
 from faao_mav.workflow import FenceSummary, Result
 
 Line: TypeAlias = tuple[str, str]

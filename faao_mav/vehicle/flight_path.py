@@ -83,11 +83,9 @@ class FlightModel(Protocol):
     @property
     def cruise_speed(self) -> float:
         """The vehicle's own speed, flown where none is commanded, m/s."""
-        ...
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
