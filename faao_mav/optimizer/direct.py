@@ -35,7 +35,7 @@ from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solut
 
 _LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded where a queue has a buffer, shares
-or a least speed. The plans of `_MONOTONE_AFTER` in `interior.search` need up to 290 steps."""
+or a least speed. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300 steps."""
 
 _EXACT_ITERATIONS = 12
 """The largest number of iterations at exact rates, after those in a table.

@@ -165,13 +165,17 @@ def test_what_a_queue_adds_to_the_matrix_grows_linearly() -> None:
     ("name", "changes"),
     [
         ("copter_relay", {"radio.bandwidth_mhz": 20, "radio.relay.buffer_mbytes": 20}),
-        (
-            "copter_relay",
-            {
-                "radio.bandwidth_mhz": 20,
-                "radio.relay.buffer_mbytes": 20,
-                "radio.duplex": "half",
-            },
+        *(
+            (
+                "copter_relay",
+                {
+                    "flight.duration": duration,
+                    "radio.bandwidth_mhz": 20,
+                    "radio.relay.buffer_mbytes": buffer,
+                    "radio.duplex": "half",
+                },
+            )
+            for duration, buffer in ((120, 5), (70, 2), (70, 20))
         ),
         ("plane_relay", {"flight.duration": 200}),
     ],

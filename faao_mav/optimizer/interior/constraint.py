@@ -57,8 +57,9 @@ class Stiffness:
     """The symmetric 2x2 blocks of K on w, v (3, flights, n) and a (3, flights, n - 1), 0 if none.
 
     `compliance` is the inverse of `a`, for a constraint that knows it better than by inversion.
-    `entries` are those of the constraint's own unknowns. `curvature` (3, flights, n) is that of
-    its functions of w, weighted by their multipliers, which is cut where it has the wrong sign.
+    `entries` are those of the constraint's own unknowns, of which the proximal term holds the
+    places `held` as it does w. `curvature` (3, flights, n) is that of its functions of w, weighted
+    by their multipliers, which is cut where it has the wrong sign.
     """
 
     w: Real | float = 0.0
@@ -67,6 +68,7 @@ class Stiffness:
     compliance: Real | None = None
     entries: Sequence[Entry] = ()
     curvature: Real | float = 0.0
+    held: Sequence[int] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +187,11 @@ class Constraint(ABC):
     @property
     def turns(self) -> bool:
         """Whether its half-planes turn so fast that mu has to wait for the iterates."""
+        return False
+
+    @property
+    def bilinear(self) -> bool:
+        """Whether its functions are products of w and unknowns of its own."""
         return False
 
     def entries(self, slots: int, first: int) -> Sequence[Entry]:  # noqa: ARG002

@@ -12,6 +12,7 @@ share of the barrier that keeps t below the F_j, and K, ds, s of every constrain
 `constraint`. Several flights take their steps side by side, each its own: see `iterate`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.optimizer.interior.banded import Factors, Q, V, W, Y
+from faao_mav.optimizer.interior.banded import Entry, Factors, Q, V, W, Y
 from faao_mav.optimizer.interior.cones import TINY
 from faao_mav.optimizer.interior.constraint import (
     Forces,
@@ -50,6 +51,7 @@ Chosen; what a change costs is not measured.
 class Newton:
     """The factored system at an iterate; `curvature` (3, flights, n) is H with its proximal term.
 
+    `proximal` (flights, 1) is that term, which holds the places `held` of a slot's unknowns too.
     `columns` are the solutions for the gradients of the F_j, and for mu = 0 without correction;
     `border` (flights, J, J) is what the first ones leave for the weights.
     """
@@ -57,6 +59,8 @@ class Newton:
     flight: ScaledFlight
     at: Iterate
     barrier_share: float
+    proximal: Real
+    held: Sequence[int]
     curvature: Real
     compliance: Real
     factors: Factors
@@ -87,11 +91,14 @@ class Newton:
         compliance[..., :-1] /= flight.gain**2
         if not flight.gains.all():
             compliance[..., :-1] = np.where(flight.gains > 0, compliance[..., :-1], _UNBOUNDED)
+        held = [place for each in stiffness for place in each.held]
+        entries = [entry for each in stiffness for entry in each.entries]
+        entries += [Entry(place, place, np.repeat(proximal, n, axis=1)) for place in held]
         factors = matrix.factor(
             np.asarray(added([curvature, *(each.w for each in stiffness)])),
             np.asarray(added(each.v for each in stiffness)),
             compliance,
-            [entry for each in stiffness for entry in each.entries],
+            entries,
         )
 
         right = np.zeros((links + 1, flights, n, matrix.size))
@@ -104,7 +111,18 @@ class Newton:
         border = np.einsum("cibn,jbnc->bij", at.gradient, columns[:links, ..., W])
         room = (at.total - at.floor) / at.weights
         border[:, range(links), range(links)] += room[..., 0].T
-        return cls(flight, at, barrier_share, curvature, compliance, factors, columns, border)
+        return cls(
+            flight,
+            at,
+            barrier_share,
+            proximal,
+            held,
+            curvature,
+            compliance,
+            factors,
+            columns,
+            border,
+        )
 
     def looks_convex(self, direction: Direction) -> Flags:
         """Tell whether the systems look like those of minima, by two signs, (flights, 1)."""
@@ -194,8 +212,10 @@ class Newton:
         )
 
     def bend(self, direction: Direction) -> Real:
-        """Return dw^T H dw, (flights, 1)."""
-        return quadratic(self.curvature, direction.move.w)
+        """Return dw^T H dw, and what the proximal term has of other unknowns, (flights, 1)."""
+        own = direction.move.unknowns[..., self.held]
+        others = (own * own).sum(axis=(1, 2))[:, None]
+        return np.asarray(quadratic(self.curvature, direction.move.w) + self.proximal * others)
 
     def decrease(self, direction: Direction, bend: Real) -> Real:
         """Return the curvature of the whole model along a `direction` of `bend`, (flights, 1)."""

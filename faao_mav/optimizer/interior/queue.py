@@ -15,6 +15,10 @@ the worth of I_U, of I_G and of the queue,
 
 so that p_n falls from slot to slot while the queue is the bottleneck. The rates are no linear
 functions of w: by how much a step misses them stays as a margin, which the next step takes up.
+
+Half duplex is bilinear in x and w, with the Hessian -(z_1 grad I_U - z_2 grad I_G) between them. It
+is not definite: two slots that receive and forward in turn serve a flight that sways between the
+stations. Newton's matrix has it as it is, a proximal term on x and w keeps the directions uphill.
 """
 
 import math
@@ -68,6 +72,11 @@ class Queue(Constraint):
     def unknowns(self) -> int:
         """Return 2: q_n and p_n, or with shares 3: x_n too, the first."""
         return 3 if self.half else 2
+
+    @property
+    def bilinear(self) -> bool:
+        """Return whether there are shares."""
+        return self.half
 
     @property
     def corrections(self) -> int:
@@ -193,9 +202,10 @@ class QueueState(Slacks):
         steep = np.abs(self.slot.gradients).max(axis=0) * self.z[:2]
         return np.asarray(steep.sum(axis=0).max(axis=-1, keepdims=True))
 
-    def missing(self, share: Real, step: Any, then: "QueueState") -> Real:  # noqa: ARG002
+    def missing(self, share: Real, step: Any, then: "QueueState") -> Real:
         """Return by how much the rates fall short of their linear model, weighted."""
-        return summed(then.z * (then.margin - (1 - share) * self.margin))
+        missed = summed(then.z * (then.margin - (1 - share) * self.margin))
+        return np.asarray(missed - share**2 / 2 * step[-1])
 
     def _missed(self) -> Real:
         """Return q_n + r_n - f_n - q_{n+1}, (flights, n), 0 for the last slot."""
@@ -239,13 +249,22 @@ class QueueState(Slacks):
                 Entry(q, x, slot.series * I_G),
                 Entry(p, x, -outer * (I_U + slot.by_G * I_G)),
             ]
-            entries += [Entry(x, W.start + axis, -slot.series * I_G * g_G[axis]) for axis in (0, 1)]
+            crossed = self._crossed()
+            entries += [
+                Entry(x, W.start + axis, crossed[axis] - slot.series * I_G * g_G[axis])
+                for axis in (0, 1)
+            ]
         weighted = self.shares * self.z[:2]
         return Stiffness(
             w=slot.series * np.stack([g_G[0] * g_G[0], g_G[0] * g_G[1], g_G[1] * g_G[1]]),
             entries=entries,
             curvature=-(weighted * self.hessians).sum(axis=1),
+            held=(x,) if self.constraint.half else (),
         )
+
+    def _crossed(self) -> Real:
+        """Return the Hessian of the Lagrangian by x and w, (2, flights, n)."""
+        return np.asarray(self.z[1] * self.gradients[:, 1] - self.z[0] * self.gradients[:, 0])
 
     def _eliminated(
         self, m: Any, t: Any, p: Any, left: Any, risen: Any, dx: Any, dq: Any
@@ -292,7 +311,10 @@ class QueueState(Slacks):
         return super().target(mu, ahead[:2], share)
 
     def solved(self, move: Move, target: Real | None, rest: Forces) -> tuple[Any, Forces]:  # noqa: ARG002
-        """Return the changes of slacks, multipliers, r, f, q, p and x along `move`."""
+        """Return the changes of slacks, multipliers, r, f, q, p and x along `move`.
+
+        The last of the changes is the part of x and w in the curvature, (flights, 1).
+        """
         own = move.unknowns[..., self.own].transpose(2, 0, 1)
         dx = own[0] if self.constraint.half else np.zeros_like(own[0])
         dq, p = self.on[1] * own[-2], self.on[0] * own[-1]
@@ -302,11 +324,12 @@ class QueueState(Slacks):
         t = np.zeros_like(self.s) if target is None else target
         ds, z, dr, df = self._eliminated(self.margin, t, p, 1 - p, risen, dx, dq)
         force = Forces(w=(self.slot.gradients * z[:2]).sum(axis=1))
-        return (ds, z - self.z, dr, df, dq, p - self.p, dx), force
+        crossed = 2 * summed((self._crossed() * move.w).sum(axis=0) * dx)
+        return (ds, z - self.z, dr, df, dq, p - self.p, dx, crossed), force
 
     def curvature(self, step: Any) -> Real:
-        """Return the sum of z / s ds^2, the margins left out."""
-        return super().curvature(step[:2])
+        """Return the sum of z / s ds^2, the margins left out, and of the part of x and w."""
+        return np.asarray(super().curvature(step[:2]) + step[-1])
 
     def reach(self, step: Any) -> Real:
         """Return the share of `step` at which a slack or a multiplier vanishes."""
@@ -314,7 +337,7 @@ class QueueState(Slacks):
 
     def moved(self, w: Real, v: Real, share: Real, step: Any) -> "QueueState":  # noqa: ARG002
         """Return the state after `share` of `step`, with the rates at w."""
-        ds, dz, *changes = step
+        ds, dz, *changes, _ = step
         rewards = self.constraint.rewards
         rates = rewards.in_units(rewards.stage(w * LENGTH))
         names = ("r", "f", "q", "p", "x")
