@@ -115,13 +115,6 @@ class State(Protocol):
     def target(self, mu: Real, ahead: Any, share: Real) -> Any:
         """Return mu s^-1 less Mehrotra's correction by the `share` of the step `ahead`."""
 
-    def recentred(self, target: Any, mu: Real, step: Any, share: Real) -> Any:  # noqa: ARG002
-        """Return `target`, changed so that less of the `share` of `step` is lost to bad centring.
-
-        By default nothing is changed.
-        """
-        return target
-
     def solved(self, move: Move, target: Any, rest: Forces) -> tuple[Any, Forces]:
         """Return the constraint's changes along `move`, and the forces of its new multipliers.
 
@@ -180,11 +173,6 @@ class Constraint(ABC):
         return 0
 
     @property
-    def corrections(self) -> int:
-        """How often a direction of a search with this constraint is corrected at most."""
-        return 0
-
-    @property
     def turns(self) -> bool:
         """Whether its half-planes turn so fast that mu has to wait for the iterates."""
         return False
@@ -217,7 +205,6 @@ class ScaledFlight:
 
     def __init__(self, kin: Kinematics, constraints: Sequence[Constraint]) -> None:
         self.constraints = constraints
-        self.corrections = max(constraint.corrections for constraint in constraints)
         ends = SIZE + np.cumsum([constraint.unknowns for constraint in constraints])
         self.own = [
             slice(int(end) - constraint.unknowns, int(end))

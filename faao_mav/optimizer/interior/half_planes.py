@@ -36,9 +36,6 @@ from faao_mav.optimizer.interior.constraint import (
 )
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
-_FAR_FROM_CENTRE = 10.0
-"""The factor by which a product s z may differ from mu before it is corrected. Gondzio's."""
-
 
 @dataclass(frozen=True)
 class Slacks(State):
@@ -74,12 +71,6 @@ class Slacks(State):
     def target(self, mu: Real, ahead: tuple[Real, Real], share: Real) -> Real:
         """Return (mu - ds dz) / s at `share` of the step `ahead`."""
         return np.asarray((self.on * mu - ahead[0] * ahead[1] * share**2) / self.s)
-
-    def recentred(self, target: Real, mu: Real, step: Any, share: Real) -> Real:
-        """Return `target` with the products s z that `share` of `step` leads to drawn to mu."""
-        products = (self.s + share * step[0]) * (self.z + share * step[1])
-        change = np.clip(products, mu / _FAR_FROM_CENTRE, mu * _FAR_FROM_CENTRE) - products
-        return np.asarray(target + self.on * np.maximum(change, -_FAR_FROM_CENTRE * mu) / self.s)
 
     def raised(self, ds: Real, target: Real | None) -> Real:
         """Return the new multipliers `target` - z / s ds, (flights, n)."""

@@ -35,11 +35,6 @@ from faao_mav.optimizer.interior.iterate import Direction, Iterate
 _UNBOUNDED = np.array([1e20, 0.0, 1e20])[:, None, None]
 """The compliance of an acceleration without a limit: large enough that its force is nothing."""
 
-_LONGER, _MORE = 1.1, 0.1
-_WORTHWHILE = 0.1
-"""The reach that a correction aims at (`_LONGER` times that of the direction, and `_MORE`), and the
-share of what is missing to it that a correction has to win. Gondzio's."""
-
 _MIN_CURVATURE = 1e-8
 """The least curvature along a direction, per squared length, that counts as that of a minimum.
 
@@ -137,42 +132,13 @@ class Newton:
         """Return the direction for mu = 0 without a correction."""
         return self._direction(self.columns[-1], np.zeros((1, 1)), (None,) * len(self.at.states))
 
-    def corrector(self, mu: Real, ahead: Direction, share: Real) -> tuple[Direction, Real]:
-        """Return the direction for mu (flights, 1), corrected by `share` of `ahead`, and its reach.
-
-        While that is short, the targets of the products s z that it leads astray are corrected.
-        Source: Gondzio, "Multiple centrality corrections in a primal-dual method for linear
-        programming", Computational Optimization and Applications 6 (1996).
-        """
-        states = self.at.states
+    def corrector(self, mu: Real, ahead: Direction, share: Real) -> Direction:
+        """Return the direction for mu (flights, 1), corrected by `share` of `ahead`."""
+        flight, states = self.flight, self.at.states
+        right = np.zeros((1, self.at.w.shape[1], flight.matrix.slots, flight.matrix.size))
         targets = tuple(
             state.target(mu, step, share) for state, step in zip(states, ahead.steps, strict=True)
         )
-        direction = self.aimed(mu, targets)
-        reach = direction.reach(self.at)
-        going = np.ones(reach.shape, dtype=np.bool_)
-        for _ in range(self.flight.corrections):
-            aim = np.minimum(1, _LONGER * reach + _MORE)
-            others = tuple(
-                state.recentred(target, mu, step, aim)
-                for state, target, step in zip(states, targets, direction.steps, strict=True)
-            )
-            other = self.aimed(mu, others)
-            farther = other.reach(self.at)
-            going &= (reach < 1) & (farther > reach + _WORTHWHILE * (aim - reach))
-            if not going.any():
-                break
-            targets = tuple(
-                np.where(going, new, old) for new, old in zip(others, targets, strict=True)
-            )
-            direction = other if going.all() else self.aimed(mu, targets)
-            reach = np.where(going, farther, reach)
-        return direction, reach
-
-    def aimed(self, mu: Real, targets: tuple[Any, ...]) -> Direction:
-        """Return the direction for mu (flights, 1) and the `targets` of the constraints."""
-        flight, states = self.flight, self.at.states
-        right = np.zeros((1, self.at.w.shape[1], flight.matrix.slots, flight.matrix.size))
         pushes = [state.push(target) for state, target in zip(states, targets, strict=True)]
         _load(right[0], flight, self.compliance, pushes)
         return self._direction(self.columns[-1] + self.factors.solve(right)[0], mu, targets)

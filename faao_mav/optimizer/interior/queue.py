@@ -78,15 +78,6 @@ class Queue(Constraint):
         """Return whether there are shares."""
         return self.half
 
-    @property
-    def corrections(self) -> int:
-        """Return 2 where shares or a buffer make many slots change their bounds at once.
-
-        Measured: `copter_relay.yaml` with T = 70 s in half duplex takes 71 iterations in place of
-        99, and converges with half duplex and a buffer of 20 MB. 1 gains nothing.
-        """
-        return 2 if self.half or math.isfinite(self.buffer) else 0
-
     def entries(self, slots: int, first: int) -> Sequence[Entry]:
         """Return what the equations of the queue have of the next slot, and of the ends."""
         q, p = first + self.half, first + self.half + 1

@@ -295,8 +295,8 @@ class Search:
         hugged = queued & (control.centrings >= _MONOTONE_AFTER)
         waits = hugged | self.turning | self.bilinear
         control.mu = np.fmax(np.where(waits, monotone, adaptive), least)
-        direction, reach = newton.corrector(control.mu, ahead, share)
-        share = np.minimum(1, _TO_BOUNDARY * reach)
+        direction = newton.corrector(control.mu, ahead, share)
+        share = np.minimum(1, _TO_BOUNDARY * direction.reach(at))
         sound = newton.factors.sound
         moved = self._accept(newton, direction, share, sound)
         if not moved.all():
