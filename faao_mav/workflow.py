@@ -280,7 +280,7 @@ def plan_mission(
     solution = result.solution
     if observe is not None:
         observe(Progress(1, 1, "the mission's timing", solution.history[-1]))
-    result = _with_mission(result)
+    result = with_mission(result)
     ceiling = None
     if bound:
         from faao_mav.optimizer.search.bound import upper_bound
@@ -296,7 +296,7 @@ def plan_mission(
     )
 
 
-def _with_mission(result: Result) -> Result:
+def with_mission(result: Result) -> Result:
     """Return `result` with its mission, or with why there is none."""
     solution = result.solution
     try:

@@ -60,8 +60,8 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
         mission, vehicle = read_mission(out), Vehicle(kind)
         assert download(connection).items == tuple(map(vehicle.type.dialect.stored, mission.items))
 
-        arguments = ("fly", out, "--to", connection, "--solution", save, "--arm", "--json")
-        result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+        fly_it = ("fly", out, "--to", connection, "--solution", save, "--arm", "--json")
+        result = CliRunner().invoke(app, [str(argument) for argument in fly_it])
         assert result.exit_code == 0, result.output
     *lines, end = map(json.loads, result.stdout.splitlines())
     assert end["ending"] == "finished"

@@ -16,8 +16,8 @@ class FlightRecord:
     """A vehicle's own estimate of where it was.
 
     `t` (k,), s, is the vehicle's clock, which increases; `latitude` and `longitude` (k,) are
-    degrees, `height` (k,) metres above home. `wind` (2,) is the mean of what it estimated while
-    it moved, m/s towards east and north, None where it did not. `parameters` are those that the
+    degrees, `height` (k,) metres above home. `wind` (m, 3) is the wind as it was estimated: times,
+    s, and m/s towards east and north, None where that is not known. `parameters` are those that the
     log names.
     """
 
@@ -27,6 +27,17 @@ class FlightRecord:
     height: Real
     wind: Real | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def mean_wind(self, start: float, duration: float) -> Real | None:
+        """Return the mean (2,) of the wind in that time, None where nothing was estimated.
+
+        ArduCopter that is not told how its air drag is estimates none, and logs zeros.
+        """
+        if self.wind is None:
+            return None
+        t, values = self.wind[:, 0], self.wind[:, 1:]
+        values = values[(t >= start) & (t <= start + duration)]
+        return np.asarray(values.mean(axis=0)) if values.any() else None
 
     def line(self, solution: Solution) -> Line:
         """Return it in the local metres of the solution's plan."""
