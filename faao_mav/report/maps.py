@@ -82,13 +82,13 @@ def route_map(
     _draw_fence(plot, outlines)
     _draw_margin(plot, solution.plan)
     _coloured(plot, solution)
+    for path in real:
+        plot.plot(*path.T, color=SERIES[1], linewidth=1.6, label="flown")
     if conversion is not None:
         plot.plot(*lines[1].T, "--", color=INK, linewidth=0.9, label="predicted")
         for way, name in zip(lines[2:], ("from and to home", None), strict=False):
             plot.plot(*way.T, color=MUTED, linewidth=0.9, label=name)
         _draw_waypoints(plot, places, "waypoint")
-    for path in real:
-        plot.plot(*path.T, color=SERIES[2], linewidth=1.4, label="flown")
     mark_stations(plot, list(marked))
     _show_all(plot, np.concatenate([*lines, *real, stations, places]), outlines, title)
     _write_numbers(plot, numbers, places, [*lines, *real], stations)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -63,8 +63,7 @@ def _read_bin(path: Path) -> FlightRecord:
     parameters = {}
     if path.stat().st_size == 0:
         raise InputError(f"{path}: empty")
-    log = DFReader_binary(str(path))
-    for message in _messages(log, ["POS", "XKF2", "NKF2", "PARM"]):
+    for message in _messages(DFReader_binary, path, ["POS", "XKF2", "NKF2", "PARM"]):
         if message.get_type() == "POS":
             height = getattr(message, "RelHomeAlt", math.nan)
             fixes.append((message.TimeUS / 1e6, message.Lat, message.Lng, height))
@@ -82,8 +81,8 @@ def _read_tlog(path: Path) -> FlightRecord:
     winds: list[_Wind] = []
     parameters = {}
     system = None
-    log = mavlogfile(str(path))
-    for message in _messages(log, ["GLOBAL_POSITION_INT", "WIND", "WIND_COV", "PARAM_VALUE"]):
+    kinds = ["GLOBAL_POSITION_INT", "WIND", "WIND_COV", "PARAM_VALUE"]
+    for message in _messages(mavlogfile, path, kinds):
         kind = message.get_type()
         if kind == "GLOBAL_POSITION_INT" and system in (None, message.get_srcSystem()):
             system = message.get_srcSystem()
@@ -108,7 +107,8 @@ def _read_ulg(path: Path) -> FlightRecord:
         raise InputError(
             f"{path}: PX4's logs are read by pyulog: pip install 'faao-mav[debrief]'"
         ) from None
-    log = ULog(str(path), ["vehicle_global_position", "home_position", "wind"])
+    with path.open("rb") as file:
+        log = ULog(file, ["vehicle_global_position", "home_position", "wind"])
     topics = {each.name: each.data for each in log.data_list if each.multi_id == 0}
     if "vehicle_global_position" not in topics:
         raise InputError(f"{path}: no vehicle_global_position in this log")
@@ -126,9 +126,16 @@ def _read_ulg(path: Path) -> FlightRecord:
     return _record(list(fixes), winds, parameters)
 
 
-def _messages(log: Any, kinds: list[str]) -> Iterator[Any]:
-    while (message := log.recv_match(type=kinds)) is not None:
-        yield message
+def _messages(reader: Any, path: Path, kinds: list[str]) -> Iterator[Any]:
+    """Yield the messages of some `kinds` in the log at `path`, by a `reader` of pymavlink."""
+    log = reader.__new__(reader)
+    try:
+        log.__init__(str(path))  # where that fails half-way there is a file to close all the same
+        while (message := log.recv_match(type=kinds)) is not None:
+            yield message
+    finally:
+        with suppress(AttributeError):
+            log.close()
 
 
 def _record(fixes: list[_Fix], winds: list[_Wind], parameters: dict[str, float]) -> FlightRecord:
