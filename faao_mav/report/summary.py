@@ -217,7 +217,7 @@ def debriefing_lines(found: Debriefing) -> Iterator[Line]:
     solution, plan = found.solution, found.solution.plan
     bandwidth = plan.radio.bandwidth_mhz
     for name, flight in (("predicted", found.predicted), ("flown", found.flown)):
-        late = flight.duration - plan.flight.duration
+        late = round(flight.duration - plan.flight.duration, 1) + 0.0  # no minus before 0.0
         yield (
             name,
             f"delivers {_of_plan(flight.delivered_rate, solution.delivered_rate, bandwidth)}"
