@@ -19,7 +19,7 @@ from faao_mav.vehicle import Track, Vehicle
 from faao_mav.vehicle.files import parameter_path
 
 HOME = Home(-35.363262, 149.165237, 584.0)
-SPEEDUP = 40.0
+SPEEDUP = 20.0
 
 SHORTER: dict[str, Any] = {
     "flight.start": [0, 100],

@@ -23,7 +23,8 @@ from faao_mav.cli.shared import (
 )
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.flying.watch import Samples, Watch
+    from faao_mav.mavlink.flying.telemetry import Samples
+    from faao_mav.mavlink.flying.watch import Watch
     from faao_mav.mission.formats import MissionFile
     from faao_mav.optimizer.solution import Solution
     from faao_mav.validate.flown import Debriefing, Line, Standing
@@ -142,21 +143,22 @@ class _Telling:
         self, solution: "Solution | None", track: "Track | None", *, as_json: bool
     ) -> None:
         self._solution, self._as_json = solution, as_json
-        self._told, self._next, self._last = 0, 0.0, float("-inf")
+        self._told, self._next, self._last = 0, 0.0, -_PERIOD
         self._line = None if solution is None else _predicted_line(solution, track)
 
     def __call__(self, watch: "Watch") -> None:
         """Print what has happened since the last call, and once a second how the flight stands."""
-        for text in watch.told[self._told :]:
+        seen = watch.seen
+        for text in seen.told[self._told :]:
             typer.echo(json.dumps({"note": text}) if self._as_json else f"-- {text}")
-        self._told = len(watch.told)
-        t, now = watch.samples.t, time.monotonic()
-        if not t or watch.heartbeat is None or now < self._next or t[-1] < self._last + _PERIOD:
+        self._told = len(seen.told)
+        now, t = time.monotonic(), seen.samples.t[-1] if seen.samples.t else float("-inf")
+        if seen.heartbeat is None or now < self._next or t < self._last + _PERIOD:
             return
-        self._next, self._last = now + _PERIOD, t[-1]
+        self._next, self._last = now + _PERIOD, t
         stands = None
         if watch.phase not in ("checking", "arming", "starting", "waiting"):
-            stands = self._standing(watch.samples)
+            stands = self._standing(seen.samples)
         told = _as_dict(watch, stands, self._solution)
         typer.echo(json.dumps(told, allow_nan=False) if self._as_json else _as_text(told))
 
@@ -184,14 +186,14 @@ def _as_dict(
     watch: "Watch", stands: "Standing | None", solution: "Solution | None"
 ) -> dict[str, Any]:
     """Return a line of `--json`: s, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
-    samples, status = watch.samples, watch.status
+    samples, status = watch.seen.samples, watch.seen.status
     volts = status.voltage_battery if status is not None else _NO_VOLTAGE
     percent = status.battery_remaining if status is not None else -1
     told: dict[str, Any] = {
         "t": samples.t[-1],
         "phase": watch.phase,
-        "mode": watch.mode,
-        "item": watch.row,
+        "mode": watch.seen.mode,
+        "item": watch.seen.row,
         "height": samples.height[-1],
         "volts": None if volts == _NO_VOLTAGE else volts / 1000,
         "battery": None if percent < 0 else percent,

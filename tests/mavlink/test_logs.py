@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import edited
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -25,19 +26,10 @@ from faao_mav.mavlink.flying.logs import read_log
 from faao_mav.mavlink.flying.record import FlightRecord
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import save_solution
-from missions import plan_of
+from faao_mav.plan import parse_plan
 
 LOGS = Path(__file__).parent.parent / "data" / "logs"
-FLOWN = {
-    "flight.duration": 60,
-    "flight.altitude": 20,
-    "flight.start": [0, 200],
-    "flight.end": [200, 0],
-    "vehicle.max_speed": 6,
-    "radio.ground_user.position": [200, 200],
-    "mission.on_finish": "land",
-}
-"""The plan that was flown, as changes of `missions/copter_relay.yaml`."""
+PLAN = LOGS / "plan.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +38,8 @@ def solutions(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder, found = tmp_path_factory.mktemp("solutions"), {}
     for autopilot in ("ardupilot", "px4"):
         found[autopilot] = folder / f"{autopilot}.npz"
-        save_solution(optimize(plan_of(FLOWN, autopilot, "recommend")), found[autopilot])
+        plan = parse_plan(edited(PLAN.read_text(), {"vehicle.autopilot": autopilot}))
+        save_solution(optimize(plan), found[autopilot])
     return found
 
 

@@ -77,7 +77,7 @@ class Scene:
         return lambda now: self.mock.on(Envelope(FOREIGN, SetMode(1, 1, mode)), now)
 
     def told(self, words: str) -> bool:
-        return any(words in text for text in self.watch.told)
+        return any(words in text for text in self.watch.seen.told)
 
 
 def harmless(message: Message) -> bool:
@@ -115,7 +115,7 @@ def test_armed_started_and_watched_to_the_end(kind: str, loss: float) -> None:
     kinds = [order.command for order in scene.orders if isinstance(order, CommandLong)]
     assert kinds == sorted(kinds, reverse=True)  # 400 arms, then 300 starts
     assert {*kinds} == {MavCommand.ARM, MavCommand.START}
-    samples, track = scene.watch.samples, fly(a_mission(12))
+    samples, track = scene.watch.seen.samples, fly(a_mission(12))
     assert (np.diff(samples.t) > 0).all()
     assert max(samples.height) == pytest.approx(track.position[:, 2].max(), abs=0.5)
     assert samples.height[-1] < 5
@@ -149,7 +149,7 @@ def test_a_pilot_has_the_aircraft_for_good(kind: str, loss: float) -> None:
     assert scene.run(Faults(loss=loss, seed=1), events=events) == "taken over"
     assert len(scene.orders) == sent[0]
     assert scene.told("the pilot or a failsafe has the aircraft; nothing more is sent")
-    assert scene.watch.samples.t[-1] > 35
+    assert scene.watch.seen.samples.t[-1] > 35
 
 
 def test_a_pilot_who_is_quicker_than_the_start() -> None:
@@ -218,7 +218,7 @@ def test_outages_are_told_and_survived(kind: str) -> None:
     assert scene.run(events=events) == "finished"
     assert scene.told("nothing heard for 5 s")
     assert scene.told("heard again after 9 s")
-    assert sum("nothing heard" in text for text in scene.watch.told) == 1
+    assert sum("nothing heard" in text for text in scene.watch.seen.told) == 1
 
 
 def test_a_vehicle_that_is_never_heard_again_is_lost() -> None:

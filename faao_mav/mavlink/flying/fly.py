@@ -7,7 +7,8 @@ from typing import Unpack
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.client import LinkOptions, Session
 from faao_mav.mavlink.discover import FoundVehicle
-from faao_mav.mavlink.flying.watch import Ending, Samples, Watch
+from faao_mav.mavlink.flying.telemetry import Ending, Samples
+from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Script
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.transfer.session import download_lists
@@ -66,4 +67,4 @@ def fly(
             ending = session.link.watch(watch, lambda: watching(watch))
         except LinkError as error:
             ending = Ending("lost", str(error))
-    return FlightReport(vehicle, (), ending, watch.samples)
+    return FlightReport(vehicle, (), ending, watch.seen.samples)
