@@ -59,6 +59,10 @@ class Flown:
         return self.arrivals[1:] - self.departures[:-1]
 
 
+_GROUND = 0.5
+"""A flight that ends lower, m above home, has landed. Chosen."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
     """The predicted flight of a whole mission.
@@ -75,6 +79,11 @@ class Track:
     item: NDArray[np.int_]
     reached: Real
     frame: LocalFrame
+
+    @property
+    def lands(self) -> bool:
+        """Whether the flight ends on the ground."""
+        return bool(self.position[-1, 2] < _GROUND)
 
 
 class FlightModel(Protocol):
