@@ -134,11 +134,13 @@ class Newton:
 
     def corrector(self, mu: Real, ahead: Direction, share: Real) -> Direction:
         """Return the direction for mu (flights, 1), corrected by `share` of `ahead`."""
+        steps = zip(self.at.states, ahead.steps, strict=True)
+        return self.aimed(mu, tuple(state.target(mu, step, share) for state, step in steps))
+
+    def aimed(self, mu: Real, targets: tuple[Any, ...]) -> Direction:
+        """Return the direction for mu (flights, 1) and the `targets` of the constraints."""
         flight, states = self.flight, self.at.states
         right = np.zeros((1, self.at.w.shape[1], flight.matrix.slots, flight.matrix.size))
-        targets = tuple(
-            state.target(mu, step, share) for state, step in zip(states, ahead.steps, strict=True)
-        )
         pushes = [state.push(target) for state, target in zip(states, targets, strict=True)]
         _load(right[0], flight, self.compliance, pushes)
         return self._direction(self.columns[-1] + self.factors.solve(right)[0], mu, targets)
