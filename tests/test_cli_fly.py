@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from conftest import FLYABLE, free_port
+from served import running
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.main import app
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.formats import render_mission
 
