@@ -18,6 +18,7 @@ from faao_mav.plan.sections import (
     Relay,
     Site,
     VehicleOptions,
+    Wind,
 )
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "Site",
     "Vector",
     "VehicleOptions",
+    "Wind",
     "parse_plan",
     "read_plan",
     "reference",

@@ -5,6 +5,7 @@ declarations say what `plan.yaml` may hold: each field is a key, with what it me
 its limits. `fields` says how, `keys.reference` lists them all.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -89,10 +90,41 @@ def _keep(origin: Origin, info: ValidationInfo) -> Origin:
 
 
 @dataclass(frozen=True, slots=True)
+class Wind(_Section):
+    """The steady wind of the flight, everywhere the same.
+
+    >>> tuple(round(each, 6) for each in Wind(5.0, 270.0).velocity)  # a west wind
+    (5.0, 0.0)
+    """
+
+    speed: Annotated[Number, key("Mean speed of the wind.", "m/s", ge=0, le=50)]
+    from_degrees: Annotated[
+        Number,
+        key(
+            "Where the wind comes from, clockwise from north: 270 is a west wind.",
+            "degrees",
+            name="from",
+            ge=0,
+            le=360,
+        ),
+    ]
+    gust: Annotated[
+        Number, key("Speed of the wind in gusts; below `speed`: no gusts.", "m/s", ge=0, le=100)
+    ] = 0.0
+
+    @property
+    def velocity(self) -> Vector:
+        """The velocity of the air over the ground, [east, north] m/s."""
+        angle = math.radians(self.from_degrees)
+        return 0.0 - self.speed * math.sin(angle), 0.0 - self.speed * math.cos(angle)
+
+
+@dataclass(frozen=True, slots=True)
 class Site(_Section):
     """Where the plan is flown."""
 
     origin: Annotated[Origin, AfterValidator(_keep)]
+    wind: Wind = Wind(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -453,6 +485,11 @@ class Plan(PlanFile):
     def origin(self) -> Origin:
         """The point of local [0, 0]."""
         return self.site.origin
+
+    @property
+    def wind(self) -> Vector:
+        """The velocity of the air over the ground, [east, north] m/s."""
+        return self.site.wind.velocity
 
     @property
     def zones(self) -> tuple[Area, ...]:
