@@ -339,7 +339,9 @@ def draw_mission(solution: Solution, conversion: Conversion) -> str:
     ):
         latitude, longitude = frame.to_geodetic(place)
         stations.append(Station(name, float(latitude), float(longitude), ground))
-    track = predict(conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP)
+    track = predict(
+        conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP, wind=plan.wind
+    )
     latitudes, longitudes = frame.to_geodetic(track.position[:, :2])
     heights = track.position[:, 2] + ground
     spots = list(zip(latitudes.tolist(), longitudes.tolist(), heights.tolist(), strict=True))

@@ -216,6 +216,7 @@ def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
         max_speed=min(fastest, most),
         tolerance=plan.mission.path_tolerance,
         altitude=_altitude(plan),
+        wind=plan.wind,
     )
 
 

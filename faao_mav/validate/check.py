@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
+from faao_mav.plan import Vector
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
 from faao_mav.vehicle import Track, Vehicle
 
@@ -39,11 +40,13 @@ def check(
     limits: Limits | None = None,
     solution: "Solution | None" = None,
     lead: float | None = None,
+    wind: Vector | None = None,
 ) -> Check:
     """Predict the flight of `mission` by `vehicle` and judge both by all rules.
 
-    With a `solution` the flight is judged by what it makes of that plan too, from the ground or
-    from the air, as the plan has it. `lead`, where it is
+    The flight is predicted in a `wind`, east and north, m/s: without one in that of the plan, or in
+    none. With a `solution` the flight is judged by what it makes of that plan too, from the ground
+    or from the air, as the plan has it. `lead`, where it is
     known, is by how many seconds the aircraft sets out before the plan does. A mission that cannot
     be predicted is judged by its items alone; nothing is raised.
 
@@ -54,7 +57,9 @@ def check(
     >>> [finding.rule for finding in found.of(Level.ERROR)]
     ['px4-starts-with-land']
     """
-    track, unpredicted = _track(mission, vehicle)
+    if wind is None:
+        wind = solution.plan.wind if solution is not None else (0.0, 0.0)
+    track, unpredicted = _track(mission, vehicle, wind)
     link = None
     if solution is not None and track is not None:
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
@@ -65,12 +70,12 @@ def check(
     return Check(mission, vehicle, track, unpredicted, link, findings)
 
 
-def _track(mission: Mission, vehicle: Vehicle) -> tuple[Track | None, str]:
+def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:
     """Return the predicted flight, or None and why there is none."""
     from faao_mav.vehicle.predict import predict
 
     try:
-        track = predict(mission, vehicle)
+        track = predict(mission, vehicle, wind=wind)
     except FaaoError as error:
         return None, str(error)
     return (track, "") if len(track.t) else (None, "there is nothing to fly")
