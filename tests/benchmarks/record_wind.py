@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from flights_arducopter import parameters_of
-from record_px4 import flown_by, keep
+from record_px4 import flown_by, in_wind, keep
 from recorded import FLIGHTS, mission_of, wind_of
 
 COLUMNS = ("t_s", "lat", "lon", "alt_rel_m", "seq")
@@ -24,16 +24,12 @@ MISSIONS = {
 
 
 def options(folder: str, name: str) -> list[str]:
-    """Return the options of the runner for the flight `name`."""
-    east, north = wind_of(name)
+    """Return the options of the runner for the flight `name`, the wind aside."""
     if folder == "px4":
         parameters = FLIGHTS / folder / f"{mission_of(name)}.params"
-        own = ["--param-file", str(parameters), "--params", "SIH_KDV=0.2", "--speedup", "10"]
-        return [*own, f"--wind={east},{north}"]
-    speed, start = name.partition("-wind")[2].split("from")
+        return ["--param-file", str(parameters), "--params", "SIH_KDV=0.2", "--speedup", "10"]
     given = ",".join(f"{key}={value}" for key, value in parameters_of(name).items())
-    own = ["--speedup", "20", "--wind", f"{speed},{start}"]
-    return [*own, "--params", given] if given else own
+    return ["--speedup", "20", "--params", given]
 
 
 def main() -> None:
@@ -44,7 +40,8 @@ def main() -> None:
         for name in [f"{mission}-{wind}" for mission in missions for wind in WINDS]:
             if not set(sys.argv[1:]) or {folder, name} & set(sys.argv[1:]):
                 mission = FLIGHTS / folder / f"{mission_of(name)}.waypoints"
-                rows = flown_by(runner, mission, options(folder, name))
+                given = [*options(folder, name), *in_wind(runner, wind_of(name))]
+                rows = flown_by(runner, mission, given)
                 keep(rows, FLIGHTS / folder / f"{name}.csv", COLUMNS)
                 print(name, flush=True)
 

@@ -19,7 +19,7 @@ from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
 from faao_mav.mission.formats.wpl import read_wpl
-from faao_mav.plan import Vector, Wind
+from faao_mav.plan import Wind
 from faao_mav.vehicle.flight_path import FlightPath, Flown
 
 FLIGHTS = Path(__file__).parent.parent / "data" / "flights"
@@ -58,10 +58,10 @@ def mission_of(name: str) -> str:
     return name.partition("-wind")[0]
 
 
-def wind_of(name: str) -> Vector:
-    """Return the velocity of the air in the flight `name`, east and north, m/s."""
+def wind_of(name: str) -> Wind:
+    """Return the wind of the flight `name`."""
     speed, _, degrees = name.partition("-wind")[2].partition("from")
-    return Wind(float(speed or 0), float(degrees or 0)).velocity
+    return Wind(float(speed or 0), float(degrees or 0))
 
 
 def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
@@ -91,7 +91,7 @@ def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
         holds=np.array(holds),
         splines=np.array(splines),
         radii=np.array(radii),
-        wind=wind_of(name),
+        wind=wind_of(name).velocity,
     )
     horizontal = frame.to_local(column["lat"], column["lon"])
     return Recorded(path, column["t_s"] - left[0], horizontal, left - left[0], speeds[0])

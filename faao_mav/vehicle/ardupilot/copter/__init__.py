@@ -10,7 +10,7 @@ from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.recommend import accelerations_to_try
-from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType
+from faao_mav.vehicle.vehicle_type import HELD, Ceiling, VehicleType
 
 __all__ = ["ARDUCOPTER", "ArduCopter", "ArduCopterLegs"]
 
@@ -60,6 +60,10 @@ def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
     )
 
 
+def _max_airspeed(vehicle: ParameterValues) -> float:
+    return round(HELD * ArduCopterLimits.from_vehicle(vehicle).top_speed, 2)
+
+
 ARDUCOPTER = VehicleType(
     family=ARDUPILOT,
     kind="copter",
@@ -79,5 +83,6 @@ ARDUCOPTER = VehicleType(
     calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),
     ceilings=_ceilings,
+    max_airspeed=_max_airspeed,
 )
 """ArduCopter 4.1 and later; measured on 4.7."""
