@@ -7,6 +7,7 @@ from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
+from faao_mav.validate.wind_limit import WindLimit, wind_limit
 from faao_mav.vehicle import Track, Vehicle
 
 if TYPE_CHECKING:
@@ -18,7 +19,8 @@ class Check:
     """What was found in `mission` for `vehicle`.
 
     `track` is the predicted flight; where there is none `unpredicted` says why. `link` is what the
-    flight makes of a plan, None without a plan or a track. `findings` are the worst first.
+    flight makes of a plan, None without a plan or a track. `findings` are the worst first. `wind`,
+    m/s, is what `track` is predicted in, `wind_limit` the strongest wind that the mission keeps.
     """
 
     mission: Mission
@@ -27,6 +29,8 @@ class Check:
     unpredicted: str = ""
     link: LinkCheck | None = None
     findings: tuple[Finding, ...] = ()
+    wind: Vector = (0.0, 0.0)
+    wind_limit: WindLimit | None = None
 
     def of(self, level: Level) -> tuple[Finding, ...]:
         """Return the findings of `level`."""
@@ -57,17 +61,20 @@ def check(
     >>> [finding.rule for finding in found.of(Level.ERROR)]
     ['px4-starts-with-land']
     """
-    if wind is None:
-        wind = solution.plan.wind if solution is not None else (0.0, 0.0)
+    own = solution.plan.wind if solution is not None else (0.0, 0.0)
+    wind = own if wind is None else wind
     track, unpredicted = _track(mission, vehicle, wind)
-    link = None
+    made_for = track if wind == own else _track(mission, vehicle, own)[0]
+    limit = link = None
+    if made_for is not None:
+        limit = wind_limit(mission, vehicle, made_for, solution=solution, lead=lead)
     if solution is not None and track is not None:
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
 
         link = compare_with_plan(solution, track, lead=lead)
     airborne = solution is not None and not solution.plan.mission.takeoff
     findings = validate(mission, vehicle, track=track, limits=limits, link=link, airborne=airborne)
-    return Check(mission, vehicle, track, unpredicted, link, findings)
+    return Check(mission, vehicle, track, unpredicted, link, findings, wind, limit)
 
 
 def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:
