@@ -193,7 +193,10 @@ def _wind(plan: Plan, check: Check | None) -> Iterator[Line]:
 
 def _of_limit(limit: WindLimit, link: LinkCheck | None) -> str:
     rate = f"{100 * LEAST_RATE:g} % of the rate and " if link is not None else ""
-    kept = f"keeps {rate}its time within {MOST_LATE:g} s"
+    promise = f"{rate}its time within {MOST_LATE:g} s"
+    if limit.speed == 0:
+        return f"keeps {promise} in no wind from {limit.from_degrees:g} degrees"
+    kept = f"keeps {promise}"
     if limit.speed >= MOST_WIND:
         return f"{kept} in {MOST_WIND:g} m/s from any direction"
     worst = f"the worst is {limit.from_degrees:g} degrees"

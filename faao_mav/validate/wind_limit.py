@@ -25,6 +25,10 @@ MOST_WIND = 20.0
 _LONGEST = 3600.0
 """The longest flight, s, whose limit is sought. Chosen: a dozen predictions of it take seconds."""
 
+_SLOWER = 3.0
+"""How many times as long a flight in wind may take as without before it is given up. Chosen: the
+relay's part has to be in time, the ways from home and back need not."""
+
 _DIRECTIONS = 8
 _STEP, _FIRST_STEP = 0.25, 1.0
 """The step of the limit, and the first one beyond a wind that is surely kept, m/s. Chosen."""
@@ -125,7 +129,12 @@ class _Trial:
         from faao_mav.vehicle.predict import predict
 
         try:
-            track = predict(self.mission, self.vehicle, wind=Wind(speed, degrees).velocity)
+            track = predict(
+                self.mission,
+                self.vehicle,
+                wind=Wind(speed, degrees).velocity,
+                longest=_SLOWER * self.duration,
+            )
         except FaaoError:
             return False
         return self.fulfilled(track)

@@ -54,6 +54,13 @@ def test_who_leans_farther_keeps_more_wind() -> None:
     assert on_px4.speed == MOST_WIND
 
 
+def test_a_flight_that_the_wind_carries_away_ends() -> None:
+    carried = check(there_and_back(8), COPTER, wind=Wind(14, 0).velocity)
+    assert carried.track is None
+    assert "perhaps for the wind" in carried.unpredicted
+    assert carried.wind_limit is not None
+
+
 def test_a_plane_has_no_limit_yet() -> None:
     assert check(there_and_back(16), PLANE).wind_limit is None
 

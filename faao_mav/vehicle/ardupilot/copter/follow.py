@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.errors import InputError
 from faao_mav.plan import Vector
 from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Stop, TargetRow
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
@@ -20,6 +21,10 @@ _STANDING = 1e-5
 """The sum of an aircraft's speed and its error, m/s, and acceleration, m/s², below which it stands
 until a hold is over. Chosen: ten times more changed arrivals by up to 0.1 s after a leg at 0.13
 m/s."""
+
+LONGEST = 21_600.0
+"""The longest flight that is followed where nothing else is asked for, s. Chosen: six hours take a
+second or two of processor time."""
 
 _HEADED = 0.5
 """The speed of the target, m/s, above which the aircraft turns its nose along the target's way.
@@ -44,9 +49,16 @@ class Pursuit:
 
 
 def pursue(
-    course: Course, table: Iterator[TargetRow], limits: ArduCopterLimits, wind: Vector = (0.0, 0.0)
+    course: Course,
+    table: Iterator[TargetRow],
+    limits: ArduCopterLimits,
+    *,
+    wind: Vector = (0.0, 0.0),
+    longest: float = LONGEST,
 ) -> Pursuit:
     """Return the flight along `course`, given as rows, up to the end of its last hold.
+
+    Raises `InputError` for one that takes more than `longest` s, as in wind that carries it away.
 
     The target's clock runs at a rate s <= 1 with the time constant A/J: towards the
     aircraft's speed along the target's, less the position error times its gain, over the target's
@@ -77,6 +89,10 @@ def pursue(
     log = array("d", (clock, s, px, py, vx, vy))
     count, now = 0, 0.0
     while stop is not None or now < resume:
+        if now > longest:
+            raise InputError(
+                f"the flight would take more than {longest:.0f} s, perhaps for the wind"
+            )
         # where the target is at the beginning of this step, and how fast its clock runs
         w = clock / GRID
         k = int(w)
