@@ -117,7 +117,9 @@ def test_the_wind_blows_away_from_where_it_comes_from(
     wind: dict[str, float], velocity: tuple[float, float]
 ) -> None:
     assert parse_plan(SMALL).wind == (0.0, 0.0)
-    assert parse_plan(edited(SMALL, {"site.wind": wind})).wind == pytest.approx(velocity, abs=1e-9)
+    assert parse_plan(
+        edited(SMALL, {"site.wind": wind, "vehicle.max_airspeed": 40})
+    ).wind == pytest.approx(velocity, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_the_optimum_of_a_convex_problem_is_clarabels(wind: tuple[float, float])
     assert -best.value == pytest.approx(float(peer.value), rel=1e-4, abs=1e-6)
 
 
-@given(winds)
+@pytest.mark.parametrize("wind", [(0.0, 0.0), (4.0, -3.0), (-2.0, 1.0)])
 def test_the_frame_of_the_air_is_calm(wind: tuple[float, float]) -> None:
     kin = replace(FREE, wind=wind, min_speed=3.0, max_speed=20.0)
     calm = kin.in_the_air()
@@ -78,7 +78,7 @@ def test_the_frame_of_the_air_is_calm(wind: tuple[float, float]) -> None:
 
 
 CHANGES = {
-    "flight.duration": 40,
+    "flight.duration": 70,
     "vehicle.max_speed": 8,
     "flight.start": [0, 150],
     "flight.end": [150, 0],
