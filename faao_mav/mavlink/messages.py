@@ -7,7 +7,7 @@ wire, so that what was sent and what was found can be compared without rounding.
 
 from dataclasses import dataclass
 
-from faao_mav.mavlink.protocol import ARMED, Address
+from faao_mav.mavlink.protocol import ARMED, PREARM_CHECK, Address
 from faao_mav.mission.item import Params
 
 
@@ -106,11 +106,15 @@ class MissionSetCurrent(Addressed):
 
 @dataclass(frozen=True, slots=True)
 class MissionCurrent(Message):
-    """MISSION_CURRENT; `total` leaves out ArduPilot's home item, 0 is for none."""
+    """MISSION_CURRENT; `total` leaves out ArduPilot's home item, 0 is for none.
+
+    `mission_id` is the vehicle's number for the mission, 0 where it has none.
+    """
 
     seq: int
     total: int
     mission_state: int
+    mission_id: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,6 +269,20 @@ class Attitude(Message):
     rollspeed: float
     pitchspeed: float
     yawspeed: float
+
+
+@dataclass(frozen=True, slots=True)
+class SysStatus(Message):
+    """SYS_STATUS: millivolts (65535: unknown) and percent (-1: unknown) of the battery."""
+
+    onboard_control_sensors_health: int
+    voltage_battery: int
+    battery_remaining: int
+
+    @property
+    def may_arm(self) -> bool:
+        """Whether the autopilot's own checks before arming pass."""
+        return bool(self.onboard_control_sensors_health & PREARM_CHECK)
 
 
 @dataclass(frozen=True, slots=True)

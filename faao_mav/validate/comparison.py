@@ -66,14 +66,25 @@ def keeps_plan(
 
     That is the share of `LinkCheck.share`; `lead` is as in `compare_with_plan`.
     """
-    w = _in_frame_of(solution, track)
-    t, tolerance = track.t - _start(solution, track, w, lead), solution.plan.mission.path_tolerance
+    t, w = on_the_plans_clock(solution, track, lead=lead)
+    tolerance = solution.plan.mission.path_tolerance
     if not abs(lateness(solution.t, solution.w, t, w, tolerance)) <= late:
         return False
     I_U, I_G = rates_along(solution, positions_at(solution.t, t, w))
     flown = min(float(I_U.mean()), float(I_G.mean()))
     delivered = solution.relay(I_U, I_G, solution.shares).rate >= share * solution.delivered_rate
     return delivered and (solution.plan.radio.causal or flown >= share * solution.rates.R_avg)
+
+
+def on_the_plans_clock(
+    solution: Solution, track: Track, *, lead: float | None = None
+) -> tuple[Real, Real]:
+    """Return times (k,), s, and positions (k, 2), m, of `track` on the plan's clock, in its frame.
+
+    How the clock is put, and the `lead`: see `compare_with_plan`.
+    """
+    w = _in_frame_of(solution, track)
+    return track.t - _start(solution, track, w, lead), w
 
 
 def _in_frame_of(solution: Solution, track: Track) -> Real:

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.vehicle.ardupilot.copter.leg import at_speed, planned
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
-from faao_mav.vehicle.ardupilot.copter.route import CornerLimits, half_overlap
+from faao_mav.vehicle.ardupilot.copter.route import half_overlap
 
 LIMITS = LegBounds(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
 
@@ -43,7 +44,7 @@ def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(
     bounds: LegBounds, length: float
 ) -> None:
     leg = planned(length, bounds)
-    t = np.linspace(0, leg.duration, 4001)
+    t = np.linspace(0, leg.duration, 2001)
     s, v, a = np.array([leg.at(x) for x in t]).T
     h = t[1]
     slack = bounds.jerk * h * h  # of the trapezoidal rule
@@ -105,7 +106,7 @@ def test_corners_are_as_early_as_their_limits_allow(degrees: float) -> None:
     angle = math.radians(degrees)
     u, w = (1.0, 0.0, 0.0), (math.cos(angle), math.sin(angle), 0.0)
     leg = planned(100, LIMITS)
-    bounds = CornerLimits(radius=2.0, acceleration=5.0, vertical=1.0)
+    bounds = ArduCopterLimits(radius=2.0, corner_acceleration=5.0, climb_acceleration=1.0)
     h = half_overlap(leg, u, leg, w, bounds)
     left = 100 - leg.at(leg.duration - h)[0]
     apart = 2 * left * math.sin(angle / 2)
