@@ -6,12 +6,13 @@ from typing import Any, Literal
 
 import pytest
 from conftest import MISSIONS, edited, free_port
+from served import running
 from typer.testing import CliRunner
 
 from faao_mav import download
 from faao_mav.cli.main import app
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import predicted, running
+from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.mission.item import Home, Mission

@@ -48,8 +48,8 @@ def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(
     s, v, a = np.array([leg.at(x) for x in t]).T
     h = t[1]
     slack = bounds.jerk * h * h  # of the trapezoidal rule
-    assert np.cumsum(a[1:] + a[:-1]) * h / 2 == pytest.approx(v[1:], abs=4 * slack)
-    assert np.cumsum(v[1:] + v[:-1]) * h / 2 == pytest.approx(s[1:], abs=4 * slack * t[-1])
+    assert np.abs(np.cumsum(a[1:] + a[:-1]) * h / 2 - v[1:]).max() <= 4 * slack
+    assert np.abs(np.cumsum(v[1:] + v[:-1]) * h / 2 - s[1:]).max() <= 4 * slack * t[-1]
 
 
 def test_a_long_leg_has_two_full_ramps_and_a_cruise() -> None:
@@ -86,7 +86,7 @@ def test_a_speed_change_keeps_what_was_flown_and_the_end(
     t = np.linspace(0, elapsed, 30) if elapsed > 0 else np.zeros(1)
     if elapsed > 0:
         flown = [before.at(x) for x in t]
-        assert np.array([after.at(x) for x in t]) == pytest.approx(np.array(flown), abs=1e-6)
+        np.testing.assert_allclose([after.at(x) for x in t], flown, atol=1e-6, rtol=1e-6)
     assert after.at(after.duration)[0] == pytest.approx(length, rel=1e-6)
     assert max(v for _, v, _ in after.states) <= max(speed, bounds.speed) * (1 + 1e-9)
 
