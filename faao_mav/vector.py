@@ -1,5 +1,7 @@
 """Lengths and distances in the plane."""
 
+import math
+
 import numpy as np
 
 from faao_mav.arrays import Real
@@ -16,6 +18,25 @@ def lengths(vectors: Real) -> Real:
     """
     result: Real = np.hypot(vectors[..., 0], vectors[..., 1])
     return result
+
+
+def chord(center: tuple[float, float], radius: float, direction: Real) -> tuple[float, float]:
+    """Return the least and the greatest s with s `direction` in a disc about `center`.
+
+    The least is above the greatest where there is none. The length of `direction` (2,) is 1 or 0.
+
+    >>> chord((-6.0, 8.0), 10.0, np.array([1.0, 0.0]))
+    (-12.0, 0.0)
+    >>> chord((-6.0, 8.0), 7.0, np.array([1.0, 0.0]))
+    (inf, -inf)
+    """
+    if math.isinf(radius):
+        return -math.inf, math.inf
+    along = float(np.dot(center, direction))
+    room = radius**2 - (math.hypot(*center) ** 2 - along**2)
+    if room < 0:
+        return math.inf, -math.inf
+    return along - math.sqrt(room), along + math.sqrt(room)
 
 
 def distances_to_segment(points: Real, begin: Real, end: Real) -> Real:

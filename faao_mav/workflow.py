@@ -193,6 +193,10 @@ class Result:
             }
             if conversion and flown
             else None,
+            "wind": asdict(plan.site.wind),
+            "wind_limit": asdict(self.check.wind_limit)
+            if self.check and self.check.wind_limit
+            else None,
             "fence": asdict(self.fence) if self.fence else None,
             "validation": [asdict(finding) for finding in self.findings],
         }
@@ -360,7 +364,9 @@ def draw_mission(solution: Solution, conversion: Conversion) -> str:
     ):
         latitude, longitude = frame.to_geodetic(place)
         stations.append(Station(name, float(latitude), float(longitude), ground))
-    track = predict(conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP)
+    track = predict(
+        conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP, wind=plan.wind
+    )
     latitudes, longitudes = frame.to_geodetic(track.position[:, :2])
     heights = track.position[:, 2] + ground
     spots = list(zip(latitudes.tolist(), longitudes.tolist(), heights.tolist(), strict=True))

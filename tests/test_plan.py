@@ -106,6 +106,23 @@ def test_what_is_dumped_is_loaded(data: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
+    ("wind", "velocity"),
+    [
+        ({"speed": 5, "from": 0}, (0, -5)),
+        ({"speed": 5, "from": 90, "gust": 2}, (-5, 0)),
+        ({"speed": 10, "from": 210}, (5, 10 * math.cos(math.radians(30)))),
+    ],
+)
+def test_the_wind_blows_away_from_where_it_comes_from(
+    wind: dict[str, float], velocity: tuple[float, float]
+) -> None:
+    assert parse_plan(SMALL).wind == (0.0, 0.0)
+    assert parse_plan(
+        edited(SMALL, {"site.wind": wind, "vehicle.max_airspeed": 40})
+    ).wind == pytest.approx(velocity, abs=1e-9)
+
+
+@pytest.mark.parametrize(
     ("changes", "parts"),
     [
         ({"flight.duration": 10.2}, ["flight.duration", "10.2 s", "whole number", "10 or 10.5"]),
@@ -146,6 +163,13 @@ def test_what_is_dumped_is_loaded(data: dict[str, Any]) -> None:
             ["flight.start", "km from site.origin", "100 km"],
         ),
         ({"flight.start": {"latitude": 10.0}}, ["flight.start", "latitude: degrees"]),
+        ({"site.wind": {"speed": 5}}, ["site.wind.from", "missing", "degrees, 0 to 360"]),
+        ({"site.wind": {"speed": 5, "from": 450}}, ["site.wind.from", "450", "0 to 360"]),
+        ({"site.wind": {"speed": -5, "from": 4}}, ["site.wind.speed", "-5", "m/s, 0 to 50"]),
+        (
+            {"site.wind": {"speed": 5, "from": 4, "to": 4}},
+            ["site.wind.to", "known here: from, gust, speed"],
+        ),
         ({"flight.start_velocity": [30, 0]}, ["flight.start_velocity", "30 m/s", "20 m/s"]),
         ({"flight.end_velocity": "slow"}, ["flight.end_velocity", "'slow'", "hover, free"]),
         ({"vehicle.parameters": {"WPNAV_JERK": "x"}}, ["vehicle.parameters.WPNAV_JERK", "number"]),
@@ -452,16 +476,19 @@ def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
     keys = reference()
     assert all(key.description and key.accepted for key in keys.values())
     assert [path for path, key in keys.items() if key.required and not key.inside] == [
-        "site.origin.latitude", "site.origin.longitude", "vehicle.max_speed",
-        "vehicle.max_acceleration", "flight.start", "flight.end", "flight.altitude",
-        "flight.duration", "radio.base_station.position", "radio.ground_user.position",
+        "site.origin.latitude", "site.origin.longitude", "site.wind.speed", "site.wind.from",
+        "vehicle.max_speed", "vehicle.max_acceleration", "flight.start", "flight.end",
+        "flight.altitude", "flight.duration", "radio.base_station.position",
+        "radio.ground_user.position",
         "fence.inclusion.center", "fence.inclusion.radius", "fence.inclusion.polygon",
         "fence.exclusion.center", "fence.exclusion.radius", "fence.exclusion.polygon",
     ]  # fmt: skip
     written = {path: load_yaml(f"x: {key.default}", path)["x"] for path, key in keys.items()
                if key.default}  # fmt: skip
     plan = parse_plan(SMALL)
-    changed = {path for path in written if path in SMALL_KEYS or "fence" in path}
+    changed = {
+        path for path in written if path in SMALL_KEYS or path.startswith(("fence", "site.wind"))
+    }
     full = parse_plan(edited(SMALL, {k: v for k, v in written.items() if k not in changed}))
     assert replace(full, text="", study=None) == replace(plan, text="")
 

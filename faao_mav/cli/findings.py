@@ -46,6 +46,7 @@ def as_dict(checked: CheckedFile) -> dict[str, Any]:
         "parameters": vehicle.source if vehicle.parameters else None,
         "predicted": predicted,
         "link": link,
+        "wind_limit": asdict(check.wind_limit) if check.wind_limit else None,
         "errors": len(check.of(Level.ERROR)),
         "warnings": len(check.of(Level.WARNING)),
         "notes": len(check.of(Level.NOTE)),

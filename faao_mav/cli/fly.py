@@ -123,7 +123,7 @@ def _predicted(
     plan = solution.plan if solution is not None else None
     vehicle, _ = choose_vehicle(mission_file, file, plan, (None, None, None))
     try:
-        return predict(file.mission, vehicle)
+        return predict(file.mission, vehicle, wind=plan.wind if plan else (0.0, 0.0))
     except FaaoError as error:
         note(f"the flight is not predicted: {error}")
         return None

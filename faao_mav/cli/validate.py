@@ -26,6 +26,7 @@ from faao_mav.files import PAGES, check_apart, check_ending, check_writable, wri
 if TYPE_CHECKING:
     from faao_mav.cli.findings import CheckedFile
     from faao_mav.optimizer.solution import Solution
+    from faao_mav.plan import Vector
     from faao_mav.plan.autopilots import Autopilot, Kind
 
 
@@ -49,6 +50,14 @@ def validate(
     max_duration: Annotated[Number, option("S", "The longest flight, seconds.")] = None,
     max_distance: Annotated[Number, option("M", "The farthest from home, metres.")] = None,
     max_altitude: Annotated[Number, option("M", "The highest above home, metres.")] = None,
+    wind: Annotated[
+        str | None,
+        option(
+            "SPEED,FROM",
+            "The wind to predict the flight in, m/s and degrees clockwise from north that it comes "
+            "from; without: the plan's.",
+        ),
+    ] = None,
     report: Annotated[File, option("PAGE.html", "One page with map and findings.")] = None,
     strict: Annotated[bool, flag("--strict", "Warnings fail as well.")] = False,
     as_json: AsJson = False,
@@ -74,11 +83,12 @@ def validate(
     check_one(plan_file, solution_file)
     check_known(autopilot, kind)
     _check_options((max_duration, max_distance, max_altitude), report)
+    air = _wind(wind)
     read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
     check_apart({"--report": report}, read)
     solution = planned(plan_file, solution_file)
     limits = (max_duration, max_distance, max_altitude)
-    checked = _judge(mission_file, solution, (autopilot, kind, parameters), limits)
+    checked = _judge(mission_file, solution, (autopilot, kind, parameters), limits, air)
     if report is not None:
         _write_report(report, checked, solution)
     _show(checked, as_json)
@@ -110,11 +120,30 @@ def _check_options(
         check_writable(report)
 
 
+def _wind(given: str | None) -> "Vector | None":
+    """Return the velocity of the air, m/s, of --wind."""
+    from faao_mav.plan import Wind
+    from faao_mav.plan.keys import reference
+
+    if given is None:
+        return None
+    parts, keys = given.split(","), ("site.wind.speed", "site.wind.from")
+    try:
+        speed, start = map(float, parts)
+        if not (0 <= speed <= 50 and 0 <= start <= 360):
+            raise ValueError
+    except ValueError:
+        wanted = " and ".join(reference()[key].accepted for key in keys)
+        raise InputError(f"--wind {given}: expected SPEED,FROM: {wanted}") from None
+    return Wind(speed, start).velocity
+
+
 def _judge(
     mission_file: Path,
     solution: "Solution | None",
     asked: "tuple[Autopilot | None, Kind | None, Path | None]",
     given: tuple[float | None, float | None, float | None],
+    wind: "Vector | None",
 ) -> "CheckedFile":
     from faao_mav.cli.findings import CheckedFile
     from faao_mav.cli.vehicle import choose_vehicle
@@ -130,7 +159,7 @@ def _judge(
     vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
     if vehicle.type.flight_model is not None:
         vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement
-    found = check(file.mission, vehicle, limits=limits, solution=solution)
+    found = check(file.mission, vehicle, limits=limits, solution=solution, wind=wind)
     return CheckedFile(mission_file, chosen_by, found)
 
 

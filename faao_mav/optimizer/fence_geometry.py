@@ -118,7 +118,7 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
             pieces += parts
             radii += [0.0] * len(parts)
     ends = shapely.points([plan.flight.start, plan.flight.end])
-    most = plan.vehicle.max_speed * plan.flight.duration + 2 * plan.fence.margin
+    most = plan.max_ground_speed * plan.flight.duration + 2 * plan.fence.margin
     near = [
         k
         for k, (piece, radius) in enumerate(zip(pieces, radii, strict=True))

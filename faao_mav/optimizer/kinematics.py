@@ -4,13 +4,15 @@ Beyond the paper, which leaves v(N+1) unlimited, every sample of the speed is bo
 the last one is flown too. a(N+1) moves nothing and is zero.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.plan import Plan
+from faao_mav.plan import Plan, Vector
+from faao_mav.vector import chord
 
 LENGTH = 100.0
 """The unit of length inside the solvers, m: the extent of a mission is of the order of one.
@@ -33,7 +35,8 @@ class Kinematics:
     """The feasible set: w_I, w_F (2,), N + 2 = `slots`, delta_t, v_max, a_max, end velocities.
 
     An end velocity of None is free. `bound_first_acceleration` extends (13f) to n = 0. Beyond the
-    paper, every sample of the speed is at least `min_speed`, m/s: fixed wings do not hover.
+    paper, every sample of the airspeed v - `wind` is at least `min_speed`, for fixed wings do not
+    hover, and at most `max_airspeed`, m/s.
 
     >>> kin = Kinematics(np.zeros(2), np.array([40.0, 0.0]), 9, 1.0, 6.0, 3.0, None, None, True)
     >>> flight = kin.follow(np.full((9, 2), [4.0, 0.0]))  # 4 m/s do not get there in 8 s: 5 m/s do
@@ -51,6 +54,8 @@ class Kinematics:
     end_velocity: Real | None
     bound_first_acceleration: bool
     min_speed: float = 0.0
+    max_airspeed: float = math.inf
+    wind: Vector = (0.0, 0.0)
 
     @property
     def first_bounded_acceleration(self) -> int:
@@ -79,10 +84,50 @@ class Kinematics:
             ways.append(self.time_step * np.concatenate([[0.0], np.cumsum(both)]))
         return ways[0], ways[1][::-1]
 
+    def speeds_along(self, direction: Real) -> Vector:
+        """Return the least and the greatest speed along `direction` (2,), m/s.
+
+        The least is above the greatest where there is none; those on the way back are left out
+        where there is a least airspeed.
+
+        >>> kin = Kinematics(np.zeros(2), np.zeros(2), 5, 1.0, 8.0, 2.0, None, None, True,
+        ...                  max_airspeed=10.0, wind=(-6.0, 8.0))
+        >>> kin.speeds_along(np.array([1.0, 0.0])), kin.speeds_along(np.array([0.0, 1.0]))
+        ((-8.0, 0.0), (0.0, 8.0))
+        """
+        low, high = chord(self.wind, self.max_airspeed, direction)
+        low, high = max(low, -self.max_speed), min(high, self.max_speed)
+        if self.min_speed > 0:
+            low = max(low, chord(self.wind, self.min_speed, direction)[1])
+        return low, high
+
+    def in_the_air(self) -> "Kinematics":
+        """Return the feasible set in the frame that moves with the wind, which is calm there."""
+        wind, lasting = np.array(self.wind), self.time_step * (self.slots - 1)
+
+        def through_air(velocity: Real | None) -> Real | None:
+            return None if velocity is None else velocity - wind
+
+        return replace(
+            self,
+            end=self.end - lasting * wind,
+            max_speed=min(self.max_airspeed, self.max_speed + math.hypot(*self.wind)),
+            start_velocity=through_air(self.start_velocity),
+            end_velocity=through_air(self.end_velocity),
+            max_airspeed=math.inf,
+            wind=(0.0, 0.0),
+        )
+
+    def over_ground(self, flight: Trajectory) -> Trajectory:
+        """Return the `flight`, one of `in_the_air`, as it is seen from the ground."""
+        drift = self.time_step * np.arange(self.slots)[:, None] * self.wind
+        return Trajectory(flight.w + drift, flight.v + self.wind, flight.a)
+
     def residuals(self, trajectory: Trajectory) -> dict[str, float]:
         """Return the largest violation of each constraint, in its own unit; 0 where it holds."""
         w, v, a, dt = trajectory.w, trajectory.v, trajectory.a, self.time_step
         speed, acceleration = np.linalg.norm(v, axis=1), np.linalg.norm(a, axis=1)
+        airspeed = np.linalg.norm(v - self.wind, axis=1)
         bounded = acceleration[self.first_bounded_acceleration :]
         found = {
             "(11) position": _largest(w[1:] - w[:-1] - v[:-1] * dt - a[:-1] * dt**2 / 2),
@@ -96,7 +141,9 @@ class Kinematics:
         if self.end_velocity is not None:
             found["end velocity"] = _largest(v[-1] - self.end_velocity)
         if self.min_speed > 0:
-            found["minimum speed"] = float(max(0.0, self.min_speed - speed.min()))
+            found["minimum speed"] = float(max(0.0, self.min_speed - airspeed.min()))
+        if math.isfinite(self.max_airspeed):
+            found["airspeed"] = float(max(0.0, airspeed.max() - self.max_airspeed))
         return found
 
     def integrate(self, start_velocity: Real, acceleration: Real) -> Trajectory:
@@ -142,12 +189,14 @@ def kinematics(plan: Plan) -> Kinematics:
         end=np.array(flight.end, dtype=float),
         slots=flight.slots,
         time_step=flight.time_step,
-        max_speed=vehicle.max_speed,
+        max_speed=plan.max_ground_speed,
         max_acceleration=vehicle.max_acceleration,
         start_velocity=vector(flight.start_velocity),
         end_velocity=vector(flight.end_velocity),
         bound_first_acceleration=flight.bound_first_acceleration,
         min_speed=vehicle.min_speed,
+        max_airspeed=plan.max_airspeed,
+        wind=plan.wind,
     )
 
 

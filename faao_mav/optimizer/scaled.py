@@ -76,19 +76,23 @@ def flight_variables(kin: Kinematics, about: Real | None = None) -> FlightVariab
         cp.norm(a[kin.first_bounded_acceleration :], axis=1) <= 1,
         a[-1] == 0,
     ]
+    wind = np.array(kin.wind) / kin.max_speed
+    if np.isfinite(kin.max_airspeed):
+        constraints.append(cp.norm(v - wind, axis=1) <= kin.max_airspeed / kin.max_speed)
     if kin.start_velocity is not None:
         constraints.append(v[0] == kin.start_velocity / kin.max_speed)
     if kin.end_velocity is not None:
         constraints.append(v[-1] == kin.end_velocity / kin.max_speed)
     if about is not None and kin.min_speed > 0:
-        ahead = about / np.linalg.norm(about, axis=1, keepdims=True)
+        ahead = about - kin.wind
+        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
         free = slice(
             0 if kin.start_velocity is None else 1,
             kin.slots if kin.end_velocity is None else kin.slots - 1,
         )
         # given end velocities keep it already: twice said, they would leave no interior
         least = kin.min_speed / kin.max_speed * (1 + _INSIDE)
-        constraints.append(cp.sum(cp.multiply(ahead, v), axis=1)[free] >= least)
+        constraints.append(cp.sum(cp.multiply(ahead, v - wind), axis=1)[free] >= least)
     return FlightVariables(kin, w, v, a, constraints)
 
 

@@ -17,3 +17,4 @@ from faao_mav.plan.sections import Plan as Plan
 from faao_mav.plan.sections import Radio as Radio
 from faao_mav.plan.sections import Site as Site
 from faao_mav.plan.sections import VehicleOptions as VehicleOptions
+from faao_mav.plan.sections import Wind as Wind

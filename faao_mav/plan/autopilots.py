@@ -5,6 +5,7 @@ each vehicle is stands in `faao_mav.vehicle`, whose `register` adds to this tabl
 to the same facts.
 """
 
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -22,7 +23,8 @@ class PlannedVehicle:
     `hovers`: it can fly at 0 m/s. `planned`: missions are made for it; the missions of the others
     can be validated, converted and uploaded. `any_inclusion`: its fence asks for one of several
     inclusions, not for all of them. ArduPilot's FENCE_OPTIONS may ask for one, too; a plan for it
-    keeps inside all, which is right either way.
+    keeps inside all, which is right either way. `max_airspeed`, m/s, is what it holds in wind with
+    its own parameters; infinite where `vehicle.max_speed` says it.
     """
 
     autopilot: str
@@ -30,14 +32,15 @@ class PlannedVehicle:
     hovers: bool = True
     planned: bool = True
     any_inclusion: bool = False
+    max_airspeed: float = math.inf
 
 
 VEHICLES: dict[tuple[str, str], PlannedVehicle] = {
     (vehicle.autopilot, vehicle.type): vehicle
     for vehicle in (
-        PlannedVehicle("ardupilot", "copter"),
+        PlannedVehicle("ardupilot", "copter", max_airspeed=9.27),
         PlannedVehicle("ardupilot", "plane", hovers=False),
-        PlannedVehicle("px4", "copter", any_inclusion=True),
+        PlannedVehicle("px4", "copter", any_inclusion=True, max_airspeed=44.13),
         PlannedVehicle("px4", "plane", hovers=False, planned=False, any_inclusion=True),
     )
 }

@@ -10,7 +10,8 @@ from faao_mav.plan.autopilots import VEHICLES
 from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
-from faao_mav.plan.sections import Flight, Plan, VehicleOptions
+from faao_mav.plan.sections import Flight, Plan
+from faao_mav.vector import chord
 
 MAX_SLOTS = 100_000
 """Most time slots; chosen: the direct method solves 10,000 in 0.6 s; more is not measured."""
@@ -52,19 +53,42 @@ def _vehicle(plan: Plan) -> Iterator[str]:
 
 def _speeds(plan: Plan) -> Iterator[str]:
     vehicle, flight = plan.vehicle, plan.flight
-    least, most = vehicle.min_speed, vehicle.max_speed
-    if least > most:
-        yield f"vehicle.min_speed: {least:g} m/s is above vehicle.max_speed ({most:g} m/s)"
+    least, most = vehicle.min_speed, plan.max_ground_speed
+    if least > vehicle.max_speed:
+        yield (
+            f"vehicle.min_speed: {least:g} m/s is above vehicle.max_speed "
+            f"({vehicle.max_speed:g} m/s)"
+        )
+    if plan.max_airspeed <= least:
+        yield (
+            f"site.wind: {_wind(plan)}: the gusts leave {plan.max_airspeed:.4g} m/s of airspeed; "
+            "give a wind that the aircraft can fly in"
+        )
     for end, velocity in (("start", flight.start_velocity), ("end", flight.end_velocity)):
         if velocity is None:
             continue
-        speed = math.hypot(*velocity)
+        speed, airspeed = math.hypot(*velocity), math.dist(velocity, plan.wind)
         given = quote(list(velocity)) if any(velocity) else "hover"
         told = f"flight.{end}_velocity: {given} is {speed:.6g} m/s; vehicle."
         if speed > most:
             yield f"{told}max_speed allows {most:g} m/s"
-        if speed < least:
+        if any(plan.wind):
+            told = f"flight.{end}_velocity: {given} is {airspeed:.6g} m/s through the air; vehicle."
+        if airspeed > plan.max_airspeed:
+            default = "" if vehicle.max_airspeed else ", by default,"
+            yield f"{told}max_airspeed{default} allows {plan.max_airspeed:.4g} m/s{_in_wind(plan)}"
+        if airspeed < least:
             yield f"{told}min_speed asks for at least {least:g} m/s: give free or a velocity"
+
+
+def _wind(plan: Plan) -> str:
+    wind = plan.site.wind
+    gusts = f", gusts of {wind.gust:g} m/s" if wind.gust > wind.speed else ""
+    return f"{wind.speed:g} m/s from {wind.from_degrees:g} degrees{gusts}"
+
+
+def _in_wind(plan: Plan) -> str:
+    return "" if plan.max_airspeed == math.inf else f" in a wind of {_wind(plan)}"
 
 
 def _relay(plan: Plan) -> Iterator[str]:
@@ -97,15 +121,21 @@ def _steps(flight: Flight) -> Iterator[str]:
 def _distance(plan: Plan) -> Iterator[str]:
     flight, vehicle = plan.flight, plan.vehicle
     distance = math.dist(flight.start, flight.end)
-    if reach(flight.slots - 1, flight, vehicle) >= distance - _SLACK:
+    if reach(flight.slots - 1, plan) >= distance - _SLACK:
         return
-    needed = shortest_duration(flight, vehicle)
+    needed = shortest_duration(plan)
     takes = f"at least {needed:.10g} s" if needed else "longer than can be planned"
     yield (
         f"flight.duration: {flight.duration:g} s is too short: from start to end is "
         f"{distance:.6g} m, which takes {takes} at {vehicle.max_speed:g} m/s and "
         f"{vehicle.max_acceleration:g} m/s^2 with the given end velocities"
+        f"{_in_wind(plan)}{_airspeed(plan)}"
     )
+
+
+def _airspeed(plan: Plan) -> str:
+    most = plan.max_airspeed
+    return "" if most == math.inf else f" and at most {most:.4g} m/s through the air"
 
 
 def _study(plan: Plan) -> Iterator[str]:
@@ -117,17 +147,19 @@ def _study(plan: Plan) -> Iterator[str]:
         yield f"study.vary: {both} vary the same value; leave one out"
 
 
-def reach(steps: int, flight: Flight, vehicle: VehicleOptions) -> float:
+def reach(steps: int, plan: Plan) -> float:
     """Return the farthest w(N+1) - w(0) along the line from start to end, m.
 
     Under (11)-(13f) the component of v(n) along any direction is at most
     min(v_0 + n a dt, v_end + (steps - n) a dt, v_max), and a straight flight attains that bound
-    when the end velocities are zero or free. With end velocities across the line the result is
-    only an upper bound. `steps` is N + 1; a displacement is the trapezoid sum of v.
+    when the end velocities are zero or free. With end velocities across the line, or in wind, the
+    result is only an upper bound. `steps` is N + 1; a displacement is the trapezoid sum of v. In
+    wind the mean velocity, along the line, keeps the limit on the airspeed too.
     """
-    dt, limit = flight.time_step, vehicle.max_speed
-    gain = vehicle.max_acceleration * dt
-    direction = _direction(flight)
+    flight = plan.flight
+    dt, limit = flight.time_step, plan.max_ground_speed
+    gain = plan.vehicle.max_acceleration * dt
+    direction = np.array(_direction(flight))
     n = np.arange(steps + 1, dtype=float)
     speed = np.full(steps + 1, limit)
     if flight.start_velocity is not None:
@@ -138,15 +170,17 @@ def reach(steps: int, flight: Flight, vehicle: VehicleOptions) -> float:
     if flight.end_velocity is not None:
         last = math.fsum(v * d for v, d in zip(flight.end_velocity, direction, strict=True))
         np.minimum(speed, last + n[::-1] * gain, out=speed)
-    return float(dt * (speed[:-1] + speed[1:]).sum() / 2)
+    farthest = float(dt * (speed[:-1] + speed[1:]).sum() / 2)
+    return min(farthest, dt * steps * chord(plan.wind, plan.max_airspeed, direction)[1])
 
 
-def shortest_duration(flight: Flight, vehicle: VehicleOptions) -> float | None:
+def shortest_duration(plan: Plan) -> float | None:
     """Return the least T = (N + 2) dt whose reach covers the distance, s; None past `MAX_SLOTS`."""
+    flight = plan.flight
     distance = math.dist(flight.start, flight.end)
 
     def enough(slots: int) -> bool:
-        return reach(slots - 1, flight, vehicle) >= distance
+        return reach(slots - 1, plan) >= distance
 
     low, high = 2, 4
     while not enough(high):

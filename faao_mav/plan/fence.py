@@ -127,11 +127,11 @@ def _way_problems(plan: Plan, kept: FreeArea) -> Iterator[str]:
         )
         return
     length = float(np.hypot(*np.diff(way, axis=0).T).sum())
-    most = plan.vehicle.max_speed * (flight.duration - flight.time_step)
+    most = plan.max_ground_speed * (flight.duration - flight.time_step)
     if length > most * (1 + _SHORTER_WAY):
         yield (
             f"flight.duration: {flight.duration:g} s is too short: the shortest way from start to "
-            f"end inside the fence is {length:.0f} m, and {plan.vehicle.max_speed:g} m/s takes the "
+            f"end inside the fence is {length:.0f} m, and {plan.max_ground_speed:g} m/s takes the "
             f"aircraft {most:.0f} m"
         )
 

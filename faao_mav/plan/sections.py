@@ -5,6 +5,7 @@ declarations say what `plan.yaml` may hold: each field is a key, with what it me
 its limits. `fields` says how, `keys.reference` lists them all.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -15,7 +16,7 @@ from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, Vali
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
-from faao_mav.plan.autopilots import VEHICLES
+from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
 from faao_mav.plan.fields import (
     MAX_LOCAL_DISTANCE,
     Antennas,
@@ -89,10 +90,41 @@ def _keep(origin: Origin, info: ValidationInfo) -> Origin:
 
 
 @dataclass(frozen=True, slots=True)
+class Wind(_Section):
+    """The steady wind of the flight, everywhere the same.
+
+    >>> tuple(round(each, 6) for each in Wind(5.0, 270.0).velocity)  # a west wind
+    (5.0, 0.0)
+    """
+
+    speed: Annotated[Number, key("Mean speed of the wind.", "m/s", ge=0, le=50)]
+    from_degrees: Annotated[
+        Number,
+        key(
+            "Where the wind comes from, clockwise from north: 270 is a west wind.",
+            "degrees",
+            name="from",
+            ge=0,
+            le=360,
+        ),
+    ]
+    gust: Annotated[
+        Number, key("Speed of the wind in gusts; below `speed`: no gusts.", "m/s", ge=0, le=100)
+    ] = 0.0
+
+    @property
+    def velocity(self) -> Vector:
+        """The velocity of the air over the ground, [east, north] m/s."""
+        angle = math.radians(self.from_degrees)
+        return 0.0 - self.speed * math.sin(angle), 0.0 - self.speed * math.cos(angle)
+
+
+@dataclass(frozen=True, slots=True)
 class Site(_Section):
     """Where the plan is flown."""
 
     origin: Annotated[Origin, AfterValidator(_keep)]
+    wind: Wind = Wind(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,18 +133,36 @@ class VehicleOptions(_Section):
 
     autopilot: Annotated[AutopilotName, key("The autopilot that the mission is for.")] = "ardupilot"
     type: Annotated[TypeName, key("The kind of aircraft; a plane with ArduPilot.")] = "copter"
-    max_speed: Annotated[Number, key("Largest speed v_max.", "m/s", gt=0, le=1000)]
+    max_speed: Annotated[
+        Number,
+        key(
+            "Largest speed v_max, over the ground; of a plane, through the air.",
+            "m/s",
+            gt=0,
+            le=1000,
+        ),
+    ]
     max_acceleration: Annotated[Number, key("Largest acceleration a_max.", "m/s^2", gt=0, le=1000)]
     min_speed: Annotated[
         Number,
         key(
-            "Least speed v_min: above 0 both ends are free or velocities.",
+            "Least speed v_min through the air: above 0 both ends are free or velocities.",
             "m/s",
             "a speed from 0 m/s, below max_speed",
             ge=0,
             le=1000,
         ),
     ] = 0.0
+    max_airspeed: Annotated[
+        Number | None,
+        key(
+            "Largest airspeed of a plan with a wind; null: what the vehicle holds, for a plane "
+            "max_speed.",
+            "m/s",
+            gt=0,
+            le=1000,
+        ),
+    ] = None
     parameters: Annotated[
         Mapping[str, Number],
         key(
@@ -455,6 +505,35 @@ class Plan(PlanFile):
         return self.site.origin
 
     @property
+    def wind(self) -> Vector:
+        """The velocity of the air over the ground, [east, north] m/s."""
+        return self.site.wind.velocity
+
+    @property
+    def max_ground_speed(self) -> float:
+        """The greatest speed over the ground, m/s: a plane's may be above `vehicle.max_speed`."""
+        most = self.vehicle.max_speed
+        return most if self._known.hovers else most + self.site.wind.speed
+
+    @property
+    def max_airspeed(self) -> float:
+        """The greatest airspeed in the mean wind, m/s, with what gusts take off.
+
+        Infinite where the limit on the speed over the ground is enough.
+        """
+        wind, most = self.site.wind, self.vehicle.max_airspeed
+        gusts = max(0.0, wind.gust - wind.speed)
+        if most is None:
+            most = self._known.max_airspeed if wind.speed or gusts else math.inf
+        if not self._known.hovers:
+            most = min(most, self.vehicle.max_speed)
+        return most - gusts if most - gusts < self.max_ground_speed + wind.speed else math.inf
+
+    @property
+    def _known(self) -> PlannedVehicle:
+        return VEHICLES[self.vehicle.autopilot, self.vehicle.type]
+
+    @property
     def zones(self) -> tuple[Area, ...]:
         """The zones of `geofence` in local metres."""
         return _zones(self.geofence, LocalFrame(self.origin.latitude, self.origin.longitude))
@@ -462,7 +541,7 @@ class Plan(PlanFile):
     @property
     def any_inclusion(self) -> bool:
         """Whether the vehicle's fence asks for one of several inclusions, not for all of them."""
-        return VEHICLES[self.vehicle.autopilot, self.vehicle.type].any_inclusion
+        return self._known.any_inclusion
 
     @property
     def keep_in(self) -> FreeArea | None:

@@ -1,5 +1,6 @@
 """A result, a validation and its findings in words: the lines of the terminal and of the page."""
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
@@ -9,7 +10,9 @@ from typing import TypeAlias
 from faao_mav.plan import Plan
 from faao_mav.validate import Finding, Level
 from faao_mav.validate.check import Check
+from faao_mav.validate.demands import LinkCheck
 from faao_mav.validate.flown import Debriefing
+from faao_mav.validate.wind_limit import LEAST_RATE, MOST_LATE, MOST_WIND, WindLimit
 from faao_mav.workflow import FenceSummary, Result
 
 Line: TypeAlias = tuple[str, str]
@@ -75,6 +78,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     steps = _count(solution.iterations, "iteration")
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
     yield from _flown(result)
+    yield from _wind(plan, result.check)
     yield from _fenced(result.fence)
 
 
@@ -179,6 +183,31 @@ def _flown(result: Result) -> Iterator[Line]:
         yield "", doubt
 
 
+def _wind(plan: Plan, check: Check | None) -> Iterator[Line]:
+    """Yield the plan's wind, if it has one, and which winds its mission keeps."""
+    wind, told = plan.site.wind, []
+    if any(plan.wind):
+        told.append(f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees")
+    if wind.gust > wind.speed:
+        told.append(f"gusts of {wind.gust:g} m/s")
+    if check is not None and check.wind_limit is not None:
+        told.append(_of_limit(check.wind_limit, check.link))
+    if told:
+        yield "wind", "; ".join(told)
+
+
+def _of_limit(limit: WindLimit, link: LinkCheck | None) -> str:
+    rate = f"{100 * LEAST_RATE:g} % of the rate and " if link is not None else ""
+    promise = f"{rate}its time within {MOST_LATE:g} s"
+    if limit.speed == 0:
+        return f"keeps {promise} in no wind from {limit.from_degrees:g} degrees"
+    kept = f"keeps {promise}"
+    if limit.speed >= MOST_WIND:
+        return f"{kept} in {MOST_WIND:g} m/s from any direction"
+    worst = f"the worst is {limit.from_degrees:g} degrees"
+    return f"{kept} up to {limit.speed:g} m/s from any direction; {worst}"
+
+
 def _fenced(fence: FenceSummary | None) -> Iterator[Line]:
     if fence is None:
         return
@@ -200,7 +229,11 @@ def check_lines(check: Check) -> Iterator[Line]:
     else:
         doubt = check.vehicle.type.caveat
         lasting = f"{check.track.t[-1]:.0f} s"
+        if any(check.wind):
+            lasting = f"{lasting} in {math.hypot(*check.wind):.3g} m/s of wind"
         yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
+    if check.wind_limit is not None:
+        yield "wind", _of_limit(check.wind_limit, check.link)
     if link := check.link:
         of_plan = partial(_of_plan, bandwidth_mhz=link.bandwidth_mhz)
         yield (

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.plan import Vector
 from faao_mav.vector import lengths
 from faao_mav.vehicle import FlightPath
 
@@ -79,8 +80,13 @@ class Route:
         holds = np.floor(self.waits) if whole_seconds else self.waits
         return holds, np.round(self.waits - holds, 9)
 
-    def path(self, *, whole_seconds: bool, altitude: float = 0.0) -> FlightPath:
-        """Return the legs as a flight model takes them, all at `altitude`, m above sea level."""
+    def path(
+        self, *, whole_seconds: bool, altitude: float = 0.0, wind: Vector = (0.0, 0.0)
+    ) -> FlightPath:
+        """Return the legs as a flight model takes them, in a `wind`, m/s.
+
+        All are at `altitude`, m above sea level.
+        """
         holds, delays = self.holds_and_delays(whole_seconds=whole_seconds)
         return FlightPath(
             points=np.column_stack([self.positions, np.zeros(len(self.positions))]),
@@ -90,6 +96,7 @@ class Route:
             splines=self.splines,
             radii=self.radii,
             elevation=altitude,
+            wind=wind,
         )
 
     def insert(self, at: Integers, positions: Real, times: Real, speeds: Real) -> "Route":

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Clock, Schedule, positions_at
@@ -36,7 +37,7 @@ class Scheduler(ABC):
 
     The plan is at `w` (n, 2), m, at `t` (n,), s. `model` predicts the flights of `vehicle`. Speeds
     are within `min_speed` and `max_speed`, m/s. The flight is over when the aircraft is within
-    `tolerance` m of w_F. It is flown `altitude` m above sea level.
+    `tolerance` m of w_F. It is flown `altitude` m above sea level, in a `wind`, m/s.
     """
 
     t: Real
@@ -47,6 +48,7 @@ class Scheduler(ABC):
     max_speed: float
     tolerance: float
     altitude: float = 0.0
+    wind: Vector = (0.0, 0.0)
 
     def first(self, route: Route) -> Schedule:
         """Return `route`, with the run-in that the plan needs, in its first fit to the plan."""
@@ -63,7 +65,7 @@ class Scheduler(ABC):
         """Return the predicted flight of `route`, which is rounded for it."""
         route = self._with_radii(route.rounded())
         whole_seconds = self.vehicle.type.whole_second_holds
-        path = route.path(whole_seconds=whole_seconds, altitude=self.altitude)
+        path = route.path(whole_seconds=whole_seconds, altitude=self.altitude, wind=self.wind)
         return Schedule(route, self.model.fly(path), self._clock(route))
 
     def fitted(

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING
 
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
+from faao_mav.plan import Vector
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
+from faao_mav.validate.wind_limit import WindLimit, wind_limit
 from faao_mav.vehicle import Track, Vehicle
 
 if TYPE_CHECKING:
@@ -17,7 +19,8 @@ class Check:
     """What was found in `mission` for `vehicle`.
 
     `track` is the predicted flight; where there is none `unpredicted` says why. `link` is what the
-    flight makes of a plan, None without a plan or a track. `findings` are the worst first.
+    flight makes of a plan, None without a plan or a track. `findings` are the worst first. `wind`,
+    m/s, is what `track` is predicted in, `wind_limit` the strongest wind that the mission keeps.
     """
 
     mission: Mission
@@ -26,6 +29,8 @@ class Check:
     unpredicted: str = ""
     link: LinkCheck | None = None
     findings: tuple[Finding, ...] = ()
+    wind: Vector = (0.0, 0.0)
+    wind_limit: WindLimit | None = None
 
     def of(self, level: Level) -> tuple[Finding, ...]:
         """Return the findings of `level`."""
@@ -39,11 +44,13 @@ def check(
     limits: Limits | None = None,
     solution: "Solution | None" = None,
     lead: float | None = None,
+    wind: Vector | None = None,
 ) -> Check:
     """Predict the flight of `mission` by `vehicle` and judge both by all rules.
 
-    With a `solution` the flight is judged by what it makes of that plan too, from the ground or
-    from the air, as the plan has it. `lead`, where it is
+    The flight is predicted in a `wind`, east and north, m/s: without one in that of the plan, or in
+    none. With a `solution` the flight is judged by what it makes of that plan too, from the ground
+    or from the air, as the plan has it. `lead`, where it is
     known, is by how many seconds the aircraft sets out before the plan does. A mission that cannot
     be predicted is judged by its items alone; nothing is raised.
 
@@ -54,23 +61,28 @@ def check(
     >>> [finding.rule for finding in found.of(Level.ERROR)]
     ['px4-starts-with-land']
     """
-    track, unpredicted = _track(mission, vehicle)
-    link = None
+    own = solution.plan.wind if solution is not None else (0.0, 0.0)
+    wind = own if wind is None else wind
+    track, unpredicted = _track(mission, vehicle, wind)
+    made_for = track if wind == own else _track(mission, vehicle, own)[0]
+    limit = link = None
+    if made_for is not None:
+        limit = wind_limit(mission, vehicle, made_for, solution=solution, lead=lead)
     if solution is not None and track is not None:
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
 
         link = compare_with_plan(solution, track, lead=lead)
     airborne = solution is not None and not solution.plan.mission.takeoff
     findings = validate(mission, vehicle, track=track, limits=limits, link=link, airborne=airborne)
-    return Check(mission, vehicle, track, unpredicted, link, findings)
+    return Check(mission, vehicle, track, unpredicted, link, findings, wind, limit)
 
 
-def _track(mission: Mission, vehicle: Vehicle) -> tuple[Track | None, str]:
+def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:
     """Return the predicted flight, or None and why there is none."""
     from faao_mav.vehicle.predict import predict
 
     try:
-        track = predict(mission, vehicle)
+        track = predict(mission, vehicle, wind=wind)
     except FaaoError as error:
         return None, str(error)
     return (track, "") if len(track.t) else (None, "there is nothing to fly")

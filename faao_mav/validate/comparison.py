@@ -10,8 +10,8 @@ from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.initial_route import begins_at_speed, set_out
-from faao_mav.schedule.prediction import Prediction, price_flight
-from faao_mav.schedule.schedule import passing, positions_at
+from faao_mav.schedule.prediction import Prediction, price_flight, rates_along
+from faao_mav.schedule.schedule import lateness, passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LinkCheck, Stretch
 from faao_mav.vector import lengths
@@ -57,6 +57,23 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
         altitude_error=float(np.abs(during - plan.flight.altitude).max()),
         worst=_worst(solution, flown),
     )
+
+
+def keeps_plan(
+    solution: Solution, track: Track, lead: float | None, *, share: float, late: float
+) -> bool:
+    """Tell whether `track` ends within `late` s of the plan and has a `share` of its rate.
+
+    That is the share of `LinkCheck.share`; `lead` is as in `compare_with_plan`.
+    """
+    t, w = on_the_plans_clock(solution, track, lead=lead)
+    tolerance = solution.plan.mission.path_tolerance
+    if not abs(lateness(solution.t, solution.w, t, w, tolerance)) <= late:
+        return False
+    I_U, I_G = rates_along(solution, positions_at(solution.t, t, w))
+    flown = min(float(I_U.mean()), float(I_G.mean()))
+    delivered = solution.relay(I_U, I_G, solution.shares).rate >= share * solution.delivered_rate
+    return delivered and (solution.plan.radio.causal or flown >= share * solution.rates.R_avg)
 
 
 def on_the_plans_clock(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
+from faao_mav.plan import Vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,8 +24,9 @@ class FlightPath:
     waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own. A flight that turns
     out to take more than `longest`, s, need not be followed to its end: `InputError`.
 
-    Heights count from `elevation`, m above sea level. An aeroplane comes over the first point at
-    the velocity `entry` (3,), m/s, where one is given.
+    Heights count from `elevation`, m above sea level. The air moves at `wind`, east and north, m/s,
+    steadily and everywhere. An aeroplane comes over the first point at the velocity `entry` (3,),
+    m/s, where one is given.
     """
 
     points: Real
@@ -36,6 +38,7 @@ class FlightPath:
     longest: float = inf
     elevation: float = 0.0
     entry: Real | None = None
+    wind: Vector = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,6 +15,7 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.plan import Vector
 from faao_mav.vehicle.flight_path import FlightPath, Track
 from faao_mav.vehicle.vehicle import Vehicle
 
@@ -38,18 +39,25 @@ _SHORTEST = 1e-3
 
 
 def predict(
-    mission: Mission, vehicle: Vehicle, frame: LocalFrame | None = None, *, step: float = 0.1
+    mission: Mission,
+    vehicle: Vehicle,
+    frame: LocalFrame | None = None,
+    *,
+    step: float = 0.1,
+    wind: Vector = (0.0, 0.0),
+    longest: float = math.inf,
 ) -> Track:
     """Return the predicted flight of `mission` by `vehicle`, sampled every `step` seconds.
 
-    It begins on the ground at home, or, without a home, below the first place of the mission,
-    about which `frame` then is too. DO_JUMPs are followed, those without end twenty times. An
-    item that never ends (loiter unlimited, a mission without an end) ends the track on arrival.
-    A mission without places gives an empty track.
+    The air moves at `wind`, east and north, m/s, steadily and everywhere. The flight begins on the
+    ground at home, or, without a home, below the first place of the mission, about which `frame`
+    then is too. DO_JUMPs are followed, those without end twenty times. An item that never ends
+    (loiter unlimited, a mission without an end) ends the track on arrival. A mission without places
+    gives an empty track.
 
     Raises `InputError` for places that cannot be flown to (NaN, altitudes above sea level
     without a home), parameters that are useless, or a flight that takes more than
-    1.5 hours, of a plane more than six.
+    `longest` s or 1.5 hours, of a plane six.
     """
     start = _start(mission)
     if start is None:
@@ -58,7 +66,9 @@ def predict(
         none = np.empty(0, dtype=int)
         return Track(np.empty(0), empty, empty, none, reached, frame or LocalFrame(0.0, 0.0))
     frame = frame or LocalFrame(*start)
-    walk = _Walk(mission, vehicle, frame, step, np.append(frame.to_local(*start), 0.0))
+    walk = _Walk(
+        mission, vehicle, frame, step, np.append(frame.to_local(*start), 0.0), wind, longest
+    )
     for index, item in _in_order(mission):
         walk.take(index, item)
         if walk.over:
@@ -128,6 +138,8 @@ class _Walk:
     frame: LocalFrame
     step: float
     home: Real
+    wind: Vector
+    longest: float
     stretch: list[_Stop] = field(default_factory=list)
     parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
     clock: float = 0.0
@@ -140,7 +152,8 @@ class _Walk:
         self.speed = self.model.cruise_speed
         self.place = self.goal = self.home
         self.reached = np.full(len(self.mission.items), np.nan)
-        self.longest = LONGEST_COPTER if self.vehicle.type.hovers else LONGEST
+        most = LONGEST_COPTER if self.vehicle.type.hovers else LONGEST
+        self.longest = min(self.longest, most)
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
@@ -194,6 +207,7 @@ class _Walk:
             delays=np.array([stop.delay for stop in stops]),
             longest=self.longest - self.clock,
             elevation=self.mission.home.altitude if self.mission.home is not None else 0.0,
+            wind=self.wind,
             entry=None if self.vehicle.type.hovers or not self.parts else self.parts[-1][2][-1],
         )
         self._check_clock(self._at_least(path))

@@ -137,8 +137,9 @@ def register(vehicle_type: VehicleType) -> VehicleType:
     key = (vehicle_type.family.key, vehicle_type.kind)
     _TYPES[key] = vehicle_type
     planned = vehicle_type.legs is not None and vehicle_type.flight_model is not None
-    one = vehicle_type.fence_needs_one_inclusion(Vehicle(*key))
-    VEHICLES[key] = PlannedVehicle(*key, vehicle_type.hovers, planned, any_inclusion=one)
+    own = Vehicle(*key)
+    one, holds = vehicle_type.fence_needs_one_inclusion(own), vehicle_type.max_airspeed(own)
+    VEHICLES[key] = PlannedVehicle(*key, vehicle_type.hovers, planned, one, holds)
     return vehicle_type
 
 

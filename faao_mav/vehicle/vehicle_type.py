@@ -14,6 +14,10 @@ OVERSPEED = 1.1
 """The greatest speed that a mission may command, as a multiple of the plan's max_speed: it makes up
 for corners. Chosen; what a change costs is not measured."""
 
+HELD = 0.9
+"""The greatest airspeed that a plan asks of a copter, in that at which drag takes all of its lean
+limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
+
 _G = 9.80665
 """Standard gravity, m/s²."""
 
@@ -133,6 +137,8 @@ class VehicleType:
         calibrated: the flight model is compared with recorded flights.
         ceilings: how far a plan may go for the vehicle to keep it, beside `fastest`; the least of
             those with one key counts.
+        max_airspeed: the greatest airspeed, m/s, that it holds in wind with room to correct.
+        models_lean_limit: its flight model knows what becomes of a flight beyond that.
         true_over_commanded: true airspeed over the one that a mission commands, at a height in m
             above sea level; 1 where missions command ground speeds.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
@@ -159,6 +165,8 @@ class VehicleType:
     calibrated: bool = False
     recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
     ceilings: Callable[[ParameterValues], Sequence[Ceiling]] = lambda _: ()
+    max_airspeed: Callable[[ParameterValues], float] = lambda _: math.inf
+    models_lean_limit: bool = False
     true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
     corner_speed: Callable[[ParameterValues, float], float] | None = None
 

@@ -9,7 +9,7 @@ which half a metre of error in the aircraft's own position is up to a second: re
 much, and missions are made without such legs.
 """
 
-from recorded import FLIGHTS, Row, compared, read, show
+from recorded import FLIGHTS, Row, compared, mission_of, read, show
 
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.vehicle import Vehicle
@@ -51,9 +51,10 @@ def rows(names: list[str] = NAMES) -> list[Row]:
 
 def row(name: str) -> Row:
     recorded = read(FOLDER, name, home_row=False)
-    parameters = read_parameters(FOLDER / f"{name}.params")
+    parameters = read_parameters(FOLDER / f"{mission_of(name)}.params")
     model = Px4.from_vehicle(Vehicle("px4", "copter", parameters, name))
     use = "slow" if name in SLOW else "held out" if name in HELD_OUT else "fitted"
+    use = "in wind" if "wind" in name else use
     return compared(name, use, recorded, model.fly(recorded.path))
 
 

@@ -1,6 +1,9 @@
-"""Missions that real autopilots flew in their simulators, beside their plans, without wind.
+"""Missions that real autopilots flew in their simulators, beside their plans.
 
     FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/flown.py [ardupilot | px4 | plane] [PLAN ...]
+        [--wind SPEED,FROM]
+
+With a wind, m/s and degrees, plans are made for it, and flown in it; else in calm air.
 
 One row for each plan: rms position error at equal times (m), how much later than planned the flight
 is over (s), the delivered rate over the planned one; each as predicted and as flown.
@@ -16,9 +19,11 @@ from typing import Any
 
 import numpy as np
 import record_plane
+from record_px4 import in_wind
 
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
+from faao_mav.errors import FaaoError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
@@ -100,6 +105,7 @@ def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Pre
     files = result.write(folder / "mission.waypoints")
     command = [sys.executable, str(autopilots / script), str(files[0])]
     command += ["--param-file", str(files[1])] if len(files) > 1 else []
+    command += in_wind(autopilots / script, result.solution.plan.site.wind)
     track = folder / "track.csv"
     for _ in range(4):
         run = subprocess.run(
@@ -129,13 +135,17 @@ def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
     return price_flight(solution, t - begin, w)
 
 
-def row(name: str, autopilots: Path, autopilot: str) -> str:
+def row(name: str, autopilots: Path, autopilot: str, wind: dict[str, Any]) -> str:
     """Plan, fly and compare."""
-    if autopilot == "plane":
-        plan = record_plane.plan_of(*PLANES[name])
-    else:
-        plan = plan_of(FLOWN[name], autopilot, "recommend")
-    result = plan_mission(plan)
+    try:
+        if autopilot == "plane":
+            changes, elevation = PLANES[name]
+            plan = record_plane.plan_of(changes | wind, elevation)
+        else:
+            plan = plan_of(FLOWN[name] | wind, autopilot, "recommend")
+        result = plan_mission(plan)
+    except FaaoError as error:
+        return f"{autopilot:<10}{name:<28}refused: {error}"
     assert result.prediction is not None
     with tempfile.TemporaryDirectory() as folder:
         real = flown(autopilots, autopilot, result, Path(folder))
@@ -150,11 +160,15 @@ def row(name: str, autopilots: Path, autopilot: str) -> str:
 def main() -> None:
     """Print the table."""
     chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
+    wind: dict[str, Any] = {}
+    if "--wind" in chosen:
+        speed, start = chosen[chosen.index("--wind") + 1].split(",")
+        wind = {"site.wind": {"speed": float(speed), "from": float(start)}}
     print(f"{'':<41}{'predicted: m, s late, rate':<27}flown")
     for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
         plans = PLANES if autopilot == "plane" else FLOWN
         for name in [each for each in plans if each in chosen] or plans:
-            print(row(name, autopilots, autopilot), flush=True)
+            print(row(name, autopilots, autopilot, wind), flush=True)
 
 
 if __name__ == "__main__":

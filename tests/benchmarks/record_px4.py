@@ -22,6 +22,7 @@ from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
 from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.optimizer.optimize import optimize
+from faao_mav.plan import Wind
 from faao_mav.schedule.conversion import convert
 from faao_mav.vehicle import PX4_COPTER
 from missions import PLANS, plan_of
@@ -200,6 +201,13 @@ def flown_by(runner: Path, mission: Path, options: list[str]) -> list[dict[str, 
             raise SystemExit(f"{mission.stem}: not flown")
         with track.open() as file:
             return list(csv.DictReader(file))
+
+
+def in_wind(runner: Path, wind: Wind) -> list[str]:
+    """Return the option of `runner` for a steady `wind`."""
+    east, north = wind.velocity
+    asked = f"{east},{north}" if "px4" in runner.name else f"{wind.speed},{wind.from_degrees}"
+    return [f"--wind={asked}"] if wind.speed else []
 
 
 def keep(rows: list[dict[str, str]], target: Path, keys: Sequence[str]) -> None:

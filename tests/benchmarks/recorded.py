@@ -19,6 +19,7 @@ from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
 from faao_mav.mission.formats.wpl import read_wpl
+from faao_mav.plan import Wind
 from faao_mav.vehicle.flight_path import FlightPath, Flown
 
 FLIGHTS = Path(__file__).parent.parent / "data" / "flights"
@@ -52,9 +53,20 @@ class Row:
     path_error: float
 
 
+def mission_of(name: str) -> str:
+    """Return the name of the mission that was flown: without the wind of the flight."""
+    return name.partition("-wind")[0]
+
+
+def wind_of(name: str) -> Wind:
+    """Return the wind of the flight `name`."""
+    speed, _, degrees = name.partition("-wind")[2].partition("from")
+    return Wind(float(speed or 0), float(degrees or 0))
+
+
 def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
     """Read a mission and its track; `home_row`: whether the current item counts home as 0."""
-    mission = read_wpl((folder / f"{name}.waypoints").read_text(), name).mission
+    mission = read_wpl((folder / f"{mission_of(name)}.waypoints").read_text(), name).mission
     assert mission.home is not None
     frame = LocalFrame(mission.home.latitude, mission.home.longitude)
     items, points, speeds, holds, radii, splines = [], [], [], [], [], []
@@ -79,6 +91,7 @@ def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
         holds=np.array(holds),
         splines=np.array(splines),
         radii=np.array(radii),
+        wind=wind_of(name).velocity,
     )
     horizontal = frame.to_local(column["lat"], column["lon"])
     return Recorded(path, column["t_s"] - left[0], horizontal, left - left[0], speeds[0])

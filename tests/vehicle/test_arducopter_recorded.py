@@ -1,7 +1,7 @@
 """The ArduCopter model against flights of a real ArduCopter in its simulator."""
 
 import pytest
-from flights_arducopter import FITTED, HELD_OUT, SPLINES, row
+from flights_arducopter import FITTED, HELD_OUT, IN_WIND, SPLINES, row
 from recorded import Row, together
 
 
@@ -26,6 +26,21 @@ def test_splines_are_predicted_more_roughly() -> None:
         flight = row(name)
         assert flight.arrival_rms <= 0.25, flight
         assert flight.position_rms <= 0.8, flight
+        assert flight.path_error <= 0.6, flight
+
+
+@pytest.mark.parametrize(
+    ("wind", "arrival", "position"),
+    [("wind3", 0.15, 0.6), ("wind6", 0.2, 0.8), ("wind9", 0.8, 3.2)],
+)
+def test_flights_in_wind_beyond_the_lean_limit_too(
+    wind: str, arrival: float, position: float
+) -> None:
+    flights = [row(name) for name in IN_WIND if wind in name]
+    assert len(flights) == 4
+    for flight in flights:
+        assert flight.arrival_rms <= arrival, flight
+        assert flight.position_rms <= position, flight
         assert flight.path_error <= 0.6, flight
 
 

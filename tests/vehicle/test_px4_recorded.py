@@ -41,6 +41,13 @@ def test_flights_together(rows: list[Row], use: str) -> None:
     assert position <= 2.4
 
 
+def test_wind_changes_nothing_within_the_lean_limit(rows: list[Row]) -> None:
+    assert sum(flight.use == "in wind" for flight in rows) == 12
+    arrival, position = together(rows, "in wind")
+    assert arrival <= 0.55
+    assert position <= 3.4
+
+
 # What PX4 flew in other missions, none of them used for fitting: mean speeds on straight lines
 # and circles at 8 m/s, slowest speeds at corners.
 

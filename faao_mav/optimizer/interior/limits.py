@@ -1,13 +1,14 @@
-"""The limits of (13e) and (13f), ||v_n|| <= v_max and ||a_n|| <= a_max, as second-order cones.
+"""The limits of (13e), (13f), ||v_n|| <= v_max and ||a_n|| <= a_max, as second-order cones.
 
 Both stand in one array of 2 n - 1 cones, (v_0 .. v_{n-1}, a_0 .. a_{n-2}): a numpy call on some
 hundred slots costs more in the call than in the arithmetic. x = D v = (v, k (v_{n+1} - v_n)) is
-what they bound, in units of v_max and a_max, zero where it is fixed or not bounded.
+what they bound, in units of v_max and a_max, zero where it is fixed or not bounded. In wind the
+airspeed has n cones of its own.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from faao_mav.optimizer.interior.constraint import (
     quadratic,
 )
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.plan import Vector
 
 
 @dataclass(frozen=True)
@@ -32,12 +34,7 @@ class FlightLimits(Constraint):
 
     def begin(self, flight: ScaledFlight, start: Start) -> "LimitsState":
         """Return slacks s_0 = ||x|| + `start.margin`, at least 1, and centred multipliers."""
-        pair = np.empty((3, 2, start.w.shape[1], 2 * flight.matrix.slots - 1))
-        s = pair[:, 0]
-        _enter(flight, s, 0.0, start.v)
-        s[0] = np.maximum(1, np.hypot(s[1], s[2]) + start.margin)
-        pair[:, 1] = start.mu * cones.inverse(s)
-        return LimitsState(flight, pair, s[0] - 1)
+        return LimitsState.centred_at(start, flight, 2 * flight.matrix.slots - 1)
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:
         """Return the largest violation of (13e) or (13f), relative to the limit."""
@@ -58,6 +55,17 @@ class LimitsState(State):
     flight: ScaledFlight
     pair: Real
     margin: Real
+
+    @classmethod
+    def centred_at(cls, start: Start, flight: ScaledFlight, count: int, *given: Any) -> Self:
+        """Return the state of `count` cones at `start`; `given` are the fields of a subclass."""
+        pair = np.empty((3, 2, start.w.shape[1], count))
+        state = cls(flight, pair, pair[0, 0], *given)
+        s = pair[:, 0]
+        state.enter(s, 0.0, start.v)
+        s[0] = np.maximum(1, np.hypot(s[1], s[2]) + start.margin)
+        pair[:, 1] = start.mu * cones.inverse(s)
+        return replace(state, margin=s[0] - 1)
 
     @cached_property
     def scaling(self) -> cones.Scaling:
@@ -83,7 +91,7 @@ class LimitsState(State):
 
     def forces(self) -> Forces:
         """Return the multipliers of speeds and accelerations."""
-        return self._split(self.pair[1:, 1])
+        return self.split(self.pair[1:, 1])
 
     def stiffness(self) -> Stiffness:
         """Return the blocks of W^-2 on x, and their inverse on the accelerations."""
@@ -98,8 +106,8 @@ class LimitsState(State):
     def push(self, target: Real | None) -> Forces:
         """Return -W^-2 (-margin, 0) for x, or `target` for x."""
         if target is None:
-            return self._split(self.scaling.coupling() * self.margin)
-        return self._split(target[1:])
+            return self.split(self.scaling.coupling() * self.margin)
+        return self.split(target[1:])
 
     def target(self, mu: Real, ahead: Real, share: Real) -> Real:
         """Return mu s^-1 - W^-1 (l^-1 o (W^-1 ds o W dz)) at `share` of the step `ahead`."""
@@ -111,7 +119,7 @@ class LimitsState(State):
         n = self.flight.matrix.slots
         step = np.empty_like(self.pair)
         z = step[:, 1]
-        _enter(self.flight, step[:, 0], -self.margin, move.v)
+        self.enter(step[:, 0], -self.margin, move.v, change=True)
         z[1:, :, :n] = rest.v
         z[1:, :, n:] = rest.a
         z[0] = self.scaling.radial(target, -self.margin, z[1:])
@@ -126,26 +134,80 @@ class LimitsState(State):
         """Return the share of `step` at which a slack or a multiplier leaves its cone."""
         return np.asarray(cones.reach(self.pair, step).min(axis=0))
 
-    def moved(self, w: Real, v: Real, share: Real, step: Real) -> "LimitsState":  # noqa: ARG002
+    def moved(self, w: Real, v: Real, share: Real, step: Real) -> Self:  # noqa: ARG002
         """Return the state after `share` of `step`, with the slacks of the speeds v themselves."""
         margin, pair = self.margin * (1 - share), self.pair + share * step
-        _enter(self.flight, pair[:, 0], 1 + margin, v)
-        return LimitsState(self.flight, pair, margin)
+        self.enter(pair[:, 0], 1 + margin, v)
+        return replace(self, pair=pair, margin=margin)
 
-    def centred(self, mu: Real) -> "LimitsState":
+    def centred(self, mu: Real) -> Self:
         """Return the same slacks with z = mu s^-1."""
         s = self.pair[:, 0]
         return replace(self, pair=np.stack([s, mu * cones.inverse(s)], axis=1))
 
-    def _split(self, on_x: Real) -> Forces:
+    def split(self, on_x: Real) -> Forces:
         """Return forces on x (2, flights, m) as forces on speeds and accelerations."""
         n = self.flight.matrix.slots
         return Forces(v=on_x[..., :n], a=on_x[..., n:])
 
+    def enter(self, s: Real, first: Real | float, v: Real, *, change: bool = False) -> None:  # noqa: ARG002
+        """Enter s_0 = `first` and s_1 = D v, at free speeds and bounded accelerations, into s.
 
-def _enter(flight: ScaledFlight, s: Real, first: Real | float, v: Real) -> None:
-    """Enter s_0 = `first` and s_1 = D v, at free speeds and bounded accelerations, into s."""
-    n = flight.matrix.slots
-    s[0] = first
-    s[1:, :, :n] = v * flight.matrix.moves_v
-    s[1:, :, n:] = flight.accelerations(v)
+        v are speeds or, with `change`, changes of speeds.
+        """
+        n = self.flight.matrix.slots
+        s[0] = first
+        s[1:, :, :n] = v * self.flight.matrix.moves_v
+        s[1:, :, n:] = self.flight.accelerations(v)
+
+
+@dataclass(frozen=True)
+class AirspeedLimit(Constraint):
+    """The limit ||v_n - `wind`|| <= `most`, both in v_max."""
+
+    most: float
+    wind: Vector
+
+    def begin(self, flight: ScaledFlight, start: Start) -> "AirspeedState":
+        """Return slacks and multipliers as those of `FlightLimits` begin."""
+        return AirspeedState.centred_at(start, flight, flight.matrix.slots, self)
+
+    def excess(self, kin: Kinematics, flight: Trajectory) -> float:
+        """Return the largest violation, relative to the limit."""
+        return kin.residuals(flight)["airspeed"] / kin.max_airspeed
+
+
+@dataclass(frozen=True)
+class AirspeedState(LimitsState):
+    """As `LimitsState`, of the n cones on x = (v - wind) / most, zero where v is fixed."""
+
+    limit: AirspeedLimit
+
+    def stiffness(self) -> Stiffness:
+        """Return the blocks of W^-2 on v."""
+        return Stiffness(v=self.scaling.stiffness / self.limit.most**2)
+
+    def solved(self, move: Move, target: Real | None, rest: Forces) -> tuple[Real, Forces]:  # noqa: ARG002
+        """Return (ds, dz) with z_1 = target_1 - (W^-2 ds)_1."""
+        step = np.empty_like(self.pair)
+        ds, z = step[:, 0], step[:, 1]
+        self.enter(ds, -self.margin, move.v, change=True)
+        xx, xy, yy = self.scaling.stiffness
+        z[1:] = self.scaling.coupling() * self.margin
+        z[1:] -= np.stack([xx * ds[1] + xy * ds[2], xy * ds[1] + yy * ds[2]])
+        if target is not None:
+            z[1:] += target[1:]
+        z[0] = self.scaling.radial(target, -self.margin, z[1:])
+        supplied = self.split(z[1:])
+        z -= self.pair[:, 1]
+        return step, supplied
+
+    def split(self, on_x: Real) -> Forces:
+        """Return forces on x (2, flights, n) as forces on speeds."""
+        return Forces(v=on_x / self.limit.most)
+
+    def enter(self, s: Real, first: Real | float, v: Real, *, change: bool = False) -> None:
+        """Enter s_0 = `first` and the airspeeds at the speeds v, or at their `change`, into s."""
+        wind = np.zeros(2) if change else np.array(self.limit.wind)
+        s[0] = first
+        s[1:] = (v - wind[:, None, None]) * (self.flight.matrix.moves_v / self.limit.most)

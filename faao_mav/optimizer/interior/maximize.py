@@ -1,5 +1,6 @@
 """The best flight for a max-min of smooth stage rewards, from given starts."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import Constraint
-from faao_mav.optimizer.interior.limits import FlightLimits
+from faao_mav.optimizer.interior.limits import AirspeedLimit, FlightLimits
 from faao_mav.optimizer.interior.min_speed import MinSpeedConstraint
 from faao_mav.optimizer.interior.queue import Queue, QueueRewards
 from faao_mav.optimizer.interior.rewards import ScaledRewards, Stage
@@ -132,9 +133,13 @@ def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
 
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
     """Return the constraints of `kin` itself, the limits on speed and acceleration first."""
+    east, north = (part / kin.max_speed for part in kin.wind)
+    kept: list[Constraint] = [FlightLimits()]
+    if math.isfinite(kin.max_airspeed):
+        kept.append(AirspeedLimit(kin.max_airspeed / kin.max_speed, (east, north)))
     if kin.min_speed > 0:
-        return FlightLimits(), MinSpeedConstraint(kin.min_speed / kin.max_speed)
-    return (FlightLimits(),)
+        kept.append(MinSpeedConstraint(kin.min_speed / kin.max_speed, (east, north)))
+    return tuple(kept)
 
 
 def feasible(

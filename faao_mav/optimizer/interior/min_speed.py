@@ -7,6 +7,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.half_planes import HalfPlanes
+from faao_mav.plan import Vector
 
 _SMALLEST = 1e-9
 """The least speed, in v_max, whose direction is divided by; far below any that is flown."""
@@ -14,9 +15,10 @@ _SMALLEST = 1e-9
 
 @dataclass(frozen=True)
 class MinSpeedConstraint(HalfPlanes):
-    """g(v) = ||v|| - `least`, in v_max: the half-plane u^T v >= `least` with u = v / ||v||."""
+    """g(v) = ||v - wind|| - `least`, in v_max: half-planes along the airspeed v - `wind`."""
 
     least: float
+    wind: Vector = (0.0, 0.0)
     quantity: ClassVar = "v"
 
     @property
@@ -30,6 +32,7 @@ class MinSpeedConstraint(HalfPlanes):
         return 0.1 * self.least * (1 + 1e-6)
 
     def slack(self, x: Real) -> tuple[Real, Real]:
-        """Return ||v|| - least and v / ||v||."""
+        """Return ||v - wind|| - least and its gradient."""
+        x = x - np.reshape(self.wind, (2, 1, 1))
         speed = np.hypot(*x)
         return speed - self.least, x / np.maximum(speed, _SMALLEST)

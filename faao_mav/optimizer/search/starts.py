@@ -67,7 +67,7 @@ def starts(
             found[name] = straight_flight(kin)
             continue
         stops = [stations[key] for key in name.split("-")]
-        flight = cruise_by(kin, stops) if kin.min_speed > 0 else _by_way_of(kin, stops)
+        flight = _circling_by(kin, stops) if kin.min_speed > 0 else _by_way_of(kin, stops)
         if flight is not None:
             found[name] = flight
     return found or {"straight": straight_flight(kin)}
@@ -82,6 +82,8 @@ def straight_flight(kin: Kinematics) -> Trajectory:
     Raises:
         InfeasibleError: there is no feasible flight, or none was found that keeps the least speed.
     """
+    if kin.min_speed > 0 and any(kin.wind):
+        return kin.over_ground(straight_flight(kin.in_the_air()))
     line = kin.end - kin.start
     distance = float(np.linalg.norm(line))
     ends = [v for v in (kin.start_velocity, kin.end_velocity) if v is not None]
@@ -92,6 +94,13 @@ def straight_flight(kin: Kinematics) -> Trajectory:
         if speed is not None:
             return kin.follow(speed[:, None] * direction)
     return cruise(kin) if kin.min_speed > 0 else _gentlest_flight(kin)
+
+
+def _circling_by(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
+    """Return the flight that circles at `stations`, with the wind: it is over them at half time."""
+    drift = kin.time_step * (kin.slots - 1) / 2 * np.array(kin.wind)
+    flight = cruise_by(kin.in_the_air(), [station - drift for station in stations])
+    return None if flight is None else kin.over_ground(flight)
 
 
 def _leads_aside(kin: Kinematics, direction: Real) -> bool:
@@ -132,15 +141,16 @@ def fewest_slots(kin: Kinematics, direction: Real, distance: float) -> int | Non
     after = np.arange(kin.slots)
     slots = after[1:] + 1
     gain = kin.max_acceleration * kin.time_step
-    rising, falling = np.full((2, kin.slots), kin.max_speed)
+    most = kin.speeds_along(direction)[1]
+    rising, falling = np.full((2, kin.slots), most)
     split, possible = np.zeros_like(slots), np.ones(slots.shape, dtype=bool)
     if kin.end_velocity is not None:
         last = float(kin.end_velocity @ direction)
-        falling = np.minimum(kin.max_speed, last + gain * after)
+        falling = np.minimum(most, last + gain * after)
     if kin.start_velocity is not None:
         first = float(kin.start_velocity @ direction)
         if kin.bound_first_acceleration:
-            rising = np.minimum(kin.max_speed, first + gain * after)
+            rising = np.minimum(most, first + gain * after)
         rising[0] = first
         if kin.end_velocity is None:
             split = slots
@@ -162,8 +172,8 @@ def _speed_limits(kin: Kinematics, direction: Real) -> tuple[Real, Real]:
     """Return the least and the greatest speed (N + 2,) that the ends and the limits allow, m/s."""
     n = np.arange(kin.slots, dtype=float)
     gain = kin.max_acceleration * kin.time_step
-    upper = np.full(kin.slots, kin.max_speed)
-    lower = np.full(kin.slots, kin.min_speed) if kin.min_speed > 0 else -upper
+    least, most = kin.speeds_along(direction)
+    lower, upper = np.full(kin.slots, least), np.full(kin.slots, most)
     if kin.start_velocity is not None:
         first = float(kin.start_velocity @ direction)
         steps = n + (0.0 if kin.bound_first_acceleration else np.where(n > 0, np.inf, 0.0))
@@ -190,9 +200,10 @@ def _gentlest_flight(kin: Kinematics) -> Trajectory:
     flight = flight_variables(kin)
     problem = cp.Problem(cp.Minimize(cp.sum_squares(flight.a)), flight.constraints)
     if solve(problem) == cp.INFEASIBLE:
+        air = f"{kin.max_airspeed:.4g} m/s through the air, " if any(kin.wind) else ""
         raise InfeasibleError(
             "no flight from start to end meets the end velocities within the duration, "
-            f"{kin.max_speed:g} m/s and {kin.max_acceleration:g} m/s^2; "
+            f"{air}{kin.max_speed:g} m/s and {kin.max_acceleration:g} m/s^2; "
             "give more time or gentler end velocities"
         )
     return flight.trajectory()

@@ -24,6 +24,7 @@ from faao_mav.vehicle.px4.legs import Px4Legs as Px4Legs
 from faao_mav.vehicle.px4.parameters import COPTER_TABLE, PLANE_TABLE
 from faao_mav.vehicle.px4.response import DRAG
 from faao_mav.vehicle.vehicle_type import (
+    HELD,
     OVERSPEED,
     AutopilotFamily,
     Ceiling,
@@ -151,6 +152,10 @@ def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
     )
 
 
+def _max_airspeed(vehicle: ParameterValues) -> float:
+    return round(HELD * lean_acceleration(vehicle.value("lean_angle")) / DRAG, 2)
+
+
 PX4_COPTER = VehicleType(
     family=PX4,
     kind="copter",
@@ -169,6 +174,7 @@ PX4_COPTER = VehicleType(
     calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),
     ceilings=_ceilings,
+    max_airspeed=_max_airspeed,
     corner_speed=_corner_speed,
 )
 """A multicopter with PX4 1.16."""

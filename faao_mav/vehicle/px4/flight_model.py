@@ -13,7 +13,7 @@ from faao_mav.vehicle.px4.simulation import SWITCH_DELAY, FlightLog, simulate
 
 @dataclass(frozen=True, slots=True)
 class Px4(Px4Limits):
-    """How a PX4 multicopter flies plain waypoints in mission mode, without wind.
+    """How a PX4 multicopter flies plain waypoints in mission mode.
 
     A simulation of PX4's own chain: guidance with a look at the next waypoint only, smoothing
     within jerk and acceleration, a clock that runs slower while the aircraft lags behind, a
@@ -21,7 +21,9 @@ class Px4(Px4Limits):
     equations. Four constants are fitted to recorded flights (`response.ATTITUDE_LAG`,
     how its position estimate strays in `step`, `simulation.START_LAG`,
     `simulation.SWITCH_DELAY`), the rest is PX4's. Limits are
-    SI: m, m/s, m/s², m/s³; the defaults are those of PX4 1.16.
+    SI: m, m/s, m/s², m/s³; the defaults are those of PX4 1.16. A steady wind changes nothing: the
+    drag is linear in the airspeed, the controller's integral holds against the wind from the
+    take-off on, and drag takes all of the lean limit at 49 m/s only.
     """
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:

@@ -9,7 +9,7 @@ from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
-from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType
+from faao_mav.vehicle.vehicle_type import HELD, Ceiling, VehicleType
 
 _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""
@@ -57,6 +57,10 @@ def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
     )
 
 
+def _max_airspeed(vehicle: ParameterValues) -> float:
+    return round(HELD * ArduCopterLimits.from_vehicle(vehicle).top_speed, 2)
+
+
 ARDUCOPTER = VehicleType(
     family=ARDUPILOT,
     kind="copter",
@@ -76,5 +80,7 @@ ARDUCOPTER = VehicleType(
     calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),
     ceilings=_ceilings,
+    max_airspeed=_max_airspeed,
+    models_lean_limit=True,
 )
 """ArduCopter 4.1 and later; measured on 4.7."""

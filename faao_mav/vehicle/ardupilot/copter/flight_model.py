@@ -8,7 +8,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
 from faao_mav.vehicle.ardupilot.copter.course import Course, grid_of, motion_of, rows_of
-from faao_mav.vehicle.ardupilot.copter.follow import pursue
+from faao_mav.vehicle.ardupilot.copter.follow import LONGEST, pursue
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.route import Router
 from faao_mav.vehicle.flight_path import FlightPath, Flown
@@ -16,7 +16,7 @@ from faao_mav.vehicle.flight_path import FlightPath, Flown
 
 @dataclass(frozen=True, slots=True)
 class ArduCopter(ArduCopterLimits):
-    """ArduCopter 4.1 and later in AUTO, without wind. SI units; the defaults are its own.
+    """ArduCopter 4.1 and later in AUTO, in steady wind. SI units; the defaults are its own.
 
     What is flown: a target moves along jerk-limited legs, each planned from rest to rest, which
     overlap at corners; its clock waits for an aircraft that falls behind; a position controller
@@ -32,7 +32,8 @@ class ArduCopter(ArduCopterLimits):
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
 
-        Raises `InputError` for speeds that are not positive, and for what is not finite.
+        Raises `InputError` for speeds that are not positive, for what is not finite, and for a
+        flight that takes more than `path.longest`.
         """
         waits = np.floor(path.holds) + path.delays
         _check(path, waits, step)
@@ -41,7 +42,7 @@ class ArduCopter(ArduCopterLimits):
         scale = np.array([self.east_metre, self.north_metre, 1.0])
         router = self._router(path.points * scale, path.splines, stopping)
         course = router.course(path.speeds.tolist(), waits.tolist())
-        flown = self._followed(course, step)
+        flown = self._followed(course, path, step)
         return replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
 
     def _router(self, points: Real, splines: Flags, stopping: Flags) -> Router:
@@ -50,11 +51,17 @@ class ArduCopter(ArduCopterLimits):
             self._routers[:] = [Router(points, splines, stopping, self)]
         return self._routers[0]
 
-    def _followed(self, course: Course, step: float) -> Flown:
+    def _followed(self, course: Course, path: FlightPath, step: float) -> Flown:
         """Return the flight of the aircraft after its target."""
         grid = grid_of(course)
         target = motion_of(course, grid)
-        pursuit = pursue(course, rows_of(target), self)
+        pursuit = pursue(
+            course,
+            rows_of(target),
+            self,
+            wind=path.wind,
+            longest=min(path.longest, LONGEST),
+        )
         arrivals = np.interp(course.passed, pursuit.clock, pursuit.t)
         departures = _stopped(course, arrivals, pursuit.arrivals)
         motion = np.column_stack(

@@ -1,0 +1,97 @@
+"""Missions in wind: predicted in one that is given, and up to which they keep their plan."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judged import COPTER, FRAME, HOME, PLANE, PX4, at, having
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.formats.wpl import write_wpl
+from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.plan import Wind
+from faao_mav.validate.check import check
+from faao_mav.validate.wind_limit import MOST_WIND
+from faao_mav.vehicle import Vehicle
+from faao_mav.vehicle.predict import predict
+
+
+def there_and_back(speed: float) -> Mission:
+    """North for 300 m, and back."""
+    items = [at(0, 0, 30, command=Command.NAV_TAKEOFF)]
+    items += [MissionItem(Command.DO_CHANGE_SPEED, Frame.MISSION, (1.0, speed, -1.0, 0.0))]
+    items += [at(0, 0, 30, 5), at(0, 300, 30), at(0, 0, 30)]
+    items += [at(0, 0, 0, command=Command.NAV_LAND)]
+    return Mission(tuple(items), HOME)
+
+
+def lasting(mission: Mission, vehicle: Vehicle, speed: float, degrees: float) -> float:
+    return float(predict(mission, vehicle, FRAME, wind=Wind(speed, degrees).velocity).t[-1])
+
+
+@pytest.mark.parametrize("speed", [5.0, 8.0])
+def test_the_limit_is_where_five_seconds_are_lost(speed: float) -> None:
+    mission = there_and_back(speed)
+    limit = check(mission, COPTER).wind_limit
+    assert limit is not None
+    assert limit.from_degrees in (0.0, 180.0)
+    calm = lasting(mission, COPTER, 0, 0)
+    worst = max(lasting(mission, COPTER, limit.speed, each) for each in range(0, 360, 45))
+    assert worst - calm <= 5
+    assert lasting(mission, COPTER, limit.speed + 0.5, limit.from_degrees) - calm > 5
+
+
+def test_who_leans_farther_keeps_more_wind() -> None:
+    mission = there_and_back(8)
+    limits = [check(mission, having(COPTER, ANGLE_MAX=each)).wind_limit for each in (2500, 4500)]
+    less, more = (limit.speed for limit in limits if limit)
+    assert more > less + 3
+    on_px4 = check(mission, PX4).wind_limit
+    assert on_px4 is not None
+    assert on_px4.speed == MOST_WIND
+
+
+def test_a_flight_that_the_wind_carries_away_ends() -> None:
+    carried = check(there_and_back(8), COPTER, wind=Wind(14, 0).velocity)
+    assert carried.track is None
+    assert "perhaps for the wind" in carried.unpredicted
+    assert carried.wind_limit is not None
+
+
+def test_a_plane_has_no_limit_yet() -> None:
+    assert check(there_and_back(16), PLANE).wind_limit is None
+
+
+def test_a_wind_across_is_held_without_a_trace() -> None:
+    mission = there_and_back(6)
+    calm, windy = (predict(mission, COPTER, wind=Wind(each, 90).velocity) for each in (0, 6))
+    assert abs(windy.t[-1] - calm.t[-1]) < 0.5
+    assert np.abs(windy.position[:, 0]).max() < 0.5
+
+
+def validated(folder: Path, *options: str) -> tuple[int, str]:
+    path = folder / "mission.waypoints"
+    path.write_text(write_wpl(there_and_back(8)))
+    done = CliRunner().invoke(app, ["validate", str(path), *options])
+    return done.exit_code, done.stdout + done.stderr
+
+
+def test_a_mission_is_validated_in_a_wind(tmp_path: Path) -> None:
+    _, calm = validated(tmp_path, "--json")
+    _, windy = validated(tmp_path, "--json", "--wind", "8,180")
+    slow, quick = (json.loads(each)["predicted"]["duration"] for each in (windy, calm))
+    assert slow > quick + 20
+    assert json.loads(calm)["wind_limit"] == json.loads(windy)["wind_limit"]
+    told = validated(tmp_path, "--wind", "8,180")[1]
+    assert "in 8 m/s of wind" in told
+    assert "wind: keeps its time within 5 s up to" in told
+
+
+@pytest.mark.parametrize("given", ["8", "8,400", "fast,90", "-1,90", "nan,90", "8,90,3"])
+def test_a_wind_that_is_none_is_refused(tmp_path: Path, given: str) -> None:
+    status, told = validated(tmp_path, f"--wind={given}")
+    assert status == 2
+    assert f"--wind {given}: expected SPEED,FROM" in told
