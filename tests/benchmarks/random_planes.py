@@ -1,4 +1,4 @@
-"""Random plans for aircraft with a least speed: does the direct method converge, and refuse rightly?
+"""Random plans for planes: does the direct method converge, and does it refuse rightly?
 
     python tests/benchmarks/random_planes.py [--plans 100] [--first 0] [--jobs 1]
 
@@ -13,6 +13,7 @@ import sys
 import time
 from dataclasses import dataclass
 from random import Random
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -30,7 +31,7 @@ TRIES = 12
 """Random flights that IPOPT starts from."""
 
 _BELOW = 1e-4
-"""bit/s/Hz by which a result may be below a start that was improved roughly: `optimizer.tolerance`."""
+"""bit/s/Hz by which a result may be below its starts: `optimizer.tolerance`."""
 
 
 def random_plan(seed: int) -> str:
@@ -137,7 +138,8 @@ def any_flight(kin: Kinematics, rng: np.random.Generator) -> Trajectory | None:
     for end, velocity in ((0, kin.start_velocity), (n - 1, kin.end_velocity)):
         if velocity is not None:
             opti.subject_to(v[:, end] == velocity)
-    silent = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 500}}
+    quiet: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": 500}
+    silent: dict[str, Any] = {"print_time": False, "ipopt": quiet}
     opti.solver("ipopt", silent)
     for _ in range(TRIES):
         guess = _wandering(kin, rng)

@@ -89,7 +89,9 @@ def test_a_late_aircraft_is_told_to_take_the_precoders_that_serve_it_better(
 ) -> None:
     late = np.vstack([solution.w[:1]] * 5 + [solution.w[:-5]])
     by_time = min(each.mean() for each in rates_along(solution, late))
-    by_place = min(each.mean() for each in rates_along(solution, late, nearest_slots(solution, late)))
+    by_place = min(
+        each.mean() for each in rates_along(solution, late, nearest_slots(solution, late))
+    )
     if solution.P_B.ndim == 3:  # there is a table
         better = {"time": by_time - by_place, "place": by_place - by_time}
         assert better[taken_by(solution.plan)] > 0

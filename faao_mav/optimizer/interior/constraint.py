@@ -59,6 +59,8 @@ class Stiffness:
     `compliance` is the inverse of `a`, for a constraint that knows it better than by inversion.
     `entries` are those of the constraint's own unknowns. `curvature` (3, flights, n) is that of
     its functions of w, weighted by their multipliers, which is cut where it has the wrong sign.
+    `turning` (flights, n), at most 0, times the identity is the part of K on v that only as large a
+    share of counts as leaves the model concave; the first constraint is then no `FlightLimits`.
     """
 
     w: Real | float = 0.0
@@ -67,6 +69,7 @@ class Stiffness:
     compliance: Real | None = None
     entries: Sequence[Entry] = ()
     curvature: Real | float = 0.0
+    turning: Real | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
