@@ -32,9 +32,10 @@ from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
+from faao_mav.validate.flown import Debriefing
 from faao_mav.vehicle.files import parameter_path, plan_target
 from faao_mav.vehicle.predict import predict
-from faao_mav.vehicle.recommend import candidates
+from faao_mav.vehicle.vehicle import candidates
 
 DRAWING_START = datetime(2000, 1, 1, tzinfo=UTC)
 """When the flight in a drawing (.kml) begins: a plan says how long it takes, not when it is."""
@@ -151,7 +152,7 @@ class Result:
         information, fresh, flown = self.information, self.fresh, self.prediction
         return {
             "name": plan.name,
-            **_rates_as_dict(plan, solution.rates, solution.delivered_rate),
+            **rates_as_dict(plan, solution.rates, solution.delivered_rate),
             "rate": plan.optimizer.rate,
             "gain_over_cutoff": solution.gain,
             "causal": plan.radio.causal,
@@ -187,13 +188,7 @@ class Result:
             if conversion and flown
             else None,
             "predicted": {
-                **_rates_as_dict(plan, flown.rates, flown.delivered_rate),
-                "average_rate_by_position": flown.by_position.R_avg,
-                "delivered_rate_by_position": flown.delivered_by_position,
-                "duration": flown.duration,
-                "max_path_error": flown.max_path_error,
-                "max_position_error": flown.max_position_error,
-                "rms_position_error": flown.rms_position_error,
+                **flight_as_dict(plan, flown),
                 "calibrated": not conversion.vehicle.type.caveat,
             }
             if conversion and flown
@@ -203,7 +198,33 @@ class Result:
         }
 
 
-def _rates_as_dict(plan: Plan, rates: Rates, delivered: float) -> dict[str, Any]:
+def flight_as_dict(plan: Plan, flight: Prediction) -> dict[str, Any]:
+    """Return what a flight delivers and how far it is from `plan`, as `predicted` in `--json`."""
+    return {
+        **rates_as_dict(plan, flight.rates, flight.delivered_rate),
+        "average_rate_by_position": flight.by_position.R_avg,
+        "delivered_rate_by_position": flight.delivered_by_position,
+        "duration": flight.duration,
+        "max_path_error": flight.max_path_error,
+        "max_position_error": flight.max_position_error,
+        "rms_position_error": flight.rms_position_error,
+    }
+
+
+def debriefing_as_dict(found: Debriefing) -> dict[str, Any]:
+    """Return the JSON object of what became of a plan: units as in `Result.as_dict`."""
+    solution, plan = found.solution, found.solution.plan
+    return {
+        "planned": rates_as_dict(plan, solution.rates, solution.delivered_rate),
+        "predicted": flight_as_dict(plan, found.predicted),
+        "flown": flight_as_dict(plan, found.flown),
+        "start": found.start,
+        "missing": found.missing,
+        "altitude_error": found.altitude_error,
+    }
+
+
+def rates_as_dict(plan: Plan, rates: Rates, delivered: float) -> dict[str, Any]:
     """Return rates by their names in `--json`, bit/s/Hz, and with a bandwidth in Mbit/s too."""
     named = {
         "average_rate": rates.R_avg,
@@ -259,7 +280,7 @@ def plan_mission(
     solution = result.solution
     if observe is not None:
         observe(Progress(1, 1, "the mission's timing", solution.history[-1]))
-    result = _with_mission(result)
+    result = with_mission(result)
     ceiling = None
     if bound:
         from faao_mav.optimizer.search.bound import upper_bound
@@ -275,7 +296,7 @@ def plan_mission(
     )
 
 
-def _with_mission(result: Result) -> Result:
+def with_mission(result: Result) -> Result:
     """Return `result` with its mission, or with why there is none."""
     solution = result.solution
     try:

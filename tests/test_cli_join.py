@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 from conftest import MISSIONS, SMALL, edited, free_port
+from served import running
 from typer.testing import CliRunner
 
 from faao_mav import download, upload
 from faao_mav.cli.main import app
 from faao_mav.mavlink.messages import ParamRequestRead, ParamValue
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import Address, MavResult
 from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence

@@ -6,6 +6,7 @@ from types import ModuleType
 
 import pytest
 from conftest import MISSIONS, SMALL, MakePlan, edited, free_port
+from served import running
 
 import faao_mav.study.sweep
 import faao_mav.validate.check
@@ -22,7 +23,6 @@ from faao_mav import (
 )
 from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.report.summary import result_lines
 from faao_mav.workflow import Result, mission_files, optimize_plan
 

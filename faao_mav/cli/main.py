@@ -14,7 +14,9 @@ from typer.core import TyperGroup
 
 from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.convert import convert
+from faao_mav.cli.debrief import debrief
 from faao_mav.cli.download import download
+from faao_mav.cli.fly import fly
 from faao_mav.cli.plan import plan
 from faao_mav.cli.shared import note
 from faao_mav.cli.study import study
@@ -63,7 +65,7 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (plan, validate, upload, download, convert, autopilot, study):
+for command in (plan, validate, upload, download, fly, debrief, convert, autopilot, study):
     app.command(command.__name__)(command)
 
 

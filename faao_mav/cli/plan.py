@@ -166,7 +166,7 @@ def _write(result: "Result", option: str, path: Path) -> None:
 def _sound(result: "Result") -> bool:
     """Say the errors that validation found, and whether there are none."""
     from faao_mav.report.summary import by_rule, line_of
-    from faao_mav.validate.finding import Level
+    from faao_mav.validate import Level
 
     errors = [finding for finding in result.findings if finding.level is Level.ERROR]
     for group in by_rule(errors):

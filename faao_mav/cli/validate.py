@@ -2,12 +2,12 @@
 
 import json
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
 from faao_mav.cli.shared import (
     Aircraft,
     AsJson,
@@ -34,22 +34,8 @@ def validate(
     mission_file: Annotated[
         File, typer.Argument(metavar="MISSION", help="The mission: .waypoints or .plan.")
     ] = None,
-    plan_file: Annotated[
-        File,
-        option(
-            "PLAN.yaml",
-            "The plan: its vehicle, its limits, and the link that it is to deliver.",
-            "--plan",
-        ),
-    ] = None,
-    solution_file: Annotated[
-        File,
-        option(
-            "RESULT.npz",
-            "Instead of --plan: what --save wrote, with the plan in it, already solved.",
-            "--solution",
-        ),
-    ] = None,
+    plan_file: PlanFile = None,
+    solution_file: SolutionFile = None,
     autopilot: Whose = None,
     kind: Aircraft = None,
     parameters: Annotated[
@@ -78,20 +64,19 @@ def validate(
     Exit status: 0 nothing is wrong; 1 errors, with --strict also warnings; 2 unusable arguments
     or a file that cannot be read.
     """
-    from faao_mav.validate.finding import Level
+    from faao_mav.validate import Level
 
     if rules:
         _list_rules(as_json)
         return
     if mission_file is None:
         raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
-    if plan_file is not None and solution_file is not None:
-        raise InputError("--plan and --solution: give one; the solution has its plan in it")
+    check_one(plan_file, solution_file)
     check_known(autopilot, kind)
     _check_options((max_duration, max_distance, max_altitude), report)
     read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
     check_apart({"--report": report}, read)
-    solution = _planned(plan_file, solution_file)
+    solution = planned(plan_file, solution_file)
     limits = (max_duration, max_distance, max_altitude)
     checked = _judge(mission_file, solution, (autopilot, kind, parameters), limits)
     if report is not None:
@@ -123,23 +108,6 @@ def _check_options(
     if report is not None:
         check_ending(report, "--report", PAGES)
         check_writable(report)
-
-
-def _planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | None":
-    """Return what the flight is to be: the solution saved, or that of the plan."""
-    if solution_file is not None:
-        from faao_mav.optimizer.solution import load_solution
-
-        return load_solution(solution_file)
-    if plan_file is None:
-        return None
-    from faao_mav.cli.progress import optimizer_progress
-    from faao_mav.optimizer.optimize import optimize
-    from faao_mav.plan import read_plan
-
-    plan = read_plan(plan_file)
-    with optimizer_progress(shown=sys.stderr.isatty()) as observe:
-        return optimize(plan, observe=observe)
 
 
 def _judge(

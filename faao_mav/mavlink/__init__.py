@@ -1,17 +1,10 @@
 """The wire: missions to and from vehicles, and a mock autopilot."""
 
-from faao_mav.mavlink.client import LinkOptions, UploadReport, clear, download, upload
-from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mavlink.transfer.pace import Timeouts
-from faao_mav.mavlink.transfer.verify import Difference
-
-__all__ = [
-    "Difference",
-    "LinkOptions",
-    "MissionType",
-    "Timeouts",
-    "UploadReport",
-    "clear",
-    "download",
-    "upload",
-]
+from faao_mav.mavlink.client import LinkOptions as LinkOptions
+from faao_mav.mavlink.client import UploadReport as UploadReport
+from faao_mav.mavlink.client import clear as clear
+from faao_mav.mavlink.client import download as download
+from faao_mav.mavlink.client import upload as upload
+from faao_mav.mavlink.protocol import MissionType as MissionType
+from faao_mav.mavlink.transfer.pace import Timeouts as Timeouts
+from faao_mav.mavlink.transfer.verify import Difference as Difference

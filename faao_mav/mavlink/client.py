@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from faao_mav.errors import InputError, LinkError
-from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
+from faao_mav.mavlink.discover import AskAlive, AskHome, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.link import Observe, WireLink
-from faao_mav.mavlink.liveness import AskAlive
 from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.signing import Verdict, read_signing, remember
@@ -101,7 +100,7 @@ def upload(
     if not mission.items:
         raise InputError("upload: the mission has no items; clear the vehicle's instead")
 
-    def job(session: "_Session") -> Job[tuple[PartReport, ...]]:
+    def job(session: "Session") -> Job[tuple[PartReport, ...]]:
         vehicle = session.peer.vehicle
         lists = [(part, wire_items(mission, part, vehicle)) for part in MissionType]
         return upload_parts(
@@ -123,7 +122,7 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> tuple[FoundVehi
     Raises `LinkError` if there is no such vehicle or a list does not come whole; a vehicle that
     has no fence or rally points at all is one that has none stored.
     """
-    with _Session(connection, options) as session:
+    with Session(connection, options) as session:
         peer = session.peer
         lists = session.run(Script(download_lists(tuple(MissionType), peer, session.timeouts)))
         for part, outcome in lists.missing.items():
@@ -157,13 +156,13 @@ def clear(
     Arguments and errors as in `upload`.
     """
 
-    def job(session: "_Session") -> Job[tuple[PartReport, ...]]:
+    def job(session: "Session") -> Job[tuple[PartReport, ...]]:
         return clear_lists(types, session.peer, session.timeouts)
 
     return _change(connection, Mission(()), allow_armed, job, options)
 
 
-class _Session:
+class Session:
     """A link on which the vehicle has been found; to be used in a `with` statement."""
 
     def __init__(self, connection: str, options: LinkOptions) -> None:
@@ -190,7 +189,7 @@ class _Session:
             raise
         self.peer = Peer(self.link.address, self.found.address, self.found.vehicle)
 
-    def __enter__(self) -> "_Session":
+    def __enter__(self) -> "Session":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -220,6 +219,7 @@ class _Session:
                 raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
 
     def run(self, machine: Machine[T]) -> T:
+        """Run `machine` to its end and return the outcome."""
         return self.link.run(machine, self._observe)
 
 
@@ -227,11 +227,11 @@ def _change(
     connection: str,
     mission: Mission,
     allow_armed: bool,
-    job: Callable[[_Session], Job[tuple[PartReport, ...]]],
+    job: Callable[[Session], Job[tuple[PartReport, ...]]],
     options: LinkOptions,
 ) -> UploadReport:
     """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
-    with _Session(connection, options) as session:
+    with Session(connection, options) as session:
         if session.found.armed and not allow_armed:
             raise LinkError(
                 f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "

@@ -32,6 +32,9 @@ _LEGACY: dict[str, type[Message]] = {
 }
 """Predecessors with the same fields."""
 
+_BEYOND = ("opaque_id", "mission_id")
+"""Fields behind those that the dialects of pymavlink know, of 4 bytes."""
+
 
 @dataclass(frozen=True, slots=True)
 class Packet:
@@ -102,11 +105,11 @@ class Codec:
             values |= _item_values(item, exact=name.endswith("_INT"))
         kind = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
         packet = kind(*_arguments(kind, values))
-        if (opaque_id := values.get("opaque_id")) is None:
+        beyond = next((values[field] for field in _BEYOND if field in values), None)
+        if beyond is None:
             return bytes(packet.pack(self._mav))
-        # The last field of the message, which the dialects of pymavlink leave out.
-        known = kind.unpacker.pack(*(values[field] for field in kind.ordered_fieldnames))
-        payload = known + opaque_id.to_bytes(4, "little")
+        known = kind.unpacker.pack(*(values.get(field, 0) for field in kind.ordered_fieldnames))
+        payload = known + beyond.to_bytes(4, "little")
         return bytes(packet._pack(self._mav, packet.crc_extra, payload))
 
     def _envelope(self, packet: Any, sender: Address) -> Envelope | None:
@@ -120,8 +123,8 @@ class Codec:
             match field.name:
                 case "target":
                     values["target"] = Address(packet.target_system, packet.target_component)
-                case "opaque_id":
-                    values["opaque_id"] = _opaque_id(packet)
+                case "opaque_id" | "mission_id" as beyond:
+                    values[beyond] = _number_beyond(packet)
                 case "legacy":
                     values["legacy"] = legacy
                 case "item":
@@ -179,7 +182,7 @@ def _text_or_number(value: Any) -> Any:
     return "".join(letter if letter.isprintable() else " " for letter in value)
 
 
-def _opaque_id(packet: Any) -> int:
-    """Return the last field of a packet that is longer than pymavlink knows it, or 0."""
+def _number_beyond(packet: Any) -> int:
+    """Return the next field of a packet that is longer than pymavlink knows it, or 0."""
     tail = payload_of(bytes(packet.get_msgbuf()))[packet.unpacker.size :][:4]
     return int.from_bytes(tail, "little")

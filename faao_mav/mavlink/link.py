@@ -145,6 +145,22 @@ class WireLink:
                 observe(*machine.progress)
         return outcome
 
+    def watch(self, machine: Machine[T], observe: Callable[[], object]) -> T:
+        """Run `machine` to its end and return the outcome; `observe` is called after every step.
+
+        Interrupted from the keyboard the machine is told to cancel, and is run on until it ends.
+        """
+        self._beat(time.monotonic())
+        self.begin(machine)
+        while (outcome := machine.outcome) is None:
+            try:
+                self.step(machine, self._next_beat)
+                self._beat(time.monotonic())
+                observe()
+            except KeyboardInterrupt:
+                self._send(machine.cancel(time.monotonic()))
+        return outcome
+
     def begin(self, machine: Machine[T]) -> None:
         """Start `machine`; `step` then carries it on."""
         self._send(machine.start(time.monotonic()))

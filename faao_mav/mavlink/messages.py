@@ -6,8 +6,9 @@ wire, so that what was sent and what was found can be compared without rounding.
 """
 
 from dataclasses import dataclass
+from typing import dataclass_transform
 
-from faao_mav.mavlink.protocol import ARMED, Address
+from faao_mav.mavlink.protocol import ARMED, PREARM_CHECK, Address
 from faao_mav.mission.item import Params
 
 
@@ -29,26 +30,27 @@ class WireItem:
     autocontinue: int = 1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass_transform(frozen_default=True)
+@dataclass(frozen=True)
 class Message:
-    """What a packet says; each kind has a type of its own."""
+    """What a packet says; each kind has a type of its own, which is a frozen dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
 
 
-@dataclass(frozen=True, slots=True)
 class Addressed(Message):
     """A message for one system and component: `target_system` and `target_component`."""
 
     target: Address
 
 
-@dataclass(frozen=True, slots=True)
 class ListMessage(Addressed):
     """A message of the mission protocol: `mission_type` says which list it is about."""
 
     mission_type: int
 
 
-@dataclass(frozen=True, slots=True)
 class MissionCount(ListMessage):
     """MISSION_COUNT: so many items are to come, or are there."""
 
@@ -56,7 +58,6 @@ class MissionCount(ListMessage):
     opaque_id: int = 0
 
 
-@dataclass(frozen=True, slots=True)
 class MissionRequestInt(ListMessage):
     """MISSION_REQUEST_INT, or its predecessor MISSION_REQUEST (`legacy`)."""
 
@@ -64,7 +65,6 @@ class MissionRequestInt(ListMessage):
     legacy: bool = False
 
 
-@dataclass(frozen=True, slots=True)
 class MissionItemInt(ListMessage):
     """MISSION_ITEM_INT, or its predecessor MISSION_ITEM (`legacy`), which has single precision."""
 
@@ -73,7 +73,6 @@ class MissionItemInt(ListMessage):
     legacy: bool = False
 
 
-@dataclass(frozen=True, slots=True)
 class MissionAck(ListMessage):
     """MISSION_ACK; `type` is a MAV_MISSION_RESULT."""
 
@@ -89,7 +88,6 @@ class MissionClearAll(ListMessage):
     """MISSION_CLEAR_ALL."""
 
 
-@dataclass(frozen=True, slots=True)
 class MissionWritePartialList(ListMessage):
     """MISSION_WRITE_PARTIAL_LIST: items `start_index` to `end_index` are to be replaced."""
 
@@ -97,30 +95,30 @@ class MissionWritePartialList(ListMessage):
     end_index: int
 
 
-@dataclass(frozen=True, slots=True)
 class MissionSetCurrent(Addressed):
     """MISSION_SET_CURRENT."""
 
     seq: int
 
 
-@dataclass(frozen=True, slots=True)
 class MissionCurrent(Message):
-    """MISSION_CURRENT; `total` leaves out ArduPilot's home item, 0 is for none."""
+    """MISSION_CURRENT; `total` leaves out ArduPilot's home item, 0 is for none.
+
+    `mission_id` is the vehicle's number for the mission, 0 where it has none.
+    """
 
     seq: int
     total: int
     mission_state: int
+    mission_id: int = 0
 
 
-@dataclass(frozen=True, slots=True)
 class MissionItemReached(Message):
     """MISSION_ITEM_REACHED."""
 
     seq: int
 
 
-@dataclass(frozen=True, slots=True)
 class CommandLong(Addressed):
     """COMMAND_LONG."""
 
@@ -135,7 +133,6 @@ class CommandLong(Addressed):
     param7: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class CommandAck(Addressed):
     """COMMAND_ACK; `result` is a MAV_RESULT."""
 
@@ -143,7 +140,6 @@ class CommandAck(Addressed):
     result: int
 
 
-@dataclass(frozen=True, slots=True)
 class SetMode(Message):
     """SET_MODE, which is for all components of `target_system`."""
 
@@ -156,7 +152,6 @@ class ParamRequestList(Addressed):
     """PARAM_REQUEST_LIST."""
 
 
-@dataclass(frozen=True, slots=True)
 class ParamRequestRead(Addressed):
     """PARAM_REQUEST_READ; `param_index` -1 asks by name."""
 
@@ -164,7 +159,6 @@ class ParamRequestRead(Addressed):
     param_index: int
 
 
-@dataclass(frozen=True, slots=True)
 class ParamSet(Addressed):
     """PARAM_SET."""
 
@@ -173,7 +167,6 @@ class ParamSet(Addressed):
     param_type: int
 
 
-@dataclass(frozen=True, slots=True)
 class ParamValue(Message):
     """PARAM_VALUE."""
 
@@ -184,7 +177,6 @@ class ParamValue(Message):
     param_index: int
 
 
-@dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
     """HEARTBEAT."""
 
@@ -201,7 +193,6 @@ class Heartbeat(Message):
         return bool(self.base_mode & ARMED)
 
 
-@dataclass(frozen=True, slots=True)
 class Timesync(Message):
     """TIMESYNC: a question (`tc1` 0) is answered with its own `ts1`, and `tc1` the time there."""
 
@@ -209,7 +200,6 @@ class Timesync(Message):
     ts1: int
 
 
-@dataclass(frozen=True, slots=True)
 class Statustext(Message):
     """STATUSTEXT; `text` is one line."""
 
@@ -217,7 +207,6 @@ class Statustext(Message):
     text: str
 
 
-@dataclass(frozen=True, slots=True)
 class AutopilotVersion(Message):
     """AUTOPILOT_VERSION, as much as ground stations look at."""
 
@@ -226,7 +215,6 @@ class AutopilotVersion(Message):
     uid: int
 
 
-@dataclass(frozen=True, slots=True)
 class GlobalPositionInt(Message):
     """GLOBAL_POSITION_INT: 1e-7 degrees, mm, cm/s north, east, down, heading in 0.01 degrees."""
 
@@ -241,7 +229,6 @@ class GlobalPositionInt(Message):
     hdg: int
 
 
-@dataclass(frozen=True, slots=True)
 class LocalPositionNed(Message):
     """LOCAL_POSITION_NED: metres and m/s north, east, down of home."""
 
@@ -254,7 +241,6 @@ class LocalPositionNed(Message):
     vz: float
 
 
-@dataclass(frozen=True, slots=True)
 class Attitude(Message):
     """ATTITUDE: radians and rad/s."""
 
@@ -267,7 +253,19 @@ class Attitude(Message):
     yawspeed: float
 
 
-@dataclass(frozen=True, slots=True)
+class SysStatus(Message):
+    """SYS_STATUS: millivolts (65535: unknown) and percent (-1: unknown) of the battery."""
+
+    onboard_control_sensors_health: int
+    voltage_battery: int
+    battery_remaining: int
+
+    @property
+    def may_arm(self) -> bool:
+        """Whether the autopilot's own checks before arming pass."""
+        return bool(self.onboard_control_sensors_health & PREARM_CHECK)
+
+
 class HomePosition(Message):
     """HOME_POSITION: 1e-7 degrees, mm above mean sea level."""
 

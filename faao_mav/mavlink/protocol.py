@@ -67,8 +67,8 @@ class MavCommand(IntEnum):
     REQUEST_CAPABILITIES = 520
 
 
-HOME_POSITION = 242
-"""The number of the message HOME_POSITION."""
+SYSTEM_STATUS, POSITION, CURRENT_ITEM, HOME_POSITION = 1, 33, 42, 242
+"""The numbers of SYS_STATUS, GLOBAL_POSITION_INT, MISSION_CURRENT and HOME_POSITION."""
 
 GROUND_STATION_TYPE = 6
 """MAV_TYPE_GCS."""
@@ -90,6 +90,13 @@ class MavState(IntEnum):
 
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED, in a heartbeat's base_mode."""
+
+
+PREARM_CHECK = 1 << 28
+"""MAV_SYS_STATUS_PREARM_CHECK, in the sensors' health of SYS_STATUS."""
+
+MISSION_COMPLETE = 5
+"""MISSION_STATE_COMPLETE, in MISSION_CURRENT."""
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -43,15 +43,12 @@ class Transport(Protocol):
 
     def read(self, timeout: float) -> list[bytes]:
         """Return the packets that arrive within `timeout` seconds, as soon as something does."""
-        ...
 
     def write(self, data: bytes) -> None:
         """Send one packet."""
-        ...
 
     def close(self) -> None:
         """Let go of the connection."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

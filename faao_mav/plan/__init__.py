@@ -3,38 +3,17 @@
 `model` declares the keys and what they mean, `reader` reads them, `keys.reference` lists them.
 """
 
-from faao_mav.plan.fields import Vector
-from faao_mav.plan.keys import PlanKey, reference
-from faao_mav.plan.reader import parse_plan, read_plan
-from faao_mav.plan.sections import (
-    BaseStation,
-    Flight,
-    GroundUser,
-    MissionOptions,
-    Optimizer,
-    Origin,
-    Plan,
-    Radio,
-    Relay,
-    Site,
-    VehicleOptions,
-)
-
-__all__ = [
-    "BaseStation",
-    "Flight",
-    "GroundUser",
-    "MissionOptions",
-    "Optimizer",
-    "Origin",
-    "Plan",
-    "PlanKey",
-    "Radio",
-    "Relay",
-    "Site",
-    "Vector",
-    "VehicleOptions",
-    "parse_plan",
-    "read_plan",
-    "reference",
-]
+from faao_mav.plan.fields import Vector as Vector
+from faao_mav.plan.keys import reference as reference
+from faao_mav.plan.reader import parse_plan as parse_plan
+from faao_mav.plan.reader import read_plan as read_plan
+from faao_mav.plan.sections import BaseStation as BaseStation
+from faao_mav.plan.sections import Flight as Flight
+from faao_mav.plan.sections import GroundUser as GroundUser
+from faao_mav.plan.sections import MissionOptions as MissionOptions
+from faao_mav.plan.sections import Optimizer as Optimizer
+from faao_mav.plan.sections import Origin as Origin
+from faao_mav.plan.sections import Plan as Plan
+from faao_mav.plan.sections import Radio as Radio
+from faao_mav.plan.sections import Site as Site
+from faao_mav.plan.sections import VehicleOptions as VehicleOptions

@@ -44,16 +44,10 @@ def best_information_precoders(
 ) -> Complex:
     """Return one precoder (..., N_t, N_t) per group of draws: max over P of mean_s I(H_s, P).
 
-    Args:
-        H_draws: (..., S, N_r, N_t), S draws of each channel.
-        power: W, W.
-        modulation: the alphabet, one of ``MODULATIONS``.
-        noise: σ², W.
-        start: (..., N_t, N_t), precoders of similar channels: the only start then, and the result
-            is not worse.
-
-    Raises:
-        InputError: as in ``best_precoders``, or more than 65,536 input vectors.
+    `H_draws` (..., S, N_r, N_t) are S draws of each channel. `start` (..., N_t, N_t), precoders of
+    similar channels, is the only start where given, and the result is not worse. The other
+    arguments and the errors are those of ``best_precoders``; more than 65,536 input vectors are an
+    error too.
 
     >>> H = np.diag([2.0, 1.0])[None] * 0.5
     >>> P = best_information_precoders(H, 2.0, "qpsk", 1.0)

@@ -23,12 +23,8 @@ def draw_rates(
 ) -> Real:
     """Return the rate of every draw of a channel, (..., S) bit/s/Hz.
 
-    Args:
-        measure: which rate. Of the mutual information the mean over the S draws is accurate.
-        H: (..., S, N_r, N_t), S draws of each channel.
-        P: (..., S or 1, N_t, N_t), a precoder for each draw or one for all.
-        modulation: the alphabet, one of ``MODULATIONS``.
-        noise: σ², W.
+    Of the mutual information the mean over the S draws is accurate. Arguments and errors are those
+    of ``fixed_noise_information``.
 
     >>> one = np.ones((1, 1, 1))
     >>> for measure in ("cutoff", "mutual_information"):

@@ -159,18 +159,8 @@ def pooled_mutual_information(
     """Return (5) or (6) in every slot, bit/s/Hz, as accurately as their mean needs.
 
     Standard errors are independent from slot to slot, so each slot may err √n times as much as
-    their mean; deterministic errors add up and get a quarter of the tolerance.
-
-    Args:
-        H: (n, N_r, N_t) channels.
-        P: (n, N_t, N_t) precoders.
-        modulation: one of ``MODULATIONS``.
-        noise: σ², W.
-        rng: source of the random shifts.
-        tolerance: largest error wanted in the mean, bit/s/Hz.
-
-    Raises:
-        InputError: as ``mutual_information``.
+    their mean; deterministic errors add up and get a quarter of the `tolerance`, the largest error
+    wanted in the mean. The other arguments and the errors are those of ``mutual_information``.
 
     >>> one = np.ones((3, 1, 1))
     >>> slots = pooled_mutual_information(one, one, "qpsk", 1.0, rng=np.random.default_rng(1))

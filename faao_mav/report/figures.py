@@ -35,10 +35,24 @@ def flight_figure(
     return figure
 
 
-def route(solution: Solution, conversion: Conversion | None = None) -> "Figure":
+def route(
+    solution: Solution, conversion: Conversion | None = None, flown: Prediction | None = None
+) -> "Figure":
     """Return the map of the route: see `route_map`."""
     with drawing(WIDTH, 4.2) as figure:
-        route_map(solution, conversion, figure.subplots())
+        route_map(solution, conversion, figure.subplots(), flown=flown)
+    return figure
+
+
+def apart(solution: Solution, prediction: Prediction, flown: Prediction) -> "Figure":
+    """Return how far the flight is from the plan at equal times: predicted, and as flown."""
+    with drawing(WIDTH, 2.6) as figure:
+        plot = figure.subplots()
+        for flight, name, colour in ((prediction, "predicted", 1), (flown, "flown", 2)):
+            off = lengths(flight.w - solution.w)
+            plot.plot(solution.t, off, color=SERIES[colour], linewidth=1.1, label=name)
+        plot.set_ylim(bottom=0)
+        _over_time(plot, "", "distance from the plan, m")
     return figure
 
 
@@ -52,17 +66,21 @@ def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure"
     return figure
 
 
-def rates(solution: Solution, prediction: Prediction | None = None) -> "Figure":
-    """Return I_U and I_G of (7), (8) in every slot: planned, and where the flight is predicted."""
+def rates(
+    solution: Solution, prediction: Prediction | None = None, flown: Prediction | None = None
+) -> "Figure":
+    """Return I_U and I_G of (7), (8) in every slot: planned, predicted, flown."""
     with drawing(WIDTH, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, sharey=True)
-        _rates((upper, lower), solution, prediction)
+        _rates((upper, lower), solution, prediction, flown)
         _share_time(upper)
     return figure
 
 
-def queue(solution: Solution, prediction: Prediction | None = None) -> "Figure":
-    """Return what waits in the relay over time: planned, and where the flight is predicted.
+def queue(
+    solution: Solution, prediction: Prediction | None = None, flown: Prediction | None = None
+) -> "Figure":
+    """Return what waits in the relay over time: planned, where the flight is predicted, and flown.
 
     Bits per hertz of bandwidth, or megabytes where the plan has a bandwidth.
     """
@@ -72,10 +90,13 @@ def queue(solution: Solution, prediction: Prediction | None = None) -> "Figure":
     held = plan.flight.time_step * bits  # of a bit/s/Hz for a slot
     with drawing(WIDTH, 2.6) as figure:
         plot = figure.subplots()
-        flown = (solution.t, held * prediction.relayed.queue) if prediction is not None else None
+        flights = [
+            None if flight is None else (solution.t, held * flight.relayed.queue)
+            for flight in (prediction, flown)
+        ]
         if plan.radio.relay.buffer_mbytes is not None:
             _limit(plot, plan.radio.relay.buffer_mbytes, "buffer")
-        _curves(plot, (solution.t, held * solution.relayed.queue), flown)
+        _curves(plot, (solution.t, held * solution.relayed.queue), *flights)
         plot.set_ylim(bottom=0)
         _over_time(plot, "", f"waiting, {unit}")
     return figure
@@ -152,7 +173,7 @@ def _speed(plot: "Axes", solution: Solution, conversion: Conversion | None) -> N
 def _acceleration(plot: "Axes", solution: Solution) -> None:
     limit, needed = solution.plan.vehicle.max_acceleration, lengths(solution.a)
     _limit(plot, limit, "a_max")
-    _curves(plot, (solution.t, needed), None)
+    _curves(plot, (solution.t, needed))
     plot.set_ylim(bottom=0)
     top = 1.2 * max(limit, float(needed[1:].max()))
     if needed[0] > top:  # a(0) has no bound in the paper: it would flatten all the rest
@@ -168,24 +189,38 @@ def _acceleration(plot: "Axes", solution: Solution) -> None:
     _over_time(plot, "Acceleration", "acceleration, m/s²")
 
 
-def _rates(plots: "tuple[Axes, Axes]", solution: Solution, prediction: Prediction | None) -> None:
+def _rates(
+    plots: "tuple[Axes, Axes]",
+    solution: Solution,
+    prediction: Prediction | None,
+    flown: Prediction | None = None,
+) -> None:
     """Draw each link on its own plot: over known fading, one would hide the other."""
     t = solution.t
-    planned = (("Base station to UAV", solution.I_U), ("UAV to user", solution.I_G))
-    flown = [prediction.I_U, prediction.I_G] if prediction is not None else []
-    top = max(float(values.max()) for values in (solution.I_U, solution.I_G, *flown)) or 1.0
-    for k, (plot, (name, values)) in enumerate(zip(plots, planned, strict=True)):
-        _curves(plot, (t, values), (t, flown[k]) if flown else None)
+    names = ("Base station to UAV", "UAV to user")
+    hops = [(solution.I_U, solution.I_G)]
+    hops += [(each.I_U, each.I_G) for each in (prediction, flown) if each is not None]
+    top = float(np.max(hops)) or 1.0
+    for k, (plot, name) in enumerate(zip(plots, names, strict=True)):
+        _curves(plot, *((t, values[k]) for values in hops))
         plot.set_ylim(0, 1.08 * top)
         _over_time(plot, name, "rate, bit/s/Hz")
 
 
-def _curves(plot: "Axes", planned: tuple[Real, Real], flown: tuple[Real, Real] | None) -> None:
-    """Draw a curve of the plan, and as a band beneath it where there is one of the flight."""
-    beneath: dict[str, Any] = {"linewidth": 3.6, "alpha": 0.45} if flown is not None else {}
+def _curves(
+    plot: "Axes",
+    planned: tuple[Real, Real],
+    predicted: tuple[Real, Real] | None = None,
+    flown: tuple[Real, Real] | None = None,
+) -> None:
+    """Draw a curve of the plan, and as a band beneath them where there are some of flights."""
+    alone = predicted is None and flown is None
+    beneath: dict[str, Any] = {} if alone else {"linewidth": 3.6, "alpha": 0.45}
     plot.plot(*planned, color=SERIES[0], label="planned", **beneath)
+    if predicted is not None:
+        plot.plot(*predicted, color=SERIES[1], linewidth=1.1, label="predicted")
     if flown is not None:
-        plot.plot(*flown, color=SERIES[1], linewidth=1.1, label="predicted")
+        plot.plot(*flown, color=SERIES[2], linewidth=1.1, label="flown")
 
 
 def _over_time(plot: "Axes", title: str, what: str, *, legend: bool = True) -> None:

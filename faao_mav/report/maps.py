@@ -24,6 +24,7 @@ from faao_mav.report.style import (
     mark_stations,
 )
 from faao_mav.schedule.conversion import Conversion
+from faao_mav.schedule.prediction import Prediction
 from faao_mav.schedule.schedule import positions_at
 from faao_mav.schedule.transit import way_home, way_out
 from faao_mav.vector import lengths
@@ -54,7 +55,11 @@ _SIDES = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), 
 
 
 def route_map(
-    solution: Solution, conversion: Conversion | None, plot: "Axes", title: str = ""
+    solution: Solution,
+    conversion: Conversion | None,
+    plot: "Axes",
+    title: str = "",
+    flown: Prediction | None = None,
 ) -> None:
     """Draw the map on `plot`: east and north in metres, speeds as colours with a bar.
 
@@ -73,17 +78,20 @@ def route_map(
         numbers, places = _places_of(conversion.mission, frame, _WAYPOINTS)
         lines.append(conversion.schedule.track()["predicted_w"])
         lines += _ways(solution.plan, conversion) if outlines else ()
+    real = [flown.w] if flown is not None else []
     _draw_fence(plot, outlines)
     _draw_margin(plot, solution.plan)
     _coloured(plot, solution)
+    for path in real:
+        plot.plot(*path.T, color=SERIES[1], linewidth=1.6, label="flown")
     if conversion is not None:
         plot.plot(*lines[1].T, "--", color=INK, linewidth=0.9, label="predicted")
         for way, name in zip(lines[2:], ("from and to home", None), strict=False):
             plot.plot(*way.T, color=MUTED, linewidth=0.9, label=name)
         _draw_waypoints(plot, places, "waypoint")
     mark_stations(plot, list(marked))
-    _show_all(plot, np.concatenate([*lines, stations, places]), outlines, title)
-    _write_numbers(plot, numbers, places, lines, stations)
+    _show_all(plot, np.concatenate([*lines, *real, stations, places]), outlines, title)
+    _write_numbers(plot, numbers, places, [*lines, *real], stations)
 
 
 def mission_map(mission: Mission, track: Track) -> "Figure":

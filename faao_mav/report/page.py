@@ -8,9 +8,17 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from faao_mav.report.style import inline_svg
-from faao_mav.report.summary import Line, by_rule, check_lines, result_lines, said_of
+from faao_mav.report.summary import (
+    Line,
+    by_rule,
+    check_lines,
+    debriefing_lines,
+    result_lines,
+    said_of,
+)
+from faao_mav.validate import Finding
 from faao_mav.validate.check import Check
-from faao_mav.validate.finding import Finding
+from faao_mav.validate.flown import Debriefing
 from faao_mav.workflow import Result
 
 if TYPE_CHECKING:
@@ -23,8 +31,16 @@ _PARTS = ("faao-mav", "numpy", "scipy", "matplotlib")
 """The packages whose versions the page names."""
 
 
-def render_report(about: Result | Check, *, title: str = "") -> str:
+def render_report(
+    about: Result | Check,
+    *,
+    title: str = "",
+    debriefing: Debriefing | None = None,
+    remarks: Sequence[Line] = (),
+) -> str:
     """Return the page about a planned flight, or about a mission that was checked.
+
+    With a `debriefing` of that plan it is about the real flight too, and what the `remarks` say.
 
     The page is whole, offline, for light, dark, phone and paper. A part that a `Result` does not
     have leaves its sections out. The title is the plan's name unless one is given. The same flight
@@ -34,7 +50,8 @@ def render_report(about: Result | Check, *, title: str = "") -> str:
         title = about.solution.plan.name
     title = escape(title or "Relay flight")
     style = files("faao_mav.report").joinpath("page.css").read_text(encoding="utf-8")
-    sections = "\n".join(_sections(about))
+    flown = [*debriefing_lines(debriefing), *remarks] if debriefing is not None else []
+    sections = "\n".join(_sections(about, flown, debriefing))
     return f"""<!doctype html>
 <html lang="en">
 <head>
@@ -56,7 +73,9 @@ def render_report(about: Result | Check, *, title: str = "") -> str:
 """
 
 
-def _sections(about: Result | Check) -> Iterator[str]:
+def _sections(
+    about: Result | Check, flown: Sequence[Line], debriefing: Debriefing | None
+) -> Iterator[str]:
     result = about if isinstance(about, Result) else None
     check = about if isinstance(about, Check) else about.check
     lines = list(result_lines(result, timed=False)) if result else []
@@ -64,7 +83,9 @@ def _sections(about: Result | Check) -> Iterator[str]:
     judged = check if check is not None and not (result and result.conversion) else None
     if judged is not None:
         lines += [("mission items", str(len(judged.mission.items))), *check_lines(judged)]
-    yield _section("Result", _facts(lines), "wide")
+    if flown:
+        yield _section("Flown", _facts(flown), "wide")
+    yield _section("Result" if not flown else "Planned", _facts(lines), "wide")
     if check is not None:
         yield _section("Findings", _findings(check.findings), "wide")
     if result is not None and result.conversion is not None and result.conversion.parameters:
@@ -74,7 +95,7 @@ def _sections(about: Result | Check) -> Iterator[str]:
     if judged is not None:
         yield from _mission_figures(judged)
     if result is not None:
-        yield from _plan_figures(result)
+        yield from _plan_figures(result, debriefing)
         text = f"<pre>{escape(result.solution.plan.text)}</pre>"
         yield _section("Plan", text, "wide text")
 
@@ -112,12 +133,13 @@ def _mission_figures(check: Check) -> Iterator[str]:
     yield _figure("mission-motion", "Flight", mission_motion(check.track), title)
 
 
-def _plan_figures(result: Result) -> Iterator[str]:
+def _plan_figures(result: Result, debriefing: Debriefing | None) -> Iterator[str]:
     """Yield the figures of a solved plan, and the table of the optimiser's starts."""
     from faao_mav.report import figures
 
     plan = result.solution.plan
     solution, conversion, prediction = result.solution, result.conversion, result.prediction
+    real = debriefing.flown if debriefing is not None else None
     flight, vehicle, maximised = plan.flight, plan.vehicle, plan.radio.maximised
     title = (
         f"Map of the route from {_place(flight.start)} to {_place(flight.end)}, east and north in "
@@ -125,20 +147,27 @@ def _plan_figures(result: Result) -> Iterator[str]:
     )
     if conversion:
         title += ", waypoints by item number and the predicted track"
+    if real is not None:
+        title += ", and the track that was flown"
     if plan.fence:
         title += "; zones of the fence, and the margin that the plan keeps"
-    yield _figure("route", "Route", figures.route(solution, conversion), title)
+    yield _figure("route", "Route", figures.route(solution, conversion, real), title)
+    if debriefing is not None and real is not None:
+        title = "Distance from the planned place at equal times, as predicted and as flown"
+        figure = figures.apart(solution, debriefing.predicted, real)
+        yield _figure("apart", "Off the plan", figure, title)
     title = (
         f"Speed over time, limit {vehicle.max_speed:g} m/s, and acceleration over time, limit "
         f"{vehicle.max_acceleration:g} m/s²"
     )
     yield _figure("motion", "Motion", figures.motion(solution, conversion), title)
     flown = " and along the predicted flight" if prediction else ""
+    flown += " and as flown" if real is not None else ""
     title = f"Rates of both links over time, planned{flown}"
-    yield _figure("rates", "Link", figures.rates(solution, prediction), title)
+    yield _figure("rates", "Link", figures.rates(solution, prediction, real), title)
     half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
     title = f"What the relay has received and not yet forwarded, over time{half}"
-    yield _figure("queue", "Queue", figures.queue(solution, prediction), title)
+    yield _figure("queue", "Queue", figures.queue(solution, prediction, real), title)
     first, last = solution.history[0], solution.history[-1]
     title = (
         f"{maximised} after each iteration, from {first:.4f} to {last:.4f} bit/s/Hz; "

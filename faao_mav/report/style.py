@@ -103,8 +103,8 @@ def legend_above(axes: "Axes", columns: int = 3) -> None:
         borderaxespad=0.0,
         borderpad=0.2,
         ncols=columns,
-        columnspacing=1.2,
-        handlelength=1.6,
+        columnspacing=0.9,
+        handlelength=1.3,
         handletextpad=0.5,
     )
 

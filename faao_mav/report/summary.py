@@ -1,6 +1,6 @@
 """A result, a validation and its findings in words: the lines of the terminal and of the page."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -8,8 +8,9 @@ from typing import TypeAlias
 
 from faao_mav.plan import Plan
 from faao_mav.schedule.precoder_table import taken_by
+from faao_mav.validate import Finding, Level
 from faao_mav.validate.check import Check
-from faao_mav.validate.finding import Finding, Level
+from faao_mav.validate.flown import Debriefing
 from faao_mav.workflow import FenceSummary, Result
 
 Line: TypeAlias = tuple[str, str]
@@ -38,8 +39,12 @@ def summary(
     if not written:
         lines.append(("written", "nothing: give --out MISSION.waypoints"))
     name = result.solution.plan.name
-    text = [f"{label:<{_LABEL_WIDTH}}{text}" for label, text in lines]
-    return "\n".join([*([name] if name else []), *text])
+    return "\n".join([*([name] if name else []), joined(lines)])
+
+
+def joined(lines: Iterable[Line]) -> str:
+    """Return `lines` as the terminal shows them."""
+    return "\n".join(f"{label:<{_LABEL_WIDTH}}{text}" for label, text in lines)
 
 
 def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
@@ -212,6 +217,33 @@ def check_lines(check: Check) -> Iterator[Line]:
             f"R_avg {of_plan(link.predicted_rate, link.planned_rate)}",
         )
         yield "", _apart(link.rms_position_error, link.max_position_error, link.path_error)
+
+
+def debriefing_lines(found: Debriefing) -> Iterator[Line]:
+    """Yield what became of a plan, hop by hop: planned, predicted and flown."""
+    solution, plan = found.solution, found.solution.plan
+    bandwidth = plan.radio.bandwidth_mhz
+    for name, flight in (("predicted", found.predicted), ("flown", found.flown)):
+        late = round(flight.duration - plan.flight.duration, 1) + 0.0  # no minus before 0.0
+        yield (
+            name,
+            f"delivers {_of_plan(flight.delivered_rate, solution.delivered_rate, bandwidth)}"
+            f"{_carried(plan.megabytes(flight.delivered_rate))}, in {flight.duration:.1f} s "
+            f"({late:+.1f} s)",
+        )
+        yield "", f"base station to UAV {_of_plan(flight.rates.R_U, solution.rates.R_U, bandwidth)}"
+        yield "", f"UAV to user {_of_plan(flight.rates.R_G, solution.rates.R_G, bandwidth)}"
+        yield (
+            "",
+            _apart(flight.rms_position_error, flight.max_position_error, flight.max_path_error),
+        )
+    yield "height", f"at most {found.altitude_error:.1f} m from the planned one"
+    if found.missing > 0:
+        yield (
+            "incomplete",
+            f"of the plan's last {found.missing:.1f} s there is no flight: counted as if the "
+            "aircraft had stayed where it was seen last",
+        )
 
 
 def _apart(rms: float, most: float, path: float) -> str:

@@ -1,18 +1,14 @@
 """From a route to mission items: take-off, the way to w_I, the route, the end."""
 
-from typing import TYPE_CHECKING
-
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.transit import check_run_in, way_home, way_out
 from faao_mav.vehicle import vehicle_of
-
-if TYPE_CHECKING:
-    from faao_mav.plan import Plan
 
 _DECIMALS = 9  # of a latitude or longitude in degrees: 0.1 mm
 _PITCH = 15.0  # the least pitch of a plane's climb after take-off, degrees; chosen
@@ -23,7 +19,7 @@ _STOP = 1.0  # the hold at a corner of the ways from and to home, s: the least t
 _AIRSPEED, _GROUND_SPEED = 0.0, 1.0
 
 
-def assemble(route: Route, plan: "Plan") -> Mission:
+def assemble(route: Route, plan: Plan) -> Mission:
     """Return the mission that flies `route` at `plan.flight.altitude` above the origin.
 
     Home is the plan's origin. The items: TAKEOFF there, if the plan asks for it; the way to w_I
@@ -86,7 +82,7 @@ def assemble(route: Route, plan: "Plan") -> Mission:
     return Mission(tuple(items), home, plan.geofence)
 
 
-def _places(positions: Real, plan: "Plan") -> list[tuple[float, float]]:
+def _places(positions: Real, plan: Plan) -> list[tuple[float, float]]:
     """Return `positions` (k, 2), m, in degrees."""
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     latitudes, longitudes = frame.to_geodetic(positions)
@@ -96,7 +92,7 @@ def _places(positions: Real, plan: "Plan") -> list[tuple[float, float]]:
     ]
 
 
-def _finish(plan: "Plan", place: tuple[float, float]) -> MissionItem:
+def _finish(plan: Plan, place: tuple[float, float]) -> MissionItem:
     match plan.mission.on_finish:
         case "rtl":
             return MissionItem(Command.NAV_RETURN_TO_LAUNCH, Frame.MISSION)

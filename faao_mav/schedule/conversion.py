@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import floor, inf
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
+from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.initial_route import Splines, initial_route, slowest_leg
@@ -21,11 +23,7 @@ from faao_mav.schedule.scheduler import Scheduler
 from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
-from faao_mav.vehicle.recommend import candidates
-
-if TYPE_CHECKING:
-    from faao_mav.optimizer.solution import Solution
-    from faao_mav.plan import Plan
+from faao_mav.vehicle.vehicle import candidates
 
 # Chosen; what a change costs is not measured.
 _SPLINE_SPACING = 10.0  # the least distance of spline waypoints, m
@@ -63,7 +61,7 @@ class Conversion:
     parameters: Mapping[str, float]
 
 
-def check_vehicle(plan: "Plan") -> None:
+def check_vehicle(plan: Plan) -> None:
     """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.
 
     That is one with useless parameters, one of a speed that no mission commands, or a plane that
@@ -93,7 +91,7 @@ def check_vehicle(plan: "Plan") -> None:
             )
 
 
-def beyond_vehicle(plan: "Plan") -> list[str]:
+def beyond_vehicle(plan: Plan) -> list[str]:
     """Return a line for each limit of `plan` that is beyond its vehicle, with what it may be.
 
     The vehicle has the parameters that are recommended for it, or its own if the plan keeps them.
@@ -124,7 +122,7 @@ def _ceiling(vehicle: Vehicle, key: str) -> tuple[float, str]:
     return least.value, name
 
 
-def _vehicles(plan: "Plan") -> list[Vehicle]:
+def _vehicles(plan: Plan) -> list[Vehicle]:
     """Return the vehicle of `plan` with each set of parameters that is recommended for it."""
     given = vehicle_of(plan)
     return [
@@ -133,7 +131,7 @@ def _vehicles(plan: "Plan") -> list[Vehicle]:
     ]
 
 
-def convert(solution: "Solution") -> Conversion:
+def convert(solution: Solution) -> Conversion:
     """Return the mission for `solution`, with the parameters that make it fly best.
 
     A route whose legs or predicted flight leave the plan's fence is made anew with half the path
@@ -161,7 +159,7 @@ def _outside(schedule: Schedule, area: FreeArea | None) -> float:
     return 0.0 if area is None else max(0.0, *(-area.clearance(path) for path in paths))
 
 
-def _convert(solution: "Solution", plan: "Plan") -> Conversion:
+def _convert(solution: Solution, plan: Plan) -> Conversion:
     """Return the mission for `solution` within the path tolerance of `plan`.
 
     The sets of parameters that are recommended for the vehicle are compared by the error of the
@@ -196,7 +194,7 @@ def _convert(solution: "Solution", plan: "Plan") -> Conversion:
     )
 
 
-def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
+def _scheduler(plan: Plan, t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     """Return what schedules the flights of `vehicle`, which may have recommended parameters."""
     limits = plan.vehicle
     if vehicle.type.hovers:
@@ -219,12 +217,12 @@ def _scheduler(plan: "Plan", t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
     )
 
 
-def _altitude(plan: "Plan") -> float:
+def _altitude(plan: Plan) -> float:
     """Return the height of the flight above sea level, m."""
     return plan.origin.elevation + plan.flight.altitude
 
 
-def _true_over_commanded(plan: "Plan") -> float:
+def _true_over_commanded(plan: Plan) -> float:
     """Return true over commanded airspeed at the height of the flight."""
     vehicle = vehicle_of(plan)
     return vehicle.type.true_over_commanded(vehicle, _altitude(plan))

@@ -14,7 +14,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Integers
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import Schedule
+from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
 from faao_mav.vector import lengths
 from faao_mav.vehicle.vehicle_type import OVERSPEED
@@ -73,7 +73,7 @@ class CopterScheduler(Scheduler):
             if 0 < count <= len(times):
                 chosen = np.array(sorted(times[:count]))
                 at = np.searchsorted(route.arrivals, chosen)
-                positions = np.column_stack([np.interp(chosen, self.t, x) for x in self.w.T])
+                positions = positions_at(chosen, self.t, self.w)
                 yield route.insert(at, positions, chosen, route.speeds[at - 1])
 
     def _split_times(self, schedule: Schedule) -> list[float]:

@@ -6,13 +6,13 @@ flight.
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
+from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.waypoints import (
     LEG_SHARE,
@@ -24,9 +24,6 @@ from faao_mav.schedule.waypoints import (
 )
 from faao_mav.vector import lengths
 from faao_mav.vehicle import LegLimits, vehicle_of
-
-if TYPE_CHECKING:
-    from faao_mav.plan import Plan
 
 _MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
 
@@ -48,7 +45,7 @@ class Splines:
 def initial_route(
     t: ArrayLike,
     w: ArrayLike,
-    plan: "Plan",
+    plan: Plan,
     *,
     splines: Splines | None = None,
     share: float = 1.0,
@@ -83,7 +80,7 @@ def initial_route(
     return _timed(times, waypoints, curved, slowest, plan.vehicle.max_speed)
 
 
-def slowest_leg(plan: "Plan") -> float:
+def slowest_leg(plan: Plan) -> float:
     """Return the least speed that the plan's vehicle is commanded for a leg, m/s.
 
     Where the plan is slower it waits. It is half of `max_speed` at most.
@@ -114,7 +111,7 @@ def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: floa
     return route
 
 
-def set_out(t: Real, w: Real, plan: "Plan") -> float:
+def set_out(t: Real, w: Real, plan: Plan) -> float:
     """Return when the trajectory leaves w_I, s: the end of the initial route's first hover.
 
     `t` (n,) s, `w` (n, 2) m.

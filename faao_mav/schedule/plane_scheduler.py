@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import Schedule
+from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import Scheduler
 from faao_mav.vector import distances_to_path
 
@@ -67,7 +67,7 @@ class PlaneScheduler(Scheduler):
             if len(inside) and stray[inside].max() > _STRAY * self.tolerance:
                 times.append(float(self.t[inside[np.argmax(stray[inside])]]))
         at = np.searchsorted(route.arrivals, times)
-        positions = np.column_stack([np.interp(times, self.t, x) for x in self.w.T])
+        positions = positions_at(np.array(times), self.t, self.w)
         return route.insert(at, positions, np.array(times), route.speeds[at - 1])
 
     def refined(self, first: Schedule) -> Schedule:

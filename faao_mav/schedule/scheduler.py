@@ -11,7 +11,7 @@ import numpy as np
 from faao_mav.arrays import Integers, Real
 from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.route import Route, sent_speeds
-from faao_mav.schedule.schedule import Clock, Schedule
+from faao_mav.schedule.schedule import Clock, Schedule, positions_at
 from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
 from faao_mav.vector import lengths
 from faao_mav.vehicle import FlightModel, Vehicle
@@ -101,7 +101,7 @@ class Scheduler(ABC):
         as reached, for the flight may pass it again.
         """
         route, flown = schedule.route, schedule.flown
-        planned = np.column_stack([np.interp(route.arrivals[points], self.t, x) for x in self.w.T])
+        planned = positions_at(route.arrivals[points], self.t, self.w)
         positions = route.positions.copy()
         for k, place in zip(points, planned, strict=True):
             about = flown.arrivals[k]

@@ -16,8 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.schedule.leg_times import LegTimes
-from faao_mav.schedule.retimed import Retimed, Retiming
+from faao_mav.schedule.retimed import LegTimes, Retimed, Retiming
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import LATE_WEIGHT, Clock, Schedule
 

@@ -1,16 +1,12 @@
 """The ways between home and the relay route, which keep the plan's margin from the fence's edge."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.mission.fence_area import FreeArea
-
-if TYPE_CHECKING:
-    from faao_mav.plan import Plan
-    from faao_mav.schedule.route import Route
+from faao_mav.plan import Plan
+from faao_mav.schedule.route import Route
 
 _SPARE = 0.01
 """By how much, m, a way may be nearer to the edge than the margin: a route is rounded. Chosen."""
@@ -22,7 +18,7 @@ around a circle of 60 m they are 30 m apart."""
 _HOME = np.zeros(2)
 
 
-def check_transit(plan: "Plan") -> None:
+def check_transit(plan: Plan) -> None:
     """Raise where no flight of `plan` gets from home to flight.start, and back if it has to.
 
     `InputError` for a home that is nearer to the edge of the fence than `fence.margin`,
@@ -32,12 +28,12 @@ def check_transit(plan: "Plan") -> None:
     way_home(plan, np.array(plan.flight.end))
 
 
-def way_out(plan: "Plan", first: Real) -> Real:
+def way_out(plan: Plan, first: Real) -> Real:
     """Return the corners (k, 2), m, on the way from home to `first` (2,); errors as above."""
     return _corners(plan, _HOME, first, "home (site.origin) to flight.start")
 
 
-def way_home(plan: "Plan", last: Real) -> Real:
+def way_home(plan: Plan, last: Real) -> Real:
     """Return the corners (k, 2), m, after which a return to launch from `last` (2,) is straight.
 
     There are none unless the mission ends with one. Errors as above.
@@ -47,7 +43,7 @@ def way_home(plan: "Plan", last: Real) -> Real:
     return _corners(plan, last, _HOME, "flight.end to home (site.origin)")
 
 
-def check_run_in(plan: "Plan", route: "Route") -> None:
+def check_run_in(plan: Plan, route: Route) -> None:
     """Raise `InfeasibleError` where a leg before w_I or after w_F comes nearer to the edge."""
     fence, last = plan.keep_in, len(route.positions) - 1
     if fence is None:
@@ -65,7 +61,7 @@ def check_run_in(plan: "Plan", route: "Route") -> None:
             )
 
 
-def _corners(plan: "Plan", start: Real, end: Real, name: str) -> Real:
+def _corners(plan: Plan, start: Real, end: Real, name: str) -> Real:
     fence, margin = plan.keep_in, _margin(plan)
     if fence is None:
         return np.empty((0, 2))
@@ -120,5 +116,5 @@ def _kept(fence: FreeArea, margin: float) -> FreeArea:
     return fence.inside(max(margin - _SPARE, 0.0))
 
 
-def _margin(plan: "Plan") -> float:
+def _margin(plan: Plan) -> float:
     return plan.fence.margin if plan.fence is not None else 0.0

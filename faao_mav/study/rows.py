@@ -4,7 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from statistics import fmean, stdev
@@ -73,10 +73,7 @@ class StudyRow:
     )
 
 
-_RESULTS = (
-    *("scheme", "seed", "R_avg", "R_U", "R_G", "delivered", "delivered_mbytes"),
-    *("mutual_information", "rate", "seconds", "iterations", "converged", "error"),
-)
+_RESULTS = [each.name for each in fields(StudyRow) if each.name not in ("key", "values", "route")]
 """The fields of a row that are columns of the table."""
 
 

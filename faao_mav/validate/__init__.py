@@ -6,40 +6,29 @@ from faao_mav.validate import (
     cages,
     delivery,
     extent,
-    fence_keeping,
     fences,
     items,
     px4_checks,
     px4_flight,
-    px4_radius,
     refusals,
     shape,
     speed_commands,
     speeds,
 )
-from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.demands import Limits, LinkCheck, Stretch
-from faao_mav.validate.finding import Finding, Level
-from faao_mav.validate.rule import Rule
+from faao_mav.validate.context import ValidationContext as ValidationContext
+from faao_mav.validate.demands import Limits as Limits
+from faao_mav.validate.demands import LinkCheck as LinkCheck
+from faao_mav.validate.demands import Stretch as Stretch
+from faao_mav.validate.rule import Finding as Finding
+from faao_mav.validate.rule import Level as Level
+from faao_mav.validate.rule import Rule as Rule
 from faao_mav.vehicle import Track, Vehicle
-
-__all__ = [
-    "RULES",
-    "Finding",
-    "Level",
-    "Limits",
-    "LinkCheck",
-    "Rule",
-    "Stretch",
-    "ValidationContext",
-    "validate",
-]
 
 RULES: tuple[Rule, ...] = tuple(
     rule
     for module in (
-        *(items, refusals, ardupilot, px4_checks, px4_flight, px4_radius, cages, speed_commands),
-        *(speeds, shape, extent, fences, fence_keeping, delivery),
+        *(items, refusals, ardupilot, px4_checks, px4_flight, cages, speed_commands),
+        *(speeds, shape, extent, fences, delivery),
     )
     for rule in module.RULES
 )

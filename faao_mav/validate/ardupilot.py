@@ -6,8 +6,7 @@ from itertools import pairwise
 
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
-from faao_mav.validate.finding import Level
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.rule import Issue, Level, Rules
 from faao_mav.vehicle import ARDUCOPTER, ARDUPLANE
 from faao_mav.vehicle.dialect import name_of
 
@@ -57,12 +56,9 @@ _ON_GROUND = {
 }
 
 
-@RULES.error(
-    "ardupilot-required-item",
-    "ARMING_MIS_ITEMS asks for an item that the mission does not have",
-    _ARMING,
-)
+@RULES.error("ardupilot-required-item", _ARMING)
 def _required(context: ValidationContext) -> Iterator[Issue]:
+    """ARMING_MIS_ITEMS asks for an item that the mission does not have."""
     bits = int(context.vehicle.value("arming_items"))
     there = {item.command for item in context.items}
     for bit, command in _REQUIRED.items():
@@ -75,12 +71,9 @@ def _required(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error(
-    "ardupilot-required-rally",
-    "ARMING_MIS_ITEMS asks for a rally point near enough",
-    f"{_ARMING}, AP_Rally::find_nearest_rally_point",
-)
+@RULES.error("ardupilot-required-rally", f"{_ARMING}, AP_Rally::find_nearest_rally_point")
 def _required_rally(context: ValidationContext) -> Iterator[Issue]:
+    """ARMING_MIS_ITEMS asks for a rally point near enough."""
     bits = int(context.vehicle.value("arming_items"))
     if not bits & _RALLY_BIT or context.frame is None:
         return
@@ -97,21 +90,15 @@ def _required_rally(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.error(
-    "ardupilot-no-takeoff",
-    "without a take-off ArduPilot does not start the mission from the ground",
-    _TAKEOFF,
-)
+@RULES.error("ardupilot-no-takeoff", _TAKEOFF)
 def _no_takeoff(context: ValidationContext) -> Iterator[Issue]:
+    """Without a take-off ArduPilot does not start the mission from the ground."""
     return _without_takeoff(context, airborne=False)
 
 
-@RULES.warning(
-    "ardupilot-begins-in-the-air",
-    "a plan begins in the air: ArduPilot does not start its mission from the ground",
-    _TAKEOFF,
-)
+@RULES.warning("ardupilot-begins-in-the-air", _TAKEOFF)
 def _begins_in_the_air(context: ValidationContext) -> Iterator[Issue]:
+    """A plan begins in the air: ArduPilot does not start its mission from the ground."""
     return _without_takeoff(context, airborne=True)
 
 
@@ -125,12 +112,9 @@ def _without_takeoff(context: ValidationContext, *, airborne: bool) -> Iterator[
         )
 
 
-@RULES.error(
-    "ardupilot-takeoff-first",
-    "ArduPilot starts a mission on the ground only if it begins with a take-off",
-    _TAKEOFF,
-)
+@RULES.error("ardupilot-takeoff-first", _TAKEOFF)
 def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
+    """ArduPilot starts a mission on the ground only if it begins with a take-off."""
     own = context.vehicle.type
     takeoff = next((index for index, _ in context.each(*_TAKEOFFS[own])), 0)
     before = next(
@@ -149,13 +133,9 @@ def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.error(
-    "ardupilot-land-start",
-    "DO_LAND_START, but RTL_AUTOLAND is 0: ArduPlane does not arm",
-    _ARMING,
-    kind="plane",
-)
+@RULES.error("ardupilot-land-start", _ARMING, kind="plane")
 def _land_start(context: ValidationContext) -> Iterator[Issue]:
+    """DO_LAND_START, but RTL_AUTOLAND is 0: ArduPlane does not arm."""
     for index, _ in context.each(Command.DO_LAND_START):
         if context.vehicle.value("return_lands") == 0:
             yield Issue(
@@ -174,11 +154,11 @@ def _flying(context: ValidationContext) -> Iterator[tuple[int, int]]:
 
 @RULES.error(
     "ardupilot-spline-delay",
-    "a NAV_DELAY after a spline waypoint: the aircraft may plunge",
     "measured on ArduCopter 4.7: from 30 m to 12 m and to 79 m in 8 of 8 flights",
     kind="copter",
 )
 def _spline_delay(context: ValidationContext) -> Iterator[Issue]:
+    """A NAV_DELAY after a spline waypoint: the aircraft may plunge."""
     for (before, first), (index, second) in pairwise(_flying(context)):
         if (first, second) == (Command.NAV_SPLINE_WAYPOINT, Command.NAV_DELAY):
             yield Issue(
@@ -191,11 +171,11 @@ def _spline_delay(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "ardupilot-spline-last",
-    "a spline waypoint behind another item is the last that flies: an internal error",
     "measured on ArduCopter 4.7: Internal Errors 0x20000000, which refuse the next arming",
     kind="copter",
 )
 def _spline_last(context: ValidationContext) -> Iterator[Issue]:
+    """A spline waypoint behind another item is the last that flies: an internal error."""
     *_, before, last = [(-1, 0), (-1, 0), *_flying(context)]
     if last[1] == Command.NAV_SPLINE_WAYPOINT != before[1]:
         yield Issue(
@@ -208,11 +188,11 @@ def _spline_last(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "ardupilot-land-approach",
-    "a plane lands straight from its take-off, without an approach",
     "measured on ArduPlane 4.7: 102 m from a landing point at home, 3 m from one 700 m ahead",
     kind="plane",
 )
 def _approach(context: ValidationContext) -> Iterator[Issue]:
+    """A plane lands straight from its take-off, without an approach."""
     for (_, first), (index, second) in pairwise(_flying(context)):
         if (first, second) == (Command.NAV_TAKEOFF, Command.NAV_LAND):
             yield Issue(
@@ -224,11 +204,10 @@ def _approach(context: ValidationContext) -> Iterator[Issue]:
 
 
 @RULES.error(
-    "ardupilot-set-home",
-    "home is set in flight: heights above home count from there, and no waypoint is reached",
-    "measured on ArduCopter 4.7: it hovers at the next waypoint for good",
+    "ardupilot-set-home", "measured on ArduCopter 4.7: it hovers at the next waypoint for good"
 )
 def _set_home(context: ValidationContext) -> Iterator[Issue]:
+    """Home is set in flight: heights above home count from there, and no waypoint is reached."""
     takeoffs = [index for index, _ in context.each(*_TAKEOFFS[context.vehicle.type])]
     for index, item in context.each(Command.DO_SET_HOME):
         same_height = item.params[0] == 0 and abs(context.height(item)) < _SAME_HEIGHT
@@ -278,10 +257,10 @@ RULES.commands(
 
 @RULES.warning(
     "ardupilot-command-skipped",
-    "ArduPilot stores this command, but this kind of aircraft does nothing with it",
     "measured; ArduCopter 4.7 ModeAuto::start_command, ArduPlane 4.7 Plane::start_command",
 )
 def _skipped(context: ValidationContext) -> Iterator[Issue]:
+    """ArduPilot stores this command, but this kind of aircraft does nothing with it."""
     for index, item in context.each(*_SKIPPED[context.vehicle.type]):
         yield Issue(
             index,
@@ -292,10 +271,10 @@ def _skipped(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.error(
     "ardupilot-terrain",
-    "heights above terrain: without terrain data ArduPilot does not arm",
     "measured on ArduCopter and ArduPlane 4.7: arming is refused (waiting for terrain data)",
 )
 def _terrain(context: ValidationContext) -> Iterator[Issue]:
+    """Heights above terrain: without terrain data ArduPilot does not arm."""
     above = [index for index, item in context.each(*FLOWN_TO) if item.frame in ABOVE_TERRAIN]
     if above:
         off = context.vehicle.value("terrain_enable") == 0
@@ -309,12 +288,9 @@ def _terrain(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.note(
-    "altitude-rounded",
-    "an altitude is stored in whole centimetres",
-    "measured on ArduCopter 4.7: read back",
-)
+@RULES.note("altitude-rounded", "measured on ArduCopter 4.7: read back")
 def _altitude(context: ValidationContext) -> Iterator[Issue]:
+    """An altitude is stored in whole centimetres."""
     changed = []
     for index, item in context.each(*FLOWN_TO):
         stored = context.stored(item)

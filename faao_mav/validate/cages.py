@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from faao_mav.mission.command import Command
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.finding import Level
-from faao_mav.validate.rule import Issue, Rule
+from faao_mav.validate.rule import Issue, Level, Rule
 from faao_mav.vehicle import ARDUCOPTER, PX4_COPTER
 
 _ARDUPILOT, _PX4 = ARDUCOPTER.family, PX4_COPTER.family

@@ -59,6 +59,17 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
     )
 
 
+def on_the_plans_clock(
+    solution: Solution, track: Track, *, lead: float | None = None
+) -> tuple[Real, Real]:
+    """Return times (k,), s, and positions (k, 2), m, of `track` on the plan's clock, in its frame.
+
+    How the clock is put, and the `lead`: see `compare_with_plan`.
+    """
+    w = _in_frame_of(solution, track)
+    return track.t - _start(solution, track, w, lead), w
+
+
 def _in_frame_of(solution: Solution, track: Track) -> Real:
     """Return the positions (k, 2) of `track` in the plan's local metres."""
     own = LocalFrame(solution.plan.origin.latitude, solution.plan.origin.longitude)

@@ -35,8 +35,9 @@ _SOURCE = "the plan, and the rate along the predicted flight"
 
 @RULES.error(
     "link-rate-lost",
-    f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of what is planned",
     _SOURCE,
+    summary=f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of what is "
+    "planned",
 )
 def _lost(context: ValidationContext) -> Iterator[Issue]:
     if context.link is not None and context.link.share < LEAST_SHARE:
@@ -45,8 +46,9 @@ def _lost(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "link-rate-reduced",
-    f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of what is planned",
     _SOURCE,
+    summary=f"the flight is predicted to deliver less than {100 * GOOD_SHARE:g} % of what is "
+    "planned",
 )
 def _reduced(context: ValidationContext) -> Iterator[Issue]:
     if context.link is not None and LEAST_SHARE <= context.link.share < GOOD_SHARE:
@@ -70,12 +72,9 @@ def _rate_issue(link: LinkCheck) -> Issue:
     )
 
 
-@RULES.warning(
-    "link-path",
-    "the predicted path leaves the planned one by more than the plan's path_tolerance",
-    _SOURCE,
-)
+@RULES.warning("link-path", _SOURCE)
 def _path(context: ValidationContext) -> Iterator[Issue]:
+    """The predicted path leaves the planned one by more than the plan's path_tolerance."""
     link = context.link
     if link is not None and link.path_error > link.path_tolerance + PATH_ALLOWANCE:
         yield Issue(
@@ -89,9 +88,9 @@ def _path(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "link-late",
-    f"the predicted flight ends later than planned by more than {100 * LATE_SHARE:g} % and "
-    f"{LATE:g} s: what the plan has at its end is not done in its time",
     _SOURCE,
+    summary=f"the predicted flight ends later than planned by more than {100 * LATE_SHARE:g} % and "
+    f"{LATE:g} s: what the plan has at its end is not done in its time",
 )
 def _late(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
@@ -109,8 +108,9 @@ def _late(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "link-apart",
-    f"the predicted aircraft is more than {APART:g} m rms from where the plan has it at the time",
     _SOURCE,
+    summary=f"the predicted aircraft is more than {APART:g} m rms from where the plan has it at "
+    "the time",
 )
 def _apart(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
@@ -126,8 +126,9 @@ def _apart(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "link-altitude",
-    f"the predicted flight is more than {ALTITUDE_ERROR:g} m above or below the planned altitude",
     _SOURCE,
+    summary=f"the predicted flight is more than {ALTITUDE_ERROR:g} m above or below the planned "
+    "altitude",
 )
 def _altitude(context: ValidationContext) -> Iterator[Issue]:
     link = context.link
@@ -140,12 +141,9 @@ def _altitude(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.note(
-    "link-timing",
-    "where the aircraft is predicted to be, beside where the plan has it at the same time",
-    _SOURCE,
-)
+@RULES.note("link-timing", _SOURCE)
 def _timing(context: ValidationContext) -> Iterator[Issue]:
+    """Where the aircraft is predicted to be, beside where the plan has it at the same time."""
     link = context.link
     if link is not None:
         late = link.predicted_duration - link.planned_duration

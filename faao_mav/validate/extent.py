@@ -35,10 +35,10 @@ _DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
 @RULES.error(
     "below-home",
-    "an item below home: on level ground the aircraft flies into it",
     "measured on ArduCopter and ArduPlane 4.7: on the ground, armed; on PX4 1.16.1: the same",
 )
 def _below_home(context: ValidationContext) -> Iterator[Issue]:
+    """An item below home: on level ground the aircraft flies into it."""
     for place in context.places:
         if place.up < 0 and context.items[place.index].command not in LANDINGS | TAKEOFFS:
             yield _too_low(context, place, f"{-place.up:g} m below home")
@@ -46,8 +46,8 @@ def _below_home(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "near-ground",
-    f"an item less than {LEAST_HEIGHT:g} m above home",
     "measured on ArduCopter 4.7 and PX4 1.16.1",
+    summary=f"an item less than {LEAST_HEIGHT:g} m above home",
 )
 def _near_ground(context: ValidationContext) -> Iterator[Issue]:
     for place in context.places:
@@ -66,7 +66,7 @@ def _too_low(context: ValidationContext, place: PlacedItem, how: str) -> Issue:
     return Issue(place.index, sea + how, "use frame 3, height above home, or raise the item")
 
 
-@RULES.error("too-high", f"higher than {HIGHEST / 1000:g} km above home", "common sense")
+@RULES.error("too-high", "common sense", summary=f"higher than {HIGHEST / 1000:g} km above home")
 def _too_high(context: ValidationContext) -> Iterator[Issue]:
     for place in context.places:
         if place.up > HIGHEST:
@@ -77,8 +77,9 @@ def _too_high(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error("above-ceiling", "higher than the ceiling that was set", _GIVEN)
+@RULES.error("above-ceiling", _GIVEN)
 def _above_ceiling(context: ValidationContext) -> Iterator[Issue]:
+    """Higher than the ceiling that was set."""
     limit = context.limits.max_altitude
     if limit is not None:
         heights = None if context.track is None else context.track.position[:, 2]
@@ -86,8 +87,9 @@ def _above_ceiling(context: ValidationContext) -> Iterator[Issue]:
         yield from _outside(context, limit, lambda place: place.up, heights, shown)
 
 
-@RULES.error("beyond-distance", "farther from home than was set", _GIVEN)
+@RULES.error("beyond-distance", _GIVEN)
 def _beyond(context: ValidationContext) -> Iterator[Issue]:
+    """Farther from home than was set."""
     limit, positions = context.limits.max_distance, context.track_positions
     if limit is not None and context.home is not None:
         distances = None if positions is None else np.hypot(*positions[:, :2].T)
@@ -116,8 +118,8 @@ def _outside(
 
 @RULES.note(
     "above-120-m",
-    f"higher than {COMMON_CEILING:g} m above home, what many countries allow",
     "EU 2019/947 (open category), FAA part 107 (400 ft)",
+    summary=f"higher than {COMMON_CEILING:g} m above home, what many countries allow",
 )
 def _above_common(context: ValidationContext) -> Iterator[Issue]:
     high = [place for place in context.places if place.up > COMMON_CEILING]
@@ -130,12 +132,9 @@ def _above_common(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning(
-    "return-above-ceiling",
-    "on a return to launch the aircraft climbs above the ceiling that was set",
-    "RTL_ALT, RTL_ALTITUDE (ArduPilot), RTL_RETURN_ALT (PX4)",
-)
+@RULES.warning("return-above-ceiling", "RTL_ALT, RTL_ALTITUDE (ArduPilot), RTL_RETURN_ALT (PX4)")
 def _return_above(context: ValidationContext) -> Iterator[Issue]:
+    """On a return to launch the aircraft climbs above the ceiling that was set."""
     ceiling = context.limits.max_altitude
     vehicle = context.vehicle
     height, name = vehicle.value("return_height"), vehicle.name_of("return_height")
@@ -149,7 +148,7 @@ def _return_above(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning("far-from-home", f"farther than {FAR / 1000:g} km from home", "common sense")
+@RULES.warning("far-from-home", "common sense", summary=f"farther than {FAR / 1000:g} km from home")
 def _far(context: ValidationContext) -> Iterator[Issue]:
     if context.home is None or context.limits.max_distance is not None:
         return
@@ -163,7 +162,7 @@ def _far(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.warning("long-leg", f"a leg of more than {FAR / 1000:g} km", "common sense")
+@RULES.warning("long-leg", "common sense", summary=f"a leg of more than {FAR / 1000:g} km")
 def _long(context: ValidationContext) -> Iterator[Issue]:
     for leg in context.legs:
         if leg.length > FAR and leg.start.index != HOME and leg.end.index != HOME:
@@ -175,8 +174,9 @@ def _long(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error("too-long", "the flight takes longer than was set", f"{_GIVEN}; predicted flight")
+@RULES.error("too-long", f"{_GIVEN}; predicted flight")
 def _too_long(context: ValidationContext) -> Iterator[Issue]:
+    """The flight takes longer than was set."""
     limit = context.limits.max_duration
     if limit is None:
         return

@@ -1,4 +1,4 @@
-"""The fence: legs and predicted flight, not only points, and how near they come."""
+"""The fence: what of the mission leaves it, how near it comes, whether the vehicle keeps it."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,12 +10,18 @@ from faao_mav.mission.fence_area import Area
 from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME
+from faao_mav.vector import lengths
+from faao_mav.vehicle import ARDUCOPTER
 
 RULES = Rules()
+_ARDUPILOT = Rules(ARDUCOPTER.family)
 
 LEAST_MARGIN = 2.0
 """The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
 what a change costs is not measured."""
+
+_STILL = 0.1
+"""The speed, m/s, below which an aircraft heads nowhere. Chosen."""
 
 _GEOMETRY = "plane geometry about home; ArduPilot AC_Fence, PX4 Geofence"
 
@@ -26,8 +32,9 @@ def _what(part: Area | None) -> str:
     return f"{'outside' if part.inclusion else 'inside'} {part.name}"
 
 
-@RULES.error("fence-crosses-itself", "a fence polygon crosses itself", _GEOMETRY)
+@RULES.error("fence-crosses-itself", _GEOMETRY)
 def _crosses(context: ValidationContext) -> Iterator[Issue]:
+    """A fence polygon crosses itself."""
     for area in context.fence.areas if context.fence else ():
         if area.crosses_itself:
             yield Issue(
@@ -37,16 +44,18 @@ def _crosses(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error("fence-home", "home lies outside the fence", _GEOMETRY)
+@RULES.error("fence-home", _GEOMETRY)
 def _home(context: ValidationContext) -> Iterator[Issue]:
+    """Home lies outside the fence."""
     if context.home is not None:
         for issue in _points(context, [("home", (0.0, 0.0))], "move home or the fence"):
             then = context.vehicle.type.home_outside_fence
             yield replace(issue, message="; ".join(filter(None, (issue.message, then))))
 
 
-@RULES.error("fence-rally", "a rally point lies outside the fence", _GEOMETRY)
+@RULES.error("fence-rally", _GEOMETRY)
 def _rally(context: ValidationContext) -> Iterator[Issue]:
+    """A rally point lies outside the fence."""
     if context.fence is not None:
         points = [
             (f"rally point {n}", context.fence.frame.to_local(point.latitude, point.longitude))
@@ -55,8 +64,9 @@ def _rally(context: ValidationContext) -> Iterator[Issue]:
         yield from _points(context, points, "move the rally point or the fence")
 
 
-@RULES.error("fence-return", "the breach return point lies outside the fence", _GEOMETRY)
+@RULES.error("fence-return", _GEOMETRY)
 def _return(context: ValidationContext) -> Iterator[Issue]:
+    """The breach return point lies outside the fence."""
     point = context.mission.fence.breach_return
     if context.fence is not None and point is not None:
         local = context.fence.frame.to_local(point.latitude, point.longitude)
@@ -75,8 +85,9 @@ def _points(
         yield Issue(None, f"{points[k][0]} is {' and '.join(map(_what, broken.parts(k)))}", action)
 
 
-@RULES.error("fence-leg", "a leg leaves the fence", _GEOMETRY)
+@RULES.error("fence-leg", _GEOMETRY)
 def _legs(context: ValidationContext) -> Iterator[Issue]:
+    """A leg leaves the fence."""
     fence = context.fence
     if fence is None or not context.legs:
         return
@@ -99,8 +110,9 @@ def _legs(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.error("fence-flight", "the predicted flight leaves the fence", _GEOMETRY)
+@RULES.error("fence-flight", _GEOMETRY)
 def _flight(context: ValidationContext) -> Iterator[Issue]:
+    """The predicted flight leaves the fence."""
     fence, track = context.fence, context.track
     if fence is None or track is None or not len(fence.flight):
         return
@@ -118,7 +130,7 @@ def _flight(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning("fence-close", f"less than {LEAST_MARGIN:g} m from the fence", _GEOMETRY)
+@RULES.warning("fence-close", _GEOMETRY, summary=f"less than {LEAST_MARGIN:g} m from the fence")
 def _close(context: ValidationContext) -> Iterator[Issue]:
     nearest = context.fence.nearest if context.fence else None
     if nearest is not None and nearest[0] < LEAST_MARGIN:
@@ -130,8 +142,9 @@ def _close(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.note("fence-margin", "how near the mission comes to the fence", _GEOMETRY)
+@RULES.note("fence-margin", _GEOMETRY)
 def _margin(context: ValidationContext) -> Iterator[Issue]:
+    """How near the mission comes to the fence."""
     nearest = context.fence.nearest if context.fence else None
     if nearest is not None and nearest[0] >= LEAST_MARGIN:
         yield Issue(
@@ -139,3 +152,73 @@ def _margin(context: ValidationContext) -> Iterator[Issue]:
             f"{nearest[0]:.1f} m from the edge of the fence, the nearest that the mission comes",
             "nothing",
         )
+
+
+@RULES.note(
+    "fence-not-kept", "FENCE_ENABLE, FENCE_TYPE, FENCE_ACTION (ArduPilot 4.7); GF_ACTION (PX4 1.16)"
+)
+def _not_kept(context: ValidationContext) -> Iterator[Issue]:
+    """The vehicle's parameters let it fly on where it leaves the fence."""
+    response = context.vehicle.type.at_fence(context.vehicle)
+    if context.fence is None or response.keeps or not response.parameter:
+        return
+    value = context.vehicle.value(response.parameter)
+    name = context.vehicle.name_of(response.parameter)
+    does = "says so, and flies on" if response.action == "report" else "flies on"
+    yield Issue(
+        None,
+        f"a vehicle that leaves the fence {does} ({name} {value:g})",
+        f"set {name.partition(',')[0]} to {response.set_to} for the vehicle to turn back",
+    )
+
+
+@_ARDUPILOT.note(
+    "ardupilot-fence-margin",
+    "measured on ArduCopter 4.7: in AUTO it flies on, at 1 m with FENCE_MARGIN 2 too",
+)
+def _fence_margin(context: ValidationContext) -> Iterator[Issue]:
+    """The mission comes nearer to the fence than FENCE_MARGIN."""
+    nearest = context.fence.nearest if context.fence else None
+    margin = context.vehicle.value("fence_margin")
+    if nearest is not None and nearest[0] < margin:
+        name = context.vehicle.name_of("fence_margin")
+        yield Issue(
+            nearest[1],
+            f"{nearest[0]:.1f} m from the edge of the fence; {name} is {margin:g} m: in AUTO "
+            "ArduPilot flies there all the same, in modes that avoid the fence it does not",
+            "keep more room, or set FENCE_MARGIN to less",
+        )
+
+
+@RULES.error(
+    "fence-ahead",
+    "GF_PREDICT: PX4 1.16 GeofenceBreachAvoidance; measured: at 7 m/s it stopped 32 m before",
+)
+def _ahead(context: ValidationContext) -> Iterator[Issue]:
+    """The vehicle takes a flight towards the fence for one that leaves it."""
+    vehicle, fence, track = context.vehicle, context.fence, context.track
+    if fence is None or track is None or context.track_positions is None:
+        return
+    velocity, positions = track.velocity[:, :2], context.track_positions[:, :2]
+    speed = lengths(velocity)
+    ahead = vehicle.type.fence_ahead(vehicle, speed)
+    if not ahead.any() or not vehicle.type.at_fence(vehicle).keeps:
+        return
+    import shapely
+
+    moving = speed > _STILL
+    tested = positions[moving] + velocity[moving] * (ahead[moving] / speed[moving])[:, None]
+    outside = np.zeros(len(speed), dtype=bool)
+    outside[moving] = fence.broken(shapely.points(tested)).any
+    for index in np.unique(track.item[outside]).tolist():
+        first = int(np.flatnonzero(outside & (track.item == index))[0])
+        yield Issue(
+            index,
+            f"at {track.t[first]:.0f} s the flight is at {speed[first]:.1f} m/s, and "
+            f"{ahead[first]:.0f} m straight on it were outside the fence: the vehicle "
+            "breaks off the mission there",
+            "set GF_PREDICT to 0, or fly slower there and keep more room",
+        )
+
+
+RULES += _ARDUPILOT

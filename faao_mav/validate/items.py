@@ -14,8 +14,9 @@ _RETURN_PATH_START = 188
 _ENDINGS = LANDINGS | {Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM}
 
 
-@RULES.error("empty", "the mission has no items", _COMMON)
+@RULES.error("empty", _COMMON)
 def _empty(context: ValidationContext) -> Iterator[Issue]:
+    """The mission has no items."""
     if not context.items:
         yield Issue(
             None,
@@ -24,8 +25,9 @@ def _empty(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning("no-home", "the file says nothing about home", _COMMON)
+@RULES.warning("no-home", _COMMON)
 def _no_home(context: ValidationContext) -> Iterator[Issue]:
+    """The file says nothing about home."""
     if context.items and context.mission.home is None:
         yield Issue(
             None,
@@ -35,12 +37,9 @@ def _no_home(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning(
-    "unreachable",
-    "items stand after one that ends the mission",
-    "measured on ArduCopter and ArduPlane 4.7 and PX4 1.16.1",
-)
+@RULES.warning("unreachable", "measured on ArduCopter and ArduPlane 4.7 and PX4 1.16.1")
 def _unreachable(context: ValidationContext) -> Iterator[Issue]:
+    """Items stand after one that ends the mission."""
     end = next((k for k in range(len(context.items)) if _ends(context, k)), len(context.items))
     after = context.items[end + 1 :]
     rest = [k for k, item in enumerate(after, end + 1) if item.command <= NAV_LAST]
@@ -66,12 +65,9 @@ def _ends(context: ValidationContext, index: int) -> bool:
     return command in dialect.endings
 
 
-@RULES.warning(
-    "flies-on",
-    "items stand after a landing: the aircraft takes off again by itself",
-    "measured on ArduCopter 4.7 (MIS_OPTIONS 4) and PX4 1.16.1",
-)
+@RULES.warning("flies-on", "measured on ArduCopter 4.7 (MIS_OPTIONS 4) and PX4 1.16.1")
 def _flies_on(context: ValidationContext) -> Iterator[Issue]:
+    """Items stand after a landing: the aircraft takes off again by itself."""
     for index, _ in context.each(*LANDINGS):
         flown = any(item.command <= NAV_LAST for item in context.items[index + 1 :])
         if flown and not any(_ends(context, k) for k in range(index + 1)):
@@ -83,8 +79,9 @@ def _flies_on(context: ValidationContext) -> Iterator[Issue]:
             return
 
 
-@RULES.note("no-ending", "the mission ends neither in a landing nor in a return", _COMMON)
+@RULES.note("no-ending", _COMMON)
 def _no_ending(context: ValidationContext) -> Iterator[Issue]:
+    """The mission ends neither in a landing nor in a return."""
     if context.items and not any(item.command in _ENDINGS for item in context.items):
         what = "hovers" if context.vehicle.type.hovers else "circles"
         yield Issue(
@@ -94,8 +91,9 @@ def _no_ending(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.note("mixed-heights", "some heights count from sea level, others from home", _COMMON)
+@RULES.note("mixed-heights", _COMMON)
 def _mixed_heights(context: ValidationContext) -> Iterator[Issue]:
+    """Some heights count from sea level, others from home."""
     frames = [(k, item.frame) for k, item in context.each(*FLOWN_TO)]
     sea = next((k for k, frame in frames if frame in ABOVE_SEA), None)
     home = next((k for k, frame in frames if frame in ABOVE_HOME), None)
@@ -108,8 +106,9 @@ def _mixed_heights(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.error("jump-target", "a DO_JUMP goes to an item that does not exist", _COMMON)
+@RULES.error("jump-target", _COMMON)
 def _jump_target(context: ValidationContext) -> Iterator[Issue]:
+    """A DO_JUMP goes to an item that does not exist."""
     for index, item in context.each(Command.DO_JUMP):
         if context.jump_target(index) is None:
             yield Issue(
@@ -120,8 +119,9 @@ def _jump_target(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.warning("jump-forever", "a DO_JUMP repeats without end", _COMMON)
+@RULES.warning("jump-forever", _COMMON)
 def _jump_forever(context: ValidationContext) -> Iterator[Issue]:
+    """A DO_JUMP repeats without end."""
     for index, item in context.each(Command.DO_JUMP):
         target = context.jump_target(index)
         if target is not None and target <= index and item.params[1] < 0:
@@ -133,8 +133,9 @@ def _jump_forever(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.note("same-place", "two waypoints in a row are the same place", _COMMON)
+@RULES.note("same-place", _COMMON)
 def _same_place(context: ValidationContext) -> Iterator[Issue]:
+    """Two waypoints in a row are the same place."""
     for leg in context.legs:
         start, end = leg.start.index, leg.end.index
         if HOME in (start, end) or leg.jump or leg.length >= 0.05:

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, number
-from faao_mav.validate.finding import Level
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.rule import Issue, Level, Rules
 from faao_mav.validate.straight import PlacedItem
 from faao_mav.vehicle import PX4_COPTER
 from faao_mav.vehicle.dialect import name_of
@@ -44,21 +43,17 @@ RULES.commands(
 
 
 @RULES.error(
-    "px4-starts-with-land",
-    "the mission starts with a landing",
-    f"{_CHECKER}checkMissionItemValidity, checkLandPatternValidity",
+    "px4-starts-with-land", f"{_CHECKER}checkMissionItemValidity, checkLandPatternValidity"
 )
 def _starts_with_land(context: ValidationContext) -> Iterator[Issue]:
+    """The mission starts with a landing."""
     if context.items and context.items[0].command in LANDINGS:
         yield Issue(0, "the first item is a landing", "put a take-off and waypoints before it")
 
 
-@RULES.error(
-    "px4-takeoff-first",
-    "a take-off is not the first item that flies",
-    f"{_CHECKER}checkTakeoff; measured on 1.16.1",
-)
+@RULES.error("px4-takeoff-first", f"{_CHECKER}checkTakeoff; measured on 1.16.1")
 def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
+    """A take-off is not the first item that flies."""
     before = next((k for k, item in enumerate(context.items) if item.command in _FLIES), None)
     for index, _ in context.each(*TAKEOFFS):
         if before is not None and before < index:
@@ -72,12 +67,9 @@ def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error(
-    "px4-takeoff-altitude",
-    "a take-off to home's height or below",
-    f"{_CHECKER}checkTakeoff; measured on 1.16.1",
-)
+@RULES.error("px4-takeoff-altitude", f"{_CHECKER}checkTakeoff; measured on 1.16.1")
 def _takeoff_altitude(context: ValidationContext) -> Iterator[Issue]:
+    """A take-off to home's height or below."""
     for place in _takeoffs(context):
         if place.up < _SINGLE:
             yield Issue(
@@ -88,11 +80,10 @@ def _takeoff_altitude(context: ValidationContext) -> Iterator[Issue]:
 
 
 @RULES.warning(
-    "px4-takeoff-low",
-    "a take-off lower than older PX4 versions accept or any version flies",
-    f"PX4 before 1.15 {_CHECKER.split()[-1]}checkTakeoff; MIS_TAKEOFF_ALT",
+    "px4-takeoff-low", f"PX4 before 1.15 {_CHECKER.split()[-1]}checkTakeoff; MIS_TAKEOFF_ALT"
 )
 def _takeoff_low(context: ValidationContext) -> Iterator[Issue]:
+    """A take-off lower than older PX4 versions accept or any version flies."""
     vehicle = context.vehicle
     radius = vehicle.name_of("acceptance_radius")
     least, first = vehicle.value("acceptance_radius") + 1, vehicle.value("takeoff_height")
@@ -114,11 +105,10 @@ def _takeoffs(context: ValidationContext) -> Iterator[PlacedItem]:
 
 
 @RULES.error(
-    "px4-takeoff-or-landing-missing",
-    "MIS_TKO_LAND_REQ asks for a take-off or landing that the mission does not have",
-    f"{_CHECKER}checkTakeoffLandAvailable; measured on 1.16.1",
+    "px4-takeoff-or-landing-missing", f"{_CHECKER}checkTakeoffLandAvailable; measured on 1.16.1"
 )
 def _takeoff_landing(context: ValidationContext) -> Iterator[Issue]:
+    """MIS_TKO_LAND_REQ asks for a take-off or landing that the mission does not have."""
     required = int(context.vehicle.value("takeoff_land_required"))
     takeoff, landing = any(context.each(*TAKEOFFS)), any(context.each(Command.NAV_LAND))
     both_or_none = "both a take-off and a landing, or neither,", takeoff == landing
@@ -139,12 +129,9 @@ def _takeoff_landing(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning(
-    "px4-first-waypoint-far",
-    "the first item is farther from home than MIS_DIST_1WP",
-    f"{_CHECKER}checkHorizontalDistanceToFirstWaypoint",
-)
+@RULES.warning("px4-first-waypoint-far", f"{_CHECKER}checkHorizontalDistanceToFirstWaypoint")
 def _first_far(context: ValidationContext) -> Iterator[Issue]:
+    """The first item is farther from home than MIS_DIST_1WP."""
     limit = context.vehicle.value("first_waypoint_distance")
     if context.home is not None and context.places and limit > 0:
         first = context.places[0]
@@ -177,13 +164,9 @@ def _approaches(context: ValidationContext) -> Iterator[tuple[int, float, float,
             yield index, entrance.up - landing.up, away, abs(item.params[1]) if orbits else 0.0
 
 
-@RULES.error(
-    "px4-approach-entrance",
-    "a landing approach starts neither at a waypoint nor at a loiter to altitude",
-    _APPROACH,
-    kind="plane",
-)
+@RULES.error("px4-approach-entrance", _APPROACH, kind="plane")
 def _entrance(context: ValidationContext) -> Iterator[Issue]:
+    """A landing approach starts neither at a waypoint nor at a loiter to altitude."""
     for index, _ in context.each(Command.NAV_LAND):
         before = context.items[index - 1] if index else None
         if before is not None and before.command in FLOWN_TO and before.command not in _ENTRANCES:
@@ -194,13 +177,9 @@ def _entrance(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error(
-    "px4-approach-below",
-    "a landing approach starts below the landing point",
-    _APPROACH,
-    kind="plane",
-)
+@RULES.error("px4-approach-below", _APPROACH, kind="plane")
 def _below(context: ValidationContext) -> Iterator[Issue]:
+    """A landing approach starts below the landing point."""
     for index, above, _, _ in _approaches(context):
         if above <= 0:
             yield Issue(
@@ -210,13 +189,9 @@ def _below(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error(
-    "px4-approach-orbit",
-    "a landing point lies inside the orbit that its approach starts from",
-    _APPROACH,
-    kind="plane",
-)
+@RULES.error("px4-approach-orbit", _APPROACH, kind="plane")
 def _orbit(context: ValidationContext) -> Iterator[Issue]:
+    """A landing point lies inside the orbit that its approach starts from."""
     for index, _, away, radius in _approaches(context):
         if radius > 0 and away <= radius:
             yield Issue(
@@ -226,10 +201,9 @@ def _orbit(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error(
-    "px4-approach-steep", "a landing approach is steeper than FW_LND_ANG", _APPROACH, kind="plane"
-)
+@RULES.error("px4-approach-steep", _APPROACH, kind="plane")
 def _steep(context: ValidationContext) -> Iterator[Issue]:
+    """A landing approach is steeper than FW_LND_ANG."""
     angle = math.degrees(context.vehicle.value("landing_angle"))
     slope = math.tan(math.radians(angle + _SPARE_ANGLE))
     for index, above, away, radius in _approaches(context):
@@ -246,13 +220,9 @@ def _steep(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error(
-    "px4-land-start",
-    "DO_LAND_START is there twice, before a return to launch, or without a landing after it",
-    _PATTERN,
-    kind="plane",
-)
+@RULES.error("px4-land-start", _PATTERN, kind="plane")
 def _land_start(context: ValidationContext) -> Iterator[Issue]:
+    """DO_LAND_START is there twice, before a return to launch, or without a landing after it."""
     starts = [index for index, _ in context.each(Command.DO_LAND_START)]
     if not starts:
         return

@@ -17,10 +17,9 @@ _PARSERS = (
 _SIZES = "ArduPilot: 15 bytes an item; PX4: 1000 items on most boards; measured"
 
 
-@RULES.error(
-    "refused-on-upload", "the autopilot refuses the item, and the mission with it", _PARSERS
-)
+@RULES.error("refused-on-upload", _PARSERS)
 def _refused(context: ValidationContext) -> Iterator[Issue]:
+    """The autopilot refuses the item, and the mission with it."""
     for index, item in enumerate(context.items):
         reason = context.vehicle.type.dialect.refusal(item)
         if reason is not None:
@@ -30,12 +29,9 @@ def _refused(context: ValidationContext) -> Iterator[Issue]:
             yield Issue(index, message, action)
 
 
-@RULES.error(
-    "number-too-large",
-    "a number that a message cannot carry",
-    "MAVLink: MISSION_ITEM_INT has numbers of single precision",
-)
+@RULES.error("number-too-large", "MAVLink: MISSION_ITEM_INT has numbers of single precision")
 def _too_large(context: ValidationContext) -> Iterator[Issue]:
+    """A number that a message cannot carry."""
     for index, item in enumerate(context.items):
         if not fits_message(item):
             largest = max(abs(v) for v in (*item.params, item.z) if not math.isnan(v))
@@ -56,15 +52,17 @@ def _replacement(command: int, frame: int) -> str:
     return "remove the item, or use a command that the autopilot has"
 
 
-@RULES.error("storage-full", "more items than any board of the autopilot stores", _SIZES)
+@RULES.error("storage-full", _SIZES)
 def _full(context: ValidationContext) -> Iterator[Issue]:
+    """More items than any board of the autopilot stores."""
     own = context.vehicle.type
     most = own.dialect.items.most
     return _too_many(context, most, math.inf, f"{own.name} stores {most} at most (NO_SPACE)")
 
 
-@RULES.warning("storage-tight", "more items than common boards store", _SIZES)
+@RULES.warning("storage-tight", _SIZES)
 def _tight(context: ValidationContext) -> Iterator[Issue]:
+    """More items than common boards store."""
     limit = context.vehicle.type.dialect.items
     return _too_many(
         context, limit.sure, limit.most, f"{limit.sure} are known to fit, boards differ"
@@ -82,11 +80,10 @@ def _too_many(context: ValidationContext, sure: int, most: float, limit: str) ->
 
 
 @RULES.warning(
-    "many-jumps",
-    "more DO_JUMPs than the autopilot counts the repeats of",
-    "ArduPilot 4.7 AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS: 15, on large boards 100",
+    "many-jumps", "ArduPilot 4.7 AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS: 15, on large boards 100"
 )
 def _many_jumps(context: ValidationContext) -> Iterator[Issue]:
+    """More DO_JUMPs than the autopilot counts the repeats of."""
     limit = context.vehicle.type.dialect.jumps
     jumps = [index for index, _ in context.each(Command.DO_JUMP)]
     if limit is not None and len(jumps) > limit.sure:
@@ -112,8 +109,9 @@ _INSTEAD: dict[tuple[int, int], str] = {
 _YAW = 3
 
 
-@RULES.warning("hold-changed", "a hold is not stored as it is written", _SOURCE)
+@RULES.warning("hold-changed", _SOURCE)
 def _hold(context: ValidationContext) -> Iterator[Issue]:
+    """A hold is not stored as it is written."""
     for index, item in context.each(*_HELD):
         stored = context.stored(item)
         if stored is not None and not _same(item.params[0], stored.params[0]):
@@ -128,8 +126,9 @@ def _hold(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.note("value-dropped", "a parameter is not stored as it is written", _SOURCE)
+@RULES.note("value-dropped", _SOURCE)
 def _dropped(context: ValidationContext) -> Iterator[Issue]:
+    """A parameter is not stored as it is written."""
     found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
     for index, item in context.each(*FLOWN_TO):
         stored = context.stored(item)

@@ -1,17 +1,45 @@
-"""What a rule is, and how the modules of rules list theirs."""
+"""What a rule is and finds, and how the modules of rules list theirs."""
 
 from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import partialmethod
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.mission.item import MissionItem
-from faao_mav.validate.finding import Finding, Level
 from faao_mav.vehicle import AutopilotFamily, Vehicle
 from faao_mav.vehicle.dialect import name_of
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
+
+
+class Level(StrEnum):
+    """How bad it is.
+
+    `ERROR`: the autopilot refuses the mission, or the flight is dangerous or breaks a limit that
+    was set. `WARNING`: it will not fly as it is written. `NOTE`: worth knowing.
+    """
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that a rule found.
+
+    `item` is the number that people see: the row of a `.waypoints` file, where row 0 is home, and
+    the item's number in QGroundControl and Mission Planner; None if it is about no single item.
+    `message` says what is the context, with the value and the limit; `action` what to do about it.
+    """
+
+    level: Level
+    rule: str
+    item: int | None
+    message: str
+    action: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +100,16 @@ class Rules(list[Rule]):
         self._family = family
 
     def add(
-        self, level: Level, name: str, summary: str, source: str, kind: str | None = None
+        self, level: Level, name: str, source: str, *, summary: str = "", kind: str | None = None
     ) -> Decorator:
-        """Return a decorator that makes a rule of a check; for the arguments see `Rule`."""
+        """Return a decorator that makes a rule of a check; for the arguments see `Rule`.
+
+        Without a `summary` the check's docstring is it.
+        """
 
         def register(check: Check) -> Check:
-            self.append(Rule(name, level, summary, source, check, self._family, kind))
+            told = summary or _summary_of(check)
+            self.append(Rule(name, level, told, source, check, self._family, kind))
             return check
 
         return register
@@ -110,4 +142,11 @@ class Rules(list[Rule]):
                     told = {"name": name_of(item.command), "kind": context.vehicle.kind}
                     yield Issue(index, message.format(item=item, **told), action)
 
-        self.add(level, name, summary, source, kind)(check)
+        self.add(level, name, source, summary=summary, kind=kind)(check)
+
+
+def _summary_of(check: Check) -> str:
+    """Return the docstring of `check` as the end of a sentence: "A leg." becomes "a leg"."""
+    told = (check.__doc__ or "").removesuffix(".")
+    first = told.partition(" ")[0]
+    return told[:1].lower() + told[1:] if first[1:].islower() or len(first) == 1 else told

@@ -41,22 +41,13 @@ def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, f
         item = context.items[before.index]
         passed = item.command == Command.NAV_WAYPOINT and not item.params[0] > 0
         if passed and after.start == before.end and not after.spline:
-            yield before, after, math.degrees(abs(_turn(before, after)))
-
-
-def _turn(before: Straight, after: Straight) -> float:
-    angle = _heading(after) - _heading(before)
-    return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
-def _heading(leg: Straight) -> float:
-    return math.atan2(leg.end.east - leg.start.east, leg.end.north - leg.start.north)
+            yield before, after, math.degrees(before.turn(after))
 
 
 @RULES.note(
     "sharp-corners",
-    f"turns of more than {SHARP:g} degrees at speed: the aircraft slows down for them",
     "measured on ArduCopter 4.7 and PX4 1.16.1",
+    summary=f"turns of more than {SHARP:g} degrees at speed: the aircraft slows down for them",
     kind="copter",
 )
 def _sharp(context: ValidationContext) -> Iterator[Issue]:
@@ -80,13 +71,9 @@ def _sharp(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.warning(
-    "turn-too-tight",
-    "a corner that a plane cannot fly between its waypoints",
-    "coordinated turn: radius v^2 / (g tan bank)",
-    kind="plane",
-)
+@RULES.warning("turn-too-tight", "coordinated turn: radius v^2 / (g tan bank)", kind="plane")
 def _tight(context: ValidationContext) -> Iterator[Issue]:
+    """A corner that a plane cannot fly between its waypoints."""
     bank = context.vehicle.value("roll_limit")
     shown = f"{math.degrees(bank):g} degrees of bank"
     for before, after, turn in _corners(context):
@@ -104,11 +91,10 @@ def _tight(context: ValidationContext) -> Iterator[Issue]:
 
 
 @RULES.warning(
-    "steep-leg",
-    "a leg so steep that the climb or descent takes longer than the way over ground",
-    "WPNAV_SPEED_UP and _DN, TECS_CLMB_MAX, MPC_Z_V_AUTO_UP and _DN, FW_T_CLMB_MAX",
+    "steep-leg", "WPNAV_SPEED_UP and _DN, TECS_CLMB_MAX, MPC_Z_V_AUTO_UP and _DN, FW_T_CLMB_MAX"
 )
 def _steep(context: ValidationContext) -> Iterator[Issue]:
+    """A leg so steep that the climb or descent takes longer than the way over ground."""
     climb = context.vehicle.value("climb_speed")
     descent = context.vehicle.value("descent_speed")
     for leg in context.legs:

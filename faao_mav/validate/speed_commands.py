@@ -21,11 +21,10 @@ def _asked(context: ValidationContext) -> Iterator[tuple[int, float, float]]:
 
 
 @_ARDUPILOT.warning(
-    "ardupilot-speed-ignored",
-    "ArduPilot does nothing on this DO_CHANGE_SPEED",
-    "measured on ArduCopter 4.7; ArduPlane 4.7 Plane::do_change_speed",
+    "ardupilot-speed-ignored", "measured on ArduCopter 4.7; ArduPlane 4.7 Plane::do_change_speed"
 )
 def _ignored(context: ValidationContext) -> Iterator[Issue]:
+    """ArduPilot does nothing on this DO_CHANGE_SPEED."""
     for index, kind, speed in _asked(context):
         item = context.items[index]
         throttle = 0.0 if context.vehicle.type.hovers else item.params[2]
@@ -40,11 +39,11 @@ def _ignored(context: ValidationContext) -> Iterator[Issue]:
 
 @_ARDUPILOT.warning(
     "ardupilot-speed-lean",
-    "faster than a copter flies at its lean limit",
     "measured: 10.3 m/s at 30 degrees, 15.2 m/s at 45 (quadrotor of ArduPilot's simulator)",
     kind="copter",
 )
 def _lean(context: ValidationContext) -> Iterator[Issue]:
+    """Faster than a copter flies at its lean limit."""
     angle = round(math.degrees(context.vehicle.value("lean_angle")), 9)
     top = ArduCopterLimits.from_vehicle(context.vehicle).top_speed
     for index, kind, speed in _asked(context):
@@ -58,23 +57,15 @@ def _lean(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@_ARDUPILOT.warning(
-    "ardupilot-plane-speed",
-    "an airspeed outside what ArduPlane allows is not flown",
-    "ArduPlane 4.7 Plane::do_change_speed",
-    kind="plane",
-)
+@_ARDUPILOT.warning("ardupilot-plane-speed", "ArduPlane 4.7 Plane::do_change_speed", kind="plane")
 def _ardupilot_plane(context: ValidationContext) -> Iterator[Issue]:
+    """An airspeed outside what ArduPlane allows is not flown."""
     return _plane(context, (0,), "AIRSPEED_MIN, AIRSPEED_MAX")
 
 
-@_PX4.warning(
-    "px4-plane-speed",
-    "an airspeed outside what PX4 flies a plane at",
-    "PX4 1.16: FW_AIRSPD_MIN, FW_AIRSPD_MAX",
-    kind="plane",
-)
+@_PX4.warning("px4-plane-speed", "PX4 1.16: FW_AIRSPD_MIN, FW_AIRSPD_MAX", kind="plane")
 def _px4_plane(context: ValidationContext) -> Iterator[Issue]:
+    """An airspeed outside what PX4 flies a plane at."""
     return _plane(context, None, "FW_AIRSPD_MIN, FW_AIRSPD_MAX")
 
 
@@ -92,12 +83,9 @@ def _plane(
             )
 
 
-@_PX4.warning(
-    "px4-speed-default",
-    "a DO_CHANGE_SPEED without a speed above 0 sets the default speed",
-    _MEASURED,
-)
+@_PX4.warning("px4-speed-default", _MEASURED)
 def _default(context: ValidationContext) -> Iterator[Issue]:
+    """A DO_CHANGE_SPEED without a speed above 0 sets the default speed."""
     default, name = context.vehicle.value("cruise_speed"), context.vehicle.name_of("cruise_speed")
     for index, _, speed in _asked(context):
         if not speed > 0:
@@ -108,13 +96,9 @@ def _default(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@_PX4.warning(
-    "px4-speed-type",
-    "PX4 takes a climb or descent speed for the horizontal speed",
-    _MEASURED,
-    kind="copter",
-)
+@_PX4.warning("px4-speed-type", _MEASURED, kind="copter")
 def _type(context: ValidationContext) -> Iterator[Issue]:
+    """PX4 takes a climb or descent speed for the horizontal speed."""
     for index, kind, speed in _asked(context):
         if kind in (2, 3) and speed > 0:
             yield Issue(
@@ -124,13 +108,9 @@ def _type(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@_PX4.warning(
-    "px4-speed-capped",
-    "faster than PX4 flies",
-    f"{_MEASURED}: capped at MPC_XY_VEL_MAX",
-    kind="copter",
-)
+@_PX4.warning("px4-speed-capped", f"{_MEASURED}: capped at MPC_XY_VEL_MAX", kind="copter")
 def _capped(context: ValidationContext) -> Iterator[Issue]:
+    """Faster than PX4 flies."""
     limit, name = context.vehicle.value("max_speed"), context.vehicle.name_of("max_speed")
     for index, _, speed in _asked(context):
         if speed > limit:

@@ -70,9 +70,9 @@ class _Run:
 
 @RULES.warning(
     "speed-not-reached",
-    f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed and lose "
-    f"{TIME_LOST:g} s or more by it; with a plan its own clock is compared instead",
     _MEASURED,
+    summary=f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed and lose "
+    f"{TIME_LOST:g} s or more by it; with a plan its own clock is compared instead",
     kind="copter",
 )
 def _not_reached(context: ValidationContext) -> Iterator[Issue]:
@@ -98,9 +98,9 @@ def _not_reached(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning(
     "crawl",
-    f"waypoints so dense that {CRAWL_LEGS} legs or more stay below "
-    f"{100 * CRAWL_SHARE:g} % of the commanded speed",
     _MEASURED,
+    summary=f"waypoints so dense that {CRAWL_LEGS} legs or more stay below "
+    f"{100 * CRAWL_SHARE:g} % of the commanded speed",
     kind="copter",
 )
 def _crawl(context: ValidationContext) -> Iterator[Issue]:
@@ -152,8 +152,8 @@ def _reached_speeds(context: ValidationContext) -> tuple[list[Straight], list[fl
 
 @RULES.error(
     "speed-above-limit",
-    f"faster than the vehicle's max_speed by more than {100 * (OVERSPEED - 1):.0f} %",
     _LIMIT,
+    summary=f"faster than the vehicle's max_speed by more than {100 * (OVERSPEED - 1):.0f} %",
 )
 def _above_limit(context: ValidationContext) -> Iterator[Issue]:
     limit = context.limits.max_speed
@@ -168,8 +168,8 @@ def _above_limit(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.note(
     "speed-headroom",
-    f"faster than the vehicle's max_speed by up to {100 * (OVERSPEED - 1):.0f} %",
     _LIMIT,
+    summary=f"faster than the vehicle's max_speed by up to {100 * (OVERSPEED - 1):.0f} %",
 )
 def _headroom(context: ValidationContext) -> Iterator[Issue]:
     limit = context.limits.max_speed
@@ -195,11 +195,10 @@ def _faster_than(speed: float, context: ValidationContext) -> Iterator[tuple[int
 
 
 @RULES.warning(
-    "acceleration-above-limit",
-    "the predicted flight accelerates more than the vehicle's max_acceleration",
-    "the plan's vehicle.max_acceleration; the predicted flight",
+    "acceleration-above-limit", "the plan's vehicle.max_acceleration; the predicted flight"
 )
 def _acceleration(context: ValidationContext) -> Iterator[Issue]:
+    """The predicted flight accelerates more than the vehicle's max_acceleration."""
     limit, track = context.limits.max_acceleration, context.track
     if limit is None or track is None or len(track.t) < 3:
         return

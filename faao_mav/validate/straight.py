@@ -50,3 +50,12 @@ class Straight:
     def rise(self) -> float:
         """Metres upwards; NaN if a height is unknown."""
         return self.end.up - self.start.up
+
+    def turn(self, onward: "Straight") -> float:
+        """Return the turn from here to the straight `onward`, rad, 0 to pi; 0 without a heading."""
+        before, after = (
+            complex(each.end.east - each.start.east, each.end.north - each.start.north)
+            for each in (self, onward)
+        )
+        across = after * before.conjugate()
+        return abs(math.atan2(across.imag, across.real))

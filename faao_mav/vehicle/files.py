@@ -8,8 +8,7 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.formats import MissionFile, PlanTarget
 from faao_mav.mission.item import MissionItem
 from faao_mav.plan.autopilots import Autopilot
-from faao_mav.vehicle.registry import families, family, vehicle_type_by_numbers
-from faao_mav.vehicle.vehicle import Vehicle
+from faao_mav.vehicle.vehicle import Vehicle, families, family, vehicle_type_by_numbers
 
 _NOT_SET = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, (math.nan, 0.0, 0.0, 0.0))
 

@@ -59,6 +59,10 @@ class Flown:
         return self.arrivals[1:] - self.departures[:-1]
 
 
+_GROUND = 0.5
+"""A flight that ends lower, m above home, has landed. Chosen."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
     """The predicted flight of a whole mission.
@@ -76,6 +80,11 @@ class Track:
     reached: Real
     frame: LocalFrame
 
+    @property
+    def lands(self) -> bool:
+        """Whether the flight ends on the ground."""
+        return bool(self.position[-1, 2] < _GROUND)
+
 
 class FlightModel(Protocol):
     """How a vehicle with given parameters flies a path."""
@@ -83,11 +92,9 @@ class FlightModel(Protocol):
     @property
     def cruise_speed(self) -> float:
         """The vehicle's own speed, flown where none is commanded, m/s."""
-        ...
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

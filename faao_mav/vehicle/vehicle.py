@@ -1,16 +1,19 @@
-"""A vehicle: its type and the parameters that it is given."""
+"""A vehicle: its type and the parameters that it is given; and the types that are known.
+
+Another vehicle is one folder with one `VehicleType` and one call of `register`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from faao_mav.errors import InputError
+from faao_mav.plan import Plan
+from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
-from faao_mav.vehicle.registry import vehicle_type
-from faao_mav.vehicle.vehicle_type import LegLimits, VehicleType
+from faao_mav.vehicle.vehicle_type import AutopilotFamily, LegLimits, VehicleType
 
-if TYPE_CHECKING:
-    from faao_mav.plan import Plan
+_TYPES: dict[tuple[str, str], VehicleType] = {}
+"""The vehicle types that are known, by the names of autopilot and type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,9 +110,87 @@ class Vehicle:
         return self.type.flight_model(self, latitude)
 
 
-def vehicle_of(plan: "Plan") -> Vehicle:
+def vehicle_of(plan: Plan) -> Vehicle:
     """Return the vehicle of `plan`."""
     given = plan.vehicle
     return Vehicle(
         given.autopilot, given.type, given.parameters, f"{plan.source}: vehicle.parameters"
     )
+
+
+def candidates(plan: Plan) -> tuple[Mapping[str, float], ...]:
+    """Return the sets of parameters to try for `plan`, the gentlest first.
+
+    An autopilot whose ramps take longer than the plan's falls behind at every one; one that turns
+    corners at a crawl does so in every curve. Few parameters decide that. One empty set if the plan
+    keeps its vehicle's own, or if they are tuned on each vehicle, as an aeroplane's are.
+    """
+    given = plan.vehicle
+    if plan.mission.parameters == "keep":
+        return ({},)
+    recommended = vehicle_type(given.autopilot, given.type).recommended
+    return tuple(recommended(given.max_speed, given.max_acceleration))
+
+
+def register(vehicle_type: VehicleType) -> VehicleType:
+    """Make `vehicle_type` known by its names, to plans as well, and return it."""
+    key = (vehicle_type.family.key, vehicle_type.kind)
+    _TYPES[key] = vehicle_type
+    planned = vehicle_type.legs is not None and vehicle_type.flight_model is not None
+    one = vehicle_type.fence_needs_one_inclusion(Vehicle(*key))
+    VEHICLES[key] = PlannedVehicle(*key, vehicle_type.hovers, planned, any_inclusion=one)
+    return vehicle_type
+
+
+def unregister(vehicle_type: VehicleType) -> None:
+    """Forget `vehicle_type`."""
+    key = (vehicle_type.family.key, vehicle_type.kind)
+    del _TYPES[key], VEHICLES[key]
+
+
+def vehicle_types() -> tuple[VehicleType, ...]:
+    """Return every vehicle type that is known."""
+    return tuple(_TYPES.values())
+
+
+def vehicle_type(autopilot: str, kind: str) -> VehicleType:
+    """Return the vehicle type with these names.
+
+    Raises `InputError` that lists the known names if there is none.
+
+    >>> vehicle_type("ardupilot", "copter").name
+    'ArduCopter'
+    """
+    try:
+        return _TYPES[autopilot, kind]
+    except KeyError:
+        known = ", ".join(" ".join(key) for key in _TYPES)
+        raise InputError(f"vehicle: {autopilot} {kind} is unknown; known are {known}") from None
+
+
+def families() -> tuple[AutopilotFamily, ...]:
+    """Return every autopilot that is known."""
+    return tuple({each.family.key: each.family for each in _TYPES.values()}.values())
+
+
+def family(autopilot: str) -> AutopilotFamily:
+    """Return the autopilot with this name; raises `InputError` if there is none."""
+    for each in families():
+        if each.key == autopilot:
+            return each
+    known = ", ".join(each.key for each in families())
+    raise InputError(f"autopilot: {autopilot} is unknown; known are {known}")
+
+
+def kind_by_number(mav_type: int | None) -> str | None:
+    """Return the type of vehicle with this MAV_TYPE number, whatever its autopilot, or None."""
+    return next((each.kind for each in _TYPES.values() if mav_type in each.mav_types), None)
+
+
+def vehicle_type_by_numbers(mav_autopilot: int, mav_type: int | None) -> VehicleType | None:
+    """Return the vehicle type with these MAV_AUTOPILOT and MAV_TYPE numbers.
+
+    Without a MAV_TYPE it is the first type of that autopilot; None for numbers that are unknown.
+    """
+    own = (each for each in _TYPES.values() if each.family.mav_autopilot == mav_autopilot)
+    return next((each for each in own if mav_type is None or mav_type in each.mav_types), None)

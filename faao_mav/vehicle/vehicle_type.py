@@ -81,25 +81,20 @@ class LegLimits(Protocol):
     @property
     def least(self) -> float:
         """Shorter legs, m, are not flown: both their ends count as reached at once."""
-        ...
 
     @property
     def run_in(self) -> float:
         """The leg before a start at speed, as a multiple of the shortest leg for that speed."""
-        ...
 
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg on which `speed`, m/s, is reached, m; same shape."""
-        ...
 
     def reachable_speed(self, length: Real) -> Real:
         """Return the greatest speed reached on legs of `length`, m, in m/s; same shape."""
-        ...
 
     @property
     def slowest(self) -> float:
         """The least speed that is commanded for a leg, m/s: who has more time waits at its end."""
-        ...
 
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:
         """Return acceptance radii, m, that suit waypoints; 0 leaves them to the autopilot.
@@ -107,7 +102,6 @@ class LegLimits(Protocol):
         `room` (n,), m, is the shorter of the legs at each waypoint that do not end at a stop,
         `turn` (n,) the angle between them, rad; `stops` (n,) marks the waypoints at which it waits.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,13 +22,13 @@ from mavsdk.component_type import ComponentType
 from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins.mission_raw import MissionItem as SdkItem
 from mavsdk.plugins.mission_raw import MissionRaw, MissionRawError
+from served import running
 from stations import HOME, a_mission, places
 
 from faao_mav.errors import LinkError
 from faao_mav.mavlink import upload
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.wire_items import wire_items
 

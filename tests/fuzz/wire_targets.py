@@ -12,9 +12,8 @@ from faao_mav.cli.upload import as_dict, as_text
 from faao_mav.errors import FaaoError
 from faao_mav.mavlink.client import UploadReport
 from faao_mav.mavlink.codec import Codec
-from faao_mav.mavlink.discover import AskHome, Discovery, FoundVehicle, choose
+from faao_mav.mavlink.discover import AskAlive, AskHome, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.framing import Framer
-from faao_mav.mavlink.liveness import AskAlive
 from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.messages import (
     CommandLong,

@@ -12,6 +12,7 @@ import pytest
 from conftest import free_port
 from mock_flights import fly
 from pymavlink import mavutil
+from served import running
 from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
 
 from faao_mav.errors import InputError, LinkError
@@ -20,7 +21,6 @@ from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.link import WireLink
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import Address, MavResult, MissionType
 from faao_mav.mavlink.transport import open_transport, parse_connection
 from faao_mav.mavlink.wire_items import wire_items

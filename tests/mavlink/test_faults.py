@@ -71,7 +71,7 @@ def vehicle_holds(
     return places(mock.lists.items(part)) == places(rows)
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(st.sampled_from([*KINDS, "px4-late-items"]), st.integers(2, 12), bad_links, st.booleans())
 def test_no_wrong_mission_is_ever_called_verified(
     kind: str, count: int, faults: Faults, occupied: bool

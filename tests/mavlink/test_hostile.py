@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from conftest import free_port
+from served import running
 from stations import FENCE, HOME, VEHICLE, a_mission, mock_of, rows_for, vehicle_of
 from typer.testing import CliRunner
 
@@ -33,7 +34,7 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.mock.serve import predicted, running
+from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavCommand, MavResult, MissionType
 from faao_mav.mavlink.transfer.verify import compare
 from faao_mav.mavlink.wire_items import mission_of

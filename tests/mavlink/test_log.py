@@ -10,6 +10,7 @@ import pytest
 from conftest import free_port
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
+from served import running
 from stations import HOME, a_mission
 
 from faao_mav.errors import LinkError
@@ -18,7 +19,6 @@ from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.link import Tlog
 from faao_mav.mavlink.messages import Heartbeat
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import GROUND_STATION
 
 KEY = bytes(range(32))

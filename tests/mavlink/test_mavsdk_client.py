@@ -14,12 +14,12 @@ from mavsdk.plugins.mission_raw import MissionItem as SdkItem
 from mavsdk.plugins.mission_raw import MissionRaw
 from mavsdk.plugins.mission_raw_server import MissionRawServer
 from mock_flights import fly
+from served import running
 from stations import FENCE, HOME, RALLY, a_mission, places
 
 from faao_mav.mavlink import upload
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import MissionType
 from faao_mav.mavlink.wire_items import wire_items
 

@@ -149,7 +149,7 @@ def test_a_question_put_once_more_on_request_measures_nothing() -> None:
     assert asker.pace.wait == pytest.approx(wait)
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(st.floats(0.001, 0.7), st.floats(0, 1), st.floats(0, 0.5), st.integers(0, 2**32))
 def test_a_link_is_never_flooded(least: float, jitter: float, loss: float, seed: int) -> None:
     """Without duplicates to learn from: a tenth more questions than needed, once it is known."""

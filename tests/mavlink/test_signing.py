@@ -13,6 +13,7 @@ from conftest import free_port
 from hypothesis import given
 from hypothesis import strategies as st
 from mock_flights import fly
+from served import running
 from stations import HOME, VEHICLE, a_mission, signing_key
 
 from faao_mav.errors import InputError, LinkError
@@ -21,7 +22,6 @@ from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.framing import message_id
 from faao_mav.mavlink.messages import Heartbeat, Statustext
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import GROUND_STATION
 from faao_mav.mavlink.signing import Signing, read_signing, remember
 from faao_mav.mavlink.transport import Transport, open_transport

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import typer
 from conftest import free_port
+from served import running
 from stations import FENCE, HOME, a_mission, places, vehicle_of
 from typer.testing import CliRunner, Result
 
@@ -18,7 +19,6 @@ from faao_mav.cli.progress import transfer_progress
 from faao_mav.cli.upload import upload
 from faao_mav.errors import InputError
 from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.mock.serve import running
 from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem

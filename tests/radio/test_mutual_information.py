@@ -135,7 +135,7 @@ def test_grid_errors_are_honest(snr: float) -> None:
     assert np.all(np.abs(coarse.value - fine.value) <= coarse.error + 1e-7)
 
 
-@settings(deadline=None, derandomize=True, max_examples=60)
+@settings(deadline=None, derandomize=True, max_examples=25)
 @given(
     st.integers(0, 10_000),
     st.sampled_from([("bpsk", 1), ("bpsk", 2), ("bpsk", 3), ("qpsk", 2), ("8psk", 2)]),

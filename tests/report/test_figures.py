@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from faao_mav.report import figures
 from faao_mav.report.style import save_figure
 
 
+@cache
 def every() -> list[Any]:
     solution = flown().solution
     return [

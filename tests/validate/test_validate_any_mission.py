@@ -65,7 +65,7 @@ STRICT = {
 
 
 @given(mission=missions, bare=st.booleans())
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_any_mission_can_be_judged(mission: Mission, bare: bool) -> None:
     for vehicle in VEHICLES:
         judged = vehicle if bare else having(vehicle, **dict.fromkeys(ZEROS, 0.0), **STRICT)
@@ -75,7 +75,7 @@ def test_any_mission_can_be_judged(mission: Mission, bare: bool) -> None:
 
 
 @given(mission=missions.filter(lambda mission: len(mission.items) >= 2))
-@settings(max_examples=50)
+@settings(max_examples=25)
 def test_any_mission_can_be_judged_with_a_flight(mission: Mission) -> None:
     flight = track(((0, 0, 0), (0, 0, 30), (0, 90, 30)), [0, 1], 5.0)
     for vehicle in VEHICLES:

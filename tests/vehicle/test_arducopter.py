@@ -49,7 +49,7 @@ def test_measured_top_speed_by_lean_angle(degrees: float, top: float) -> None:
     assert np.hypot(*flown.velocity[:, :2].T).max() == pytest.approx(top, rel=0.05)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(wandering(climbs=True), models)
 def test_motion_is_continuous_and_within_limits(path: FlightPath, model: ArduCopter) -> None:
     flown = model.fly(path, 0.05)
@@ -126,7 +126,7 @@ def test_splines_pass_straight_legs_without_a_stop() -> None:
         assert abs(complex(*place) - point) < 3
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(wandering(climbs=True), models)
 def test_arrivals_are_in_order_and_stops_are_at_their_points(
     path: FlightPath, model: ArduCopter

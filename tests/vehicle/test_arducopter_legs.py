@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.vehicle.ardupilot.copter.leg import at_speed, planned
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
-from faao_mav.vehicle.ardupilot.copter.route import CornerLimits, half_overlap
+from faao_mav.vehicle.ardupilot.copter.route import half_overlap
 
 LIMITS = LegBounds(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
 
@@ -43,12 +44,12 @@ def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(
     bounds: LegBounds, length: float
 ) -> None:
     leg = planned(length, bounds)
-    t = np.linspace(0, leg.duration, 4001)
+    t = np.linspace(0, leg.duration, 2001)
     s, v, a = np.array([leg.at(x) for x in t]).T
     h = t[1]
     slack = bounds.jerk * h * h  # of the trapezoidal rule
-    assert np.cumsum(a[1:] + a[:-1]) * h / 2 == pytest.approx(v[1:], abs=4 * slack)
-    assert np.cumsum(v[1:] + v[:-1]) * h / 2 == pytest.approx(s[1:], abs=4 * slack * t[-1])
+    assert np.abs(np.cumsum(a[1:] + a[:-1]) * h / 2 - v[1:]).max() <= 4 * slack
+    assert np.abs(np.cumsum(v[1:] + v[:-1]) * h / 2 - s[1:]).max() <= 4 * slack * t[-1]
 
 
 def test_a_long_leg_has_two_full_ramps_and_a_cruise() -> None:
@@ -85,7 +86,7 @@ def test_a_speed_change_keeps_what_was_flown_and_the_end(
     t = np.linspace(0, elapsed, 30) if elapsed > 0 else np.zeros(1)
     if elapsed > 0:
         flown = [before.at(x) for x in t]
-        assert np.array([after.at(x) for x in t]) == pytest.approx(np.array(flown), abs=1e-6)
+        np.testing.assert_allclose([after.at(x) for x in t], flown, atol=1e-6, rtol=1e-6)
     assert after.at(after.duration)[0] == pytest.approx(length, rel=1e-6)
     assert max(v for _, v, _ in after.states) <= max(speed, bounds.speed) * (1 + 1e-9)
 
@@ -105,7 +106,7 @@ def test_corners_are_as_early_as_their_limits_allow(degrees: float) -> None:
     angle = math.radians(degrees)
     u, w = (1.0, 0.0, 0.0), (math.cos(angle), math.sin(angle), 0.0)
     leg = planned(100, LIMITS)
-    bounds = CornerLimits(radius=2.0, acceleration=5.0, vertical=1.0)
+    bounds = ArduCopterLimits(radius=2.0, corner_acceleration=5.0, climb_acceleration=1.0)
     h = half_overlap(leg, u, leg, w, bounds)
     left = 100 - leg.at(leg.duration - h)[0]
     apart = 2 * left * math.sin(angle / 2)

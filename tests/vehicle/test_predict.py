@@ -388,7 +388,7 @@ def any_items(draw: st.DrawFn) -> MissionItem:
     return do(command, *params)
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(
     st.lists(any_items(), max_size=8),
     st.sampled_from([None, HOME]),

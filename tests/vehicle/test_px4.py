@@ -20,7 +20,7 @@ SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)
 models = st.sampled_from([Px4(), SUITED])
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(wandering(climbs=True), models)
 def test_motion_is_continuous_and_within_limits(path: FlightPath, model: Px4) -> None:
     flown = model.fly(path, 0.1)
@@ -37,7 +37,7 @@ def test_motion_is_continuous_and_within_limits(path: FlightPath, model: Px4) ->
     assert change.max() <= 1.5 * model.acceleration + 0.5
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(wandering(climbs=True), models)
 def test_arrivals_are_in_order_and_within_the_radius(path: FlightPath, model: Px4) -> None:
     flown = model.fly(path, 0.02)
@@ -51,7 +51,7 @@ def test_arrivals_are_in_order_and_within_the_radius(path: FlightPath, model: Px
         assert abs(place[2] - point[2]) <= model.height_radius + 0.02
 
 
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(
     st.lists(st.floats(4, 80), min_size=2, max_size=8),
     st.data(),

@@ -4,11 +4,10 @@ from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 from faao_mav.mavlink.mock.ardupilot_firmware import ArduPilotFirmware
-from faao_mav.mavlink.mock.firmware import COUNT, Behaviour
-from faao_mav.mavlink.mock.mock_autopilot import Fly, MockAutopilot
+from faao_mav.mavlink.mock.firmware import COUNT as COUNT
+from faao_mav.mavlink.mock.firmware import Behaviour as Behaviour
+from faao_mav.mavlink.mock.mock_autopilot import MockAutopilot as MockAutopilot
 from faao_mav.mavlink.mock.px4_firmware import Px4Firmware
-
-__all__ = ["COUNT", "Behaviour", "Fly", "MockAutopilot", "MockKind", "behaviour_of"]
 
 MockKind: TypeAlias = Literal["ardupilot", "px4", "px4-legacy-first"]
 

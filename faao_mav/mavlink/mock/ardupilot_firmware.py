@@ -49,10 +49,6 @@ class ArduPilotFirmware(MockFirmware):
 
     family = ARDUPILOT
     mission_limit = 655  # as in its simulator
-    modes = MappingProxyType({"copter": (0, 3), "plane": (2, 10)})  # COPTER_MODE, PLANE_MODE
-    fence_modes = MappingProxyType(
-        {"copter": {"return": 6, "land": 9, "hold": 17}, "plane": {"return": 11}}
-    )
     fence_texts = (Statustext(MavSeverity.NOTICE, "Polygon fence breached"),)
     armed_inside_only = True
     parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})

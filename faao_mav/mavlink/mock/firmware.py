@@ -15,7 +15,6 @@ from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.vehicle import AutopilotFamily, VehicleType
 from faao_mav.vehicle.dialect import BESIDE
-from faao_mav.vehicle.vehicle_type import FenceAction
 
 COUNT = -1
 """In `Behaviour.refusals`: instead of an item, the announcement of the list."""
@@ -102,24 +101,22 @@ class MockFirmware(ABC):
     Attributes:
         family: the autopilot that is mocked.
         mission_limit: how many items of a mission it holds, home included.
-        modes: its custom modes at rest and on a mission, by the type of vehicle.
         parameters: what ground stations look for beside the parameters that the package knows.
         misplaced: the answer to an item of a fence, or a rally point, in a mission.
         nonsense: the answer to commands 0 and 1.
         silent_at_boot: it answers nothing about lists before it is ready.
-        fence_modes: its custom modes after a breach of the fence, by the type of vehicle.
+        numbers_missions: its MISSION_CURRENT has a number for the mission.
         fence_texts: what it says when it leaves the fence.
         armed_inside_only: it does not arm where home lies outside the fence.
     """
 
     family: ClassVar[AutopilotFamily]
     mission_limit: ClassVar[int]
-    modes: ClassVar[Mapping[str, tuple[int, int]]]
     parameters: ClassVar[Mapping[str, float]] = {}
     misplaced: ClassVar[MavResult]
     nonsense: ClassVar[MavResult]
     silent_at_boot: ClassVar[bool] = False
-    fence_modes: ClassVar[Mapping[str, Mapping[FenceAction, int]]]
+    numbers_missions: ClassVar[bool] = False
     fence_texts: ClassVar[tuple[Statustext, ...]]
     armed_inside_only: ClassVar[bool] = False
 
@@ -152,10 +149,6 @@ class MockFirmware(ABC):
     @abstractmethod
     def tick(self, now: float) -> list[Message]:
         """Ask again, or give up."""
-
-    def fence_mode(self, kind: str, action: FenceAction) -> int | None:
-        """Return the custom mode in which a vehicle of that `kind` does `action`, None if none."""
-        return self.fence_modes[kind].get(action)
 
     def requested_mode(self, command: CommandLong) -> int:
         """Return the custom mode that DO_SET_MODE asks for."""

@@ -19,7 +19,6 @@ from faao_mav.mission.item import Home, MissionItem
 from faao_mav.vehicle import Track
 
 _FIRST_DO = 176  # below: navigation and conditions, which take time
-_GROUND = 0.5  # m: a flight that ends below has landed
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +81,14 @@ class MockFlight:
         self._over = now >= self.end
         return self._over
 
+    def delay(self, seconds: float) -> None:
+        """Let the rest of the flight be `seconds` later, after a break."""
+        self._started += seconds
+
     @property
     def lands(self) -> bool:
         """Whether it ends on the ground."""
-        return bool(self._track.position[-1, 2] < _GROUND)
+        return self._track.lands
 
     def at(self, now: float) -> Posture:
         """Return the posture at `now`; after the end, the last one at rest."""
@@ -97,7 +100,7 @@ class MockFlight:
             for values in (track.position, track.velocity)
         )
         sample = int(np.searchsorted(track.t, time, side="right")) - 1
-        return Posture(position, velocity * self._speedup, int(track.item[max(sample, 0)]))
+        return Posture(position, velocity, int(track.item[max(sample, 0)]))
 
     def reached(self, now: float, first: int) -> list[Message]:
         """Return what has been reached since the last call; `first` is the first item's number."""
@@ -133,7 +136,7 @@ def telemetry(posture: Posture, home: Home, since_boot: float) -> list[Message]:
 
 
 def _fitted(value: float, bits: int) -> int:
-    """What a field of so many bits holds: 300 m/s and more, flown many times as fast, are cut."""
+    """What a field of so many bits holds: 300 m/s and more are cut."""
     most = (1 << bits - 1) - 1
     return round(min(max(value, -most), most))
 

@@ -24,16 +24,21 @@ from faao_mav.mavlink.messages import (
     ParamSet,
     SetMode,
     Statustext,
+    SysStatus,
     Timesync,
 )
 from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
 from faao_mav.mavlink.mock.flight import MockFlight, Posture, telemetry
 from faao_mav.mavlink.mock.parameter_protocol import ParameterServer
 from faao_mav.mavlink.mock.turn_back import home_outside, kept_inside
+from faao_mav.mavlink.modes import modes_of
 from faao_mav.mavlink.protocol import (
     ARMED,
     GROUND_STATION,
     HOME_POSITION,
+    MISSION_COMPLETE,
+    POSITION,
+    PREARM_CHECK,
     Address,
     MavCommand,
     MavSeverity,
@@ -66,8 +71,10 @@ class MockAutopilot(Machine[None]):
 
     `aircraft` is what its heartbeats say that it is, and whose missions it stores.
     It boots for `boot` seconds, in which it refuses lists. Armed and set to the mission it flies
-    what it holds, `speedup` times as fast as predicted, reports its position `rate` times a
-    second, and disarms where the flight ends on the ground. Heartbeats are `beat` seconds apart.
+    what it holds, and disarms where the flight ends on the ground; in another mode it stays where
+    it is, and flies on when set to the mission again. It reports its position `rate` times a
+    second until it is asked for another rate. Its clock runs `speedup` times as fast as the
+    world's, as those of simulators do. Heartbeats are `beat` of the world's seconds apart.
     `parameters` are told beside its defaults; what they do to the flight is up to `fly`. `armed`
     tells whether the motors may turn.
     """
@@ -91,13 +98,14 @@ class MockAutopilot(Machine[None]):
         super().__init__()
         self.behaviour, self.address, self.home = behaviour, address, home
         self.vehicle = vehicle_type(behaviour.family.key, aircraft)
-        self._mode, self._mission_mode = behaviour.firmware.modes[aircraft]
+        self._modes = modes_of(self.vehicle)
+        self._mode = self._modes.rest
         self.lists = StoredLists(self.vehicle, home)
         known = self.vehicle.defaults() | dict(behaviour.firmware.parameters)
         self.parameters = ParameterServer(known | dict(parameters or {}))
         self._firmware = behaviour.firmware(self.lists, behaviour, self._is_ready, self._is_flying)
         self._fly, self._speedup = fly, speedup
-        self._period = 1 / rate if rate > 0 else None
+        self._period = 1 / rate / speedup if rate > 0 else None
         self._beat = beat
         self._boot = boot
         self._booted = self._ready_at = self._now = 0.0
@@ -106,6 +114,7 @@ class MockAutopilot(Machine[None]):
         self._current = 0
         self._flight: MockFlight | None = None
         self._rest = _AT_HOME
+        self._broken_off: tuple[MockFlight, float] | None = None
 
     @property
     def deadline(self) -> float | None:
@@ -129,6 +138,7 @@ class MockAutopilot(Machine[None]):
         """Begin anew; what is stored stays, what is under way is lost."""
         self._firmware.reset()
         self.armed, self._flight, self._current = False, None, 0
+        self._rest, self._broken_off = _AT_HOME, None
         self._booted, self._ready_at = now, now + self._boot
 
     def _time_out(self, now: float) -> Sequence[Message]:
@@ -138,10 +148,11 @@ class MockAutopilot(Machine[None]):
             out += self._follow(self._flight, now)
         if now >= self._next_beat:
             self._next_beat = now + self._beat
-            out += [self._heartbeat(), self._mission_current()]
+            out += [self._heartbeat(), self._mission_current(now), self._system_status()]
         if self._period is not None and now >= self._next_report:
             self._next_report = now + self._period
-            out += telemetry(self._posture(now), self.home, now - self._booted)
+            since_boot = (now - self._booted) * self._speedup
+            out += telemetry(self._posture(now), self.home, since_boot)
         return out
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
@@ -168,7 +179,7 @@ class MockAutopilot(Machine[None]):
             case ParamRequestList() | ParamRequestRead() | ParamSet():
                 return self.parameters.on(message)
             case MissionSetCurrent(seq=seq):
-                return self._set_current(seq)
+                return self._set_current(seq, now)
         if self._firmware.silent_at_boot and not self._is_ready():
             return ()
         return self._firmware.on(envelope, now)
@@ -178,9 +189,14 @@ class MockAutopilot(Machine[None]):
         return mission_of({part: self.lists.items(part) for part in MissionType}, self.vehicle)
 
     @property
+    def mode(self) -> int:
+        """The custom mode that it is in."""
+        return self._mode
+
+    @property
     def _is_mission(self) -> bool:
         """Whether the mode is to fly the mission."""
-        return self._mode == self._mission_mode
+        return self._mode == self._modes.mission
 
     def _is_ready(self) -> bool:
         return self._now >= self._ready_at
@@ -194,12 +210,12 @@ class MockAutopilot(Machine[None]):
             case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
             case MavCommand.START:
-                self._mode = self._mission_mode
+                self._mode = self._modes.mission
                 result = self._begin(now)
             case MavCommand.SET_MODE:
                 result = self._set_mode(self._firmware.requested_mode(command), now)
             case MavCommand.SET_CURRENT:
-                found = self._set_current(whole(command.param1))
+                found = self._set_current(whole(command.param1), now)
                 result = ACCEPTED if found else DENIED
                 answers += found
             case MavCommand.REQUEST_MESSAGE | MavCommand.REQUEST_CAPABILITIES as asked:
@@ -208,7 +224,9 @@ class MockAutopilot(Machine[None]):
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
             case MavCommand.SET_INTERVAL:
-                pass
+                asked = whole(command.param2)  # microseconds; 0: the usual rate
+                if command.param1 == POSITION and asked > 0 and self._period is not None:
+                    self._period = asked / 1e6 / self._speedup
             case MavCommand.REBOOT:
                 self.reboot(now)
             case _:
@@ -227,7 +245,7 @@ class MockAutopilot(Machine[None]):
 
     def _arm(self, wanted: bool, now: float) -> int:
         if not wanted:
-            self.armed, self._flight = False, None
+            self.armed, self._flight, self._broken_off = False, None, None
             return ACCEPTED
         if not self._is_ready() or self._is_kept_on_ground():
             return REJECTED
@@ -235,11 +253,13 @@ class MockAutopilot(Machine[None]):
         return self._begin(now) if self._is_mission else ACCEPTED
 
     def _set_mode(self, mode: int, now: float) -> int:
-        if mode == self._mission_mode and self._problem() is not None:
+        if mode == self._modes.mission and self._problem() is not None:
             return DENIED
         self._mode = mode
         if not self._is_mission:
-            self._flight = None
+            if self._flight is not None:
+                self._rest = replace(self._flight.at(now), velocity=np.zeros(3))
+                self._broken_off, self._flight = (self._flight, now), None
             return ACCEPTED
         return self._begin(now)
 
@@ -257,7 +277,11 @@ class MockAutopilot(Machine[None]):
         """Fly, once armed and told to; not a second time."""
         if self._problem() is not None or self._fly is None:
             return DENIED
-        if self.armed and self._flight is None:
+        if self.armed and self._flight is None and self._broken_off is not None:
+            self._flight, since = self._broken_off
+            self._flight.delay(now - since)
+            self._broken_off = None
+        elif self.armed and self._flight is None:
             mission = replace(self.mission(), home=self.home)
             try:
                 track = self._fly(mission)
@@ -270,12 +294,12 @@ class MockAutopilot(Machine[None]):
     def _follow(self, flight: MockFlight, now: float) -> list[Message]:
         out = flight.reached(now, self._first_number())
         if (breach := flight.breached(now)) is not None:
-            self._mode = self._firmware.fence_mode(self.vehicle.kind, breach.action) or self._mode
+            self._mode = self._modes.at_fence.get(breach.action, self._mode)
             out += [*self._firmware.fence_texts, self._heartbeat()]
         current = flight.at(now).item + self._first_number()
         if current != self._current:
             self._current = current
-            out.append(self._mission_current())
+            out.append(self._mission_current(now))
         if flight.ended(now) and flight.lands:
             self._rest, self._flight, self.armed = flight.at(now), None, False
             out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
@@ -302,17 +326,24 @@ class MockAutopilot(Machine[None]):
     def _posture(self, now: float) -> Posture:
         return self._rest if self._flight is None else self._flight.at(now)
 
-    def _set_current(self, seq: int) -> list[Message]:
+    def _set_current(self, seq: int, now: float) -> list[Message]:
         if not 0 <= seq < len(self.lists.items(MissionType.MISSION)):
             return []
         self._current = seq
-        return [self._mission_current()]
+        return [self._mission_current(now)]
 
-    def _mission_current(self) -> Message:
+    def _mission_current(self, now: float) -> Message:
         total = len(self.lists.items(MissionType.MISSION)) - self._first_number()
         # MISSION_STATE: none, not started, active
         state = 1 if total == 0 else 3 if self._flight is not None else 2
-        return MissionCurrent(self._current, max(total, 0), state)
+        if self._flight is not None and now >= self._flight.end:
+            state = MISSION_COMPLETE
+        number = self.lists.number(MissionType.MISSION) if self._firmware.numbers_missions else 0
+        return MissionCurrent(self._current, max(total, 0), state, number)
+
+    def _system_status(self) -> Message:
+        """Return that its checks pass, once it is ready, and that its battery is as good as new."""
+        return SysStatus(PREARM_CHECK * self._is_ready(), 12_600, 100)
 
     def _heartbeat(self) -> Message:
         if not self._is_ready():

@@ -1,8 +1,6 @@
 """How PX4 takes and gives lists."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Literal
 
 from faao_mav.mavlink.messages import (
@@ -19,6 +17,7 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.mock.firmware import MockFirmware, whole
+from faao_mav.mavlink.modes import px4_mode
 from faao_mav.mavlink.protocol import (
     ALL_TYPES,
     NOBODY,
@@ -30,7 +29,6 @@ from faao_mav.mavlink.protocol import (
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, POLYGON, Command, Frame
 from faao_mav.mission.item import Mission
 from faao_mav.vehicle.px4 import PX4
-from faao_mav.vehicle.vehicle_type import FenceAction
 
 _POSITIONS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
 """Commands that PX4 counts as positions."""
@@ -51,20 +49,8 @@ class _Transfer:
     items: tuple[WireItem, ...] = ()
 
 
-def _packed_mode(main: int, sub: int) -> int:
-    """Return the custom mode for a main and a sub mode; 0 for numbers that are none."""
-    if not (0 <= main < 256 and 0 <= sub < 256):
-        return 0
-    return main << 16 | sub << 24
-
-
 def _said(text: str) -> Statustext:
     return Statustext(MavSeverity.CRITICAL, f"{text}\t")
-
-
-_FENCE_MODES: Mapping[FenceAction, int] = MappingProxyType(
-    {"hold": _packed_mode(4, 3), "return": _packed_mode(4, 5), "land": _packed_mode(4, 6)}
-)
 
 
 class Px4Firmware(MockFirmware):
@@ -72,8 +58,7 @@ class Px4Firmware(MockFirmware):
 
     family = PX4
     mission_limit = 1000
-    modes = dict.fromkeys(("copter", "plane"), (_packed_mode(4, 3), _packed_mode(4, 4)))
-    fence_modes = dict.fromkeys(("copter", "plane"), _FENCE_MODES)
+    numbers_missions = True
     fence_texts = (
         Statustext(MavSeverity.CRITICAL, "Geofence: approaching or outside geofence"),
         _said("Failsafe activated"),
@@ -84,7 +69,7 @@ class Px4Firmware(MockFirmware):
 
     def requested_mode(self, command: CommandLong) -> int:
         """Return the custom mode that DO_SET_MODE asks for: main and sub mode in one number."""
-        return _packed_mode(whole(command.param2), whole(command.param3))
+        return px4_mode(whole(command.param2), whole(command.param3))
 
     def infeasible(self, mission: Mission) -> str | None:
         """Return why PX4, which says so in an event only, refuses to start `mission`."""

@@ -1,9 +1,7 @@
 """The mock autopilot on a real endpoint."""
 
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 from faao_mav.mavlink.faults import Faults, FaultyTransport
 from faao_mav.mavlink.link import WireLink
@@ -40,31 +38,6 @@ def serve(
             link.step(mock, time.monotonic() + _PATIENCE)
             if observe is not None:
                 observe(mock)
-
-
-@contextmanager
-def running(
-    mock: MockAutopilot,
-    connection: str | Transport,
-    *,
-    faults: Faults | None = None,
-    key: bytes | None = None,
-) -> Iterator[MockAutopilot]:
-    """Run `mock` at `connection` in the background for as long as the `with` block lasts."""
-    ended = threading.Event()
-    transport = open_transport(connection) if isinstance(connection, str) else connection
-    thread = threading.Thread(
-        target=serve,
-        args=(mock, transport),
-        kwargs={"faults": faults, "key": key, "stop": ended.is_set},
-        daemon=True,
-    )
-    thread.start()
-    try:
-        yield mock
-    finally:
-        ended.set()
-        thread.join()
 
 
 def predicted(vehicle: Vehicle) -> Fly:

@@ -17,7 +17,7 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.protocol import MavResult, MavState, MissionType
-from faao_mav.mavlink.transfer.exchange import TENTATIVE, Exchange, Peer, Status
+from faao_mav.mavlink.transfer.exchange import TENTATIVE, Exchange, Peer
 from faao_mav.mavlink.transfer.pace import Budget, Pace, Question, Timeouts
 
 _REASONS = 0.3
@@ -135,9 +135,7 @@ class Upload(Exchange):
         if self._sent_unasked and self._result is not None:
             self._most_ahead = 0
             return self.start(now)
-        status: Status = "silent" if self._result is None else "refused"
-        self._end(status, self._result)
-        return ()
+        return super()._give_up(now)
 
     def _on_request(self, seq: int, now: float) -> Sequence[Message]:
         if seq >= len(self._items):

@@ -10,28 +10,12 @@ from faao_mav.files import read_text, write_together
 from faao_mav.mission.fence_items import fence_items
 from faao_mav.mission.formats.beside import check_replaceable, comment_for, remove_outdated
 from faao_mav.mission.formats.losses import kml_losses, plan_losses, wpl_losses
-from faao_mav.mission.formats.mission_file import MissionFile, PlanTarget
-from faao_mav.mission.formats.qgc_plan_writer import write_qgc_plan
-from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, write_wpl, write_wpl_fence
+from faao_mav.mission.formats.mission_file import MissionFile as MissionFile
+from faao_mav.mission.formats.mission_file import PlanTarget as PlanTarget
+from faao_mav.mission.formats.qgc_plan_writer import write_qgc_plan as write_qgc_plan
+from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, write_wpl_fence
+from faao_mav.mission.formats.wpl import write_wpl as write_wpl
 from faao_mav.mission.item import Mission
-
-__all__ = [
-    "MISSION_SUFFIXES",
-    "MissionFile",
-    "PlanTarget",
-    "check_readable",
-    "check_suffix",
-    "fence_path",
-    "losses_in",
-    "read_mission",
-    "read_mission_file",
-    "read_wpl",
-    "render_files",
-    "render_mission",
-    "write_mission",
-    "write_qgc_plan",
-    "write_wpl",
-]
 
 Target: TypeAlias = PlanTarget | None
 

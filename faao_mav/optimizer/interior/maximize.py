@@ -20,8 +20,9 @@ _ALLOWED = 1e-9
 """The violation of a limit, relative to it, that a flight may have: rounding of 1,000s of slots."""
 
 
-_LAST_STEPS = 150
-"""Steps at most of the search with curvature that ends one with a least speed. Chosen."""
+_LAST_STEPS, _LAST_SHARE = 150, 3
+"""Steps at most of each search with curvature that ends one with a least speed, and in multiples of
+those that the search before it may take. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +103,12 @@ def maximize_all(
         if not left:
             break
         near, kept = [optima[k].trajectory for k in left], (*smooth_limits(kin), *constraints)
-        ends = _optima(kin, stage, near, kept, tolerance, _LAST_STEPS, finish, relay)
+        steps = min(_LAST_STEPS, _LAST_SHARE * max_iterations)
+        ends = _optima(kin, stage, near, kept, tolerance, steps, finish, relay)
         for k, end in zip(left, ends, strict=True):
-            steps = optima[k].iterations + end.iterations
-            optima[k] = replace(end if end.converged else optima[k], iterations=steps)
+            taken = optima[k].iterations + end.iterations
+            further = end.converged or end.value > optima[k].value
+            optima[k] = replace(end if further else optima[k], iterations=taken)
     return optima
 
 

@@ -29,7 +29,6 @@ class Stage(Protocol):
 
     def __call__(self, w: Real, /) -> StageValues:
         """Return the rewards at w (2, ..., n), m; not-a-number where there is none."""
-        ...
 
 
 class ScaledRewards:

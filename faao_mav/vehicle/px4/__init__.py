@@ -16,14 +16,13 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
-from faao_mav.vehicle.parameter import ParameterValues
+from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
 from faao_mav.vehicle.px4.dialect import DIALECT
-from faao_mav.vehicle.px4.flight_model import Px4
+from faao_mav.vehicle.px4.flight_model import Px4 as Px4
 from faao_mav.vehicle.px4.guidance import corner_speed
-from faao_mav.vehicle.px4.legs import Px4Legs
+from faao_mav.vehicle.px4.legs import Px4Legs as Px4Legs
 from faao_mav.vehicle.px4.parameters import COPTER_TABLE, PLANE_TABLE
 from faao_mav.vehicle.px4.response import DRAG
-from faao_mav.vehicle.recommend import accelerations_to_try
 from faao_mav.vehicle.vehicle_type import (
     OVERSPEED,
     AutopilotFamily,
@@ -33,8 +32,6 @@ from faao_mav.vehicle.vehicle_type import (
     VehicleType,
     lean_acceleration,
 )
-
-__all__ = ["PX4", "PX4_COPTER", "PX4_PLANE", "Px4", "Px4Legs"]
 
 _HOME_OUTSIDE_FENCE = "PX4 says so (Geofence invalid), and flies the mission all the same"
 """Measured on PX4 1.16.1."""

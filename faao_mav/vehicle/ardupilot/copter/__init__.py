@@ -3,16 +3,13 @@
 from collections.abc import Iterator, Mapping
 
 from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
-from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter
-from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs
+from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter as ArduCopter
+from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs as ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.vehicle.flight_path import VerticalProfile
-from faao_mav.vehicle.parameter import ParameterValues
-from faao_mav.vehicle.recommend import accelerations_to_try
+from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
 from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType
-
-__all__ = ["ARDUCOPTER", "ArduCopter", "ArduCopterLegs"]
 
 _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""

@@ -14,13 +14,7 @@ from faao_mav.vehicle.ardupilot.copter.course import Course, PlacedLeg, Stop
 from faao_mav.vehicle.ardupilot.copter.leg import StraightLeg, at_speed, planned
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.ramp import LegBounds
-from faao_mav.vehicle.ardupilot.copter.spline import (
-    Curve,
-    CurvedLeg,
-    SplineLimits,
-    flown,
-    hermite,
-)
+from faao_mav.vehicle.ardupilot.copter.spline import Curve, CurvedLeg, flown, hermite
 
 Direction: TypeAlias = tuple[float, float, float]
 """A unit vector: east, north, up."""
@@ -29,26 +23,18 @@ _TICKS = 1 << 24
 """The number of steps into which the longest overlap of two legs is divided to find it."""
 
 
-@dataclass(frozen=True, slots=True)
-class CornerLimits:
-    """What must hold half-way round: metres from the waypoint, m/s² across the ground and up."""
-
-    radius: float
-    acceleration: float
-    vertical: float
-
-
 def half_overlap(
-    leg: StraightLeg, u: Direction, following: StraightLeg, w: Direction, limits: CornerLimits
+    leg: StraightLeg, u: Direction, following: StraightLeg, w: Direction, limits: ArduCopterLimits
 ) -> float:
     """Return h, s: the `following` leg begins 2 h before `leg` ends, along `u` and `w`.
 
     The target moves by the sum of both. h is the largest, up to half of either leg's ramp, at
-    which after h s of the overlap it is within the limits and slower than both legs' limits.
+    which after h s of the overlap it is within `radius` of the waypoint, within the accelerations
+    in a corner and of a climb, and slower than both legs' limits.
     """
     longest = min(leg.down.duration, following.up.duration) / 2
     end, length = leg.duration, leg.length
-    slowest = min(leg.limits.speed, following.limits.speed)
+    slowest, corner = min(leg.limits.speed, following.limits.speed), limits.corner
     across = u[0] * w[0] + u[1] * w[1]
     along = across + u[2] * w[2]
     u_ground, w_ground = u[0] ** 2 + u[1] ** 2, w[0] ** 2 + w[1] ** 2
@@ -64,8 +50,8 @@ def half_overlap(
             max(
                 position / limits.radius,
                 velocity / slowest,
-                ground / limits.acceleration,
-                abs(a * u[2] + b * w[2]) / limits.vertical,
+                ground / corner,
+                abs(a * u[2] + b * w[2]) / limits.climb_acceleration,
             )
             - 1
         )
@@ -117,7 +103,6 @@ class Router:
         self._lengths: list[float] = np.linalg.norm(self._steps, axis=1).tolist()
         self._directions = [_direction(step) for step in self._steps.tolist()]
         self._curves = [self._curve(k, splines) for k in range(len(self._steps))]
-        self._corner = CornerLimits(limits.radius, limits.corner, limits.climb_acceleration)
         # flights that differ in a few speeds have most of their legs in common
         self._known: dict[tuple[int, float, float | None, float, float], _PlannedLeg] = {}
         self._from_rest: dict[tuple[int, float], StraightLeg] = {}
@@ -166,7 +151,7 @@ class Router:
         if isinstance(leg, StraightLeg) and self._is_straight(k + 1):
             following = self._begun(k + 1, speed)
             u, w = self._directions[k], self._directions[k + 1]
-            return _PlannedLeg(leg, half_overlap(leg, u, following, w, self._corner), overlaps=True)
+            return _PlannedLeg(leg, half_overlap(leg, u, following, w, self._limits), overlaps=True)
         return _PlannedLeg(leg, entry=leg.final)
 
     def _is_straight(self, k: int) -> bool:
@@ -178,7 +163,7 @@ class Router:
         if curve is None:
             return self._straight(k, speed, entry)
         end = 0.0 if self._stopping[k + 1] else self._final(k, speed)
-        return flown(curve, _spline_limits(self._limits, speed), entry, end)
+        return flown(curve, self._limits, speed, entry, end)
 
     def _begun(self, k: int, speed: float) -> StraightLeg:
         """Return the straight leg k that begins at rest, as the one before it ends."""
@@ -193,15 +178,13 @@ class Router:
 
     def _final(self, k: int, speed: float) -> float:
         """The speed at the end of leg k, where a spline goes on: 0 between straight legs."""
-        spline = _spline_limits(self._limits, speed)
-        here, following = self._curves[k], self._curves[k + 1]
+        limits, here, following = self._limits, self._curves[k], self._curves[k + 1]
         if following is not None:
-            final = float(following.allowed(spline)[0])
-            return final if here is None else min(final, float(here.allowed(spline)[-1]))
+            final = float(following.allowed(limits, speed)[0])
+            return final if here is None else min(final, float(here.allowed(limits, speed)[-1]))
         if here is not None and self._is_straight(k + 1):
-            limits = _along(self._limits, self._directions[k + 1], speed)
-            straight = planned(self._lengths[k + 1], limits)
-            return min(straight.up.high, float(here.allowed(spline)[-1]))
+            straight = planned(self._lengths[k + 1], _along(limits, self._directions[k + 1], speed))
+            return min(straight.up.high, float(here.allowed(limits, speed)[-1]))
         return 0.0
 
     def _curve(self, k: int, splines: NDArray[np.bool_]) -> Curve | None:
@@ -243,15 +226,4 @@ def _along(limits: ArduCopterLimits, direction: Direction, speed: float) -> LegB
         min(_over(limits.acceleration, ground), _over(limits.climb_acceleration, abs(up))),
         limits.jerk,
         limits.rise,
-    )
-
-
-def _spline_limits(limits: ArduCopterLimits, speed: float) -> SplineLimits:
-    """Return the limits along a spline where `speed` is commanded."""
-    return SplineLimits(
-        speed,
-        limits.climb_speed,
-        limits.descent_speed,
-        limits.acceleration,
-        limits.climb_acceleration,
     )

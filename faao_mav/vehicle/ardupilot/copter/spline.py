@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 
 _SCALE = 4.0
 """The greatest length of both tangents of a spline together, in lengths of its chord. The
@@ -13,29 +14,6 @@ autopilot's own."""
 _SPACING = 0.5
 """About the distance, m, between the points at which a curve is evaluated. Chosen; what a change
 costs is not measured."""
-
-
-@dataclass(frozen=True, slots=True)
-class SplineLimits:
-    """Speeds across the ground, up and down, m/s, and accelerations across and up or down, m/s².
-
-    A spline uses half of either acceleration along the curve and half across it.
-    """
-
-    horizontal: float
-    up: float
-    down: float
-    acceleration: float
-    vertical: float
-
-    def speed(self, directions: Real) -> Real:
-        """Return the largest speeds (k,) along the unit vectors `directions` (k, 3)."""
-        rising = directions[:, 2] >= 0
-        return _within(directions, self.horizontal, np.where(rising, self.up, self.down))
-
-    def halved(self, directions: Real) -> Real:
-        """Return half of the largest accelerations (k,) along unit vectors (k, 3)."""
-        return _within(directions, self.acceleration, self.vertical) / 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +29,16 @@ class Curve:
     curvature: Real
     lengths: Real
 
-    def allowed(self, limits: SplineLimits) -> Real:
-        """Return the speeds (k,), m/s, at which v² |curvature| is half the acceleration."""
+    def allowed(self, limits: ArduCopterLimits, speed: float) -> Real:
+        """Return the speeds (k,), m/s, within the commanded `speed` across the ground and `limits`.
+
+        At a speed v in a bend v² |curvature| is half the acceleration at most.
+        """
         bend = np.maximum(np.linalg.norm(self.curvature, axis=1), 1e-12)
-        bent: Real = np.sqrt(limits.halved(self.curvature / bend[:, None]) / bend)
-        return np.minimum(limits.speed(self.tangents), bent)
+        bent: Real = np.sqrt(_half_acceleration(limits, self.curvature / bend[:, None]) / bend)
+        rising = self.tangents[:, 2] >= 0
+        vertical = np.where(rising, limits.climb_speed, limits.descent_speed)
+        return np.minimum(_within(self.tangents, speed, vertical), bent)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,15 +84,19 @@ def hermite(origin: Real, destination: Real, leaving: Real, arriving: Real) -> C
     return Curve(points, unit, across / speed**2, lengths)
 
 
-def flown(curve: Curve, limits: SplineLimits, start: float, end: float) -> CurvedLeg:
+def flown(
+    curve: Curve, limits: ArduCopterLimits, speed: float, start: float, end: float
+) -> CurvedLeg:
     """Return how the target moves along `curve` from the speed `start` to at most `end`, m/s.
+
+    The commanded `speed`, m/s, is one across the ground.
 
     At every point it is at most as fast as the bend allows and as it could brake, over the
     straight line to the end, to `end`; its speed changes by half the acceleration at most.
     """
-    slope = limits.halved(curve.tangents)
+    slope = _half_acceleration(limits, curve.tangents)
     left = np.linalg.norm(curve.points[-1] - curve.points, axis=1)
-    wanted = np.minimum(curve.allowed(limits) ** 2, 2 * slope * left + end**2)
+    wanted = np.minimum(curve.allowed(limits, speed) ** 2, 2 * slope * left + end**2)
     squares = [start**2]
     for aim, change in zip(
         wanted[1:].tolist(), (2 * slope[1:] * curve.lengths).tolist(), strict=True
@@ -119,6 +106,14 @@ def flown(curve: Curve, limits: SplineLimits, start: float, end: float) -> Curve
     speeds = np.sqrt(np.maximum(squares, 0.0))
     spans = 2 * curve.lengths / np.maximum(speeds[1:] + speeds[:-1], 1e-3)
     return CurvedLeg(curve, np.concatenate([[0.0], np.cumsum(spans)]), speeds)
+
+
+def _half_acceleration(limits: ArduCopterLimits, directions: Real) -> Real:
+    """Return half of the largest accelerations (k,), m/s², along unit vectors (k, 3).
+
+    A spline uses one half along the curve and the other across it.
+    """
+    return _within(directions, limits.acceleration, limits.climb_acceleration) / 2
 
 
 def _within(directions: Real, across: float, vertical: Real | float) -> Real:

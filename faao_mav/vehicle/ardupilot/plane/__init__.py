@@ -2,14 +2,13 @@
 
 from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
 from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
-from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane, ArduPlaneLegs
+from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane as ArduPlane
+from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlaneLegs
 from faao_mav.vehicle.ardupilot.plane.motion import SIDESLIP
 from faao_mav.vehicle.ardupilot.plane.parameters import TABLE, true_over_commanded
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType, lean_acceleration
-
-__all__ = ["ARDUPLANE", "ArduPlane", "ArduPlaneLegs"]
 
 
 def _vertical(vehicle: ParameterValues) -> VerticalProfile:

@@ -1,0 +1,116 @@
+"""`faao-mission debrief`: what became of a plan in a real flight, from its log."""
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
+from faao_mav.cli.shared import AsJson, File, exit_status, option
+from faao_mav.errors import InputError
+from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
+
+if TYPE_CHECKING:
+    from faao_mav.mavlink.flying.record import FlightRecord
+    from faao_mav.report.summary import Line
+    from faao_mav.validate.flown import Debriefing
+    from faao_mav.workflow import Result
+
+_SAME = 1e-5
+"""Relative difference of two parameters that single precision does not tell apart."""
+
+
+@exit_status()
+def debrief(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg.")],
+    plan_file: PlanFile = None,
+    solution_file: SolutionFile = None,
+    report: Annotated[File, option("PAGE.html", "One page with all three tracks.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what became of a plan, from the log of its flight.
+
+    Finds the relay flight in the log of an ArduPilot (.bin), a PX4 (.ulg, with pyulog) or a ground
+    station (.tlog), and tells how late it was, how far from plan and path, and what each hop
+    carried along the real track with the planned precoders, beside what was planned and predicted.
+
+    Exit status: 0 told; 1 the plan's flight is not in the log; 2 unusable arguments or input.
+    """
+    check_one(plan_file, solution_file)
+    if plan_file is None and solution_file is None:
+        raise InputError("--plan or --solution: give the plan that was flown")
+    if report is not None:
+        check_ending(report, "--report", PAGES)
+        check_writable(report)
+    read = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
+    check_apart({"--report": report}, read)
+    from faao_mav.errors import FaaoError
+    from faao_mav.mavlink.flying.logs import read_log
+    from faao_mav.report.summary import debriefing_lines, joined
+    from faao_mav.validate.flown import Line, planned_line
+    from faao_mav.workflow import Result, debriefing_as_dict, with_mission
+
+    record = read_log(log)
+    solution = planned(plan_file, solution_file)
+    assert solution is not None
+    result, line = with_mission(Result(solution)), planned_line(solution)
+    if result.conversion is not None:
+        track = result.conversion.schedule.track()
+        line = Line(track["predicted_t"], track["predicted_w"])
+    found = record.debriefing(solution, line)
+    if found is None:
+        raise FaaoError(
+            f"{log}: the plan's flight is not in it: no departure from flight.start like the "
+            f"predicted one in {record.t[-1] - record.t[0]:.0f} s of flight"
+        )
+    remarks = list(_remarks(record, found, result))
+    if report is not None:
+        from faao_mav.report import render_report
+
+        page = render_report(result, title=f"{log.name}", debriefing=found, remarks=remarks)
+        write_whole(report, page.encode())
+    if as_json:
+        told = debriefing_as_dict(found) | {
+            "wind": None,
+            "parameters": dict(_differing(record, result)),
+        }
+        wind = record.mean_wind(found.start, solution.plan.flight.duration)
+        told["wind"] = None if wind is None else wind.tolist()
+        typer.echo(json.dumps(told, allow_nan=False))
+    else:
+        typer.echo(joined([*debriefing_lines(found), *remarks]))
+
+
+def _remarks(record: "FlightRecord", found: "Debriefing", result: "Result") -> "Iterator[Line]":
+    """Yield what the log says of wind and parameters."""
+    wind = record.mean_wind(found.start, found.solution.plan.flight.duration)
+    if wind is None:
+        yield "wind", "not estimated by the autopilot"
+    else:
+        east, north = map(float, wind)
+        source = math.degrees(math.atan2(-east, -north)) % 360
+        yield "wind", f"{math.hypot(east, north):.1f} m/s from {source:.0f} degrees, as estimated"
+    timed = result.conversion.parameters if result.conversion is not None else {}
+    differing = _differing(record, result)
+    known = sum(name in record.parameters for name in timed)
+    if differing:
+        text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in differing.items())
+        yield "parameters", f"other than the mission is timed for: {text}"
+    elif timed and known:
+        yield "parameters", f"{known} in the log, as the mission is timed for"
+    elif timed:
+        yield "parameters", "not in the log"
+
+
+def _differing(record: "FlightRecord", result: "Result") -> dict[str, tuple[float, float]]:
+    """Return by name the value in the log and the one that the mission is timed for, if another."""
+    timed = result.conversion.parameters if result.conversion is not None else {}
+    return {
+        name: (record.parameters[name], value)
+        for name, value in timed.items()
+        if name in record.parameters
+        and not math.isclose(record.parameters[name], value, rel_tol=_SAME)
+    }

@@ -1,0 +1,1 @@
+"""Flights on the wire: watching them, and reading their logs."""

@@ -1,0 +1,70 @@
+"""Watch the flight of a mission that a vehicle holds: compare it with the file, then follow it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Unpack
+
+from faao_mav.errors import LinkError
+from faao_mav.mavlink.client import LinkOptions, Session
+from faao_mav.mavlink.discover import FoundVehicle
+from faao_mav.mavlink.flying.telemetry import Ending, Samples
+from faao_mav.mavlink.flying.watch import Watch
+from faao_mav.mavlink.machine import Script
+from faao_mav.mavlink.protocol import MissionType
+from faao_mav.mavlink.transfer.session import download_lists
+from faao_mav.mavlink.transfer.verify import Difference, compare
+from faao_mav.mavlink.wire_items import wire_items
+from faao_mav.mission.item import Mission
+
+
+@dataclass(frozen=True, slots=True)
+class FlightReport:
+    """How a flight was watched: `ending` is None where the vehicle does not hold the mission.
+
+    `differences` are what it holds instead; `samples` is where it was.
+    """
+
+    vehicle: FoundVehicle
+    differences: tuple[Difference, ...]
+    ending: Ending | None
+    samples: Samples
+
+
+def fly(
+    mission: Mission,
+    connection: str,
+    *,
+    arm: bool = False,
+    lands: bool = True,
+    watching: Callable[[Watch], object] = lambda _: None,
+    **options: Unpack[LinkOptions],
+) -> FlightReport:
+    """Watch the vehicle at `connection` fly `mission`, which it has to hold already.
+
+    It is armed and started only with `arm`; `lands` tells whether the flight ends on the ground:
+    see `Watch`. `watching` is called after every step. `options` are those of `LinkOptions`. Raises
+    `LinkError` if there is no such vehicle, none that is known here, or its mission cannot be read.
+    """
+    with Session(connection, options) as session:
+        vehicle, peer = session.found, session.peer
+        if peer.vehicle is None:
+            raise LinkError(f"{connection}: {vehicle}: flights of it are not watched")
+        lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
+        asked = tuple(part for part in MissionType if lists[part])
+        held = session.run(Script(download_lists(asked, peer, session.timeouts)))
+        for part in held.missing:
+            raise LinkError(f"{connection}: {part.title}: what the vehicle holds cannot be read")
+        wrong = tuple(
+            each
+            for part in asked
+            for each in compare(lists[part], held.items[part], part, peer.vehicle)
+            if each.kind == "wrong"
+        )
+        if wrong:
+            return FlightReport(vehicle, wrong, None, Samples())
+        watch = Watch(peer, held.items[MissionType.MISSION], arm=arm, lands=lands)
+        try:
+            ending = session.link.watch(watch, lambda: watching(watch))
+        except LinkError as error:
+            ending = Ending("lost", str(error))
+    return FlightReport(vehicle, (), ending, watch.seen.samples)

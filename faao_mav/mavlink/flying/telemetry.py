@@ -1,0 +1,226 @@
+"""What a vehicle tells of its flight, and asking it for what it does not tell by itself."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from faao_mav.mavlink.messages import (
+    CommandLong,
+    Envelope,
+    GlobalPositionInt,
+    Heartbeat,
+    Message,
+    MissionCurrent,
+    MissionItemInt,
+    MissionRequestInt,
+    Statustext,
+    SysStatus,
+    WireItem,
+)
+from faao_mav.mavlink.modes import mode_name
+from faao_mav.mavlink.protocol import (
+    CURRENT_ITEM,
+    GROUND_STATION_TYPE,
+    POSITION,
+    SYSTEM_STATUS,
+    MavCommand,
+    MavSeverity,
+    MissionType,
+)
+from faao_mav.mavlink.transfer.exchange import Peer
+from faao_mav.mavlink.transfer.verify import compare
+from faao_mav.mavlink.wire_items import home_items
+
+if TYPE_CHECKING:
+    from faao_mav.mavlink.flying.record import FlightRecord
+
+Kind: TypeAlias = Literal[
+    "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
+]
+
+_SILENT = 5.0
+"""Seconds without any message after which the link counts as interrupted: five heartbeats."""
+
+_RATES = {POSITION: 0.2, SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
+"""Messages that are needed, and the seconds between two of them that are asked for. Chosen: at
+8 m/s positions are 1.6 m apart."""
+
+_MISSED = 3.0
+"""Seconds without one of these after which it is asked for again; chosen."""
+
+_READ_AGAIN = 1.0
+"""Seconds between two items that are read again; chosen."""
+
+_BACK = 2000
+"""Milliseconds by which a vehicle's clock goes back when it has rebooted; less is a late packet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How watching ended: `kind`, and in words.
+
+    "finished": the mission was flown to its end; "taken over": not by the mission, the pilot or a
+    failsafe had the aircraft; "held": we asked it to hold; "left": interrupted by the user;
+    "refused": not armed or not started; "contested": another ground station is there, nothing was
+    started; "changed": the vehicle's mission is another one now; "rebooted"; "lost": nothing is
+    heard any more.
+    """
+
+    kind: Kind
+    text: str
+
+
+@dataclass(slots=True)
+class Samples:
+    """Where the vehicle was: its clock in s, degrees, metres above home."""
+
+    t: list[float] = field(default_factory=list)
+    latitude: list[float] = field(default_factory=list)
+    longitude: list[float] = field(default_factory=list)
+    height: list[float] = field(default_factory=list)
+
+    def record(self) -> "FlightRecord":
+        """Return them as arrays."""
+        import numpy as np
+
+        from faao_mav.mavlink.flying.record import FlightRecord
+
+        place = np.array(self.latitude), np.array(self.longitude)
+        return FlightRecord(np.array(self.t), *place, np.array(self.height))
+
+
+class Telemetry:
+    """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
+
+    Attributes:
+        told: what has happened, in words, one after the other.
+        said: what the vehicle said that is a warning or worse.
+        samples: where it was.
+        heartbeat, current, status: the last of these messages, None before the first.
+        stations: other ground stations that were heard.
+        ending: why nothing more can be known, None as long as something can.
+    """
+
+    def __init__(self, peer: Peer, rows: Sequence[WireItem], patience: float) -> None:
+        self._peer, self._rows, self._patience = peer, tuple(rows), patience
+        self._home = home_items(peer.vehicle, MissionType.MISSION)
+        self.told: list[str] = []
+        self.said: list[str] = []
+        self.samples = Samples()
+        self.heartbeat: Heartbeat | None = None
+        self.current: MissionCurrent | None = None
+        self.status: SysStatus | None = None
+        self.stations: set[str] = set()
+        self.ending: Ending | None = None
+        self._next_item = self._home
+        self.start(0.0)
+
+    def start(self, now: float) -> None:
+        """Begin to listen."""
+        self._heard, self._silent = now, False
+        self._needed = dict.fromkeys(_RATES, now - _MISSED)
+        self._next_reading = now
+
+    @property
+    def items(self) -> int:
+        """How many items the mission has, home not counted."""
+        return len(self._rows) - self._home
+
+    @property
+    def mode(self) -> str:
+        """The vehicle's mode by its name."""
+        return "unknown" if self.heartbeat is None else mode_name(self.heartbeat)
+
+    @property
+    def row(self) -> int | None:
+        """The row of the mission file that is under way: row 0 is home, also for PX4."""
+        return None if self.current is None else self._row(self.current.seq)
+
+    def _row(self, seq: int) -> int:
+        return seq + 1 - self._home
+
+    def hear(self, envelope: Envelope, now: float) -> None:
+        """Take note of a message."""
+        sender, message = envelope.sender, envelope.message
+        if isinstance(message, Heartbeat) and message.type == GROUND_STATION_TYPE:
+            name = f"system {sender.system}, component {sender.component}"
+            if name not in self.stations:
+                self.stations.add(name)
+                self.told.append(f"another ground station is on this link: {name}")
+        if sender != self._peer.address:
+            return
+        if self._silent:
+            self.told.append(f"heard again after {now - self._heard:.0f} s")
+        self._heard, self._silent = now, False
+        match message:
+            case Heartbeat():
+                self.heartbeat = message
+            case GlobalPositionInt():
+                self._needed[POSITION] = now
+                self._on_position(message)
+            case SysStatus():
+                self._needed[SYSTEM_STATUS], self.status = now, message
+            case MissionCurrent():
+                self._needed[CURRENT_ITEM] = now
+                self._on_current(message)
+            case MissionItemInt(mission_type=MissionType.MISSION, seq=seq, item=item):
+                self._on_item(seq, item)
+            case Statustext(severity=severity, text=text) if severity <= MavSeverity.WARNING:
+                self.said.append(text.strip())
+                self.told.append(f"the vehicle says: {text.strip()}")
+
+    def tick(self, now: float) -> Sequence[Message]:
+        """Take note of the time, and return what to ask the vehicle."""
+        quiet = now - self._heard
+        if quiet >= self._patience:
+            self._end("lost", f"nothing was heard for {quiet:.0f} s; the vehicle is on its own")
+        elif quiet >= _SILENT and not self._silent:
+            self._silent = True
+            self.told.append(f"nothing heard for {quiet:.0f} s")
+        out: list[Message] = []
+        for kind, period in _RATES.items():
+            if now - self._needed[kind] >= _MISSED:
+                self._needed[kind] = now
+                ask = (MavCommand.SET_INTERVAL, 0, float(kind), period * 1e6)
+                out.append(CommandLong(self._peer.address, *ask))
+        # ArduPilot has no number for its mission, and answers each request by itself: its mission
+        # is read again item by item, which disturbs nobody.
+        if self._peer.manners.any_request_order and now >= self._next_reading:
+            self._next_reading = now + _READ_AGAIN
+            out.append(MissionRequestInt(self._peer.address, MissionType.MISSION, self._next_item))
+            beyond = self._next_item + 1
+            self._next_item = beyond if beyond < len(self._rows) else self._home
+        return out
+
+    def _on_position(self, message: GlobalPositionInt) -> None:
+        t, samples = message.time_boot_ms, self.samples
+        last = 1000 * samples.t[-1] if samples.t else -1.0
+        if t < last - _BACK:
+            self._end("rebooted", "the vehicle has rebooted: what it flies now is not known")
+        elif t > last:
+            samples.t.append(t / 1000)
+            samples.latitude.append(message.lat / 1e7)
+            samples.longitude.append(message.lon / 1e7)
+            samples.height.append(message.relative_alt / 1000)
+
+    def _on_current(self, message: MissionCurrent) -> None:
+        known, self.current = self.current or message, message
+        same = (message.total, message.mission_id) == (known.total, known.mission_id)
+        if not same or message.total not in (0, self.items):
+            self._end("changed", "the vehicle's mission is another one now than the file's")
+
+    def _on_item(self, seq: int, item: WireItem) -> None:
+        if not self._home <= seq < len(self._rows):
+            return
+        rows = (*self._rows[: self._home], self._rows[seq])
+        part = MissionType.MISSION
+        found = compare(rows, (*rows[:-1], item), part, self._peer.vehicle)
+        wrong = next((each for each in found if each.kind == "wrong"), None)
+        if wrong is not None:
+            row = f"item {self._row(seq)} of the vehicle's mission"
+            text = f"{wrong.field} is {wrong.found}, in the file {wrong.sent}"
+            self._end("changed", f"{row} is another one now: {text}")
+
+    def _end(self, kind: Kind, text: str) -> None:
+        if self.ending is None:
+            self.ending = Ending(kind, text)

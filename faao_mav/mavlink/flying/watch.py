@@ -1,0 +1,277 @@
+"""Watching a mission from the ground to its end, and starting it where that is asked for."""
+
+from collections.abc import Callable, Sequence
+from typing import Literal, TypeAlias
+
+from faao_mav.mavlink.flying.telemetry import Ending, Kind, Telemetry
+from faao_mav.mavlink.machine import Machine, Progress
+from faao_mav.mavlink.messages import (
+    CommandAck,
+    CommandLong,
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionCurrent,
+    SetMode,
+    WireItem,
+)
+from faao_mav.mavlink.modes import modes_of
+from faao_mav.mavlink.protocol import MISSION_COMPLETE, MavCommand, MissionType
+from faao_mav.mavlink.transfer.exchange import Peer
+from faao_mav.mavlink.wire_items import home_items
+
+Phase: TypeAlias = Literal[
+    "checking", "arming", "starting", "waiting", "flying", "holding", "ending", "aside"
+]
+
+_ACCEPTED, _IN_PROGRESS = 0, 5
+"""MAV_RESULT."""
+
+_TICK = 0.5
+"""Seconds between two looks at what is due; chosen."""
+
+_LISTEN = 2.0
+"""Seconds of listening for other ground stations before anything is started: two of their
+heartbeats."""
+
+_AGAIN, _TRIES = 1.5, 5
+"""Seconds after which a command without an answer is repeated, and how often it is sent: as the
+MAVLink guide has it for missions."""
+
+_REBOOT = 1.5
+"""Seconds in which a vehicle that is not armed any more can show that it has rebooted; chosen."""
+
+_FIRST_DO = 176
+"""From this command on an item is no place to fly to or to wait at."""
+
+
+class Watch(Machine[Ending]):
+    """A machine that watches the vehicle of `peer` fly the mission `rows` to its end.
+
+    `rows` are the items that it holds, the home row included where it has one. With `arm` it arms
+    and starts the mission once the autopilot's own checks pass and no other ground station was
+    heard; else somebody else does. `lands`: the flight ends on the ground. After `patience` seconds
+    without a message, or of checks that do not pass, it ends. `seen` is what it has heard.
+
+    Nothing is sent but what asks for telemetry, until `arm` or `cancel` has a reason; and nothing
+    ever again once the mode is one that was not asked for: then the pilot, or a failsafe, has the
+    aircraft. `cancel` asks a flight that was started here to hold; a second time, and in any other
+    flight, it leaves.
+
+    The phases: "checking", "arming" and "starting", with `arm`, or "waiting" for others to start
+    it; "flying" the mission; "ending", when that is over; "holding", as `cancel` asked for;
+    "aside", when the pilot has the aircraft. Raises `ValueError` for a vehicle that is not known.
+    """
+
+    def __init__(
+        self,
+        peer: Peer,
+        rows: Sequence[WireItem],
+        *,
+        arm: bool = False,
+        lands: bool = True,
+        patience: float = 60.0,
+    ) -> None:
+        super().__init__()
+        if peer.vehicle is None:
+            raise ValueError("watch: a vehicle that is known is needed")
+        self._peer, self._modes = peer, modes_of(peer.vehicle)
+        self._first = home_items(peer.vehicle, MissionType.MISSION)
+        places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
+        self._last = max(places, default=len(rows) - 1)
+        self._arm, self._lands, self._patience = arm, lands, patience
+        self.seen = Telemetry(peer, rows, patience)
+        self.phase: Phase = "checking" if arm else "waiting"
+        self._begun = 0.0
+        self._furthest = 0
+        self._armed = False
+        self._disarmed_at: float | None = None
+        self._mode_before = -1
+        self._command: Callable[[], Message] | None = None
+        self._sent, self._next_try = 0, 0.0
+
+    @property
+    def progress(self) -> Progress:
+        """What is going on, at which item of how many."""
+        return f"watching ({self.phase})", self.seen.row or 0, self.seen.items
+
+    def start(self, now: float) -> Sequence[Message]:
+        """Listen, and ask for telemetry."""
+        self._begun = now
+        self.seen.start(now)
+        return self._time_out(now)
+
+    def cancel(self, now: float) -> Sequence[Message]:
+        """Ask the flight to hold, or leave it: what has been asked for is told."""
+        if self._arm and self.phase in ("starting", "flying"):
+            self.phase = "holding"
+            self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
+            return self._say(self._hold, now)
+        if self.phase == "arming":
+            self._end("left", "interrupted before the start; the vehicle is asked to disarm")
+            return [self._arming(False)]
+        self._end("left", f"no longer watched; the vehicle is in mode {self.seen.mode}")
+        return ()
+
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        self.seen.hear(envelope, now)
+        self.outcome = self.seen.ending
+        if self.outcome is not None or envelope.sender != self._peer.address:
+            return ()
+        match envelope.message:
+            case Heartbeat() as heartbeat:
+                self._on_heartbeat(heartbeat, now)
+            case MissionCurrent() as current:
+                self._on_current(current)
+            case CommandAck(target, command, result) if self._peer.own.takes(target):
+                return self._on_ack(command, result, now)
+        return ()
+
+    def _time_out(self, now: float) -> Sequence[Message]:
+        self._due = now + _TICK
+        questions = self.seen.tick(now)
+        self.outcome = self.seen.ending
+        if self.outcome is not None:
+            return ()
+        if self._disarmed_at is not None and now >= self._disarmed_at + _REBOOT:
+            self._disarmed_at = None
+            return self._on_disarmed()
+        if self.phase == "checking":
+            return [*questions, *self._check(now)]
+        return [*questions, *self._repeat(now)]
+
+    # ---- what the vehicle does
+
+    def _on_current(self, current: MissionCurrent) -> None:
+        if self.phase in ("flying", "holding", "ending"):
+            self._furthest = max(self._furthest, current.seq)
+        if current.mission_state == MISSION_COMPLETE and self.phase == "flying":
+            self._over()
+
+    def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> None:
+        if self._armed != heartbeat.armed:
+            self._armed = heartbeat.armed
+            self._disarmed_at = None if self._armed else now
+        mode, mission, hold = heartbeat.custom_mode, self._modes.mission, self._modes.hold
+        match self.phase:
+            case "arming" if mode != self._mode_before:
+                self._step_aside()
+            case "starting" if mode not in (self._mode_before, mission):
+                self._step_aside()
+            case "starting" | "waiting" if self._armed and mode == mission:
+                self.phase, self._command = "flying", None
+                self.seen.told.append("the mission is under way")
+            case "flying" if mode != mission and self._furthest >= self._last:
+                self._over()  # the last item has a mode of its own, as PX4's return
+            case "flying" if mode != mission:
+                self._step_aside()
+            case "holding" if mode == hold and self._command is not None:
+                self._command = None
+                self.seen.told.append("it holds; interrupt again to leave it")
+            case "holding" if mode not in (mission, hold) or (
+                mode == mission and self._command is None
+            ):
+                self._step_aside()
+
+    def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
+        awaited = {"arming": MavCommand.ARM, "starting": MavCommand.START}.get(self.phase)
+        if command != awaited or result == _IN_PROGRESS:
+            return ()
+        if result != _ACCEPTED:
+            return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
+        if self.phase == "arming":
+            self.phase = "starting"
+            return self._say(self._starting, now)
+        return ()
+
+    def _on_disarmed(self) -> Sequence[Message]:
+        match self.phase:
+            case "flying" if self._furthest < self._last:
+                text = f"disarmed at item {self.seen.row}, before the end of the mission"
+                self._end("taken over", text)
+            case "flying" | "ending":
+                self._end("finished", "landed and disarmed at the end of the mission")
+            case "holding":
+                self._end("held", "disarmed after it was asked to hold")
+            case "aside":
+                self._end("taken over", "disarmed; it was not the mission that flew it last")
+            case "arming" | "starting":
+                return self._refused("disarmed before the mission began")
+        return ()
+
+    def _over(self) -> None:
+        """The mission is done; what is left is the landing, if there is one."""
+        self.phase = "ending"
+        if not self._lands:
+            self._end("finished", f"the mission is over; the vehicle is in mode {self.seen.mode}")
+
+    def _step_aside(self) -> None:
+        self.phase, self._command = "aside", None
+        self.seen.told.append(
+            f"mode {self.seen.mode}: the pilot or a failsafe has the aircraft; nothing more is sent"
+        )
+
+    # ---- what it is told
+
+    def _check(self, now: float) -> Sequence[Message]:
+        """Arm, if there is nothing against it."""
+        seen, waited = self.seen, now - self._begun
+        beat, current = seen.heartbeat, seen.current
+        if beat is not None and beat.armed:
+            self._end("refused", "it is armed already: watch it without --arm")
+        elif seen.stations:
+            names = "; ".join(sorted(seen.stations))
+            self._end("contested", f"nothing was started: another ground station ({names})")
+        elif current is not None and current.seq > self._first:
+            text = f"it would go on at item {seen.row}, not at the beginning"
+            self._end("refused", f"nothing was started: {text}; set the first item (or reboot)")
+        elif waited >= self._patience:
+            said = "; ".join(dict.fromkeys(seen.said)) or "it does not say why"
+            self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
+        if self.outcome is not None or waited < _LISTEN or beat is None or current is None:
+            return ()
+        if seen.status is None or not seen.status.may_arm:
+            return ()
+        self.phase, self._mode_before = "arming", beat.custom_mode
+        seen.told.append(f"its own checks pass: arming, and starting {seen.items} items")
+        return self._say(lambda: self._arming(True), now)
+
+    def _arming(self, wanted: bool) -> Message:
+        return CommandLong(
+            self._peer.address, MavCommand.ARM, max(0, self._sent - 1), float(wanted)
+        )
+
+    def _starting(self) -> Message:
+        return CommandLong(self._peer.address, MavCommand.START, max(0, self._sent - 1))
+
+    def _hold(self) -> Message:
+        return SetMode(self._peer.address.system, 1, self._modes.hold)
+
+    def _say(self, command: Callable[[], Message], now: float) -> Sequence[Message]:
+        """Send `command`, and repeat it until it is answered."""
+        self._command, self._sent, self._next_try = command, 0, now
+        return self._repeat(now)
+
+    def _repeat(self, now: float) -> Sequence[Message]:
+        if self._command is None or now < self._next_try:
+            return ()
+        if self._sent == _TRIES and self.phase == "holding":
+            self._command = None
+            self.seen.told.append("it does not confirm that it holds")
+            return ()
+        if self._sent == _TRIES:
+            return self._refused("does not answer")
+        self._sent, self._next_try = self._sent + 1, now + _AGAIN
+        return [self._command()]
+
+    def _refused(self, why: str) -> Sequence[Message]:
+        """End before the start; an aircraft that was armed here is asked to disarm again."""
+        said = f": {'; '.join(dict.fromkeys(self.seen.said))}" if self.seen.said else ""
+        armed = self.phase == "starting"
+        self._end("refused", f"the vehicle {why}{said}" + (", and disarms" if armed else ""))
+        self._sent = 0
+        return [self._arming(False)] if armed else ()
+
+    def _end(self, kind: Kind, text: str) -> None:
+        if self.outcome is None:
+            self.outcome = Ending(kind, text)

@@ -1,0 +1,66 @@
+"""The flight modes that the package asks for, by the numbers that heartbeats carry."""
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, field
+from types import MappingProxyType
+
+from faao_mav.mavlink.messages import Heartbeat
+from faao_mav.vehicle import VehicleType
+from faao_mav.vehicle.ardupilot import ARDUPILOT
+from faao_mav.vehicle.px4 import PX4
+from faao_mav.vehicle.vehicle_type import FenceAction
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """Custom modes of an autopilot that flies one type of vehicle.
+
+    `rest` is one to stand on the ground in, `mission` flies the mission, `hold` stays at the place
+    (a plane circles there) without sticks. `at_fence` are those after a breach of the fence.
+    """
+
+    rest: int
+    mission: int
+    hold: int
+    at_fence: Mapping[FenceAction, int] = field(default_factory=dict)
+
+
+def px4_mode(main: int, sub: int) -> int:
+    """Return PX4's custom mode for a main and a sub mode; 0 for numbers that are none."""
+    if not (0 <= main < 256 and 0 <= sub < 256):
+        return 0
+    return main << 16 | sub << 24
+
+
+_HOLD = px4_mode(4, 3)
+_PX4 = Modes(
+    rest=_HOLD,
+    mission=px4_mode(4, 4),
+    hold=_HOLD,
+    at_fence=MappingProxyType({"hold": _HOLD, "return": px4_mode(4, 5), "land": px4_mode(4, 6)}),
+)
+_BRAKE, _LOITER = 17, 12
+_MODES = {
+    (ARDUPILOT, "copter"): Modes(0, 3, _BRAKE, {"return": 6, "land": 9, "hold": _BRAKE}),
+    (ARDUPILOT, "plane"): Modes(2, 10, _LOITER, {"return": 11}),
+    (PX4, "copter"): _PX4,
+    (PX4, "plane"): _PX4,
+}
+"""COPTER_MODE and PLANE_MODE of MAVLink; PX4's main and sub modes in one number."""
+
+
+def modes_of(vehicle: VehicleType) -> Modes:
+    """Return the modes of `vehicle`."""
+    return _MODES[vehicle.family, vehicle.kind]
+
+
+def mode_name(heartbeat: Heartbeat) -> str:
+    """Return what people call the mode that `heartbeat` tells.
+
+    >>> mode_name(Heartbeat(type=2, autopilot=3, base_mode=1, custom_mode=17, system_status=4))
+    'BRAKE'
+    """
+    from pymavlink.dialects.v20.common import MAVLink_heartbeat_message
+    from pymavlink.mavutil import mode_string_v10
+
+    return str(mode_string_v10(MAVLink_heartbeat_message(*astuple(heartbeat))))

@@ -1,0 +1,183 @@
+"""A real flight beside the plan that it carries out: while it lasts, and when it is over.
+
+A flight is at `w` (k, 2), m in the plan's frame, at `t` (k,), s on a clock of its own. What it was
+predicted to be, or the plan itself where nothing was predicted, is told on the plan's clock.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.solution import Solution
+from faao_mav.schedule.initial_route import set_out
+from faao_mav.schedule.prediction import Prediction, price_flight
+from faao_mav.schedule.schedule import positions_at
+from faao_mav.schedule.timing import MOST_LEAD
+from faao_mav.vector import distances_to_path, lengths
+
+_REACH = 20.0
+"""By so many metres from w_I the departure is told from anything else. Chosen: ten times the path
+tolerance."""
+
+_ALIKE = 0.25
+"""The share of that reach, rms, within which a departure is the predicted one. An aircraft that
+stands at w_I instead is 0.45 of it away: sqrt(1/5), where it speeds up steadily. Chosen."""
+
+_BEFORE = 1.0
+"""Seconds before the earliest departure that belong to it: the aircraft waits. Chosen."""
+
+_COARSE, _FINE = 0.4, 0.02
+"""Steps in which the time of departure is searched, s. Chosen."""
+
+_METRES_PER_SECOND = 0.5
+"""How many metres off the planned path weigh as much as a second before or after its time, where
+the path comes by a place more than once, or rests there: as for the end of a flight."""
+
+
+_AT_END, _AROUND_END = 5.0, 5.0
+"""The relay flight ends within so many metres of w_F, and not more than so many seconds before its
+time. Chosen."""
+
+
+class Line(NamedTuple):
+    """Where an aircraft is at which time: `t` (k,), s, and `w` (k, 2), m."""
+
+    t: Real
+    w: Real
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How a flight stands at `time`, s on the plan's clock.
+
+    It is `late` by so many seconds, `apart` metres from where the plan has it now and `astray`
+    metres from the planned path. `I_U` and `I_G` are the rates of the present slot, bit/s/Hz.
+    `delivered` is what the relay has forwarded in the slots that are over, `expected` that of the
+    whole flight if it goes on as predicted and as late as it is: bit/Hz. The relay flight is `over`
+    when its time is up and the aircraft has been at w_F.
+    """
+
+    time: float
+    late: float
+    apart: float
+    astray: float
+    I_U: float
+    I_G: float
+    delivered: float
+    expected: float
+    over: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Debriefing:
+    """What became of a plan: as it was `predicted`, and as it was `flown`.
+
+    The plan's clock reads 0 at `start` s of the flight's. `missing` is for how many seconds of the
+    plan there is no flight: the aircraft then counts as staying where it was seen last.
+    `altitude_error` is the greatest distance, m, from the planned height.
+    """
+
+    solution: Solution
+    predicted: Prediction
+    flown: Prediction
+    start: float
+    missing: float
+    altitude_error: float
+
+
+def planned_line(solution: Solution) -> Line:
+    """Return the plan itself as a prediction."""
+    return Line(solution.t, solution.w)
+
+
+def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | None:
+    """Return when, s on the clock of `flight`, the plan's clock reads 0; None: not in this flight.
+
+    That is where the departure from w_I is most like the predicted one, at equal times, from a
+    second before it until 20 m away (or half as far as the plan goes). What the flight does later
+    does not move the clock: who pauses on the way is late from there on.
+    """
+    begin = set_out(solution.t, solution.w, solution.plan) - float(solution.t[0]) - MOST_LEAD
+    begin = max(begin - _BEFORE, float(predicted.t[0]))
+    after = predicted.t > begin
+    away = lengths(predicted.w[after] - solution.w[0])
+    reach = min(_REACH, float(away.max()) / 2)
+    end = float(predicted.t[after][np.argmax(away >= reach)])
+    t = np.linspace(begin, end, max(2, round((end - begin) / 0.2)))
+    w = positions_at(t, *predicted)
+
+    def apart(starts: Real) -> Real:
+        at = positions_at((starts[:, None] + t).ravel(), *flight).reshape(len(starts), *w.shape)
+        return np.asarray(np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1))
+
+    first, last = float(flight.t[0]) - begin, float(flight.t[-1]) - end
+    if last < first:
+        return None
+    coarse = np.arange(first, last + _COARSE, _COARSE)
+    near = coarse[np.argmin(apart(coarse))]
+    fine = np.clip(near + np.arange(-2 * _COARSE, 2 * _COARSE, _FINE), first, last)
+    errors = apart(fine)
+    best = int(np.argmin(errors))
+    return float(fine[best]) if errors[best] <= (_ALIKE * reach) ** 2 else None
+
+
+def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
+    """Return how `flight`, on the plan's clock, stands at its last sample.
+
+    It is priced as a predicted flight is (`price_flight`): as it was flown until now, and as it is
+    predicted from where the plan stands.
+    """
+    now, place = float(flight.t[-1]), flight.w[-1]
+    late = _late(solution, now, place)
+    ahead = predicted.t + late > now
+    t = np.concatenate([flight.t, predicted.t[ahead] + late])
+    priced = price_flight(solution, t, np.concatenate([flight.w, predicted.w[ahead]]))
+    step = float(solution.t[1] - solution.t[0])
+    slot = int(np.clip(now / step, 0, len(solution.t) - 1))
+    forwarded = step * priced.relayed.forwarded
+    over = slot if now < solution.plan.flight.duration else len(solution.t)
+    return Standing(
+        time=now,
+        late=late,
+        apart=float(lengths(place - positions_at(np.array([now]), *planned_line(solution)))[0]),
+        astray=float(distances_to_path(place[None], solution.w)[0]),
+        I_U=float(priced.I_U[slot]),
+        I_G=float(priced.I_G[slot]),
+        delivered=float(forwarded[:over].sum()),
+        expected=float(forwarded.sum()),
+        over=now >= solution.plan.flight.duration and _has_arrived(solution, flight),
+    )
+
+
+def debriefing(
+    solution: Solution, predicted: Line, flight: Line, height: Real
+) -> Debriefing | None:
+    """Return what became of the plan in `flight`, at `height` (k,) m; None: it is not in there."""
+    start = plan_start(solution, predicted, flight)
+    if start is None:
+        return None
+    t = flight.t - start
+    during = np.interp(solution.t, t, height)
+    return Debriefing(
+        solution=solution,
+        predicted=price_flight(solution, *predicted),
+        flown=price_flight(solution, t, flight.w),
+        start=start,
+        missing=max(0.0, float(solution.t[-1] - t[-1])),
+        altitude_error=float(np.abs(during - solution.plan.flight.altitude).max()),
+    )
+
+
+def _has_arrived(solution: Solution, flight: Line) -> bool:
+    """Tell whether `flight`, on the plan's clock, has come to w_F when it should, or later."""
+    due = flight.t >= solution.t[-1] - _AROUND_END
+    return bool((lengths(flight.w[due] - solution.w[-1]) < _AT_END).any())
+
+
+def _late(solution: Solution, now: float, place: Real) -> float:
+    """Return by how many seconds an aircraft at `place` (2,) is later than planned."""
+    t = np.arange(0.0, float(solution.t[-1]) + 0.05, 0.1)
+    apart = lengths(positions_at(t, *planned_line(solution)) - place)
+    return now - float(t[np.argmin(apart + _METRES_PER_SECOND * np.abs(t - now))])

@@ -1,0 +1,71 @@
+"""Real autopilots fly a short plan: armed, started and watched by `fly`, then debriefed."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import MISSIONS, edited
+from simulators import simulated
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+
+SHORT = {
+    "flight.duration": 25,
+    "flight.altitude": 8,
+    "flight.start": [0, 30],
+    "flight.end": [60, 0],
+    "vehicle.max_speed": 5,
+    "radio.ground_user.position": [100, 60],
+    "radio.base_station.power_dbm": 0,
+    "radio.relay.power_dbm": 0,
+    "radio.fading_samples": 8,
+    "mission.on_finish": "land",
+}
+
+
+def run(*arguments: object) -> list[dict[str, Any]]:
+    """Run `faao-mission`, and return the objects that it prints."""
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert result.exit_code == 0, result.output
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def options_for(kind: str, autopilots: Path, parameters: Path, where: Path) -> tuple[str, ...]:
+    """Return options that make it fly with `parameters`, and quickly; ArduPilot logs the flight."""
+    if kind == "px4":
+        tuned = ("--param-file", str(parameters), "--params", "SIH_KDV=0.2")
+        return ("--speedup", "10", *tuned)
+    lines = [line for line in parameters.read_text().splitlines() if not line.startswith("#")]
+    own = where / "own.parm"
+    own.write_text("\n".join(["LOG_BACKEND_TYPE 1", *(line.replace(",", " ") for line in lines)]))
+    defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{own}"
+    return ("--speedup", "20", "--defaults", defaults)
+
+
+@pytest.mark.parametrize("kind", ["arducopter", "px4"])
+def test_a_plan_is_flown_watched_and_debriefed(kind: str, autopilots: Path, tmp_path: Path) -> None:
+    autopilot = "px4" if kind == "px4" else "ardupilot"
+    plan, mission, save = (tmp_path / name for name in ("plan.yaml", "m.waypoints", "r.npz"))
+    text = (MISSIONS / "copter_relay.yaml").read_text()
+    plan.write_text(edited(text, SHORT | {"vehicle.autopilot": autopilot}))
+    run(plan, "--out", mission, "--save", save, "--quiet", "--json")
+    parameters = mission.with_suffix(".params" if kind == "px4" else ".param")
+    options = options_for(kind, autopilots, parameters, tmp_path)
+    heard = tmp_path / "heard.tlog"
+    with simulated(autopilots, kind, tmp_path, *options) as connection:
+        link = ("--to", connection, "--json", "--timeout", "40")
+        assert run("upload", mission, *link)[0]["verified"]
+        *_, end = run("fly", mission, *link, "--solution", save, "--arm", "--log", heard)
+    assert end["ending"] == "finished"
+    flight = end["flight"]
+    assert flight["flown"]["delivered_rate"] > 0.99 * flight["planned"]["delivered_rate"]
+    assert flight["flown"]["rms_position_error"] < 3
+    assert flight["altitude_error"] < 1.5
+    own = [*(tmp_path / "logs").glob("*.BIN")] if kind == "arducopter" else []
+    for log in (heard, *own):
+        (told,) = run("debrief", log, "--solution", save, "--json")
+        for name in ("rate_bs_uav", "rate_uav_user", "delivered_rate"):
+            assert told["flown"][name] == pytest.approx(flight["flown"][name], rel=1e-3)
+    assert len(own) == (kind == "arducopter")

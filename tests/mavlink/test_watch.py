@@ -1,0 +1,310 @@
+"""Watching a flight: every end has its name, and nothing is sent that was not asked for."""
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from mock_flights import fly
+from simulate import Station, simulate
+from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, rows_for, vehicle_of
+
+from faao_mav.mavlink.faults import Faults
+from faao_mav.mavlink.flying.watch import Watch
+from faao_mav.mavlink.machine import Machine
+from faao_mav.mavlink.messages import (
+    CommandLong,
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionRequestInt,
+    SetMode,
+)
+from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION,
+    GROUND_STATION_TYPE,
+    NO_AUTOPILOT,
+    MavCommand,
+    MissionType,
+)
+from faao_mav.mavlink.wire_items import wire_items
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import Circle, Fence
+
+KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+LOSSES = pytest.mark.parametrize("loss", [0.05, 0.2])
+AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
+HOLD = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
+LOITER = 5
+"""A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
+
+
+class Scene:
+    """A mock autopilot that holds a mission, and a watch of it on a simulated link."""
+
+    def __init__(
+        self, kind: str, mission: Mission | None = None, *, lands: bool = True, **options: Any
+    ) -> None:
+        self.arm = bool(options.pop("arm", False))
+        mission = mission or a_mission(12)
+        behaviour = behaviour_of(cast(MockKind, kind))
+        self.mock = MockAutopilot(behaviour, home=HOME, fly=fly, **options)
+        for part in MissionType:
+            self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
+        rows = self.mock.lists.items(MissionType.MISSION)
+        self.watch = Watch(peer_of(kind), rows, arm=self.arm, lands=lands)
+        self.client = Counted(self.watch)
+
+    def run(self, faults: Faults | None = None, until: float = 300.0, **more: Any) -> str:
+        """Return the kind of the ending, "" for none."""
+        stations = Station(self.client, GROUND_STATION), Station(self.mock, VEHICLE)
+        simulate(*stations, faults, until, **more)
+        return self.watch.outcome.kind if self.watch.outcome is not None else ""
+
+    @property
+    def orders(self) -> list[Message]:
+        """What was sent that moves the vehicle: everything but requests for telemetry."""
+        return [each for each in self.client.sent if not harmless(each)]
+
+    def does(self, number: int, *params: float) -> Any:
+        """Return an event: somebody else gives a command."""
+        message = CommandLong(VEHICLE, number, 0, *map(float, params))
+        return lambda now: self.mock.on(Envelope(FOREIGN, message), now)
+
+    def sets(self, mode: int) -> Any:
+        """Return an event: the pilot sets a mode."""
+        return lambda now: self.mock.on(Envelope(FOREIGN, SetMode(1, 1, mode)), now)
+
+    def told(self, words: str) -> bool:
+        return any(words in text for text in self.watch.seen.told)
+
+
+def harmless(message: Message) -> bool:
+    asks = isinstance(message, CommandLong) and message.command == MavCommand.SET_INTERVAL
+    return asks or isinstance(message, MissionRequestInt)
+
+
+class AnotherStation(Machine[None]):
+    """A ground station that says once a second, from a given time on, that it is there."""
+
+    progress = ("being there", 0, 0)
+
+    def __init__(self, since: float = 0.0) -> None:
+        super().__init__()
+        self._since = since
+
+    def start(self, now: float) -> Sequence[Message]:
+        self._due = now + self._since
+        return ()
+
+    def _receive(self, *_: object) -> Sequence[Message]:
+        return ()
+
+    def _time_out(self, now: float) -> Sequence[Message]:
+        self._due = now + 1.0
+        return [Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, 4)]
+
+
+@KINDS
+@pytest.mark.parametrize("loss", [0.0, 0.05, 0.2])
+def test_armed_started_and_watched_to_the_end(kind: str, loss: float) -> None:
+    scene = Scene(kind, arm=True)
+    assert scene.run(Faults(loss=loss, seed=3)) == "finished"
+    assert not scene.mock.armed
+    kinds = [order.command for order in scene.orders if isinstance(order, CommandLong)]
+    assert kinds == sorted(kinds, reverse=True)  # 400 arms, then 300 starts
+    assert {*kinds} == {MavCommand.ARM, MavCommand.START}
+    samples, track = scene.watch.seen.samples, fly(a_mission(12))
+    assert (np.diff(samples.t) > 0).all()
+    assert max(samples.height) == pytest.approx(track.position[:, 2].max(), abs=0.5)
+    assert samples.height[-1] < 5
+    if not loss:
+        assert np.diff(samples.t).max() == pytest.approx(0.2, abs=0.06)
+
+
+@KINDS
+def test_without_arm_it_only_watches(kind: str) -> None:
+    scene = Scene(kind)
+    assert scene.run(until=20.0) == ""
+    assert not scene.mock.armed
+    scene = Scene(kind)
+    events = [(8.0, scene.does(MavCommand.ARM, 1)), (9.0, scene.does(MavCommand.START))]
+    assert scene.run(events=events) == "finished"
+    assert scene.orders == []
+
+
+@KINDS
+@LOSSES
+def test_a_pilot_has_the_aircraft_for_good(kind: str, loss: float) -> None:
+    scene = Scene(kind, arm=True)
+    sent: list[int] = []
+    events = [
+        (12.0, scene.sets(LOITER)),
+        (14.0, lambda _: sent.append(len(scene.orders))),
+        (20.0, scene.sets(AUTO[kind])),  # back to the mission: it stays the pilot's flight
+        (30.0, scene.sets(HOLD[kind])),
+        (40.0, scene.does(MavCommand.ARM, 0)),
+    ]
+    assert scene.run(Faults(loss=loss, seed=1), events=events) == "taken over"
+    assert len(scene.orders) == sent[0]
+    assert scene.told("the pilot or a failsafe has the aircraft; nothing more is sent")
+    assert scene.watch.seen.samples.t[-1] > 35
+
+
+def test_a_pilot_who_is_quicker_than_the_start() -> None:
+    scene = Scene("ardupilot", arm=True)
+    answer = scene.mock.on
+
+    def heedless(envelope: Envelope, now: float) -> Sequence[Message]:
+        """Arm, but say nothing about it: the answer is lost, and the pilot changes the mode."""
+        message = envelope.message
+        if isinstance(message, CommandLong) and message.command == MavCommand.ARM:
+            answer(envelope, now)
+            scene.sets(LOITER)(now)
+            return ()
+        return answer(envelope, now)
+
+    scene.mock.on = heedless  # type: ignore[method-assign]
+    assert scene.run(until=30.0) == ""
+    assert scene.watch.phase == "aside"
+    assert {order.command for order in scene.orders if isinstance(order, CommandLong)} == {400}
+
+
+@KINDS
+@LOSSES
+def test_interrupted_it_holds_and_interrupted_again_it_leaves(kind: str, loss: float) -> None:
+    scene = Scene(kind, arm=True)
+    modes: list[int] = []
+
+    def interrupt(now: float) -> None:
+        scene.client.sent += scene.watch.cancel(now)
+        for message in scene.client.sent[-1:]:  # what the link would have sent
+            scene.mock.on(Envelope(GROUND_STATION, message), now)
+
+    def look(now: float) -> None:
+        modes.append(scene.mock.mode)
+
+    events = [(12.0, interrupt), (25.0, look), (26.0, interrupt)]
+    assert scene.run(Faults(loss=loss, seed=2), events=events) == "left"
+    assert modes == [HOLD[kind]]
+    assert scene.mock.armed
+    assert scene.told("it holds")
+
+
+def test_a_flight_that_was_not_started_here_is_left_at_once() -> None:
+    scene = Scene("ardupilot")
+    events = [
+        (2.0, scene.does(MavCommand.ARM, 1)),
+        (3.0, scene.does(MavCommand.START)),
+        (12.0, scene.watch.cancel),
+    ]
+    assert scene.run(events=events) == "left"
+    assert scene.orders == []
+
+
+@KINDS
+def test_outages_are_told_and_survived(kind: str) -> None:
+    scene = Scene(kind, arm=True)
+    deaf: list[bool] = [False]
+    tick, on = scene.mock.tick, scene.mock.on
+    scene.mock.tick = lambda now: () if deaf[0] and tick(now) else tick(now)  # type: ignore
+    scene.mock.on = lambda *told: () if deaf[0] else on(*told)  # type: ignore
+
+    def switch(_: float) -> None:
+        deaf[0] = not deaf[0]
+
+    events = [(time, switch) for time in (10.0, 12.0, 15.0, 24.0)]
+    assert scene.run(events=events) == "finished"
+    assert scene.told("nothing heard for 5 s")
+    assert scene.told("heard again after 9 s")
+    assert sum("nothing heard" in text for text in scene.watch.seen.told) == 1
+
+
+def test_a_vehicle_that_is_never_heard_again_is_lost() -> None:
+    scene = Scene("ardupilot", arm=True)
+
+    def vanish(_: float) -> None:
+        scene.mock.tick = lambda *_: ()  # type: ignore[method-assign]
+        scene.mock.on = lambda *_: ()  # type: ignore[method-assign]
+
+    assert scene.run(events=[(12.0, vanish)]) == "lost"
+
+
+@KINDS
+def test_a_reboot_ends_it(kind: str) -> None:
+    scene = Scene(kind, arm=True)
+    assert scene.run(events=[(12.0, lambda now: scene.mock.reboot(now))]) == "rebooted"
+
+
+@KINDS
+def test_nothing_is_started_beside_another_ground_station(kind: str) -> None:
+    scene = Scene(kind, arm=True)
+    assert scene.run(others=[Station(AnotherStation(), FOREIGN)]) == "contested"
+    assert scene.orders == []
+    scene = Scene(kind, arm=True)
+    assert scene.run(others=[Station(AnotherStation(since=10.0), FOREIGN)]) == "finished"
+    assert scene.told("another ground station is on this link: system 250, component 190")
+
+
+@KINDS
+def test_a_mission_that_is_changed_underneath_ends_it(kind: str) -> None:
+    for started in (False, True):
+        scene = Scene(kind, arm=started)
+        rows = list(scene.mock.lists.items(MissionType.MISSION))
+        rows[5] = rows_for(kind, 12, shift=1e-4)[5]
+
+        def change(_: float, scene: Scene = scene, rows: Any = rows) -> None:
+            scene.mock.lists.replace(MissionType.MISSION, rows)
+
+        assert scene.run(events=[(9.0, change)]) == "changed"
+        scene = Scene(kind)
+        shorter = rows_for(kind, 12)[:-2]
+        scene.mock.lists.replace(MissionType.MISSION, shorter)
+        assert scene.run() == "changed"
+
+
+def test_it_waits_for_the_checks_and_says_why_they_do_not_pass() -> None:
+    scene = Scene("px4", arm=True, boot=20.0)
+    assert scene.run() == "finished"
+    scene = Scene("px4", arm=True, boot=1e9)
+    assert scene.run() == "refused"
+    assert scene.orders == []
+
+
+def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
+    away = Fence((), (Circle((HOME.latitude + 0.1, HOME.longitude), 50.0, inclusion=True),))
+    scene = Scene("ardupilot", a_mission(12, fence=away), arm=True, parameters={"FENCE_ENABLE": 1})
+    assert scene.run() == "refused"
+    assert [order.command for order in scene.orders if isinstance(order, CommandLong)] == [400]
+    scene = Scene(
+        "px4", Mission((MissionItem(22, 3, x=1.0, y=1.0, z=0.0),), Home(1, 1, 0)), arm=True
+    )
+    assert scene.run() == "refused"
+    orders = [each for each in scene.orders if isinstance(each, CommandLong)]
+    assert [(each.command, each.param1) for each in orders] == [(400, 1.0), (300, 0.0), (400, 0.0)]
+
+
+def test_what_is_armed_already_is_not_started() -> None:
+    scene = Scene("ardupilot", arm=True)
+    assert scene.run(events=[(0.5, scene.does(MavCommand.ARM, 1))]) == "refused"
+    assert scene.orders == []
+
+
+def test_a_mission_that_would_go_on_in_the_middle_is_not_started() -> None:
+    scene = Scene("ardupilot", arm=True)
+    assert scene.run(events=[(0.5, scene.does(MavCommand.SET_CURRENT, 5))]) == "refused"
+    assert scene.orders == []
+
+
+@KINDS
+def test_a_mission_that_ends_in_the_air_is_over_when_it_is_complete(kind: str) -> None:
+    hovering = Mission(a_mission(12).items[:-1], HOME)
+    scene = Scene(kind, hovering, arm=True, lands=False)
+    assert scene.run() == "finished"
+    assert scene.mock.armed
+
+
+def test_a_crash_is_no_end_of_the_mission() -> None:
+    scene = Scene("ardupilot", arm=True)
+    assert scene.run(events=[(12.0, scene.does(MavCommand.ARM, 0))]) == "taken over"
