@@ -97,6 +97,7 @@ def test_every_public_name_can_be_had() -> None:
         ("import faao_mav.cli.validate", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
         ("import faao_mav.mavlink.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
         ("import faao_mav.cli.upload, faao_mav.cli.download", {"numpy", "pymavlink"}),
+        ("import faao_mav.cli.fly, faao_mav.cli.debrief", {"numpy", "pymavlink", "pydantic"}),
         ("import faao_mav.cli.autopilot", {"numpy", "pymavlink"}),
         ("import faao_mav.cli.study", {"numpy", "joblib", "matplotlib"}),
         ("import faao_mav.study", {"scipy", "cvxpy", "joblib", "matplotlib", "pyproj"}),

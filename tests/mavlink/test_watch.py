@@ -305,6 +305,18 @@ def test_a_mission_that_ends_in_the_air_is_over_when_it_is_complete(kind: str) -
     assert scene.mock.armed
 
 
+@LOSSES
+def test_a_return_has_a_mode_of_its_own_and_is_the_missions(loss: float) -> None:
+    scene = Scene("px4", arm=True)
+    modes: set[int] = set()
+    events: list[tuple[float, Any]] = [(115.0, lambda _: modes.add(scene.mock.mode))]
+    assert scene.run(Faults(loss=loss, seed=4), events=events) == "finished"
+    assert modes == {4 << 16 | 5 << 24}
+    scene = Scene("px4", arm=True)
+    events = [(12.0, scene.sets(4 << 16 | 5 << 24)), (30.0, scene.does(MavCommand.ARM, 0))]
+    assert scene.run(Faults(loss=loss, seed=4), events=events) == "taken over"
+
+
 def test_a_crash_is_no_end_of_the_mission() -> None:
     scene = Scene("ardupilot", arm=True)
     assert scene.run(events=[(12.0, scene.does(MavCommand.ARM, 0))]) == "taken over"

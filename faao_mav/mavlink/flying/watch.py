@@ -41,6 +41,10 @@ MAVLink guide has it for missions."""
 _REBOOT = 1.5
 """Seconds in which a vehicle that is not armed any more can show that it has rebooted; chosen."""
 
+_LATE_NEWS = 3.0
+"""Seconds after a change of mode in which the last item may still be told to be under way: then it
+was the mission that changed it. Chosen: three of the messages that tell the item."""
+
 _FIRST_DO = 176
 """From this command on an item is no place to fly to or to wait at."""
 
@@ -85,6 +89,7 @@ class Watch(Machine[Ending]):
         self._begun = 0.0
         self._furthest = 0
         self._armed = False
+        self._aside_since = float("-inf")
         self._disarmed_at: float | None = None
         self._mode_before = -1
         self._command: Callable[[], Message] | None = None
@@ -122,7 +127,7 @@ class Watch(Machine[Ending]):
             case Heartbeat() as heartbeat:
                 self._on_heartbeat(heartbeat, now)
             case MissionCurrent() as current:
-                self._on_current(current)
+                self._on_current(current, now)
             case CommandAck(target, command, result) if self._peer.own.takes(target):
                 return self._on_ack(command, result, now)
         return ()
@@ -142,9 +147,14 @@ class Watch(Machine[Ending]):
 
     # ---- what the vehicle does
 
-    def _on_current(self, current: MissionCurrent) -> None:
+    def _on_current(self, current: MissionCurrent, now: float) -> None:
         if self.phase in ("flying", "holding", "ending"):
             self._furthest = max(self._furthest, current.seq)
+        late_news = self.phase == "aside" and now < self._aside_since + _LATE_NEWS
+        if late_news and current.seq >= self._last > self._furthest:
+            self.seen.told.append("it is the mission that changed the mode, at its last item")
+            self._furthest = current.seq
+            self._over()
         if current.mission_state == MISSION_COMPLETE and self.phase == "flying":
             self._over()
 
@@ -164,6 +174,7 @@ class Watch(Machine[Ending]):
             case "flying" if mode != mission and self._furthest >= self._last:
                 self._over()  # the last item has a mode of its own, as PX4's return
             case "flying" if mode != mission:
+                self._aside_since = now
                 self._step_aside()
             case "holding" if mode == hold and self._command is not None:
                 self._command = None

@@ -51,6 +51,7 @@ class ArduPilotFirmware(MockFirmware):
     mission_limit = 655  # as in its simulator
     fence_texts = (Statustext(MavSeverity.NOTICE, "Polygon fence breached"),)
     armed_inside_only = True
+    returns_by_mode = frozenset({"plane"})
     parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
     misplaced = MavResult.UNSUPPORTED
     nonsense = MavResult.INVALID

@@ -106,6 +106,7 @@ class MockFirmware(ABC):
         nonsense: the answer to commands 0 and 1.
         silent_at_boot: it answers nothing about lists before it is ready.
         numbers_missions: its MISSION_CURRENT has a number for the mission.
+        returns_by_mode: the types of vehicle that change their mode when a mission has them return.
         fence_texts: what it says when it leaves the fence.
         armed_inside_only: it does not arm where home lies outside the fence.
     """
@@ -117,6 +118,7 @@ class MockFirmware(ABC):
     nonsense: ClassVar[MavResult]
     silent_at_boot: ClassVar[bool] = False
     numbers_missions: ClassVar[bool] = False
+    returns_by_mode: ClassVar[frozenset[str]] = frozenset()
     fence_texts: ClassVar[tuple[Statustext, ...]]
     armed_inside_only: ClassVar[bool] = False
 

@@ -46,6 +46,7 @@ from faao_mav.mavlink.protocol import (
     MissionType,
 )
 from faao_mav.mavlink.wire_items import home_items, mission_of
+from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
 from faao_mav.vehicle import Track, Vehicle, vehicle_type
 
@@ -299,12 +300,19 @@ class MockAutopilot(Machine[None]):
         current = flight.at(now).item + self._first_number()
         if current != self._current:
             self._current = current
+            if self.vehicle.kind in self._firmware.returns_by_mode and self._is_return(current):
+                self._mode = self._modes.at_fence["return"]
+                out.append(self._heartbeat())
             out.append(self._mission_current(now))
         if flight.ended(now) and flight.lands:
             self._rest, self._flight, self.armed = flight.at(now), None, False
             out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
             out.append(self._heartbeat())
         return out
+
+    def _is_return(self, seq: int) -> bool:
+        rows = self.lists.items(MissionType.MISSION)
+        return seq < len(rows) and rows[seq].command == Command.NAV_RETURN_TO_LAUNCH
 
     def _is_kept_on_ground(self) -> bool:
         """Tell whether it does not arm because of its fence."""

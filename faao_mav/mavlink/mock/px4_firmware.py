@@ -59,6 +59,7 @@ class Px4Firmware(MockFirmware):
     family = PX4
     mission_limit = 1000
     numbers_missions = True
+    returns_by_mode = frozenset({"copter", "plane"})
     fence_texts = (
         Statustext(MavSeverity.CRITICAL, "Geofence: approaching or outside geofence"),
         _said("Failsafe activated"),

@@ -1,0 +1,76 @@
+"""`fly` and `debrief` on the command line: what they refuse, and what they compare first."""
+
+import json
+from pathlib import Path
+
+import pytest
+from conftest import FLYABLE, free_port
+from served import running
+from typer.testing import CliRunner, Result
+
+from faao_mav.cli.main import app
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.formats import render_mission
+
+HOME = Home(-35.363262, 149.165237, 584.0)
+LOG = Path(__file__).parent / "data" / "logs" / "arducopter.tlog"
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def mission(tmp_path: Path) -> Path:
+    up, over = (
+        MissionItem(command, 3, x=HOME.latitude, y=HOME.longitude, z=height)
+        for command, height in ((22, 20.0), (16, 30.0))
+    )
+    path = tmp_path / "mission.waypoints"
+    path.write_text(render_mission(Mission((up, over, MissionItem(20, 2)), HOME), path))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("fly", "missing.waypoints", "--to", "udpout:127.0.0.1:1"), "missing.waypoints"),
+        (("fly", "{mission}", "--to", "nowhere"), "nowhere"),
+        (
+            ("fly", "{mission}", "--to", "udpout:127.0.0.1:1", "--plan", "a", "--solution", "b"),
+            "--plan and --solution: give one",
+        ),
+        (("debrief", LOG), "--plan or --solution: give the plan that was flown"),
+        (("debrief", "flight.txt", "--plan", "a.yaml"), "give a flight log: .bin, .tlog, .ulg"),
+        (("debrief", LOG, "--plan", "a.yaml", "--report", "page.txt"), "--report"),
+    ],
+)
+def test_unusable_arguments(mission: Path, arguments: tuple[object, ...], told: str) -> None:
+    result = run(*(str(each).format(mission=mission) for each in arguments))
+    assert result.exit_code == 2
+    assert told in result.output
+    assert "Traceback" not in result.output
+
+
+def test_a_flight_of_another_plan_is_not_in_the_log(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(FLYABLE)
+    result = run("debrief", LOG, "--plan", plan)
+    assert result.exit_code == 1
+    assert "the plan's flight is not in it" in result.output
+
+
+def test_another_mission_is_not_flown(mission: Path) -> None:
+    port = free_port()
+    connection = f"udpout:127.0.0.1:{port}"
+    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        assert run("upload", mission, "--to", connection).exit_code == 0
+        mission.write_text(mission.read_text().replace("30", "40"))
+        result = run("fly", mission, "--to", connection, "--arm", "--json")
+        assert result.exit_code == 1
+        told = json.loads(result.stdout.splitlines()[-1])
+        assert told["ending"] == "different"
+        assert told["differences"] == ["mission item 1: z: sent 40.0, found 30.0"]
+        assert not mock.armed
