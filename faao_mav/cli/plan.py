@@ -27,7 +27,7 @@ def plan(
     ] = None,
     save: Annotated[File, option("RESULT.npz", "Write trajectory, precoders and rates.")] = None,
     precoders: Annotated[
-        File, option("TABLE.csv", "Write the precoders by time and position.")
+        File, option("TABLE.csv", "Write the precoders by time and place.")
     ] = None,
     report: Annotated[File, option("FILE.html", "Write a page about the flight.")] = None,
     figure: Annotated[File, option("FILE", "Draw the flight: .png, .svg or .pdf.")] = None,
@@ -90,7 +90,7 @@ def plan(
         except FaaoError as error:  # told after the result
             failure = error
     if not quiet or as_json:
-        _show(result, written, uploaded, as_json)
+        _show(result, written, precoders, uploaded, as_json)
     if failure is not None:
         raise failure
     if not sound or (uploaded is not None and not uploaded.verified):
@@ -194,7 +194,11 @@ def _upload(
 
 
 def _show(
-    result: "Result", written: list[Path], uploaded: "UploadReport | None", as_json: bool
+    result: "Result",
+    written: list[Path],
+    precoders: Path | None,
+    uploaded: "UploadReport | None",
+    as_json: bool,
 ) -> None:
     from faao_mav.cli import upload
     from faao_mav.report import summary
@@ -203,6 +207,6 @@ def _show(
         told = upload.as_dict(uploaded) if uploaded is not None else None
         typer.echo(json.dumps(result.as_dict() | {"upload": told}, allow_nan=False))
         return
-    typer.echo(summary(result, written))
+    typer.echo(summary(result, written, precoders))
     if uploaded is not None:
         typer.echo(upload.as_text(uploaded))

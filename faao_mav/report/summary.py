@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from faao_mav.plan import Plan
+from faao_mav.schedule.precoder_table import taken_by
 from faao_mav.validate import Finding, Level
 from faao_mav.validate.check import Check
 from faao_mav.validate.demands import LinkCheck
@@ -28,10 +29,16 @@ _MAX_RUNS_SHOWN = 8
 """Runs of item numbers that are named in one line; chosen: about a line of a terminal."""
 
 
-def summary(result: Result, written: Sequence[Path] = ()) -> str:
-    """Return the text that the main job prints: `result`, and the files that were `written`."""
+def summary(
+    result: Result, written: Sequence[Path] = (), precoder_table: Path | None = None
+) -> str:
+    """Return the text that the main job prints: `result`, and the files that were `written`.
+
+    Of a `precoder_table` among them it says which rows a late aircraft takes.
+    """
     lines = [*result_lines(result), *_checked(result)]
-    lines += [("written", str(path)) for path in written]
+    rows = f": a late aircraft takes the row of the {taken_by(result.solution.plan)}"
+    lines += [("written", f"{path}{rows if path == precoder_table else ''}") for path in written]
     if not written:
         lines.append(("written", "nothing: give --out MISSION.waypoints"))
     name = result.solution.plan.name

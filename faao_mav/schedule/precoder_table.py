@@ -1,12 +1,25 @@
-"""The precoders of every slot as a table that a radio can go by: by time or by position."""
+"""The precoders of every slot as a table that a radio can go by: by time or by place."""
 
 import io
+from typing import Literal
 
 import numpy as np
 
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
+
+
+def taken_by(plan: Plan) -> Literal["time", "place"]:
+    """Return by what a radio takes a row of the table, which matters when the aircraft is late.
+
+    Without fading, or with precoders for its mean (`radio.fading: none`, `ergodic`), by the nearest
+    place: they belong to the line of sight there. With a known draw for each slot
+    (`radio.fading: realization`) by time: the draw is the slot's, wherever the aircraft is (2.436
+    bit/s/Hz by time, 2.358 by place, on a flight with such draws).
+    """
+    return "time" if plan.radio.fading == "realization" else "place"
 
 
 def precoder_table(solution: Solution) -> str:
@@ -14,14 +27,9 @@ def precoder_table(solution: Solution) -> str:
 
     Columns: `slot`; `t_s`, when it begins on the plan's clock, s; `east_m`, `north_m`,
     `latitude_deg`, `longitude_deg`, where the aircraft then is; in half duplex `receive_share`, the
-    share of the slot in which it receives, before it sends; and the entries of P_B and P_U,
-    row by row, sqrt(W), each as `P_B_1_1_re`, `P_B_1_1_im`.
-
-    Which row a radio takes depends on the fading. Without fading, or with precoders for its mean
-    (`radio.fading: none`, `ergodic`), that of the nearest place (`nearest_slots`): they belong to
-    the line of sight there, and stay right when the aircraft is early or late. With a known draw
-    for each slot (`radio.fading: realization`) that of the time: the draw is the slot's, wherever
-    the aircraft is (2.436 bit/s/Hz by time, 2.358 by place, on a flight with such draws).
+    share of the slot in which it receives, before it sends; the entries of P_B and P_U, row by
+    row, sqrt(W), each as `P_B_1_1_re`, `P_B_1_1_im`; and `taken_by`: `time` where a late aircraft
+    takes the row of the time, `place` where that of the nearest place (see `taken_by`).
 
     Raises `InputError` for precoders that know the fading's draw: they are no table of slots.
     """
@@ -45,6 +53,7 @@ def precoder_table(solution: Solution) -> str:
         flat = P.reshape(len(P), -1)
         columns += list(np.stack([flat.real, flat.imag], axis=-1).reshape(len(P), -1).T)
     text = io.StringIO()
-    formats = ["%d"] + ["%.12g"] * (len(names) - 1)
-    np.savetxt(text, np.stack(columns, axis=1), formats, ",", header=",".join(names), comments="")
+    formats = ",".join(["%d"] + ["%.12g"] * (len(names) - 1) + [taken_by(solution.plan)])
+    header = ",".join([*names, "taken_by"])
+    np.savetxt(text, np.stack(columns, axis=1), formats, header=header, comments="")
     return text.getvalue()

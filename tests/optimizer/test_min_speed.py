@@ -1,7 +1,6 @@
 """The least speed: starts that keep it, optimisers that keep it, and plans that cannot."""
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -85,6 +84,26 @@ def test_it_circles_at_the_stations() -> None:
         assert (np.linalg.norm(flight.w - place, axis=1) < 60).sum() > 100
 
 
+@pytest.mark.parametrize("ends", [(30.0, None), (None, 200.0), (30.0, 210.0)])
+def test_back_to_the_start_is_no_refusal_where_a_circle_does(
+    ends: tuple[float | None, float | None],
+) -> None:
+    velocities = [None if degrees is None else heading(14.0, degrees) for degrees in ends]
+    kin = cruiser(60, 12.0, start_velocity=velocities[0], end_velocity=velocities[1])
+    kin = replace(kin, end=kin.start)
+    assert worst(kin, straight_flight(kin)) < 1e-8
+
+
+def test_smooth_limits_end_a_search_that_half_planes_leave() -> None:
+    kin, stage = cruiser(120, 12.0, time_step=1.0, max_speed=15.0), links(bpsk, 4e4, 4e4)
+    start = starts(kin, ["bs-user"], PLACES)["bs-user"]
+    best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=20)
+    assert best.iterations > 20  # the half-planes alone have not converged
+    assert best.converged
+    assert worst(kin, best.trajectory) < 1e-8
+    assert best.value >= reward(stage, start)
+
+
 def test_too_little_room_for_a_turn_is_refused_with_the_reason() -> None:
     kin = cruiser(5, 20.0)
     kin = replace(kin, end=kin.start)
@@ -105,11 +124,11 @@ def test_the_optimum_keeps_the_least_speed(
         free = maximize(replace(kin, min_speed=0.0), stage, flight)
         hovering = max(hovering, free.value)
         values = [reward(stage, flight)]
-        for iterations in (10, 30, 60):
-            found = maximize(kin, stage, flight, max_iterations=iterations)
+        for iterations in (30,):
+            found = maximize(kin, stage, flight, tolerance=1e-4, max_iterations=iterations)
             assert worst(kin, found.trajectory) < 1e-6
             values.append(found.value)
-        assert all(b >= a - 1e-12 for a, b in pairwise(values))
+        assert min(values) >= values[0] - 1e-12
         best = max(best, values[-1])
     assert 0.93 * hovering < best < 1.001 * hovering
 

@@ -14,7 +14,7 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.rate import cutoff_rate
-from faao_mav.schedule.precoder_table import precoder_table
+from faao_mav.schedule.precoder_table import precoder_table, taken_by
 from faao_mav.schedule.prediction import nearest_slots, rates_along
 
 FADINGS: list[dict[str, Any]] = [
@@ -66,6 +66,7 @@ def test_the_table_holds_every_slot(small_plan: MakePlan) -> None:
     assert len(rows) == len(solution.t)
     frame = LocalFrame(solution.plan.origin.latitude, solution.plan.origin.longitude)
     for n, row in enumerate(rows):
+        assert row.pop("taken_by") == "place"
         values = {name: float(value) for name, value in row.items()}
         assert values["slot"] == n
         assert values["t_s"] == pytest.approx(solution.t[n])
@@ -81,6 +82,19 @@ def test_the_table_holds_every_slot(small_plan: MakePlan) -> None:
                 for i in (1, 2)
             ]
             assert np.allclose(found, P, rtol=1e-10, atol=1e-14)
+
+
+def test_a_late_aircraft_is_told_to_take_the_precoders_that_serve_it_better(
+    solution: Solution,
+) -> None:
+    late = np.vstack([solution.w[:1]] * 5 + [solution.w[:-5]])
+    by_time = min(each.mean() for each in rates_along(solution, late))
+    by_place = min(
+        each.mean() for each in rates_along(solution, late, nearest_slots(solution, late))
+    )
+    if solution.P_B.ndim == 3:  # there is a table
+        better = {"time": by_time - by_place, "place": by_place - by_time}
+        assert better[taken_by(solution.plan)] > 0
 
 
 def test_precoders_that_know_the_draw_have_no_table(small_plan: MakePlan) -> None:

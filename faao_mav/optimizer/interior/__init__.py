@@ -18,7 +18,8 @@ Lifecycle. `maximize.maximize` (or `maximize_all`, from many starts side by side
 `search.Search`: it scales the rewards (`rewards`), lays out the Newton matrix (`banded`) and lets
 every constraint begin its state. Per iteration: measure the residual, factor (`newton`), predict,
 choose the barrier parameter mu, correct, move. At the end the speeds are integrated to a flight
-that is exact in (11), (12) and (13d).
+that is exact in (11), (12) and (13d). Searches with a least speed that have not converged by then
+go on with the limits of `smooth`, whose curvature counts.
 
 Units inside: lengths in 100 m, speeds in v_max, accelerations in a_max, rewards summed over the
 slots and divided by the largest gradient at the start.

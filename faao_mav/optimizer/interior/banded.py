@@ -26,6 +26,10 @@ SIZE = 8
 W, V, Q, Y = (slice(2 * part, 2 * part + 2) for part in range(4))
 """Where the unknowns of a slot are."""
 
+_PENALTY = 1e6
+"""What a squared miss of the equations of motion weighs where signs of curvature are told: far more
+than any curvature of a reward, which are of the order of one. 1e4 and 1e8 do as well."""
+
 _EAST, _NORTH = slice(0, Y.start, 2), slice(1, Y.start, 2)  # of w, v and q
 _UNIT = np.array([1.0, 0.0, 1.0])[:, None, None]
 
@@ -129,6 +133,53 @@ class FlightMatrix:
             if info == 0:
                 return Factors(lu, pivots, band, sound)
             sound[(info - 1) // (self.size * self.slots)] = False
+
+    def positive(self, at_w: Real, at_v: Real, at_a: Real) -> Flags:
+        """Tell whether M + Dᵀ C⁻¹ D is positive definite where A (w, v) = 0, (flights, 1).
+
+        M is as in `factor`; `at_a` (3, flights, n) is C⁻¹, its last slot unused. With a large
+        multiple of AᵀA added it is so for every (w, v), which Cholesky's factors tell.
+        """
+        flights, n = at_w.shape[1:]
+        h, rho, size = self.half_step, _PENALTY, V.stop
+        one, moves = np.ones(n - 1), self._moves[:size]
+        cells = np.zeros((flights, n, size, 2 * size))  # the lower band: columns, rows below
+
+        def add(row: int, column: int, values: Real, ahead: int = 0) -> None:
+            """Add `values` in slots n + `ahead` (rows) and n (columns)."""
+            later, count = slice(ahead, None), n - ahead
+            moved = values * moves[row][later] * moves[column][:count]
+            cells[:, :count, column, row - column + size * ahead] += moved
+
+        stiff = at_a[..., :-1]
+        pairs = np.zeros_like(at_v)
+        pairs[..., :-1] += stiff
+        pairs[..., 1:] += stiff
+        inner = np.append(one, 0) + np.append(0, one)
+        ends = np.append(one, 0) - np.append(0, one)
+        for block, first in ((at_w, W.start), (at_v + pairs, V.start)):
+            for k, (row, column) in enumerate(((0, 0), (1, 0), (1, 1))):
+                add(first + row, first + column, block[k])
+        for k, (row, column) in ((0, (0, 0)), (1, (1, 0)), (1, (0, 1)), (2, (1, 1))):
+            add(V.start + row, V.start + column, -stiff[k], 1)
+        for w, v in ((0, 2), (1, 3)):
+            add(w, w, rho * inner)
+            add(v, v, rho * h * h * inner)
+            add(v, w, rho * h * ends)
+            add(w, w, -rho * one, 1)
+            add(v, v, rho * h * h * one, 1)
+            add(v, w, rho * h * one, 1)
+            add(w, v, -rho * h * one, 1)
+        for column, moving in enumerate(moves):
+            cells[:, moving == 0, column, 0] = 1
+        sound = np.asarray(np.isfinite(cells).all(axis=(1, 2, 3)))
+        while True:
+            cells[~sound] = 0
+            cells[~sound, :, :, 0] = 1
+            _, info = lapack.dpbtrf(cells.reshape(-1, 2 * size).T, lower=1)
+            if info == 0:
+                return np.asarray(sound[:, None])
+            sound[(info - 1) // (size * n)] = False
 
     def _band(self, blocks: Real, entries: Sequence[Entry], sound: Flags) -> Real:
         """Return K in LAPACK's band storage, from (w v q, xx xy yy, flights, n).

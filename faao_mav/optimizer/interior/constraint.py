@@ -59,7 +59,9 @@ class Stiffness:
     `compliance` is the inverse of `a`, for a constraint that knows it better than by inversion.
     `entries` are those of the constraint's own unknowns, of which the proximal term holds the
     places `held` as it does w. `curvature` (3, flights, n) is that of its functions of w, weighted
-    by their multipliers, which is cut where it has the wrong sign.
+    by their multipliers, which is cut where it has the wrong sign. `turning` (flights, n), at most
+    0, times the identity is the part of K on v that only as large a share of counts as leaves the
+    model concave; the first constraint is then no `FlightLimits`.
     """
 
     w: Real | float = 0.0
@@ -69,6 +71,7 @@ class Stiffness:
     entries: Sequence[Entry] = ()
     curvature: Real | float = 0.0
     held: Sequence[int] = ()
+    turning: Real | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,9 @@ half-planes turn with every step (successive convex approximation, one Newton st
 curvature of g is left out, for it misleads. Where x_n is fixed the slot is off: s = 1, z = 0, no
 force.
 
+Near an optimum the curvature serves: a g whose Hessian is `bend` times the identity says so. Its
+slacks then follow g to first order only, and what is missed in second order is its margin.
+
 A new constraint of this kind is one class with two members, `MinSpeedConstraint` for example:
 
     class NorthOf(HalfPlanes):
@@ -68,7 +71,7 @@ class Slacks(State):
         """Return the largest margin, (flights, 1)."""
         return largest(self.margin)
 
-    def target(self, mu: Real, ahead: tuple[Real, Real], share: Real) -> Real:
+    def target(self, mu: Real, ahead: tuple[Real, ...], share: Real) -> Real:
         """Return (mu - ds dz) / s at `share` of the step `ahead`."""
         return np.asarray((self.on * mu - ahead[0] * ahead[1] * share**2) / self.s)
 
@@ -82,7 +85,7 @@ class Slacks(State):
         ds = step[0] + self.margin
         return summed(self.z / self.s * ds * ds)
 
-    def reach(self, step: tuple[Real, Real]) -> Real:
+    def reach(self, step: tuple[Real, ...]) -> Real:
         """Return the share of `step` at which a slack or a multiplier vanishes, (flights, 1)."""
         falls = np.maximum(
             -step[0] * self.on / self.s, -step[1] * self.on / np.maximum(self.z, TINY)
@@ -104,9 +107,13 @@ class HalfPlanesState(Slacks):
         return self._on_quantity(self.z)
 
     def stiffness(self) -> Stiffness:
-        """Return z / s u u^T."""
+        """Return z / s u u^T - `bend` z I."""
         x, y = self.u
         packed: Any = _per_slot(self.z / self.s * np.stack([x * x, x * y, y * y]))
+        curved = -self.constraint.bend * self.z
+        if self.constraint.bend > 0:
+            return Stiffness(**{self.constraint.quantity: packed}, turning=curved)
+        packed[::2] += curved
         return Stiffness(**{self.constraint.quantity: packed})
 
     def push(self, target: Real | None) -> Forces:
@@ -118,20 +125,33 @@ class HalfPlanesState(Slacks):
         move: Move,
         target: Real | None,
         rest: Forces,  # noqa: ARG002
-    ) -> tuple[tuple[Real, Real], Forces]:
+    ) -> tuple[tuple[Real, Real, Real], Forces]:
         """Return the change of the linear slack along `move`, with that of its multiplier."""
         dx = self.constraint.bounded(self.flight, move.w, move.v)
         ds = np.asarray(self.u[0] * dx[0] + self.u[1] * dx[1] - self.margin)
         z = self.raised(ds, target)
-        return (ds, z - self.z), self._on_quantity(z)
+        bent = max(0.0, -self.constraint.bend) * summed(self.z * (dx * dx).sum(axis=0))
+        return (ds, z - self.z, bent), self._on_quantity(z)
+
+    def curvature(self, step: Any) -> Real:
+        """Return the sum of z / s ds^2 and of what g curves towards a maximum, (flights, 1)."""
+        return np.asarray(super().curvature(step[:2]) + step[2])
+
+    def violation(self) -> Real:
+        """Return the largest margin; what is missed in second order counts tenfold."""
+        return super().violation() * (10 if self.constraint.bend else 1)
 
     def moved(
-        self, w: Real, v: Real, share: Real | float, step: tuple[Real, Real]
+        self, w: Real, v: Real, share: Real | float, step: tuple[Real, ...]
     ) -> "HalfPlanesState":
         """Return the state after `share` of `step`, with g and u at w and v."""
         g, u = self.constraint.slack(self.constraint.bounded(self.flight, w, v))
-        margin = self.margin * (1 - share)
-        s = np.where(self.on > 0, g - self.constraint.inside + margin, 1.0)
+        if self.constraint.bend:
+            s = self.s + share * step[0] * self.on
+            margin = (s - g + self.constraint.inside) * self.on
+        else:
+            margin = self.margin * (1 - share)
+            s = np.where(self.on > 0, g - self.constraint.inside + margin, 1.0)
         return replace(self, s=s, z=self.z + share * step[1], margin=margin, u=u * self.on)
 
     def centred(self, mu: Real) -> "HalfPlanesState":
@@ -167,6 +187,11 @@ class HalfPlanes(Constraint):
         """The slack that starts are given where they have less. Chosen, as 10 m or v_max / 10."""
         return 0.1
 
+    @property
+    def bend(self) -> float:
+        """The curvature of g, in multiples of the identity, where it is to count; 0 if not."""
+        return 0.0
+
     @abstractmethod
     def slack(self, x: Real) -> tuple[Real, Real]:
         """Return g (flights, n) and its gradient (2, flights, n) at x (2, flights, n).
@@ -190,8 +215,9 @@ class HalfPlanes(Constraint):
         g, u = self.slack(x)
         on, none = self.held(flight, g.shape), np.zeros(g.shape)
         margin = on * np.maximum(0, self.inside + self.headroom - g)
-        unset = HalfPlanesState(on, none, none, margin, self, flight, u)
-        return unset.moved(start.w, start.v, 0.0, (none, none)).centred(start.mu)
+        s = np.where(on > 0, g - self.inside + margin, 1.0)
+        unset = HalfPlanesState(on, s, none, margin, self, flight, u * on)
+        return unset.centred(start.mu)
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:
         """Return the largest -g of the flight, 0 where there is none."""

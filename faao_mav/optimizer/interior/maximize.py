@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,12 +12,18 @@ from faao_mav.optimizer.interior.limits import AirspeedLimit, FlightLimits
 from faao_mav.optimizer.interior.min_speed import MinSpeedConstraint
 from faao_mav.optimizer.interior.queue import Queue, QueueRewards
 from faao_mav.optimizer.interior.rewards import ScaledRewards, Stage
-from faao_mav.optimizer.interior.search import COLD_START, Search, StartStrategy
+from faao_mav.optimizer.interior.search import COLD_START, FINISHES, Search, StartStrategy
+from faao_mav.optimizer.interior.smooth import smooth_limits
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
 
 _ALLOWED = 1e-9
 """The violation of a limit, relative to it, that a flight may have: rounding of 1,000s of slots."""
+
+
+_LAST_STEPS, _LAST_SHARE = 150, 3
+"""Steps at most of each search with curvature that ends one with a least speed, and in multiples of
+those that the search before it may take. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +97,34 @@ def maximize_all(
     relay: RelayQueue | None = None,
 ) -> list[LocalOptimum]:
     """Return what `maximize` finds from each of the `starts`; the searches run side by side."""
-    w, v = (np.stack(each, axis=1) for each in zip(*((s.w.T, s.v.T) for s in starts), strict=True))
     kept = (*constraints_of(kin), *constraints)
+    optima = _optima(kin, stage, starts, kept, tolerance, max_iterations, strategy, relay)
+    for finish in FINISHES if kin.min_speed > 0 else ():
+        left = [k for k, optimum in enumerate(optima) if not optimum.converged]
+        if not left:
+            break
+        near, kept = [optima[k].trajectory for k in left], (*smooth_limits(kin), *constraints)
+        steps = min(_LAST_STEPS, _LAST_SHARE * max_iterations)
+        ends = _optima(kin, stage, near, kept, tolerance, steps, finish, relay)
+        for k, end in zip(left, ends, strict=True):
+            taken = optima[k].iterations + end.iterations
+            further = end.converged or end.value > optima[k].value
+            optima[k] = replace(end if further else optima[k], iterations=taken)
+    return optima
+
+
+def _optima(
+    kin: Kinematics,
+    stage: Stage,
+    starts: Sequence[Trajectory],
+    kept: Sequence[Constraint],
+    tolerance: float,
+    max_iterations: int,
+    strategy: StartStrategy,
+    relay: RelayQueue | None,
+) -> list[LocalOptimum]:
+    """Return what one search from each of the `starts` within the limits `kept` finds."""
+    w, v = (np.stack(each, axis=1) for each in zip(*((s.w.T, s.v.T) for s in starts), strict=True))
     if relay is None:
         rewards = ScaledRewards(stage, w)
     else:
@@ -116,9 +148,12 @@ def maximize_all(
             optima.append(LocalOptimum(start, least, lowest / lowest.sum(), 0, 0.0, True))
             continue
         end = results[k]
-        flight, value = (flights[k], value) if value >= least else (start, least)
+        better = value >= least
+        flight, value = (flights[k], value) if better else (start, least)
+        # inside a search that keeps its limits a start is as good an end as any; else it is none
+        converged = end.converged and (better or isinstance(kept[0], FlightLimits))
         optima.append(
-            LocalOptimum(flight, value, end.weights, end.iterations, end.residual, end.converged)
+            LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
         )
     return optima
 

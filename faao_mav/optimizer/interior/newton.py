@@ -29,6 +29,7 @@ from faao_mav.optimizer.interior.constraint import (
     Stiffness,
     added,
     quadratic,
+    summed,
 )
 from faao_mav.optimizer.interior.iterate import Direction, Iterate
 
@@ -47,6 +48,9 @@ class Newton:
     """The factored system at an iterate; `curvature` (3, flights, n) is H with its proximal term.
 
     `proximal` (flights, 1) is that term, which holds the places `held` of a slot's unknowns too.
+    `turning` (flights, n), 0 or less, times the identity is what constraints on the speeds curve
+    away from a maximum, or the share of it that leaves the model concave.
+
     `columns` are the solutions for the gradients of the F_j, and for mu = 0 without correction;
     `border` (flights, J, J) is what the first ones leave for the weights.
     """
@@ -57,6 +61,7 @@ class Newton:
     proximal: Real
     held: Sequence[int]
     curvature: Real
+    turning: Real | float
     compliance: Real
     factors: Factors
     columns: Real
@@ -89,9 +94,15 @@ class Newton:
         held = [place for each in stiffness for place in each.held]
         entries = [entry for each in stiffness for entry in each.entries]
         entries += [Entry(place, place, np.repeat(proximal, n, axis=1)) for place in held]
+        on_w = np.asarray(added([curvature, *(each.w for each in stiffness)]))
+        on_v = np.asarray(added(each.v for each in stiffness))
+        turning = added(each.turning for each in stiffness)
+        if isinstance(turning, np.ndarray):
+            turning = turning * _concave_share(flight, on_w, on_v, compliance, turning)
+            on_v[::2] += turning
         factors = matrix.factor(
-            np.asarray(added([curvature, *(each.w for each in stiffness)])),
-            np.asarray(added(each.v for each in stiffness)),
+            on_w,
+            on_v,
             compliance,
             entries,
         )
@@ -113,6 +124,7 @@ class Newton:
             proximal,
             held,
             curvature,
+            turning,
             compliance,
             factors,
             columns,
@@ -189,10 +201,31 @@ class Newton:
         """Return the curvature of the whole model along a `direction` of `bend`, (flights, 1)."""
         at = self.at
         kink = at.weights / (at.total - at.floor) * (direction.total - direction.floor) ** 2
+        bend = bend + summed(self.turning * (direction.move.v**2).sum(axis=0))
         of_constraints = [
             state.curvature(step) for state, step in zip(at.states, direction.steps, strict=True)
         ]
         return np.asarray(reduce(np.add, of_constraints, bend) + kink.sum(axis=0))
+
+
+_SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0)
+"""Shares of the constraints' curvature that are tried. Chosen."""
+
+
+def _concave_share(
+    flight: ScaledFlight, on_w: Real, on_v: Real, compliance: Real, turning: Real
+) -> Real:
+    """Return the largest share (flights, 1) of `turning` with which the model is concave."""
+    xx, xy, yy = compliance
+    on_a = np.stack([yy, -xy, xx]) / (xx * yy - xy * xy)
+    share, curved = np.full((on_w.shape[1], 1), _SHARES[0]), on_v.copy()
+    for lower in _SHARES[1:]:
+        curved[::2] = on_v[::2] + share * turning
+        sound = flight.matrix.positive(on_w, curved, on_a)
+        if sound.all():
+            break
+        share = np.where(sound, share, lower)
+    return share
 
 
 def _load(right: Real, flight: ScaledFlight, compliance: Real, pushes: list[Forces]) -> None:

@@ -131,6 +131,10 @@ WARM_START = StartStrategy(mu=0.1, margin=0.03)
 """For starts that are nearly optimal."""
 
 
+FINISHES = StartStrategy(mu=1e-3, margin=0.0), WARM_START
+"""For flights that another search left near an optimum: tried one after the other."""
+
+
 @dataclass(frozen=True, slots=True)
 class SearchResult:
     """Where a search ended: scaled speeds v (2, n), and the rest as in `LocalOptimum`."""

@@ -1,12 +1,13 @@
 """Starts for an aircraft that cannot hover: feasible flights with ||v|| >= v_min throughout.
 
-Where there is more time than the line from w_I to w_F takes, the flight weaves about the line or
-flies full circles. Both are built as headings theta(n) at one speed c: the displacement is
-c delta_t sum (cos, sin) theta(n), to which a full circle adds nothing. Given end velocities add a
-turn and a change of speed at each end.
+A curve flown at one speed c is its headings theta(n); the displacement is c delta_t sum (cos, sin)
+theta(n). Where there is more time than the line from w_I to w_F takes, the curve weaves about the
+line or has full circles on the way, as many as the limits allow, or fewer and wider ones; given end
+velocities turn its ends. Such a curve meets w_F but for what its ends add. The flight nearest to
+the curve that keeps every limit is found by the interior-point method.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -14,18 +15,33 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.search.track import nearest_flight
 
-# Chosen, but for _WIDEST.
-_TURN_SHARE = 0.95  # share of a_max that turns use; the rest is for meeting the ends
-_WIDEST = 2.404825557695773  # amplitude of a weave of no displacement: the first zero of J_0
-_WEAVES = (16, 8, 4, 2, 1)  # numbers of waves that are tried; many stay close to the line
-_SPEEDS = (1.1, 1.02, 1.3, 1.0)  # speeds c that are tried, in v_min; above 1 there is room
-_TOLERANCE = 1e-9  # violation of a limit, in its SI unit, and length in metres that are zero
-_ROUNDS = 40  # bisections of an amplitude, and fixed-point rounds of a line between two turns
+_TURN_SHARE = 0.95
+"""Share of a_max that turns use; the rest is for meeting the ends. Chosen."""
 
-Headings = Callable[[int, float], Real]
-"""A function of k and a share: k headings (k,), radians, relative to the mean direction, whose
-displacement is that share of the distance flown."""
+_WIDEST = 2.404825557695773
+"""Amplitude of a weave of no displacement, radians: the first zero of J_0."""
+
+_WEAVES = (16, 8, 4, 2, 1)
+"""Numbers of waves that are tried. Chosen: many stay close to the line."""
+
+_SPEEDS = (1.3, 1.1, 1.02)
+"""Speeds c that are tried, in v_min; above 1 there is room. Chosen."""
+
+_TOLERANCE = 1e-9
+"""Violation of a limit, in its SI unit, and length in metres that count as none: rounding."""
+
+_BISECTIONS = 40
+"""Bisections of an amplitude, which is then known to 1e-12 radians."""
+
+_REPAIRS = 12
+"""Curves at most that are brought within the limits, the least violation first. Chosen."""
+
+
+_DRAWN_IN = 0.1
+"""Share by which the path of a curve that breaks limits is drawn to its middle: chosen. A path that
+is the curve itself has no gradient there."""
 
 
 def cruise(kin: Kinematics) -> Trajectory:
@@ -34,175 +50,149 @@ def cruise(kin: Kinematics) -> Trajectory:
     Raises:
         InfeasibleError: none was found, which is no proof that there is none.
     """
-    for flight in _attempts(kin, []):
-        return flight
-    raise InfeasibleError(
-        f"no flight from start to end was found that keeps at least {kin.min_speed:g} m/s "
-        f"(vehicle.min_speed) for {kin.time_step * kin.slots:g} s within {kin.max_speed:g} m/s, "
-        f"{kin.max_acceleration:g} m/s^2 and the end velocities; give a longer or shorter "
-        "flight.duration, free end velocities or a lower vehicle.min_speed"
-    )
+    flight = _first_flight(kin, _curves(kin))
+    if flight is None:
+        raise InfeasibleError(
+            f"no flight from start to end was found that keeps at least {kin.min_speed:g} m/s "
+            f"(vehicle.min_speed) for {kin.time_step * kin.slots:g} s within {kin.max_speed:g} "
+            f"m/s, {kin.max_acceleration:g} m/s^2 and the end velocities; give a longer or shorter "
+            "flight.duration, free end velocities or a lower vehicle.min_speed"
+        )
+    return flight
 
 
-def cruise_by(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
+def cruise_by(kin: Kinematics, stations: Sequence[Real]) -> Trajectory | None:
     """Return a feasible flight that circles at each of `stations`, or None if none was found."""
-    return next(_attempts(kin, stations), None)
-
-
-def _attempts(kin: Kinematics, stations: list[Real]) -> Iterator[Trajectory]:
-    """Yield the feasible ones of the flights that are tried, in the order of preference."""
-    speeds = sorted({min(kin.max_speed, share * kin.min_speed) for share in _SPEEDS}, reverse=True)
     middle = (kin.min_speed + kin.max_speed) / 2
-    if stations:
-        for c in (min(middle, 3 * kin.min_speed), *speeds):
-            yield from _feasible(kin, _circling(kin, stations, c))
-        return
-    first, last = ((0.0,) if v is None else (0.0, 2 * np.pi, -2 * np.pi) for v in _ends(kin))
-    ends = product(first, last)
-    for extra in sorted(ends, key=lambda pair: abs(pair[0]) + abs(pair[1])):
-        for c in (*speeds, middle):
-            for headings in (*(_weave(m) for m in _WEAVES), _circle(1), _circle(-1)):
-                yield from _feasible(kin, _between_turns(kin, headings, c, extra))
+    curves = (_circling(kin, stations, c) for c in (middle, *_speeds(kin)))
+    return _first_flight(kin, (v for v in curves if v is not None))
+
+
+def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
+    """Return the first feasible flight at velocities (n, 2) of `curves`, else one near to some."""
+    near: list[tuple[float, int, Trajectory]] = []
+    for v in curves:
+        flight = kin.follow(v)
+        missed = kin.residuals(flight)
+        if max(missed.values()) < _TOLERANCE:
+            return flight
+        speed = max(missed["(13e) speed"], missed["minimum speed"]) / kin.max_speed
+        near.append(
+            (speed + missed["(13f) acceleration"] / kin.max_acceleration, len(near), flight)
+        )
+    for _, _, flight in sorted(near)[:_REPAIRS]:
+        drawn_in = (1 - _DRAWN_IN) * flight.w + _DRAWN_IN * flight.w.mean(axis=0)
+        repaired = nearest_flight(kin, drawn_in, flight)
+        if repaired is not None:
+            return repaired
+    return None
+
+
+def _speeds(kin: Kinematics) -> list[float]:
+    """Return the speeds c that are tried, m/s."""
+    ends = [float(np.hypot(*v)) for v in (kin.start_velocity, kin.end_velocity) if v is not None]
+    middle = (kin.min_speed + kin.max_speed) / 2
+    tried = [*(share * kin.min_speed for share in _SPEEDS), middle, *ends, kin.max_speed]
+    return list(dict.fromkeys(c for c in tried if c <= kin.max_speed))
+
+
+def _curves(kin: Kinematics) -> Iterator[Real]:
+    """Yield velocities (n, 2) along weaves and circles from w_I to w_F."""
+    goal, steps = kin.end - kin.start, kin.slots - 1
+    distance = float(np.hypot(*goal))
+    time = np.linspace(0.0, 1.0, kin.slots)
+    given = [v for v in (kin.start_velocity, kin.end_velocity) if v is not None]
+    ahead = goal if distance > _TOLERANCE else (given or [np.array([1.0, 0.0])])[0]
+    heading = float(np.arctan2(ahead[1], ahead[0]))
+    sides = [(0.0,) if v is None else (0.0, 1.0, -1.0) for v in _ends(kin)]
+    around = sorted(product(*sides), key=lambda pair: abs(pair[0]) + abs(pair[1]))
+    for extra, c in product(around, _speeds(kin)):
+        share = distance / (c * kin.time_step * steps)
+        if share > 1:
+            continue
+        turn = c / (_TURN_SHARE * kin.max_acceleration)  # seconds per radian
+        most = int((1 - share) * kin.time_step * steps / (2 * np.pi * turn))
+        circles = sorted({min(1, most), most} - {0})
+        for theta in (
+            *(_weave(time, waves, share) for waves in _WEAVES),
+            *(_circle(time, side * k, share) for k in circles for side in (1, -1)),
+        ):
+            yield _with_ends(kin, heading + theta, c, extra)
 
 
 def _ends(kin: Kinematics) -> tuple[Real | None, Real | None]:
     return kin.start_velocity, kin.end_velocity
 
 
-def _feasible(kin: Kinematics, v: Real | None) -> Iterator[Trajectory]:
-    """Yield the flight with velocities v (n, 2), corrected to meet the ends, if it is feasible."""
-    if v is None:
-        return
-    flight = kin.follow(v)
-    if max(kin.residuals(flight).values()) < _TOLERANCE:
-        yield flight
+def _weave(time: Real, waves: int, share: float) -> Real:
+    """Return headings (n,) that swing about 0 `waves` times; `share` is the displacement's."""
+    phase = np.sin(2 * np.pi * waves * time)
+    low, high = 0.0, _WIDEST
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        along = np.cos(middle * phase)
+        low, high = (middle, high) if (along[1:] + along[:-1]).mean() / 2 > share else (low, middle)
+    return np.asarray(high * phase)
 
 
-def _weave(waves: int) -> Headings:
-    """Return headings that swing about the mean direction `waves` times."""
-
-    def headings(count: int, share: float) -> Real:
-        phase = np.sin(2 * np.pi * waves * np.arange(count) / (count - 1))
-        low, high = 0.0, _WIDEST
-        for _ in range(_ROUNDS):
-            middle = (low + high) / 2
-            low, high = (middle, high) if _mean(middle * phase) > share else (low, middle)
-        return np.asarray(high * phase)
-
-    return headings
+def _circle(time: Real, circles: int, share: float) -> Real:
+    """Return headings (n,) of 0 with full `circles` half way, left if positive."""
+    return np.asarray(
+        2 * np.pi * circles * np.clip((time - share / 2) / max(1 - share, _TOLERANCE), 0, 1)
+    )
 
 
-def _circle(turns: int) -> Headings:
-    """Return straight headings with `turns` full circles half way, left if positive."""
+def _with_ends(
+    kin: Kinematics, theta: Real, c: float, extra: tuple[float, ...] = (0.0, 0.0)
+) -> Real:
+    """Return velocities (n, 2) at speed c along headings `theta` (n,), turned to the given ends.
 
-    def headings(count: int, share: float) -> Real:
-        straight = round((count - 1) * share)
-        before = straight // 2
-        round_trip = count - 1 - straight
-        steps = np.clip(np.arange(count) - before, 0, round_trip)
-        return np.asarray(2 * np.pi * turns * steps / max(1, round_trip))
-
-    return headings
-
-
-def _mean(headings: Real) -> float:
-    """Return the displacement along the mean direction as a share of the distance flown."""
-    along = np.cos(headings)
-    return float((along[1:] + along[:-1]).mean() / 2)
-
-
-def _turn(kin: Kinematics, v: Real, heading: float, extra: float, c: float) -> Real:
-    """Return velocities (k, 2) from v to speed c along `heading`, `extra` radians added."""
-    speed, first = float(np.hypot(*v)), float(np.arctan2(v[1], v[0]))
-    angle = (heading - first + np.pi) % (2 * np.pi) - np.pi + extra
-    limit = _TURN_SHARE * kin.max_acceleration * kin.time_step
-    # turning and speeding up share the limit: the sum of their squares stays below its square
-    steps = int(np.ceil(np.hypot(abs(angle) * max(speed, c), speed - c) / limit))
-    share = np.arange(steps + 1) / max(1, steps)
-    size, at = speed + (c - speed) * share, first + angle * share
-    return np.asarray(size[:, None] * np.stack([np.cos(at), np.sin(at)], axis=1))
-
-
-def _displacement(kin: Kinematics, v: Real) -> Real:
-    """Return the displacement (2,) at the velocities v (k, 2), m."""
-    return np.asarray(kin.time_step * (v[1:] + v[:-1]).sum(axis=0) / 2)
-
-
-def _between_turns(
-    kin: Kinematics, headings: Headings, c: float, extra: tuple[float, float]
-) -> Real | None:
-    """Return velocities (n, 2): a turn from v(0), `headings` at speed c, a turn to v(N+1).
-
-    `extra` are the radians, 0 or a full circle, by which the turns are longer than they must be.
-    None where there is no time for the turns or c exceeds v_max.
+    `extra` are full circles by which the turns at both ends are longer than they must be.
     """
-    goal = kin.end - kin.start
-    line, fallback = goal, next((v for v in _ends(kin) if v is not None), np.array([1.0, 0.0]))
-    ends: list[Real] = []
-    for _ in range(_ROUNDS):  # the turns depend on the line between them, and the line on them
-        towards = line if np.hypot(*line) > _TOLERANCE else fallback
-        heading = float(np.arctan2(towards[1], towards[0]))
-        on = c * np.array([np.cos(heading), np.sin(heading)])
-        first, last = (
-            on[None] if v is None else _turn(kin, v if k == 0 else -v, at, extra[k], c)
-            for k, (v, at) in enumerate(zip(_ends(kin), (heading, heading + np.pi), strict=True))
+    time = kin.time_step * np.arange(kin.slots)
+    speed = np.full(kin.slots, c)
+    theta = theta.copy()
+    for v, at, since, more in zip(_ends(kin), (0, -1), (time, time[::-1]), extra, strict=True):
+        if v is None:
+            continue
+        size = float(np.hypot(*v))
+        angle = float(np.arctan2(v[1], v[0])) - theta[at]
+        angle = (angle + np.pi) % (2 * np.pi) - np.pi + 2 * np.pi * more
+        # turning and changing speed share the limit: the sum of their squares stays below its own
+        change = np.hypot(angle * max(size, c), size - c)
+        left = np.clip(
+            1 - since * _TURN_SHARE * kin.max_acceleration / max(change, _TOLERANCE), 0, 1
         )
-        ends = [first, -last[::-1] if kin.end_velocity is not None else last]
-        line = goal - _displacement(kin, ends[0]) - _displacement(kin, ends[1])
-        count = kin.slots - len(ends[0]) - len(ends[1]) + 2
-        if count < 3:
-            return None
-        whole = kin.time_step * (count - 1)
-        c = max(c, float(np.hypot(*line)) / whole)
-        if c > kin.max_speed:
-            return None
-    share = float(np.hypot(*line)) / (c * whole)
-    theta = headings(count, share)
-    # a circle of whole steps misses the share by a little, which the speed makes up for
-    reached = _mean(theta)
-    if share > 0 and reached > 0:
-        c = float(np.clip(c * share / reached, kin.min_speed, kin.max_speed))
-    theta = theta + heading
-    inner = c * np.stack([np.cos(theta), np.sin(theta)], axis=1)
-    if kin.start_velocity is not None:
-        inner[0] = ends[0][-1]
-    if kin.end_velocity is not None:
-        inner[-1] = ends[1][0]
-    return np.vstack([ends[0][:-1], inner, ends[1][1:]])
+        theta += angle * left
+        speed += (size - c) * left
+    v = speed[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    for velocity, at in zip(_ends(kin), (0, -1), strict=True):
+        if velocity is not None:
+            v[at] = velocity  # free of rounding
+    return np.asarray(v)
 
 
-def _circling(kin: Kinematics, stations: list[Real], c: float) -> Real | None:
+def _circling(kin: Kinematics, stations: Sequence[Real], c: float) -> Real | None:
     """Return velocities (n, 2) straight to each of `stations`, with circles there, and to w_F.
 
     The time that is left is shared evenly among the stations. None where it is too short.
     """
-    points = [kin.start, *stations, kin.end]
-    lines = np.diff(np.array(points), axis=0)
+    lines = np.diff(np.array([kin.start, *stations, kin.end]), axis=0)
     lengths = np.hypot(*lines.T)
-    if lengths.min() < _TOLERANCE:
-        return None
     headings = np.arctan2(lines[:, 1], lines[:, 0])
     steps = np.round(lengths / (c * kin.time_step)).astype(int)
-    first, last = kin.start_velocity, kin.end_velocity
-    on = np.stack([np.cos(headings), np.sin(headings)], axis=1)
-    lead = on[:0] if first is None else _turn(kin, first, float(headings[0]), 0.0, c)[:-1]
-    tail = on[:0]
-    if last is not None:
-        tail = -_turn(kin, -last, float(headings[-1]) + np.pi, 0.0, c)[:-1][::-1]
-    spare = kin.slots - 1 - int(steps.sum()) - len(lead) - len(tail)
-    each = np.full(len(stations), max(0, spare) // len(stations))
-    each[0] += max(0, spare) % len(stations)
+    spare = kin.slots - 1 - int(steps.sum())
+    if lengths.min() < _TOLERANCE or spare < 0:
+        return None
     fastest = _TURN_SHARE * kin.max_acceleration * kin.time_step / c  # radians per step
     theta = [np.full(steps[0] + 1, headings[0])]
-    for k, count in enumerate(each):
-        corner = (headings[k + 1] - headings[k] + np.pi) % (2 * np.pi) - np.pi
+    for k, corner in enumerate((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi):
+        count = spare // len(stations) + (k < spare % len(stations))
         most = count * fastest - abs(corner)
         if most < 0:
             return None
         side = 1.0 if corner >= 0 else -1.0
         turn = corner + side * 2 * np.pi * np.floor(most / (2 * np.pi))
-        theta.append(headings[k] + turn * np.arange(1, count + 1) / count)
+        theta.append(headings[k] + turn * np.arange(1, count + 1) / max(1, count))
         theta.append(np.full(steps[k + 1], headings[k + 1]))
-    at = np.concatenate(theta)
-    v = np.vstack([lead, c * np.stack([np.cos(at), np.sin(at)], axis=1), tail])
-    return v if len(v) == kin.slots else None
+    return _with_ends(kin, np.concatenate(theta), c)

@@ -17,7 +17,7 @@ from faao_mav.optimizer.interior.rewards import ScaledRewards, StageValues
 from faao_mav.optimizer.interior.search import COLD_START, Search
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
-_TOLERANCE = 1e-3
+_TOLERANCE = 1e-4
 """Tolerance of the search: a start need not be the nearest flight to the last metre. Chosen."""
 
 ALLOWED = 1e-9
