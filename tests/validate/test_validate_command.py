@@ -36,7 +36,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
     app.command()(validate)
 
     def runner(*arguments: object, predicted: bool = False) -> Any:
-        def predict(mission: Mission, vehicle: Vehicle) -> object:
+        def predict(mission: Mission, vehicle: Vehicle, **_: object) -> object:
             if predicted:
                 return LEVEL
             raise InfeasibleError(f"no model of {len(mission.items)} items for {vehicle.autopilot}")

@@ -110,7 +110,7 @@ class HalfPlanesState(Slacks):
         """Return z / s u u^T - `bend` z I."""
         x, y = self.u
         packed: Any = _per_slot(self.z / self.s * np.stack([x * x, x * y, y * y]))
-        curved = -self.constraint.bend * self.z
+        curved = -self.constraint.bend * self.z.reshape(-1, *self.z.shape[-2:]).sum(axis=0)
         if self.constraint.bend > 0:
             return Stiffness(**{self.constraint.quantity: packed}, turning=curved)
         packed[::2] += curved

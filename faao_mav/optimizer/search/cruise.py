@@ -15,7 +15,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.search.track import nearest_flight
+from faao_mav.optimizer.search.track import MOST_STEPS, nearest_flight
 
 _TURN_SHARE = 0.95
 """Share of a_max that turns use; the rest is for meeting the ends. Chosen."""
@@ -38,6 +38,8 @@ _BISECTIONS = 40
 _REPAIRS = 12
 """Curves at most that are brought within the limits, the least violation first. Chosen."""
 
+_FEW_STEPS = 30
+"""Steps that each of them is given before any has more: enough for most. Chosen."""
 
 _DRAWN_IN = 0.1
 """Share by which the path of a curve that breaks limits is drawn to its middle: chosen. A path that
@@ -80,9 +82,9 @@ def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
         near.append(
             (speed + missed["(13f) acceleration"] / kin.max_acceleration, len(near), flight)
         )
-    for _, _, flight in sorted(near)[:_REPAIRS]:
+    for steps, (_, _, flight) in product((_FEW_STEPS, MOST_STEPS), sorted(near)[:_REPAIRS]):
         drawn_in = (1 - _DRAWN_IN) * flight.w + _DRAWN_IN * flight.w.mean(axis=0)
-        repaired = nearest_flight(kin, drawn_in, flight)
+        repaired = nearest_flight(kin, drawn_in, flight, steps=steps)
         if repaired is not None:
             return repaired
     return None

@@ -23,7 +23,8 @@ _TOLERANCE = 1e-4
 ALLOWED = 1e-9
 """The violation of a limit, in solver units, that counts as none: rounding."""
 
-_MAX_ITERATIONS = 200
+MOST_STEPS = 200
+"""Steps after which a search ends. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +48,12 @@ def nearest_flight(
     path: Real,
     start: Trajectory,
     constraints: Sequence[Constraint] = (),
+    steps: int = MOST_STEPS,
 ) -> Trajectory | None:
     """Return the flight nearest to `path` (n, 2) m that keeps the limits of `kin`.
 
-    None where none is found that keeps `constraints` too. `start` is any flight of `kin`.
+    None where none is found within `steps` that keeps `constraints` too. `start` is any flight of
+    `kin`.
     """
     for kept in ((), tuple(constraints)) if constraints else ((),):
         every = (*constraints_of(kin), *kept)
@@ -58,7 +61,7 @@ def nearest_flight(
         rewards = ScaledRewards(Closeness(path), w)
         search = Search(kin, every, rewards, w, v, tolerance=_TOLERANCE, strategy=COLD_START)
         with np.errstate(all="ignore"):
-            results = search.run(_MAX_ITERATIONS)
+            results = search.run(steps)
         if 0 in results:
             start = kin.follow(results[0].v.T * kin.max_speed)
     every = (*constraints_of(kin), *constraints)
