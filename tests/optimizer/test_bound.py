@@ -63,11 +63,9 @@ def bounds(small_plan: MakePlan) -> dict[str, float]:
     [
         ({}, True),
         ({"radio.line_of_sight": "all_ones"}, True),
-        ({"radio.fading": "none"}, True),
         ({"radio.fading": "ergodic", "radio.fading_samples": 8}, False),
         ({"radio.modulation": "qpsk"}, False),
         ({"radio.base_station.antennas": 1, "radio.relay.antennas": 1}, True),
-        ({"radio.base_station.power_dbm": 30, "radio.relay.power_dbm": 30}, True),
         ({"flight.duration": 8.5}, True),
     ],
 )

@@ -39,7 +39,7 @@ def heading(speed: float, degrees: float) -> Any:
     st.one_of(st.none(), st.floats(-180, 180)),
     st.booleans(),
 )
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_every_start_keeps_the_least_speed(
     least: float, slots: int, first: float | None, last: float | None, closed: bool
 ) -> None:

@@ -177,7 +177,7 @@ def test_what_a_queue_adds_to_the_matrix_grows_linearly() -> None:
             )
             for duration, buffer in ((120, 5), (70, 2), (70, 20))
         ),
-        ("plane_relay", {"flight.duration": 200}),
+        ("plane_relay", {"flight.duration": 100}),
     ],
 )
 def test_small_buffers_and_planes_converge(name: str, changes: dict[str, Any]) -> None:
