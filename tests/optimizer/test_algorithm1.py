@@ -15,7 +15,6 @@ from faao_mav.optimizer.solution import Progress
 from faao_mav.plan import read_plan
 from faao_mav.radio.precoder import SCHEMES
 
-
 COARSE = {"flight.time_step": 1}
 
 
