@@ -13,6 +13,7 @@ from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import (
+    CommandAck,
     CommandLong,
     Envelope,
     Heartbeat,
@@ -283,6 +284,21 @@ def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
     assert scene.run() == "refused"
     orders = [each for each in scene.orders if isinstance(each, CommandLong)]
     assert [(each.command, each.param1) for each in orders] == [(400, 1.0), (300, 0.0), (400, 0.0)]
+
+
+def test_a_vehicle_that_arms_without_a_word_is_asked_to_disarm(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene, on = Scene("ardupilot", arm=True), MockAutopilot.on
+
+    def mute(mock: MockAutopilot, envelope: Envelope, now: float) -> list[Message]:
+        answers = on(mock, envelope, now)
+        return [each for each in answers if not isinstance(each, CommandAck)]
+
+    monkeypatch.setattr(MockAutopilot, "on", mute)
+    assert scene.run() == "refused"
+    orders = [each for each in scene.orders if isinstance(each, CommandLong)]
+    assert [(each.command, each.param1) for each in orders] == [(400, 1.0)] * 5 + [(400, 0.0)]
 
 
 def test_what_is_armed_already_is_not_started() -> None:

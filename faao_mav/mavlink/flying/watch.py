@@ -278,7 +278,7 @@ class Watch(Machine[Ending]):
     def _refused(self, why: str) -> Sequence[Message]:
         """End before the start; an aircraft that was armed here is asked to disarm again."""
         said = f": {'; '.join(dict.fromkeys(self.seen.said))}" if self.seen.said else ""
-        armed = self.phase == "starting"
+        armed = self._armed or self.phase == "starting"
         self._end("refused", f"the vehicle {why}{said}" + (", and disarms" if armed else ""))
         self._sent = 0
         return [self._arming(False)] if armed else ()
