@@ -122,20 +122,21 @@ def _check_options(
 
 def _wind(given: str | None) -> "Vector | None":
     """Return the velocity of the air, m/s, of --wind."""
+    if given is None:
+        return None
+    from pydantic import TypeAdapter
+
     from faao_mav.plan import Wind
     from faao_mav.plan.keys import reference
 
-    if given is None:
-        return None
     parts, keys = given.split(","), ("site.wind.speed", "site.wind.from")
     try:
         speed, start = map(float, parts)
-        if not (0 <= speed <= 50 and 0 <= start <= 360):
-            raise ValueError
+        wind = TypeAdapter(Wind).validate_python({"speed": speed, "from": start})
     except ValueError:
         wanted = " and ".join(reference()[key].accepted for key in keys)
         raise InputError(f"--wind {given}: expected SPEED,FROM: {wanted}") from None
-    return Wind(speed, start).velocity
+    return wind.velocity
 
 
 def _judge(
