@@ -3,6 +3,7 @@
 import os
 import socket
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,12 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
+from faao_mav.optimizer.search import bound
+from faao_mav.optimizer.search.map_bound import map_bound
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 # Hypothesis tries numbers that it reads in the project's modules loaded so far. Which are loaded
 # depends on how the tests are shared out among processes: without them, examples are the same.
@@ -91,6 +96,18 @@ def paper_plan(small_plan: MakePlan) -> MakePlan:
         return small_plan(paper | (changes or {}))
 
     return make
+
+
+@pytest.fixture
+def coarse_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A map with a tenth of the cells: the certificate is a little higher, and quicker."""
+    monkeypatch.setattr(bound, "map_bound", partial(map_bound, cells=3_000))
+
+
+@pytest.fixture
+def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without their pictures, which take longest."""
+    monkeypatch.setattr("faao_mav.report.page.inline_svg", lambda *_: "<svg></svg>")
 
 
 @pytest.fixture(scope="session")

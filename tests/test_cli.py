@@ -89,6 +89,7 @@ def test_json_is_one_object_with_the_promised_keys(plan: Path, tmp_path: Path) -
     assert max(data["residuals"].values()) < 1e-6
 
 
+@pytest.mark.usefixtures("coarse_map")
 def test_the_bound_is_computed_when_asked_for(plan: Path) -> None:
     assert "of the best that any route can do: at most" in run(plan, "--bound").stdout
     plan.write_text(edited(FLYABLE, {"radio.fading": "ergodic"}))

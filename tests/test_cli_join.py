@@ -310,7 +310,8 @@ def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
     plan: Path, out: Path, tmp_path: Path
 ) -> None:
     save, page = tmp_path / "r.npz", tmp_path / "r.html"
-    paper = MISSIONS / "paper_fig3.yaml"  # 100 m/s
+    paper = tmp_path / "paper.yaml"  # 100 m/s
+    paper.write_text(edited((MISSIONS / "paper_fig3.yaml").read_text(), {"flight.time_step": 1}))
     told = run(paper, "--save", save, "--report", page)
     assert (told.exit_code, told.stderr) == (0, "")
     assert re.search(r"^checked      1 error, ", told.stdout, re.M)
@@ -349,7 +350,7 @@ def test_a_plane_that_flies_at_no_such_speed_is_planned_but_gets_no_mission(
     plan: Path, out: Path
 ) -> None:
     text = (MISSIONS / "plane_relay.yaml").read_text()
-    changes = {"vehicle.max_speed": 60, "radio.fading": "none", "flight.time_step": 1}
+    changes = {"vehicle.max_speed": 60, "radio.fading": "none", "flight.duration": 90}
     plan.write_text(edited(text, changes))
     refused = run(plan, "--out", out)
     assert refused.exit_code == 2

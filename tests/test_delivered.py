@@ -79,6 +79,7 @@ def test_the_summary_leads_with_what_was_maximised(result: Result) -> None:
     assert ("radio.causal: true plans for what arrives" in text) == warned
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_the_page_shows_the_queue(result: Result) -> None:
     page = render_report(result)
     assert "<h2>Queue</h2>" in page

@@ -106,7 +106,7 @@ def test_clearance_is_that_of_the_continuous_path(
 
 
 QUICK = {
-    "flight.time_step": 1.5,
+    "flight.time_step": 2.5,
     "radio.fading": "none",
     "optimizer.starts": ["straight"],
     "optimizer.max_iterations": 20,

@@ -17,6 +17,7 @@ from faao_mav.optimizer.solution import Solution, load_solution, save_solution
 from faao_mav.plan import Plan
 
 FOR_IT = {"optimizer.rate": "mutual_information", "radio.modulation": "qpsk", "power": 5}
+BPSK = {"radio.modulation": "bpsk", "power": 0}
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +41,11 @@ def maximised(solution: Solution) -> float:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"radio.fading": "none", "radio.causal": False},
-        {"radio.fading": "none", "radio.causal": True, "radio.duplex": "half"},
-        {"radio.fading": "realization", "radio.modulation": "bpsk", "radio.causal": True},
-        {
+        BPSK | {"radio.fading": "none", "radio.causal": False},
+        BPSK | {"radio.fading": "none", "radio.causal": True, "radio.duplex": "half"},
+        BPSK | {"radio.fading": "realization", "radio.causal": True},
+        BPSK
+        | {
             "radio.fading": "ergodic",
             "radio.fading_samples": 4,
             "radio.causal": True,
@@ -115,7 +117,10 @@ def test_mutual_information_is_delivered_too(
     assert solution.delivered_rate < information.delivered <= information.average
 
 
-def test_what_surrounds_a_plan_speaks_of_it(planned: Solution, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("coarse_map")
+def test_what_surrounds_a_plan_speaks_of_it(small_plan: MakePlan, tmp_path: Path) -> None:
+    few = {"radio.fading_samples": 4, "flight.duration": 9}
+    planned = optimize(plan_of(small_plan, BPSK | few | {"radio.causal": True}))
     fresh = fresh_rates(planned)
     assert fresh is not None
     assert fresh.delivered == pytest.approx(planned.delivered_rate, abs=0.3)

@@ -115,13 +115,20 @@ def test_too_little_room_for_a_turn_is_refused_with_the_reason() -> None:
         straight_flight(kin)
 
 
-@pytest.mark.parametrize("least", [3.0, 10.0, 15.0])
-@pytest.mark.parametrize("ends", [(None, None), (-45.0, -45.0), (0.0, 90.0)])
+@pytest.mark.parametrize(
+    ("least", "ends"),
+    [
+        (10.0, (None, None)),
+        (3.0, (-45.0, -45.0)),
+        (15.0, (-45.0, -45.0)),
+        (10.0, (0.0, 90.0)),
+    ],
+)
 def test_the_optimum_keeps_the_least_speed(
     least: float, ends: tuple[float | None, float | None]
 ) -> None:
     speeds = [None if d is None else heading(max(least, 10.0), d) for d in ends]
-    kin = cruiser(150, least, start_velocity=speeds[0], end_velocity=speeds[1])
+    kin = cruiser(150, least, start_velocity=speeds[0], end_velocity=speeds[1], time_step=1.0)
     stage = links(bpsk, 4e4, 4e4)
     best, hovering = 0.0, 0.0
     for flight in starts(kin, ["straight", "bs-user", "user-bs"], PLACES).values():
@@ -168,7 +175,7 @@ def test_the_published_flight_is_reached() -> None:
     assert np.linalg.norm(best.trajectory.a, axis=1).mean() == pytest.approx(4.89, rel=0.03)
 
 
-@pytest.mark.parametrize("least", [5.0, 9.0])
+@pytest.mark.parametrize("least", [9.0])
 def test_both_methods_solve_plans_with_it(
     small_plan: MakePlan, paper_plan: MakePlan, least: float
 ) -> None:

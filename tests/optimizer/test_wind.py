@@ -86,6 +86,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.usefixtures("coarse_map")
 @pytest.mark.parametrize("wind", [{"speed": 6, "from": 250}, {"speed": 6, "from": 135}])
 def test_a_plan_in_wind_is_feasible_and_within_its_bound(wind: dict[str, float]) -> None:
     plan = plan_of(CHANGES | {"site.wind": wind}, "ardupilot", "keep")

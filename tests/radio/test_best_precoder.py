@@ -28,7 +28,7 @@ from faao_mav.radio.precoder_objective import (
 from faao_mav.radio.precoder_search import minimise, search
 from faao_mav.radio.rate import cutoff_rate
 
-SETTINGS = settings(max_examples=30, deadline=None, derandomize=True)
+SETTINGS = settings(max_examples=15, deadline=None, derandomize=True)
 SEEDS = st.integers(0, 2**32 - 1)
 TABLE = np.array([[2.0, 1.0], [1.0, 1.0]]) * np.sqrt(0.5)
 
