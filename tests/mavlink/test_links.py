@@ -19,13 +19,12 @@ REQUEST_INT = 51
 def test_600_items_over_a_quick_link(
     kind: MockKind, loss: float, seconds: float, messages: float
 ) -> None:
-    for seed in range(3):
-        courses = there_and_back(kind, 600, Faults(loss=loss, seed=seed))
-        assert sum(course.took for course in courses) < seconds
-        for course in courses:
-            assert course.status in ("accepted", "unknown")
-            assert course.ours <= messages * 600
-            assert course.theirs <= messages * 600
+    courses = there_and_back(kind, 600, Faults(loss=loss, seed=0))
+    assert sum(course.took for course in courses) < seconds
+    for course in courses:
+        assert course.status in ("accepted", "unknown")
+        assert course.ours <= messages * 600
+        assert course.theirs <= messages * 600
 
 
 SLOW = {
