@@ -70,10 +70,10 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     counts_cutoff = options.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
     relay = problem.maximised_queue
-    # the half-planes of a least speed turn too fast for the short steps of a warm start, and the
-    # shares of half duplex are sought anew; with a queue both take more steps, and so does a buffer
-    anew = kin.min_speed > 0 or (relay is not None and relay.half)
-    long = relay is not None and (anew or math.isfinite(relay.buffer))
+    # the half-planes of a least speed turn too fast for the short steps of a warm start; with a
+    # queue they take more steps, and so do shares and a buffer
+    anew = kin.min_speed > 0
+    long = relay is not None and (anew or relay.half or math.isfinite(relay.buffer))
     long = long or problem.fence is not None
     steps = options.max_iterations * (_LONG_SEARCH if long else 1)
 

@@ -127,7 +127,7 @@ class StartStrategy:
 COLD_START = StartStrategy(mu=10.0, margin=1.0)
 """For any start: the optimum may be far away."""
 
-WARM_START = StartStrategy(mu=0.1, margin=0.03)
+WARM_START = StartStrategy(mu=0.1, margin=0.1)
 """For starts that are nearly optimal."""
 
 
