@@ -53,6 +53,10 @@ _LEAST_SHARE = 0.2
 class QueueRewards(ScaledRewards):
     """The unit of the rates; the objective is the queue's own."""
 
+    def mean(self, total: Real) -> Real:
+        """Return a sum of f as its mean over the slots, in the rewards' unit."""
+        return super().mean(total) - self.least
+
     def scaled(self, values: StageValues) -> tuple[Real, Real, Real]:
         """Return rewards, gradients and Hessians of no links at all."""
         shape = values.value.shape[1:]
