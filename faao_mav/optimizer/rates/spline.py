@@ -154,15 +154,15 @@ def cubic_pieces(step: float, y: Real) -> Real:
     >>> cubic_pieces(1.0, np.arange(4.0) ** 2)[:, 1].round(6).tolist()  # (1 + t)²
     [0.0, 1.0, 2.0, 1.0]
     """
-    from scipy.linalg import solve_banded  # with the optimiser, not before
+    from faao_mav.optimizer.lapack import lapack  # with the optimiser, not before
 
     secant = np.diff(y, axis=0) / step
     right = np.empty_like(y, dtype=float)
     right[1:-1] = 3 * (secant[:-1] + secant[1:])
     right[0], right[-1] = (5 * secant[0] + secant[1]) / 2, (5 * secant[-1] + secant[-2]) / 2
-    bands = np.ones((3, len(y)))
-    bands[1, 1:-1] = 4
-    bands[0, 1] = bands[2, -2] = 2
-    slope = solve_banded((1, 1), bands, right.reshape(len(y), -1)).reshape(right.shape)
+    diagonal, (below, above) = np.ones(len(y)), np.ones((2, len(y) - 1))
+    diagonal[1:-1] = 4
+    above[0] = below[-1] = 2
+    slope = lapack.dgtsv(below, diagonal, above, right.reshape(len(y), -1))[3].reshape(right.shape)
     bend = (slope[:-1] + slope[1:] - 2 * secant) / step
     return np.stack([bend / step, (secant - slope[:-1]) / step - bend, slope[:-1], y[:-1]])
