@@ -166,11 +166,6 @@ class Start:
     margin: float
     own: slice
 
-    @property
-    def warm(self) -> bool:
-        """Whether the start counts as nearly optimal: the limits are widened by less than a whole."""
-        return self.margin < 1
-
 
 class Constraint(ABC):
     """A limit on flights, apart from any iterate."""

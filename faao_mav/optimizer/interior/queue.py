@@ -54,7 +54,7 @@ class QueueRewards(ScaledRewards):
     """The unit of the rates; the objective is the queue's own."""
 
     def mean(self, total: Real) -> Real:
-        """Return a sum of f as its mean over the slots, in the rewards' unit."""
+        """Return a sum of f as its mean over the slots, in the stage's unit."""
         return super().mean(total) - self.least
 
     def scaled(self, values: StageValues) -> tuple[Real, Real, Real]:
@@ -135,7 +135,7 @@ class Queue(Constraint):
         rates = self.rewards.values.value
         if not self.half:
             return np.ones(rates.shape[1:])
-        if not start.warm:
+        if start.margin >= 1:  # cold
             return np.full(rates.shape[1:], 0.5)
         best = [best_shares(I_U, I_G, self.buffer) for I_U, I_G in rates.swapaxes(0, 1)]
         return np.clip(best, _LEAST_SHARE, 1 - _LEAST_SHARE)

@@ -61,7 +61,7 @@ class ScaledRewards:
         self.least = self.least[flights]
 
     def mean(self, total: Real) -> Real:
-        """Return the F_j `total` (..., flights, 1) as means over the slots, in the rewards' unit."""
+        """Return F_j `total` (..., flights, 1) as means over the slots, in the stage's unit."""
         return np.asarray(self.least + total * self.unit / self.base.shape[-1])
 
     def __call__(self, w: Real) -> tuple[Real, Real, Real]:
