@@ -55,7 +55,7 @@ class QueueRewards(ScaledRewards):
 
     def mean(self, total: Real) -> Real:
         """Return a sum of f as its mean over the slots, in the stage's unit."""
-        return super().mean(total) - self.least
+        return np.asarray(super().mean(total) - self.least)
 
     def scaled(self, values: StageValues) -> tuple[Real, Real, Real]:
         """Return rewards, gradients and Hessians of no links at all."""
