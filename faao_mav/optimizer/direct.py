@@ -19,7 +19,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximize_all, objectives
-from faao_mav.optimizer.interior.search import COLD_START, WARM_START
+from faao_mav.optimizer.interior.search import COLD_START, WARM_SHARES, WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
@@ -70,11 +70,12 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
     counts_cutoff = options.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
     relay = problem.maximised_queue
-    # the half-planes of a least speed turn too fast for the short steps of a warm start, and the
-    # shares of half duplex are sought anew; with a queue both take more steps, and so does a buffer
-    anew = kin.min_speed > 0 or (relay is not None and relay.half)
-    long = relay is not None and (anew or math.isfinite(relay.buffer))
+    # the half-planes of a least speed turn too fast for the short steps of a warm start; with a
+    # queue they take more steps, and so do shares and a buffer
+    anew, shared = kin.min_speed > 0, relay is not None and relay.half
+    long = relay is not None and (anew or shared or math.isfinite(relay.buffer))
     long = long or problem.fence is not None
+    warm = WARM_SHARES if shared else WARM_START
     steps = options.max_iterations * (_LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
@@ -127,7 +128,7 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
             constraints=kept,
             tolerance=options.tolerance,
             max_iterations=steps,
-            strategy=COLD_START if cold else WARM_START,
+            strategy=COLD_START if cold else warm,
             relay=relay,
         )
 

@@ -62,7 +62,9 @@ class Curve:
 def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
     """The flights that the peer starts from: by way of the stations, and of random places.
 
-    A plan that names its own starts is taken at its word.
+    A plan that names its own starts is taken at its word. Where the time is too short for a flight
+    by way of the stations, the start is the way itself at an even speed: IPOPT's iterates need not
+    be feasible.
     """
     named = problem.plan.optimizer.starts
     names: list[str] = (
@@ -75,7 +77,22 @@ def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
     for k in range(random if len(named) > 1 else 0):
         places |= {f"a{k}": rng.uniform(low, high), f"b{k}": rng.uniform(low, high)}
         names.append(f"a{k}-b{k}")
-    return starts(kin, names, places)
+    found = starts(kin, names, places)
+    for name in names:
+        if name not in found and name in {"bs", "user", "bs-user", "user-bs"}:
+            found[name] = _hurried(kin, [places[key] for key in name.split("-")])
+    return {name: found[name] for name in names if name in found}
+
+
+def _hurried(kin: Kinematics, stops: Sequence[Real]) -> Trajectory:
+    """The way by `stops` at an even speed, whatever its limit is."""
+    corners = np.vstack([kin.start, *stops, kin.end])
+    gone = np.append(0, np.cumsum(np.hypot(*np.diff(corners, axis=0).T)))
+    at = np.linspace(0, gone[-1], kin.slots)
+    w = np.stack([np.interp(at, gone, each) for each in corners.T], axis=1)
+    v = np.gradient(w, kin.time_step, axis=0)
+    a = np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)])
+    return Trajectory(w, v, a)
 
 
 def curve(link: Link, rate: CurveRate, number: int) -> Curve:

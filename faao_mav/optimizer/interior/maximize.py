@@ -95,10 +95,14 @@ def maximize_all(
     max_iterations: int = 100,
     strategy: StartStrategy = COLD_START,
     relay: RelayQueue | None = None,
+    race: bool = False,
 ) -> list[LocalOptimum]:
-    """Return what `maximize` finds from each of the `starts`; the searches run side by side."""
+    """Return what `maximize` finds from each of the `starts`; the searches run side by side.
+
+    In a `race` those are given up that fall behind the best.
+    """
     kept = (*constraints_of(kin), *constraints)
-    optima = _optima(kin, stage, starts, kept, tolerance, max_iterations, strategy, relay)
+    optima = _optima(kin, stage, starts, kept, tolerance, max_iterations, strategy, relay, race)
     for finish in FINISHES if kin.min_speed > 0 else ():
         left = [k for k, optimum in enumerate(optima) if not optimum.converged]
         if not left:
@@ -122,6 +126,7 @@ def _optima(
     max_iterations: int,
     strategy: StartStrategy,
     relay: RelayQueue | None,
+    race: bool = False,
 ) -> list[LocalOptimum]:
     """Return what one search from each of the `starts` within the limits `kept` finds."""
     w, v = (np.stack(each, axis=1) for each in zip(*((s.w.T, s.v.T) for s in starts), strict=True))
@@ -131,7 +136,7 @@ def _optima(
         rewards = QueueRewards(stage, w)
         kept = (*kept, Queue(rewards, relay.half, relay.buffer / kin.time_step))
     first = objectives(rewards.base, kin, relay)
-    search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy)
+    search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy, race=race)
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
         results = search.run(max_iterations)
     flights = [

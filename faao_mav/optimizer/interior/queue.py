@@ -44,11 +44,18 @@ from faao_mav.optimizer.interior.constraint import (
 from faao_mav.optimizer.interior.half_planes import Slacks
 from faao_mav.optimizer.interior.rewards import ScaledRewards, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
-from faao_mav.radio.relay import forward_greedily
+from faao_mav.radio.relay import best_shares, forward_greedily
+
+_LEAST_SHARE = 0.2
+"""The best shares are mostly 0 and 1; a warm search starts from them this far inside. Chosen."""
 
 
 class QueueRewards(ScaledRewards):
     """The unit of the rates; the objective is the queue's own."""
+
+    def mean(self, total: Real) -> Real:
+        """Return a sum of f as its mean over the slots, in the stage's unit."""
+        return np.asarray(super().mean(total) - self.least)
 
     def scaled(self, values: StageValues) -> tuple[Real, Real, Real]:
         """Return rewards, gradients and Hessians of no links at all."""
@@ -94,7 +101,7 @@ class Queue(Constraint):
         """Return the state at `start`: what is forwarded greedily there, and slacks widened."""
         scaled = self.rewards.in_units(self.rewards.values)
         I_U, I_G = scaled.value
-        x = np.full(I_U.shape, 0.5 if self.half else 1.0)
+        x = self._shares(start)
         most = self.buffer / self.rewards.unit
         relayed = [
             forward_greedily(arriving, leaving, float(room[0]))
@@ -122,6 +129,16 @@ class Queue(Constraint):
         s = np.where(state.on > 0, functions + 2 * start.mu, 1.0)
         state = replace(state, s=s, margin=np.where(state.on > 0, s - functions, 0.0))
         return state.centred(start.mu)
+
+    def _shares(self, start: Start) -> Real:
+        """Return the shares of receiving to start from, (flights, n): the best where it is warm."""
+        rates = self.rewards.values.value
+        if not self.half:
+            return np.ones(rates.shape[1:])
+        if start.margin >= 1:  # cold
+            return np.full(rates.shape[1:], 0.5)
+        best = [best_shares(I_U, I_G, self.buffer) for I_U, I_G in rates.swapaxes(0, 1)]
+        return np.clip(best, _LEAST_SHARE, 1 - _LEAST_SHARE)
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:  # noqa: ARG002
         """Return 0: every flight has a queue that keeps the limits."""

@@ -49,6 +49,7 @@ class ScaledRewards:
         unit = (near * steepest).max(axis=0)
         self.flat: Flags = ~(unit > _FLAT * np.abs(self.first).max(axis=0))
         self.unit = np.where(self.flat, 1.0, unit)
+        self.least = self.first.min(axis=0)
         self.offset = above * w.shape[-1] / self.unit
         rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1, keepdims=True)
         self.noise = 1e-9 + rounding.max(axis=0) / self.unit
@@ -57,6 +58,11 @@ class ScaledRewards:
         """Forget all flights but these."""
         self.base, self.offset = self.base[:, flights], self.offset[:, flights]
         self.unit, self.noise = self.unit[flights], self.noise[flights]
+        self.least = self.least[flights]
+
+    def mean(self, total: Real) -> Real:
+        """Return F_j `total` (..., flights, 1) as means over the slots, in the stage's unit."""
+        return np.asarray(self.least + total * self.unit / self.base.shape[-1])
 
     def __call__(self, w: Real) -> tuple[Real, Real, Real]:
         """Return the F_j (J, flights, 1), their gradients and Hessians at scaled w."""

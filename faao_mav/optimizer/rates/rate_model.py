@@ -54,8 +54,7 @@ class CurveRate:
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:  # noqa: ARG002
         """Return the rate and its derivatives by l, bits (..., n)."""
-        value, by_l, by_ll = (self.spline(gain_log, order) for order in range(3))
-        return RatePartials(value, by_l, by_ll)
+        return RatePartials(*self.spline.partials(gain_log))
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
         """Return precoders ((S,) n, N_t, N_t) close to the best at l and u (n,).

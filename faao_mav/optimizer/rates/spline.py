@@ -23,8 +23,8 @@ class CubicSpline:
 
     >>> x = np.arange(5.0)
     >>> spline = CubicSpline.through(x, x**3)
-    >>> spline(1.5).round(6), spline(1.5, 1).round(6)
-    (np.float64(3.375), np.float64(6.75))
+    >>> [float(part.round(6)) for part in spline.partials(1.5)]
+    [3.375, 6.75, 9.0]
     """
 
     first: float
@@ -37,11 +37,20 @@ class CubicSpline:
         step = float(x[-1] - x[0]) / (len(x) - 1)
         return cls(float(x[0]), step, cubic_pieces(step, y))
 
-    def __call__(self, x: ArrayLike, order: int = 0) -> Real:
-        """Return the spline at `x` (...), or its derivative of `order` 1 or 2."""
+    def __call__(self, x: ArrayLike) -> Real:
+        """Return the spline at `x` (...)."""
+        return _value(*self._piece(x))
+
+    def partials(self, x: ArrayLike) -> tuple[Real, Real, Real]:
+        """Return the spline and both derivatives at `x` (...)."""
+        piece, t = self._piece(x)
+        return _value(piece, t), _first(piece, t), _second(piece, t)
+
+    def _piece(self, x: ArrayLike) -> tuple[Real, Real]:
+        """Return the polynomials (4, ...) at `x` (...), and how far into them that is."""
         steps = (np.asarray(x, dtype=float) - self.first) / self.step
-        k = np.clip(steps.astype(np.intp), 0, self.pieces.shape[1] - 1)
-        return (_value, _first, _second)[order](self.pieces[:, k], (steps - k) * self.step)
+        k = np.minimum(np.maximum(steps.astype(np.intp), 0), self.pieces.shape[1] - 1)
+        return self.pieces.take(k, axis=1), (steps - k) * self.step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,15 +154,15 @@ def cubic_pieces(step: float, y: Real) -> Real:
     >>> cubic_pieces(1.0, np.arange(4.0) ** 2)[:, 1].round(6).tolist()  # (1 + t)²
     [0.0, 1.0, 2.0, 1.0]
     """
-    from scipy.linalg import solve_banded  # with the optimiser, not before
+    from faao_mav.optimizer.lapack import lapack  # with the optimiser, not before
 
     secant = np.diff(y, axis=0) / step
     right = np.empty_like(y, dtype=float)
     right[1:-1] = 3 * (secant[:-1] + secant[1:])
     right[0], right[-1] = (5 * secant[0] + secant[1]) / 2, (5 * secant[-1] + secant[-2]) / 2
-    bands = np.ones((3, len(y)))
-    bands[1, 1:-1] = 4
-    bands[0, 1] = bands[2, -2] = 2
-    slope = solve_banded((1, 1), bands, right.reshape(len(y), -1)).reshape(right.shape)
+    diagonal, (below, above) = np.ones(len(y)), np.ones((2, len(y) - 1))
+    diagonal[1:-1] = 4
+    above[0] = below[-1] = 2
+    slope = lapack.dgtsv(below, diagonal, above, right.reshape(len(y), -1))[3].reshape(right.shape)
     bend = (slope[:-1] + slope[1:] - 2 * secant) / step
     return np.stack([bend / step, (secant - slope[:-1]) / step - bend, slope[:-1], y[:-1]])

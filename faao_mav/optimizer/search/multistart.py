@@ -106,6 +106,7 @@ def improve_starts(
         tolerance=tolerance,
         max_iterations=max_iterations,
         relay=relay,
+        race=True,
     )
     optima = dict(zip(flights, solved, strict=True))
     ranked = sorted(optima, key=lambda name: -round(optima[name].value, _DECIMALS))

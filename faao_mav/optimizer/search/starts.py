@@ -217,9 +217,12 @@ def _by_way_of(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
         stops = [a + share * (p - a) for a, p in zip(anchors, stations, strict=True)]
         return _parts(kin, stops)
 
-    low, high, best = 0.0, 1.0, attempt(1.0)
+    best = attempt(1.0)
     if best is not None:
         return _joined(kin, best)
+    if attempt(_LEAST_SHARE) is None:
+        return None
+    low, high = 0.0, 1.0
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
         parts = attempt(middle)
@@ -227,7 +230,7 @@ def _by_way_of(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
             high = middle
         else:
             low, best = middle, parts
-    return _joined(kin, best) if best is not None and low >= _LEAST_SHARE else None
+    return None if best is None else _joined(kin, best)
 
 
 def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
