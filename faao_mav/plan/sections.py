@@ -55,6 +55,8 @@ StudyScheme: TypeAlias = Literal[
     "faao", "algorithm1", "mmse", "mrt", "zf", "waterfilling", "gaussian"
 ]
 StudyFigure: TypeAlias = Literal["delivered", "rate", "trajectories"]
+Maximised: TypeAlias = Literal["rate"]
+Minimised: TypeAlias = Literal["duration", "power"]
 
 _HOVER = (0.0, 0.0)
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
@@ -347,6 +349,28 @@ class Optimizer(_Section):
     ] = 50
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal(_Section):
+    """What the plan is for; by default the highest rate. Duration and powers are upper limits."""
+
+    maximise: Annotated[Maximised | None, key("What is maximised.", accepted="rate")] = None
+    minimise: Annotated[
+        Minimised | None,
+        key(
+            "What is minimised: the duration in whole time steps, or both powers by the same dB.",
+            accepted="duration or power",
+        ),
+    ] = None
+    deliver_mbytes: Annotated[
+        Number | None,
+        key("What has to be delivered (needs radio.bandwidth_mhz).", "megabytes", gt=0, le=1e9),
+    ] = None
+    rate: Annotated[
+        Number | None,
+        key("Instead: the delivered rate R_del that is needed.", "bit/s/Hz", gt=0, le=1e4),
+    ] = None
+
+
 @dataclass(frozen=True, slots=True)
 class CircleZone(_Section):
     """A circle of the fence."""
@@ -483,6 +507,7 @@ class PlanFile(_Section):
     flight: Flight
     radio: Radio
     optimizer: Optimizer = field(default_factory=Optimizer)
+    goal: Goal = field(default_factory=Goal)
     fence: FenceOptions | None = None
     mission: MissionOptions = field(default_factory=MissionOptions)
     study: Study | None = None
@@ -503,6 +528,11 @@ class Plan(PlanFile):
     def origin(self) -> Origin:
         """The point of local [0, 0]."""
         return self.site.origin
+
+    @property
+    def powers(self) -> tuple[float, float]:
+        """W_B and W_U, W."""
+        return self.radio.base_station.power, self.radio.relay.power
 
     @property
     def wind(self) -> Vector:
@@ -562,6 +592,14 @@ class Plan(PlanFile):
         """Return what `rate`, bit/s/Hz, carries in the duration T, 10^6 bytes, as `megabits`."""
         megabits = self.megabits(rate)
         return None if megabits is None else megabits * self.flight.duration / 8
+
+    @property
+    def needed_rate(self) -> float:
+        """The delivered rate that `goal` asks for in the duration T, bit/s/Hz; 0 if for none."""
+        asked, bandwidth = self.goal.deliver_mbytes, self.radio.bandwidth_mhz
+        if asked is None or bandwidth is None:
+            return self.goal.rate or 0.0
+        return 8 * asked / (bandwidth * self.flight.duration)
 
 
 @lru_cache(maxsize=16)
