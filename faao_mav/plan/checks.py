@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.sections import Flight, Plan
+from faao_mav.power import RotaryWing
 from faao_mav.vector import chord
 
 MAX_SLOTS = 100_000
@@ -31,6 +33,7 @@ def problems(plan: Plan) -> Iterator[str]:
     yield from _steps(plan.flight)
     yield from _distance(plan)
     yield from _goal(plan)
+    yield from _power(plan)
     yield from fence_problems(plan)
     yield from _study(plan)
 
@@ -158,6 +161,30 @@ def _goal(plan: Plan) -> Iterator[str]:
         yield (
             f"goal.minimise: {goal.minimise}: counts what is delivered, which radio.causal: false "
             "does not plan for; give radio.causal: true"
+        )
+
+
+def _power(plan: Plan) -> Iterator[str]:
+    power, copter = plan.vehicle.power, plan.vehicle.type == "copter"
+    if power is None:
+        if plan.vehicle.battery is not None:
+            yield (
+                "vehicle.battery: what the flight takes is missing; give vehicle.power, as "
+                "{hover_w: 170, cruise_w: 130, at: 10}"
+            )
+        return
+    measured = ("hover_w", "cruise_w", "at") if copter else ("cruise_w", "at")
+    missing = [name for name in measured if getattr(power, name) is None]
+    if missing and len(missing) < len(measured):
+        yield f"vehicle.power.{missing[0]}: missing; give {listed(measured, 'and')}, or none"
+    if not copter and power.hover_w is not None:
+        yield f"vehicle.power.hover_w: {power.hover_w:g}: a plane does not hover; leave it out"
+    model = plan.power_model
+    if isinstance(model, RotaryWing) and model.parasite < 0 and power.at:
+        least = replace(model, parasite=0.0).level(np.array(power.at))
+        yield (
+            f"vehicle.power.cruise_w: {power.cruise_w:g} W at {power.at:g} m/s: rotors that take "
+            f"{power.hover_w:g} W in hover take at least {least:.4g} W there"
         )
 
 

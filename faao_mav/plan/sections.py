@@ -11,7 +11,15 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+)
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
@@ -38,6 +46,7 @@ from faao_mav.plan.fields import (
     told,
     watts,
 )
+from faao_mav.power import GRAVITY, FixedWing, PowerModel, RotaryWing
 
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
@@ -59,7 +68,15 @@ Maximised: TypeAlias = Literal["rate"]
 Minimised: TypeAlias = Literal["duration", "power"]
 
 _HOVER = (0.0, 0.0)
+_COPTER_MASS = 20 / GRAVITY
+"""The mass of the copter of the paper of 2019, kg: it weighs 20 N."""
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
+
+
+def _percent(value: object) -> object:
+    """Return the number of `20 %`, which YAML reads as text; anything else as it is."""
+    number = value.removesuffix("%").strip() if isinstance(value, str) else ""
+    return float(number) if number.replace(".", "", 1).isdecimal() else value
 
 
 class _Section:
@@ -130,6 +147,53 @@ class Site(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PowerOptions(_Section):
+    """The power that flight takes: from measured power, or from what the aircraft is.
+
+    The defaults are those of the aircraft of the papers.
+    """
+
+    hover_w: Annotated[
+        Number | None, key("Copter: power in hover; with cruise_w and at.", "W", gt=0, le=1e6)
+    ] = None
+    cruise_w: Annotated[
+        Number | None,
+        key("Power at the airspeed `at`; of a plane at that of longest range.", "W", gt=0, le=1e6),
+    ] = None
+    at: Annotated[Number | None, key("Airspeed of cruise_w.", "m/s", gt=0, le=1000)] = None
+    mass: Annotated[
+        Number | None,
+        key("Mass; null: 2.039 kg for copters, 10 kg for planes.", "kg", gt=0, le=1e5),
+    ] = None
+    rotor_area: Annotated[Number, key("Copter: area of all rotor discs.", "m^2", gt=0, le=1e4)] = (
+        0.503
+    )
+    solidity: Annotated[Number, key("Copter: area of blades by that of discs.", gt=0, le=1)] = 0.05
+    tip_speed: Annotated[Number, key("Copter: speed of blade tips.", "m/s", gt=0, le=400)] = 120.0
+    drag_ratio: Annotated[Number, key("Copter: fuselage drag ratio d_0.", ge=0, le=1000)] = 0.6
+    air_density: Annotated[Number, key("Copter: density of the air.", "kg/m^3", gt=0, le=2)] = 1.225
+    c1: Annotated[Number, key("Plane: factor of v^3.", "W s^3/m^3", gt=0, le=1e6)] = 9.26e-4
+    c2: Annotated[Number, key("Plane: factor of 1 / v.", "W m/s", gt=0, le=1e9)] = 2250.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Battery(_Section):
+    """The battery that the whole mission is held against (needs `vehicle.power`)."""
+
+    capacity_wh: Annotated[Number, key("Energy of the full battery.", "Wh", gt=0, le=1e6)]
+    reserve: Annotated[
+        Number,
+        BeforeValidator(_percent),
+        key("Share that has to be left after landing.", "%", "a percentage, 0 to 99", ge=0, le=99),
+    ] = 20.0
+
+    @property
+    def usable(self) -> float:
+        """The energy above the reserve, Wh."""
+        return self.capacity_wh * (1 - self.reserve / 100)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleOptions(_Section):
     """The aircraft and its limits."""
 
@@ -172,6 +236,8 @@ class VehicleOptions(_Section):
             accepted="autopilot parameters as NAME: number",
         ),
     ] = field(default_factory=dict)
+    power: PowerOptions | None = None
+    battery: Battery | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -528,6 +594,29 @@ class Plan(PlanFile):
     def origin(self) -> Origin:
         """The point of local [0, 0]."""
         return self.site.origin
+
+    @property
+    def power_model(self) -> PowerModel | None:
+        """What flight takes; None where the plan does not say."""
+        asked = self.vehicle.power
+        if asked is None:
+            return None
+        if not self._known.hovers:
+            mass = asked.mass or FixedWing().mass
+            if asked.cruise_w is not None and asked.at is not None:
+                return FixedWing.fitted(asked.cruise_w, asked.at, mass)
+            return FixedWing(asked.c1, asked.c2, mass)
+        model = RotaryWing.of(
+            mass=asked.mass or _COPTER_MASS,
+            rotor_area=asked.rotor_area,
+            solidity=asked.solidity,
+            tip_speed=asked.tip_speed,
+            drag_ratio=asked.drag_ratio,
+            air_density=asked.air_density,
+        )
+        if asked.hover_w is None or asked.cruise_w is None or asked.at is None:
+            return model
+        return model.fitted(asked.hover_w, asked.cruise_w, asked.at)
 
     @property
     def powers(self) -> tuple[float, float]:

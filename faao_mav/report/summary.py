@@ -89,6 +89,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
     yield from _flown(result)
     yield from _wind(plan, result.check)
+    yield from _energy(result.check)
     yield from _fenced(result.fence)
 
 
@@ -240,6 +241,21 @@ def _wind(plan: Plan, check: Check | None) -> Iterator[Line]:
         yield "wind", "; ".join(told)
 
 
+def _energy(check: Check | None) -> Iterator[Line]:
+    """Yield what the whole predicted flight takes, and what of the battery it leaves."""
+    energy = check.energy if check is not None else None
+    if energy is None:
+        return
+    told = f"{energy.total:.4g} Wh for the whole flight"
+    if not energy.lands:
+        told += " as far as the mission goes, in the air at its end"
+    if energy.battery is not None and energy.left is not None:
+        battery = energy.battery
+        left = f"{100 * energy.left:.0f} %" if energy.left > 0 else "nothing"
+        told += f"; of {battery.capacity_wh:g} Wh is left {left} (reserve {battery.reserve:g} %)"
+    yield "energy", told
+
+
 def _of_limit(limit: WindLimit, link: LinkCheck | None) -> str:
     rate = f"{100 * LEAST_RATE:g} % of the rate and " if link is not None else ""
     promise = f"{rate}its time within {MOST_LATE:g} s"
@@ -278,6 +294,7 @@ def check_lines(check: Check) -> Iterator[Line]:
         yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
     if check.wind_limit is not None:
         yield "wind", _of_limit(check.wind_limit, check.link)
+    yield from _energy(check)
     if link := check.link:
         of_plan = partial(_of_plan, bandwidth_mhz=link.bandwidth_mhz)
         yield (
