@@ -22,7 +22,7 @@ TABLE = RotaryWing.of(mass=20 / GRAVITY, rotor_area=0.503)
 def published(v: float) -> float:
     """P(v) of the paper of 2019 with the rounded numbers of its text."""
     ratio = v**2 / (2 * 4.03**2)
-    return (
+    return float(
         79.86 * (1 + 3 * v**2 / 120**2)
         + 88.63 * ((1 + ratio**2) ** 0.5 - ratio) ** 0.5
         + 0.6 * 1.225 * 0.05 * 0.503 * v**3 / 2
