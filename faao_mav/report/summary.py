@@ -252,7 +252,7 @@ def _energy(check: Check | None) -> Iterator[Line]:
     if energy.battery is not None and energy.left is not None:
         battery = energy.battery
         left = f"{100 * energy.left:.0f} %" if energy.left > 0 else "nothing"
-        told += f"; of {battery.capacity_wh:g} Wh is left {left} (reserve {battery.reserve:g} %)"
+        told += f"; {left} of {battery.capacity_wh:g} Wh is left (reserve {battery.reserve:g} %)"
     yield "energy", told
 
 
