@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import SMALL, edited
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -44,6 +44,7 @@ def test_the_rotary_wing_is_that_of_the_paper() -> None:
         assert best == pytest.approx(speeds[(theirs / per_metre).argmin()], rel=5e-3)
 
 
+@settings(max_examples=30)
 @given(st.floats(50, 5000), st.floats(1, 20), st.floats(1, 2))
 def test_two_measured_powers_are_kept(hover: float, at: float, more: float) -> None:
     bare = RotaryWing(TABLE.blade, TABLE.induced, 120.0, TABLE.induced_speed, 0.0, 20.0)
@@ -54,6 +55,7 @@ def test_two_measured_powers_are_kept(hover: float, at: float, more: float) -> N
     assert fitted.parasite >= -1e-9
 
 
+@settings(max_examples=30)
 @given(*[st.floats(-40, 40)] * 2, *[st.floats(-5, 5)] * 2)
 def test_the_fixed_wing_is_that_of_the_paper(
     east: float, north: float, a_east: float, a_north: float

@@ -34,16 +34,23 @@ def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
     The solution's plan has them; `Solution.least` tells how they were found. Raises
     `InfeasibleError` where the goal is out of reach, with what the limits let be delivered.
 
-    >>> from faao_mav.plan import read_plan
-    >>> plan = changed_plan(
-    ...     read_plan("missions/copter_relay.yaml"),
-    ...     {"flight.time_step": 2.0, "goal": {"rate": 2.0, "minimise": "duration"}},
-    ... )
+    >>> from faao_mav.plan import parse_plan
+    >>> plan = parse_plan('''
+    ... site: {origin: {latitude: -35.36, longitude: 149.17}}
+    ... vehicle: {max_speed: 20, max_acceleration: 5}
+    ... flight: {start: [0, 50], end: [50, 0], altitude: 40, duration: 20, time_step: 0.5}
+    ... goal: {rate: 0.6, minimise: duration}
+    ... radio:
+    ...   fading: none
+    ...   base_station: {position: [0, 0], power_dbm: 0}
+    ...   relay: {power_dbm: 0}
+    ...   ground_user: {position: [60, 60]}
+    ... ''')
     >>> found = least(plan)
-    >>> found.plan.flight.duration
-    78.0
-    >>> found.delivered_rate >= 2.0 > found.least.below.delivered_rate
-    True
+    >>> found.plan.flight.duration, found.delivered_rate >= 0.6
+    (10.0, True)
+    >>> found.least.below.plan.flight.duration, found.least.below.delivered_rate < 0.6
+    (9.5, True)
     """
     search = (_Durations if plan.goal.minimise == "duration" else _Powers)(plan, observe)
     if not search.meets(search.high):

@@ -14,7 +14,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, AllowInfNan, Field, PlainValidator, Strict, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    Strict,
+    ValidationInfo,
+)
 from pydantic_core import PydanticCustomError
 
 from faao_mav.geodesy import LocalFrame
@@ -32,6 +40,13 @@ MIN_DBM = -200.0
 Number: TypeAlias = Annotated[float, Strict(), AllowInfNan(False)]
 Whole: TypeAlias = Annotated[int, Strict()]
 Flag: TypeAlias = Annotated[bool, Strict()]
+
+
+class Section:
+    """A mapping of known keys."""
+
+    __slots__ = ()
+    __pydantic_config__ = ConfigDict(extra="forbid")
 
 
 def _one_line(text: str) -> str:

@@ -13,8 +13,6 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import (
     AfterValidator,
-    BeforeValidator,
-    ConfigDict,
     Discriminator,
     Field,
     Tag,
@@ -25,6 +23,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
 from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.plan.energy import Battery, PowerOptions
 from faao_mav.plan.fields import (
     MAX_LOCAL_DISTANCE,
     Antennas,
@@ -35,6 +34,7 @@ from faao_mav.plan.fields import (
     Number,
     Position,
     Power,
+    Section,
     Text,
     TypeName,
     Vector,
@@ -46,7 +46,7 @@ from faao_mav.plan.fields import (
     told,
     watts,
 )
-from faao_mav.power import GRAVITY, FixedWing, PowerModel, RotaryWing
+from faao_mav.power import PowerModel
 
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
@@ -68,26 +68,11 @@ Maximised: TypeAlias = Literal["rate"]
 Minimised: TypeAlias = Literal["duration", "power"]
 
 _HOVER = (0.0, 0.0)
-_COPTER_MASS = 20 / GRAVITY
-"""The mass of the copter of the paper of 2019, kg: it weighs 20 N."""
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
 
 
-def _percent(value: object) -> object:
-    """Return the number of `20 %`, which YAML reads as text; anything else as it is."""
-    number = value.removesuffix("%").strip() if isinstance(value, str) else ""
-    return float(number) if number.replace(".", "", 1).isdecimal() else value
-
-
-class _Section:
-    """A mapping of known keys."""
-
-    __slots__ = ()
-    __pydantic_config__ = ConfigDict(extra="forbid")
-
-
 @dataclass(frozen=True, slots=True)
-class Origin(_Section):
+class Origin(Section):
     """The point of local [0, 0], WGS84."""
 
     latitude: Annotated[Number, key("Latitude.", "degrees", "degrees, -90 to 90, south negative")]
@@ -109,7 +94,7 @@ def _keep(origin: Origin, info: ValidationInfo) -> Origin:
 
 
 @dataclass(frozen=True, slots=True)
-class Wind(_Section):
+class Wind(Section):
     """The steady wind of the flight, everywhere the same.
 
     >>> tuple(round(each, 6) for each in Wind(5.0, 270.0).velocity)  # a west wind
@@ -139,7 +124,7 @@ class Wind(_Section):
 
 
 @dataclass(frozen=True, slots=True)
-class Site(_Section):
+class Site(Section):
     """Where the plan is flown."""
 
     origin: Annotated[Origin, AfterValidator(_keep)]
@@ -147,54 +132,7 @@ class Site(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PowerOptions(_Section):
-    """The power that flight takes: from measured power, or from what the aircraft is.
-
-    The defaults are those of the aircraft of the papers.
-    """
-
-    hover_w: Annotated[
-        Number | None, key("Copter: power in hover; with cruise_w and at.", "W", gt=0, le=1e6)
-    ] = None
-    cruise_w: Annotated[
-        Number | None,
-        key("Power at the airspeed `at`; of a plane at that of longest range.", "W", gt=0, le=1e6),
-    ] = None
-    at: Annotated[Number | None, key("Airspeed of cruise_w.", "m/s", gt=0, le=1000)] = None
-    mass: Annotated[
-        Number | None,
-        key("Mass; null: 2.039 kg for copters, 10 kg for planes.", "kg", gt=0, le=1e5),
-    ] = None
-    rotor_area: Annotated[Number, key("Copter: area of all rotor discs.", "m^2", gt=0, le=1e4)] = (
-        0.503
-    )
-    solidity: Annotated[Number, key("Copter: area of blades by that of discs.", gt=0, le=1)] = 0.05
-    tip_speed: Annotated[Number, key("Copter: speed of blade tips.", "m/s", gt=0, le=400)] = 120.0
-    drag_ratio: Annotated[Number, key("Copter: fuselage drag ratio d_0.", ge=0, le=1000)] = 0.6
-    air_density: Annotated[Number, key("Copter: density of the air.", "kg/m^3", gt=0, le=2)] = 1.225
-    c1: Annotated[Number, key("Plane: factor of v^3.", "W s^3/m^3", gt=0, le=1e6)] = 9.26e-4
-    c2: Annotated[Number, key("Plane: factor of 1 / v.", "W m/s", gt=0, le=1e9)] = 2250.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Battery(_Section):
-    """The battery that the whole mission is held against (needs `vehicle.power`)."""
-
-    capacity_wh: Annotated[Number, key("Energy of the full battery.", "Wh", gt=0, le=1e6)]
-    reserve: Annotated[
-        Number,
-        BeforeValidator(_percent),
-        key("Share that has to be left after landing.", "%", "a percentage, 0 to 99", ge=0, le=99),
-    ] = 20.0
-
-    @property
-    def usable(self) -> float:
-        """The energy above the reserve, Wh."""
-        return self.capacity_wh * (1 - self.reserve / 100)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleOptions(_Section):
+class VehicleOptions(Section):
     """The aircraft and its limits."""
 
     autopilot: Annotated[AutopilotName, key("The autopilot that the mission is for.")] = "ardupilot"
@@ -241,7 +179,7 @@ class VehicleOptions(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Flight(_Section):
+class Flight(Section):
     """The flight that is optimised.
 
     A velocity of None is free.
@@ -285,7 +223,7 @@ class Flight(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BaseStation(_Section):
+class BaseStation(Section):
     """The base station."""
 
     position: Annotated[Position, key("Place p_B.", "m")]
@@ -294,7 +232,7 @@ class BaseStation(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Relay(_Section):
+class Relay(Section):
     """The radio aboard."""
 
     antennas: Annotated[Antennas, key("Antennas N_u.")] = 2
@@ -312,7 +250,7 @@ class Relay(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GroundUser(_Section):
+class GroundUser(Section):
     """The ground user."""
 
     position: Annotated[Position, key("Place p_U.", "m")]
@@ -321,7 +259,7 @@ class GroundUser(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Radio(_Section):
+class Radio(Section):
     """Both links."""
 
     base_station: BaseStation
@@ -381,7 +319,7 @@ class Radio(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Optimizer(_Section):
+class Optimizer(Section):
     """How the plan is optimised."""
 
     method: Annotated[Method, key("The direct method, or the paper's Algorithm 1.")] = "direct"
@@ -416,7 +354,7 @@ class Optimizer(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Goal(_Section):
+class Goal(Section):
     """What the plan is for; by default the highest rate. Duration and powers are upper limits."""
 
     maximise: Annotated[Maximised | None, key("What is maximised.", accepted="rate")] = None
@@ -438,7 +376,7 @@ class Goal(_Section):
 
 
 @dataclass(frozen=True, slots=True)
-class CircleZone(_Section):
+class CircleZone(Section):
     """A circle of the fence."""
 
     center: Annotated[Position, key("Centre of the circle.", "m")]
@@ -446,7 +384,7 @@ class CircleZone(_Section):
 
 
 @dataclass(frozen=True, slots=True)
-class PolygonZone(_Section):
+class PolygonZone(Section):
     """A polygon of the fence."""
 
     polygon: Annotated[
@@ -484,7 +422,7 @@ _OnePolygon: TypeAlias = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class FenceOptions(_Section):
+class FenceOptions(Section):
     """Where the aircraft may be: it stays inside the inclusions and out of the exclusions."""
 
     inclusion: Annotated[
@@ -513,7 +451,7 @@ class FenceOptions(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MissionOptions(_Section):
+class MissionOptions(Section):
     """How the trajectory becomes a mission."""
 
     takeoff: Annotated[Flag, key("Whether the mission begins with a take-off.")] = True
@@ -534,7 +472,7 @@ class MissionOptions(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Study(_Section):
+class Study(Section):
     """What `faao-mission study` varies; the main job takes no notice of it."""
 
     vary: Annotated[
@@ -556,7 +494,7 @@ class Study(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlanFile(_Section):
+class PlanFile(Section):
     """What the file of a plan holds."""
 
     name: Annotated[
@@ -599,24 +537,7 @@ class Plan(PlanFile):
     def power_model(self) -> PowerModel | None:
         """What flight takes; None where the plan does not say."""
         asked = self.vehicle.power
-        if asked is None:
-            return None
-        if not self._known.hovers:
-            mass = asked.mass or FixedWing().mass
-            if asked.cruise_w is not None and asked.at is not None:
-                return FixedWing.fitted(asked.cruise_w, asked.at, mass)
-            return FixedWing(asked.c1, asked.c2, mass)
-        model = RotaryWing.of(
-            mass=asked.mass or _COPTER_MASS,
-            rotor_area=asked.rotor_area,
-            solidity=asked.solidity,
-            tip_speed=asked.tip_speed,
-            drag_ratio=asked.drag_ratio,
-            air_density=asked.air_density,
-        )
-        if asked.hover_w is None or asked.cruise_w is None or asked.at is None:
-            return model
-        return model.fitted(asked.hover_w, asked.cruise_w, asked.at)
+        return None if asked is None else asked.model(hovers=self._known.hovers)
 
     @property
     def powers(self) -> tuple[float, float]:

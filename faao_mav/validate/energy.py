@@ -7,7 +7,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.plan import Plan, Vector
-from faao_mav.plan.sections import Battery
+from faao_mav.plan.energy import Battery
 from faao_mav.vehicle import Track
 
 _JOULES_PER_WH = 3600.0

@@ -24,12 +24,15 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.starts import straight_flight, with_stops
+from faao_mav.optimizer.search.ways import along, shortest_by
 from faao_mav.plan import Plan, changed_plan, read_plan
 from faao_mav.plan.fields import dbm
 from faao_mav.plan.keys import ALIASES, POWER
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 LESS_DB = 0.02
+TRIES = 10
+"""Random ways that are tried for each start inside a fence."""
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "500 megabytes, 20 MHz": ("quickest_delivery", {}),
@@ -79,10 +82,20 @@ def from_random(plan: Plan, count: int) -> float:
     problem, rng = build_problem(plan), np.random.default_rng(1)
     kin, kept = problem.kinematics, problem.constraints(problem.kinematics)
     reach = float(np.linalg.norm(kin.end - kin.start))
-    inside: list[Trajectory] = []
-    while len(inside) < count:
-        flight = at_random(kin, rng, reach)
-        if all(each.excess(kin, flight) <= 0 for each in kept):
+    area, inside = problem.free_area, list[Trajectory]()
+    for _ in range(TRIES * count):
+        if len(inside) == count:
+            break
+        if area is None:
+            inside.append(at_random(kin, rng, reach))
+            continue
+        middle = (kin.start + kin.end) / 2
+        stops = [
+            area.nearest(p, kin.start) for p in middle + rng.uniform(-reach, reach, (2, 2)) / 2
+        ]
+        way = shortest_by(area, [kin.start, *stops[: rng.integers(3)], kin.end])
+        flight = None if way is None else along(kin, way, kept)
+        if flight is not None:
             inside.append(flight)
     optima = maximize_all(
         kin,
