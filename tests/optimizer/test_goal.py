@@ -15,6 +15,9 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.multistart import stretched
 from faao_mav.plan import Plan, changed_plan, parse_plan
+from faao_mav.plan.fields import dbm
+from faao_mav.report.summary import result_lines
+from faao_mav.workflow import Result
 
 BASE = parse_plan("""
 site: {origin: {latitude: 47, longitude: 8}}
@@ -80,6 +83,14 @@ def test_the_least_power_is_just_enough() -> None:
     below = found.least.below
     assert below.plan.radio.relay.power / relay == pytest.approx(10**-0.001, rel=1e-9)
     assert below.delivered_rate < share * full
+    powers, less = (f"{dbm(base) - db:.2f} and {dbm(relay) - db:.2f} dBm" for db in (0, 0.01))
+    lines = list(result_lines(Result(found)))
+    assert lines[0][0] == "goal"
+    assert lines[0][1].startswith(f"least power for {share * full:.4f} bit/s/Hz: {powers} (1 dBm ")
+    assert lines[1] == ("", f"{less} would deliver {below.delivered_rate:.4f} bit/s/Hz")
+    told = Result(found).as_dict()["goal"]
+    assert told["power_dbm"] == pytest.approx([dbm(base), dbm(relay)])
+    assert told["one_step_less"]["delivered_rate"] == below.delivered_rate
 
 
 @settings(max_examples=30, deadline=None)
