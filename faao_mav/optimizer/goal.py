@@ -134,20 +134,33 @@ class _Durations(_Search):
         low, high = self.solved.get(self.low), self.solved[self.high]
         assert high is not None
         if low is None:
-            if self.low in self.solved:  # no flight was found there
-                return (self.low + self.high) // 2
-            if self.plan.goal.deliver_mbytes is None:
-                return self.low + 1
-            return int(self.high * high.plan.needed_rate / high.delivered_rate)
-        less, more = (
-            number * (each.delivered_rate - each.plan.needed_rate)
-            for number, each in ((self.low, low), (self.high, high))
-        )
+            return self._without_flight(high)
+        less, more = _surplus(self.low, low), _surplus(self.high, high)
         if self.last == self.low:
             more *= 0.5**self.repeats
         else:
             less *= 0.5**self.repeats
         return math.ceil(self.low - less / (more - less) * (self.high - self.low))
+
+    def _without_flight(self, high: Solution) -> int:
+        """Return the guess where nothing is known of shorter times, or there is no flight."""
+        first = self.low not in self.solved
+        if first and self.plan.goal.deliver_mbytes is not None:
+            return int(self.high * high.plan.needed_rate / high.delivered_rate)
+        if first and self.plan.fence is None:
+            return self.low + 1
+        halfway = (self.low + self.high) // 2
+        longer = min((n for n, each in self.solved.items() if each and n > self.high), default=0)
+        beyond = self.solved.get(longer)
+        if beyond is None:
+            return halfway
+        here, there = _surplus(self.high, high), _surplus(longer, beyond)
+        root = self.high - here / max(there - here, 1e-9) * (longer - self.high)
+        return max(math.ceil(root), (self.low + halfway) // 2)
+
+
+def _surplus(slots: int, found: Solution) -> float:
+    return slots * (found.delivered_rate - found.plan.needed_rate)
 
 
 class _Powers(_Search):
