@@ -28,6 +28,7 @@ from faao_mav.optimizer.search.bound import Bound
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.autopilots import autopilots
+from faao_mav.plan.fields import dbm
 from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction, predict_delivery
 from faao_mav.validate import Finding, Level, Limits
@@ -169,6 +170,7 @@ class Result:
             "fresh_delivered_rate_error": fresh.delivered_error if fresh else None,
             "upper_bound": self.bound.value if self.bound else None,
             "upper_bound_exact": self.bound.exact if self.bound else None,
+            "goal": _goal_as_dict(solution),
             "starts": dict(solution.starts),
             "iterations": solution.iterations,
             "converged": solution.converged,
@@ -197,9 +199,33 @@ class Result:
             "wind_limit": asdict(self.check.wind_limit)
             if self.check and self.check.wind_limit
             else None,
+            "energy": self.check.energy.as_dict() if self.check and self.check.energy else None,
             "fence": asdict(self.fence) if self.fence else None,
             "validation": [asdict(finding) for finding in self.findings],
         }
+
+
+def _goal_as_dict(solution: Solution) -> dict[str, Any] | None:
+    """Return the least duration, s, or powers, dBm, and what one step less delivers."""
+    plan, least = solution.plan, solution.least
+    if least is None:
+        return None
+    below = least.below
+    return {
+        "minimise": plan.goal.minimise,
+        "needed_rate": plan.needed_rate,
+        "deliver_mbytes": plan.goal.deliver_mbytes,
+        "duration": plan.flight.duration,
+        "power_dbm": [round(dbm(power), 6) for power in plan.powers],
+        "limit": least.limit,
+        "one_step_less": {
+            "delivered_rate": below.delivered_rate,
+            "delivered_mbytes": below.plan.megabytes(below.delivered_rate),
+        }
+        if below is not None
+        else None,
+        "optimizations": least.optimizations,
+    }
 
 
 def flight_as_dict(plan: Plan, flight: Prediction) -> dict[str, Any]:

@@ -14,7 +14,7 @@ PACKAGE = Path(faao_mav.__file__).parent
 
 FLOORS = (
     ("errors", "arrays"),
-    ("vector", "files", "geodesy"),
+    ("vector", "files", "geodesy", "power"),
     ("radio", "mission"),
     ("plan",),
     ("optimizer",),

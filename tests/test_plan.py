@@ -26,7 +26,8 @@ def refused(changes: dict[str, Any]) -> str:
 
 
 @pytest.mark.parametrize(
-    "name", ["paper", "paper_active", "copter_relay", "fenced_relay", "plane_relay"]
+    "name",
+    ["paper", "paper_active", "copter_relay", "fenced_relay", "plane_relay", "quickest_delivery"],
 )
 def test_sample_plans_are_valid(name: str) -> None:
     plan = read_plan(MISSIONS / f"{name}.yaml")
@@ -134,6 +135,17 @@ def test_the_wind_blows_away_from_where_it_comes_from(
         ({"flight.time_step": 1e-7}, ["flight.duration", "100,000,000 steps", "100,000"]),
         ({"flight.altitude": 0}, ["flight.altitude", "above 0", "no bound"]),
         ({"flight.altitude": -40}, ["flight.altitude", "-40", "above 0"]),
+        ({"goal": {"minimise": "time"}}, ["goal.minimise", "'time'", "duration or power"]),
+        (
+            {"goal": {"minimise": "power"}},
+            ["goal.minimise", "missing", "deliver_mbytes or goal.rate"],
+        ),
+        ({"goal": {"minimise": "power", "rate": 1, "deliver_mbytes": 9}}, ["both are given"]),
+        ({"goal": {"rate": 1}}, ["goal.rate", "give goal.minimise too"]),
+        ({"goal": {"maximise": "rate", "minimise": "power"}}, ["goal.maximise", "leave one out"]),
+        ({"goal": {"deliver_mbytes": 9, "minimise": "power"}}, ["radio.bandwidth_mhz"]),
+        ({"goal": {"rate": -1, "minimise": "power"}}, ["goal.rate", "-1", "above 0"]),
+        ({"goal": {"rate": 1, "minimise": "power"}, "radio.causal": False}, ["give radio.causal"]),
         ({"radio.relay.antennas": 0}, ["radio.relay.antennas", "0", "1 to 64"]),
         ({"radio.relay.antennas": True}, ["radio.relay.antennas", "true is not accepted"]),
         ({"name": "a\nverified"}, ["name: 'a\\nverified'", "one line of at most 200 printable"]),

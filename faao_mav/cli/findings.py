@@ -47,6 +47,7 @@ def as_dict(checked: CheckedFile) -> dict[str, Any]:
         "predicted": predicted,
         "link": link,
         "wind_limit": asdict(check.wind_limit) if check.wind_limit else None,
+        "energy": check.energy.as_dict() if check.energy else None,
         "errors": len(check.of(Level.ERROR)),
         "warnings": len(check.of(Level.WARNING)),
         "notes": len(check.of(Level.NOTE)),

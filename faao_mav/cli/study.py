@@ -32,6 +32,15 @@ def study(
     seeds: Annotated[
         int | None, option("N", "Draws of the fading, from radio.seed.", min=1)
     ] = None,
+    frontier: Annotated[
+        str | None,
+        option(
+            "AXIS,data", "The most data for every duration or power: duration,data or power,data."
+        ),
+    ] = None,
+    points: Annotated[
+        int | None, option("N", "Points of the frontier; without it 12.", min=2)
+    ] = None,
     jobs: Annotated[int, option("N", "Processes; -1: one a core.")] = -1,
     cluster: Annotated[
         str | None, option("ADDRESS", "A Dask scheduler, tcp://host:port, not processes.")
@@ -53,6 +62,7 @@ def study(
     from faao_mav.plan.keys import POWER
     from faao_mav.plan.sections import Study
     from faao_mav.study import make_cases, parse_vary, run_study
+    from faao_mav.study.frontier import POINTS, frontier_cases, parse_frontier
     from faao_mav.study.sweep import join_grid, parse_schemes, parse_values
 
     if jobs == 0:
@@ -63,13 +73,22 @@ def study(
     if power is not None:
         options.append((POWER, parse_values(power, "--power")))
     grid = join_grid(options)
-    cases = make_cases(
-        plan.text,
-        vary=grid or asked.vary,
-        schemes=parse_schemes(schemes) if schemes is not None else asked.schemes,
-        seeds=seeds or asked.seeds,
-        source=str(plan_file),
-    )
+    along = None
+    if frontier is not None:
+        if grid or schemes is not None or seeds is not None:
+            raise InputError("--frontier: leave --vary, --power, --schemes and --seeds out")
+        along = parse_frontier(frontier)
+        cases = frontier_cases(plan, along, points or POINTS)
+    elif points is not None:
+        raise InputError(f"--points {points}: is for a frontier; give --frontier too")
+    else:
+        cases = make_cases(
+            plan.text,
+            vary=grid or asked.vary,
+            schemes=parse_schemes(schemes) if schemes is not None else asked.schemes,
+            seeds=seeds or asked.seeds,
+            source=str(plan_file),
+        )
     _check_cases(cases)
     try:
         with study_progress(len(cases), shown=sys.stderr.isatty()) as observe:
@@ -80,20 +99,25 @@ def study(
             kept = f"finished rows are in {out}; the same command goes on there"
         note(f"interrupted; {kept}")
         raise typer.Exit(_INTERRUPTED) from None
-    written = _draw(rows, plan, asked.figure, out) if out is not None else []
-    _tell(rows, written, as_json)
+    written = _draw(rows, plan, along, out) if out is not None else []
+    _tell(rows, plan, along, written, as_json)
     if all(row.error for row in rows):
         raise typer.Exit(1)
 
 
-def _draw(rows: "Sequence[StudyRow]", plan: "Plan", kind: str, out: Path) -> list[Path]:
-    """Add the figure to what the study has written, where there is something to draw."""
+def _draw(rows: "Sequence[StudyRow]", plan: "Plan", along: str | None, out: Path) -> list[Path]:
+    """Add the figure to what the study has written, where there is something to draw.
+
+    `along` is the key that a frontier varies, None for any other study.
+    """
+    from faao_mav.plan.sections import Study
     from faao_mav.report.style import save_figure
     from faao_mav.study.figure import can_draw, study_figure
+    from faao_mav.study.frontier import frontier_figure
 
-    written = [out / "rows.jsonl", out / "table.csv"]
+    written, kind = [out / "rows.jsonl", out / "table.csv"], (plan.study or Study()).figure
     if can_draw(rows, kind):
-        figure = study_figure(rows, plan, kind)
+        figure = frontier_figure(rows, plan, along) if along else study_figure(rows, plan, kind)
         for path in (out / "figure.svg", out / "figure.png"):
             save_figure(figure, path)
             written.append(path)
@@ -116,7 +140,14 @@ def _check_cases(cases: "Sequence[StudyCase]") -> None:
         raise first
 
 
-def _tell(rows: "Sequence[StudyRow]", written: Sequence[Path], as_json: bool) -> None:
+def _tell(
+    rows: "Sequence[StudyRow]",
+    plan: "Plan",
+    along: str | None,
+    written: Sequence[Path],
+    as_json: bool,
+) -> None:
+    from faao_mav.study.frontier import frontier_table
     from faao_mav.study.rows import as_dict, comparison
 
     files = [str(path) for path in written]
@@ -124,4 +155,5 @@ def _tell(rows: "Sequence[StudyRow]", written: Sequence[Path], as_json: bool) ->
         found = {"rows": [as_dict(row) for row in rows], "written": files}
         typer.echo(json.dumps(found, allow_nan=False))
     else:
-        typer.echo("\n".join([comparison(rows), *(f"written      {path}" for path in files)]))
+        text = frontier_table(rows, plan, along) if along else comparison(rows)
+        typer.echo("\n".join([text, *(f"written      {path}" for path in files)]))

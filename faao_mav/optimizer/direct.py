@@ -18,7 +18,14 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design, design
-from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, maximize_all, objectives
+from faao_mav.optimizer.interior.maximize import (
+    LocalOptimum,
+    constraints_of,
+    feasible,
+    maximize,
+    maximize_all,
+    objectives,
+)
 from faao_mav.optimizer.interior.search import COLD_START, WARM_SHARES, WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
@@ -27,7 +34,7 @@ from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
-from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts
+from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.routes import global_flights
 from faao_mav.optimizer.search.starts import split_names, starts
 from faao_mav.optimizer.search.ways import starts_inside
@@ -58,7 +65,13 @@ _EQUAL = 1e-6
 up to the tolerance and to rounding, so that it differs from machine to machine. Chosen."""
 
 
-def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
+KNOWN = "known"
+"""The name of the start that is the flight of a similar plan."""
+
+
+def direct(
+    problem: Problem, *, observe: Observer | None = None, known: Trajectory | None = None
+) -> Solution:
     """Optimise trajectory and precoders of `problem` together.
 
     The starts of `optimizer.starts` are improved roughly where there are several, and the best of
@@ -97,6 +110,9 @@ def direct(problem: Problem, *, observe: Observer | None = None) -> Solution:
         routes |= global_flights(kin, field, relay, first, free=problem.free_area, kept=kept)
     if before is not None:
         routes[CUTOFF] = before.trajectory
+    if known is not None:
+        limits = (*constraints_of(kin), *kept)
+        routes[KNOWN] = feasible(kin, next(iter(routes.values())), stretched(kin, known), limits)
     tell(1, "the starts", 0.0)
     if len(routes) > 1:
         rough = improve_starts(

@@ -6,11 +6,15 @@ from faao_mav.plan import Plan
 
 
 def optimize(plan: Plan, *, observe: Observer | None = None) -> Solution:
-    """Optimise trajectory and precoders of `plan` by `optimizer.method`.
+    """Optimise trajectory and precoders of `plan` by `optimizer.method`, for its `goal`.
 
     `observe` is told the progress. Raises `PlanError` when the plan asks for more than the
     method can handle, `InfeasibleError` when no flight satisfies it.
     """
+    if plan.goal.minimise is not None:
+        from faao_mav.optimizer.goal import least
+
+        return least(plan, observe=observe)
     problem = build_problem(plan)
     if plan.optimizer.method == "algorithm1":
         from faao_mav.optimizer.algorithm1 import algorithm1  # CVXPY takes half a second

@@ -47,6 +47,20 @@ class Rates:
         return min(self.R_U, self.R_G)
 
 
+@dataclass(frozen=True, slots=True)
+class Least:
+    """How the least duration or power was found, which the solution's plan has.
+
+    `limit` is what the plan allowed, s or the base station's dBm; `below` the best solution with
+    one step of the grid less, None where there is no flight, and `optimizations` how many flights
+    were optimised.
+    """
+
+    limit: float
+    below: "Solution | None"
+    optimizations: int
+
+
 @dataclass(frozen=True)
 class Solution:
     '''A solved plan: SI units, local east-north metres, one row per time slot.
@@ -61,7 +75,8 @@ class Solution:
     those that were not followed to the end. `shares` (n,) of each slot are those in which a
     half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
     `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
-    by how much the rate that it maximises is above that of the plan for the cutoff rate.
+    by how much the rate that it maximises is above that of the plan for the cutoff rate. `least`
+    tells of a plan whose `goal` minimises; it is not saved.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -97,6 +112,7 @@ class Solution:
     starts: Mapping[str, float] = field(default_factory=dict)
     shares: Real | None = None
     gain: float | None = None
+    least: Least | None = None
 
     @property
     def rates(self) -> Rates:
@@ -286,6 +302,7 @@ def load_solution(path: str | Path) -> Solution:
     shares = found.get("shares")
     if shares is not None and not ((shares >= 0) & (shares <= 1)).all():
         raise InputError(f"{path}: shares: expected a number of 0 to 1 per slot")
+    arrays: dict[str, Any] = {name: found[name] for name in _ARRAYS}
     return Solution(
         plan=plan,
         converged=bool(found["converged"]),
@@ -293,7 +310,7 @@ def load_solution(path: str | Path) -> Solution:
         starts=_starts(_text(found["starts"], f"{path}: starts"), f"{path}: starts"),
         shares=shares,
         gain=float(found["gain"]) if "gain" in found else None,
-        **{name: found[name] for name in _ARRAYS},
+        **arrays,
     )
 
 

@@ -5,10 +5,12 @@
 
 from faao_mav.plan.fields import Vector as Vector
 from faao_mav.plan.keys import reference as reference
+from faao_mav.plan.reader import changed_plan as changed_plan
 from faao_mav.plan.reader import parse_plan as parse_plan
 from faao_mav.plan.reader import read_plan as read_plan
 from faao_mav.plan.sections import BaseStation as BaseStation
 from faao_mav.plan.sections import Flight as Flight
+from faao_mav.plan.sections import Goal as Goal
 from faao_mav.plan.sections import GroundUser as GroundUser
 from faao_mav.plan.sections import MissionOptions as MissionOptions
 from faao_mav.plan.sections import Optimizer as Optimizer

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,10 +12,14 @@ from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.sections import Flight, Plan
+from faao_mav.power import RotaryWing
 from faao_mav.vector import chord
 
 MAX_SLOTS = 100_000
 """Most time slots; chosen: the direct method solves 10,000 in 0.6 s; more is not measured."""
+
+FEWEST_SLOTS = 3
+"""Fewest time slots of a flight: start, end and one between."""
 
 _SLACK = 1e-6
 """Metres that the reach may be short: a plan at the very limit is not refused for rounding."""
@@ -27,6 +32,8 @@ def problems(plan: Plan) -> Iterator[str]:
     yield from _relay(plan)
     yield from _steps(plan.flight)
     yield from _distance(plan)
+    yield from _goal(plan)
+    yield from _power(plan)
     yield from fence_problems(plan)
     yield from _study(plan)
 
@@ -114,8 +121,8 @@ def _steps(flight: Flight) -> Iterator[str]:
     if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio):
         low, high = (whole(ratio) * flight.time_step for whole in (math.floor, math.ceil))
         yield f"{given}not a whole number of steps {step}{low:.10g} or {high:.10g} would be"
-    if flight.slots < 3:
-        yield f"{given}{flight.slots} step(s) {step}give at least 3 steps"
+    if flight.slots < FEWEST_SLOTS:
+        yield f"{given}{flight.slots} step(s) {step}give at least {FEWEST_SLOTS} steps"
 
 
 def _distance(plan: Plan) -> Iterator[str]:
@@ -131,6 +138,54 @@ def _distance(plan: Plan) -> Iterator[str]:
         f"{vehicle.max_acceleration:g} m/s^2 with the given end velocities"
         f"{_in_wind(plan)}{_airspeed(plan)}"
     )
+
+
+def _goal(plan: Plan) -> Iterator[str]:
+    goal = plan.goal
+    amounts = [name for name in ("deliver_mbytes", "rate") if getattr(goal, name) is not None]
+    if goal.minimise is None:
+        if amounts:
+            yield f"goal.{amounts[0]}: is for a goal that minimises; give goal.minimise too"
+        return
+    if goal.maximise is not None:
+        yield f"goal.maximise: {goal.maximise}: goal.minimise is given too; leave one out"
+    if len(amounts) != 1:
+        given = "both are given" if amounts else "what has to be delivered is missing"
+        yield f"goal.minimise: {goal.minimise}: {given}; give goal.deliver_mbytes or goal.rate"
+    if goal.deliver_mbytes is not None and plan.radio.bandwidth_mhz is None:
+        yield (
+            f"goal.deliver_mbytes: {goal.deliver_mbytes:g}: what a rate carries depends on the "
+            "bandwidth; give radio.bandwidth_mhz too, or goal.rate"
+        )
+    if not plan.radio.causal:
+        yield (
+            f"goal.minimise: {goal.minimise}: counts what is delivered, which radio.causal: false "
+            "does not plan for; give radio.causal: true"
+        )
+
+
+def _power(plan: Plan) -> Iterator[str]:
+    power, copter = plan.vehicle.power, plan.vehicle.type == "copter"
+    if power is None:
+        if plan.vehicle.battery is not None:
+            yield (
+                "vehicle.battery: what the flight takes is missing; give vehicle.power, as "
+                "{hover_w: 170, cruise_w: 130, at: 10}"
+            )
+        return
+    measured = ("hover_w", "cruise_w", "at") if copter else ("cruise_w", "at")
+    missing = [name for name in measured if getattr(power, name) is None]
+    if missing and len(missing) < len(measured):
+        yield f"vehicle.power.{missing[0]}: missing; give {listed(measured, 'and')}, or none"
+    if not copter and power.hover_w is not None:
+        yield f"vehicle.power.hover_w: {power.hover_w:g}: a plane does not hover; leave it out"
+    model = plan.power_model
+    if isinstance(model, RotaryWing) and model.parasite < 0 and power.at:
+        least = replace(model, parasite=0.0).level(np.array(power.at))
+        yield (
+            f"vehicle.power.cruise_w: {power.cruise_w:g} W at {power.at:g} m/s: rotors that take "
+            f"{power.hover_w:g} W in hover take at least {least:.4g} W there"
+        )
 
 
 def _airspeed(plan: Plan) -> str:

@@ -14,7 +14,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, AllowInfNan, Field, PlainValidator, Strict, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    Strict,
+    ValidationInfo,
+)
 from pydantic_core import PydanticCustomError
 
 from faao_mav.geodesy import LocalFrame
@@ -26,9 +34,19 @@ Vector: TypeAlias = tuple[float, float]
 MAX_LOCAL_DISTANCE = 100_000.0
 """Largest distance of a position from the origin in metres: the frame is flat to 0.01 % there."""
 
+MIN_DBM = -200.0
+"""Least transmit power, dBm; chosen: no link carries anything there."""
+
 Number: TypeAlias = Annotated[float, Strict(), AllowInfNan(False)]
 Whole: TypeAlias = Annotated[int, Strict()]
 Flag: TypeAlias = Annotated[bool, Strict()]
+
+
+class Section:
+    """A mapping of known keys."""
+
+    __slots__ = ()
+    __pydantic_config__ = ConfigDict(extra="forbid")
 
 
 def _one_line(text: str) -> str:
@@ -89,7 +107,8 @@ def watts(dbm: float) -> float:
     return float(10 ** ((dbm - 30) / 10))
 
 
-def _dbm(power: float) -> float:
+def dbm(power: float) -> float:
+    """Return `power`, W, in dBm."""
     return 10 * math.log10(power) + 30
 
 
@@ -208,15 +227,15 @@ Velocity: TypeAlias = Annotated[
 ]
 Power: TypeAlias = Annotated[
     Number,
-    Field(ge=-200, le=100),
+    Field(ge=MIN_DBM, le=100),
     AfterValidator(watts),
-    Written("a power from -200 to 100 dBm", _dbm),
+    Written("a power from -200 to 100 dBm", dbm),
 ]
 Noise: TypeAlias = Annotated[
     Number,
     Field(ge=-250, le=100),
     AfterValidator(watts),
-    Written("a noise power from -250 to 100 dBm", _dbm),
+    Written("a noise power from -250 to 100 dBm", dbm),
 ]
 Gain: TypeAlias = Annotated[
     Number,

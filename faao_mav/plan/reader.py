@@ -6,6 +6,7 @@ from dataclasses import fields
 from functools import cache
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -57,6 +58,27 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
     for problem in problems(plan):
         raise PlanError(f"{source}: {problem}")
     return plan
+
+
+def changed_plan(plan: Plan, changes: Mapping[str, Any]) -> Plan:
+    """Return `plan` with the values at dotted keys of its file replaced. Raises `PlanError`."""
+    data = changed(load_yaml(plan.text, plan.source), changes)
+    return parse_plan(dump_yaml(data), plan.source)
+
+
+def changed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a copy of `data` with the values at dotted keys replaced.
+
+    >>> changed({"radio": {"seed": 0, "duplex": "half"}}, {"radio.seed": 7})
+    {'radio': {'seed': 7, 'duplex': 'half'}}
+    """
+    result = dict(data)
+    for path, value in changes.items():
+        head, _, rest = path.partition(".")
+        inside = result.get(head)
+        below = inside if isinstance(inside, dict) else {}
+        result[head] = changed(below, {rest: value}) if rest else value
+    return result
 
 
 @cache

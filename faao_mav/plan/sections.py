@@ -11,12 +11,19 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+)
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
 from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.plan.energy import Battery, PowerOptions
 from faao_mav.plan.fields import (
     MAX_LOCAL_DISTANCE,
     Antennas,
@@ -27,6 +34,7 @@ from faao_mav.plan.fields import (
     Number,
     Position,
     Power,
+    Section,
     Text,
     TypeName,
     Vector,
@@ -38,6 +46,7 @@ from faao_mav.plan.fields import (
     told,
     watts,
 )
+from faao_mav.power import PowerModel
 
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
@@ -55,20 +64,15 @@ StudyScheme: TypeAlias = Literal[
     "faao", "algorithm1", "mmse", "mrt", "zf", "waterfilling", "gaussian"
 ]
 StudyFigure: TypeAlias = Literal["delivered", "rate", "trajectories"]
+Maximised: TypeAlias = Literal["rate"]
+Minimised: TypeAlias = Literal["duration", "power"]
 
 _HOVER = (0.0, 0.0)
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
 
 
-class _Section:
-    """A mapping of known keys."""
-
-    __slots__ = ()
-    __pydantic_config__ = ConfigDict(extra="forbid")
-
-
 @dataclass(frozen=True, slots=True)
-class Origin(_Section):
+class Origin(Section):
     """The point of local [0, 0], WGS84."""
 
     latitude: Annotated[Number, key("Latitude.", "degrees", "degrees, -90 to 90, south negative")]
@@ -90,7 +94,7 @@ def _keep(origin: Origin, info: ValidationInfo) -> Origin:
 
 
 @dataclass(frozen=True, slots=True)
-class Wind(_Section):
+class Wind(Section):
     """The steady wind of the flight, everywhere the same.
 
     >>> tuple(round(each, 6) for each in Wind(5.0, 270.0).velocity)  # a west wind
@@ -120,7 +124,7 @@ class Wind(_Section):
 
 
 @dataclass(frozen=True, slots=True)
-class Site(_Section):
+class Site(Section):
     """Where the plan is flown."""
 
     origin: Annotated[Origin, AfterValidator(_keep)]
@@ -128,7 +132,7 @@ class Site(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleOptions(_Section):
+class VehicleOptions(Section):
     """The aircraft and its limits."""
 
     autopilot: Annotated[AutopilotName, key("The autopilot that the mission is for.")] = "ardupilot"
@@ -170,10 +174,12 @@ class VehicleOptions(_Section):
             accepted="autopilot parameters as NAME: number",
         ),
     ] = field(default_factory=dict)
+    power: PowerOptions | None = None
+    battery: Battery | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Flight(_Section):
+class Flight(Section):
     """The flight that is optimised.
 
     A velocity of None is free.
@@ -217,7 +223,7 @@ class Flight(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BaseStation(_Section):
+class BaseStation(Section):
     """The base station."""
 
     position: Annotated[Position, key("Place p_B.", "m")]
@@ -226,7 +232,7 @@ class BaseStation(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Relay(_Section):
+class Relay(Section):
     """The radio aboard."""
 
     antennas: Annotated[Antennas, key("Antennas N_u.")] = 2
@@ -244,7 +250,7 @@ class Relay(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GroundUser(_Section):
+class GroundUser(Section):
     """The ground user."""
 
     position: Annotated[Position, key("Place p_U.", "m")]
@@ -253,7 +259,7 @@ class GroundUser(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Radio(_Section):
+class Radio(Section):
     """Both links."""
 
     base_station: BaseStation
@@ -313,7 +319,7 @@ class Radio(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Optimizer(_Section):
+class Optimizer(Section):
     """How the plan is optimised."""
 
     method: Annotated[Method, key("The direct method, or the paper's Algorithm 1.")] = "direct"
@@ -347,8 +353,30 @@ class Optimizer(_Section):
     ] = 50
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal(Section):
+    """What the plan is for; by default the highest rate. Duration and powers are upper limits."""
+
+    maximise: Annotated[Maximised | None, key("What is maximised.", accepted="rate")] = None
+    minimise: Annotated[
+        Minimised | None,
+        key(
+            "What is minimised: the duration in whole time steps, or both powers by the same dB.",
+            accepted="duration or power",
+        ),
+    ] = None
+    deliver_mbytes: Annotated[
+        Number | None,
+        key("What has to be delivered (needs radio.bandwidth_mhz).", "megabytes", gt=0, le=1e9),
+    ] = None
+    rate: Annotated[
+        Number | None,
+        key("Instead: the delivered rate R_del that is needed.", "bit/s/Hz", gt=0, le=1e4),
+    ] = None
+
+
 @dataclass(frozen=True, slots=True)
-class CircleZone(_Section):
+class CircleZone(Section):
     """A circle of the fence."""
 
     center: Annotated[Position, key("Centre of the circle.", "m")]
@@ -356,7 +384,7 @@ class CircleZone(_Section):
 
 
 @dataclass(frozen=True, slots=True)
-class PolygonZone(_Section):
+class PolygonZone(Section):
     """A polygon of the fence."""
 
     polygon: Annotated[
@@ -394,7 +422,7 @@ _OnePolygon: TypeAlias = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class FenceOptions(_Section):
+class FenceOptions(Section):
     """Where the aircraft may be: it stays inside the inclusions and out of the exclusions."""
 
     inclusion: Annotated[
@@ -423,7 +451,7 @@ class FenceOptions(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MissionOptions(_Section):
+class MissionOptions(Section):
     """How the trajectory becomes a mission."""
 
     takeoff: Annotated[Flag, key("Whether the mission begins with a take-off.")] = True
@@ -444,7 +472,7 @@ class MissionOptions(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Study(_Section):
+class Study(Section):
     """What `faao-mission study` varies; the main job takes no notice of it."""
 
     vary: Annotated[
@@ -466,7 +494,7 @@ class Study(_Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlanFile(_Section):
+class PlanFile(Section):
     """What the file of a plan holds."""
 
     name: Annotated[
@@ -483,6 +511,7 @@ class PlanFile(_Section):
     flight: Flight
     radio: Radio
     optimizer: Optimizer = field(default_factory=Optimizer)
+    goal: Goal = field(default_factory=Goal)
     fence: FenceOptions | None = None
     mission: MissionOptions = field(default_factory=MissionOptions)
     study: Study | None = None
@@ -503,6 +532,17 @@ class Plan(PlanFile):
     def origin(self) -> Origin:
         """The point of local [0, 0]."""
         return self.site.origin
+
+    @property
+    def power_model(self) -> PowerModel | None:
+        """What flight takes; None where the plan does not say."""
+        asked = self.vehicle.power
+        return None if asked is None else asked.model(hovers=self._known.hovers)
+
+    @property
+    def powers(self) -> tuple[float, float]:
+        """W_B and W_U, W."""
+        return self.radio.base_station.power, self.radio.relay.power
 
     @property
     def wind(self) -> Vector:
@@ -562,6 +602,14 @@ class Plan(PlanFile):
         """Return what `rate`, bit/s/Hz, carries in the duration T, 10^6 bytes, as `megabits`."""
         megabits = self.megabits(rate)
         return None if megabits is None else megabits * self.flight.duration / 8
+
+    @property
+    def needed_rate(self) -> float:
+        """The delivered rate that `goal` asks for in the duration T, bit/s/Hz; 0 if for none."""
+        asked, bandwidth = self.goal.deliver_mbytes, self.radio.bandwidth_mhz
+        if asked is None or bandwidth is None:
+            return self.goal.rate or 0.0
+        return 8 * asked / (bandwidth * self.flight.duration)
 
 
 @lru_cache(maxsize=16)

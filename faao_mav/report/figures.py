@@ -10,6 +10,7 @@ from faao_mav.report.maps import route_map
 from faao_mav.report.style import MUTED, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
+from faao_mav.validate.energy import EnergyUse
 from faao_mav.vector import lengths
 from faao_mav.vehicle import Track
 
@@ -149,6 +150,25 @@ def mission_motion(track: Track) -> "Figure":
         label(upper, "", "", "ground speed, m/s")
         lower.plot(track.t, track.position[:, 2], color=SERIES[0])
         label(lower, "", "time, s", "height above home, m")
+    return figure
+
+
+def energy(use: EnergyUse) -> "Figure":
+    """Return the power of the whole predicted flight, W, and what is used or left, Wh."""
+    with drawing(WIDTH, 4.4) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        upper.plot(use.t, use.power, color=SERIES[1], linewidth=1.1)
+        upper.set_ylim(bottom=0)
+        label(upper, "", "", "power, W")
+        _share_time(upper)
+        battery = use.battery
+        full = 0.0 if battery is None else battery.capacity_wh
+        lower.plot(use.t, full - use.used if battery else use.used, color=SERIES[1])
+        if battery is not None:
+            _limit(lower, full - battery.usable, "reserve")
+            legend_above(lower)
+        lower.set_ylim(bottom=min(0.0, full - use.total))
+        label(lower, "", "time, s", "used, Wh" if battery is None else "left, Wh")
     return figure
 
 

@@ -94,6 +94,11 @@ def _sections(
         yield _section("Parameters", told + _table(("parameter", "value"), rows))
     if judged is not None:
         yield from _mission_figures(judged)
+    if check is not None and check.energy is not None:
+        from faao_mav.report.figures import energy
+
+        title = "Power of the whole predicted flight over time, and the energy"
+        yield _figure("energy", "Energy", energy(check.energy), title)
     if result is not None:
         yield from _plan_figures(result, debriefing)
         text = f"<pre>{escape(result.solution.plan.text)}</pre>"

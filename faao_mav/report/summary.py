@@ -7,7 +7,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import TypeAlias
 
+from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
+from faao_mav.plan.fields import dbm
 from faao_mav.schedule.precoder_table import taken_by
 from faao_mav.validate import Finding, Level
 from faao_mav.validate.check import Check
@@ -57,6 +59,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     """
     solution, plan = result.solution, result.solution.plan
     limit, bound, causal = result.saturation, result.bound, plan.radio.causal
+    yield from _least(solution)
     # what was maximised comes first, with how that came about
     yield from (_delivered if causal else _rate)(result)
     yield from (_rate if causal else _delivered)(result)
@@ -86,7 +89,42 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
     yield from _flown(result)
     yield from _wind(plan, result.check)
+    yield from _energy(result.check)
     yield from _fenced(result.fence)
+
+
+def _least(solution: Solution) -> Iterator[Line]:
+    """Yield the least duration or power, and what one step less would deliver."""
+    found = solution.least
+    if found is None:
+        return
+    below = found.below
+    of, answer = _minimised(solution.plan)
+    limit = f"{found.limit:g} {'s' if of == 'duration' else 'dBm'}"
+    yield (
+        "goal",
+        f"least {of} for {_amount(solution.plan, solution.plan.needed_rate)}: {answer} "
+        f"({limit} given); {found.optimizations} flights optimised",
+    )
+    if below is None:
+        yield "", "no flight takes less time"
+    else:
+        less = _minimised(below.plan)[1]
+        yield "", f"{less} would deliver {_amount(below.plan, below.delivered_rate)}"
+
+
+def _minimised(plan: Plan) -> tuple[str, str]:
+    """Return what the goal of `plan` minimises, and how much of it the plan has."""
+    if plan.goal.minimise == "duration":
+        return "duration", f"{plan.flight.duration:g} s"
+    powers = dict.fromkeys(f"{dbm(power):.2f}" for power in plan.powers)
+    return "power", f"{' and '.join(powers)} dBm"
+
+
+def _amount(plan: Plan, rate: float) -> str:
+    """Return what `rate`, bit/s/Hz, delivers in the unit of the plan's goal."""
+    megabytes = plan.megabytes(rate) if plan.goal.deliver_mbytes is not None else None
+    return f"{rate:.4f} bit/s/Hz" if megabytes is None else f"{megabytes:.5g} megabytes"
 
 
 def _told_rate(rate: float, bandwidth_mhz: float | None) -> str:
@@ -203,6 +241,21 @@ def _wind(plan: Plan, check: Check | None) -> Iterator[Line]:
         yield "wind", "; ".join(told)
 
 
+def _energy(check: Check | None) -> Iterator[Line]:
+    """Yield what the whole predicted flight takes, and what of the battery it leaves."""
+    energy = check.energy if check is not None else None
+    if energy is None:
+        return
+    told = f"{energy.total:.4g} Wh for the whole flight"
+    if not energy.lands:
+        told += " as far as the mission goes, in the air at its end"
+    if energy.battery is not None and energy.left is not None:
+        battery = energy.battery
+        left = f"{100 * energy.left:.0f} %" if energy.left > 0 else "nothing"
+        told += f"; {left} of {battery.capacity_wh:g} Wh is left (reserve {battery.reserve:g} %)"
+    yield "energy", told
+
+
 def _of_limit(limit: WindLimit, link: LinkCheck | None) -> str:
     rate = f"{100 * LEAST_RATE:g} % of the rate and " if link is not None else ""
     promise = f"{rate}its time within {MOST_LATE:g} s"
@@ -241,6 +294,7 @@ def check_lines(check: Check) -> Iterator[Line]:
         yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
     if check.wind_limit is not None:
         yield "wind", _of_limit(check.wind_limit, check.link)
+    yield from _energy(check)
     if link := check.link:
         of_plan = partial(_of_plan, bandwidth_mhz=link.bandwidth_mhz)
         yield (

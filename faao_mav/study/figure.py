@@ -170,19 +170,24 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
             colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
             width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
             plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
-        radio, flight = plan.radio, plan.flight
-        places = (
-            ("base station", radio.base_station.position, "s"),
-            ("user", radio.ground_user.position, "^"),
-            ("start", flight.start, "o"),
-            ("end", flight.end, "o"),
-        )
-        mark_stations(plot, places)
-        plot.set_aspect("equal", adjustable="datalim")
-        plot.margins(0.1)
-        label(plot, plan.name or "routes", "east, m", "north, m")
+        as_map(plot, plan, plan.name or "routes")
         figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
     return figure
+
+
+def as_map(plot: "Axes", plan: Plan, title: str) -> None:
+    """Make `plot` a map with the stations and the ends of `plan`."""
+    radio, flight = plan.radio, plan.flight
+    places = (
+        ("base station", radio.base_station.position, "s"),
+        ("user", radio.ground_user.position, "^"),
+        ("start", flight.start, "o"),
+        ("end", flight.end, "o"),
+    )
+    mark_stations(plot, places)
+    plot.set_aspect("equal", adjustable="datalim")
+    plot.margins(0.1)
+    label(plot, title, "east, m", "north, m")
 
 
 def _named(values: Mapping[str, Value]) -> str:

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, get_args
 
 from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.plan.keys import ALIASES, unknown_key, varied_twice
+from faao_mav.plan.reader import changed
 from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
@@ -159,18 +160,6 @@ def make_cases(
             chosen = {f"optimizer.{name}": v for name, v in OVERRIDES[scheme].items()}
             seeded = {"radio.seed": seed} if isinstance(first, int) else {}
             # what is varied goes before what the scheme would have
-            changed = _changed(data, chosen | changes | seeded)
-            plan = dump_yaml(changed)
+            plan = dump_yaml(changed(data, chosen | changes | seeded))
             made.append(StudyCase(pairs, scheme, seed, plan, source))
     return tuple(made)
-
-
-def _changed(data: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
-    """Return a copy of `data` with the values at dotted keys replaced."""
-    result = dict(data)
-    for path, value in changes.items():
-        head, _, rest = path.partition(".")
-        inside = result.get(head)
-        below = inside if isinstance(inside, dict) else {}
-        result[head] = _changed(below, {rest: value}) if rest else value
-    return result

@@ -19,6 +19,7 @@ from faao_mav.validate.context import ValidationContext as ValidationContext
 from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
 from faao_mav.validate.demands import Stretch as Stretch
+from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
@@ -45,20 +46,22 @@ def validate(
     limits: Limits | None = None,
     link: LinkCheck | None = None,
     airborne: bool = False,
+    energy: EnergyUse | None = None,
 ) -> tuple[Finding, ...]:
     """Return what all rules about `vehicle` find in `mission`, worst first, then by item.
 
     `track` is the predicted flight: with it speeds, heights, duration and fence are judged along
     the flight as well as along the straights between the items. `limits` are what the flight must
     stay within. `link` says what of a plan's rate the flight delivers. `airborne`: the mission is
-    begun in the air, and needs no take-off. Parameters of the vehicle that are no use count as not
-    given. Any mission can be judged, however odd; nothing is raised.
+    begun in the air, and needs no take-off. `energy` is what the flight takes. Parameters of the
+    vehicle that are no use count as not given. Any mission can be judged, however odd; nothing is
+    raised.
 
     >>> from faao_mav.mission.item import Mission
     >>> [finding.rule for finding in validate(Mission(()), Vehicle())]
     ['empty']
     """
-    context = ValidationContext(mission, vehicle, track, limits or Limits(), link, airborne)
+    context = ValidationContext(mission, vehicle, track, limits or Limits(), link, airborne, energy)
     found = [
         finding for rule in RULES if rule.applies_to(vehicle) for finding in rule.findings(context)
     ]

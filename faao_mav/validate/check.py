@@ -7,6 +7,7 @@ from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
+from faao_mav.validate.energy import EnergyUse, energy_use
 from faao_mav.validate.wind_limit import WindLimit, wind_limit
 from faao_mav.vehicle import Track, Vehicle
 
@@ -20,7 +21,8 @@ class Check:
 
     `track` is the predicted flight; where there is none `unpredicted` says why. `link` is what the
     flight makes of a plan, None without a plan or a track. `findings` are the worst first. `wind`,
-    m/s, is what `track` is predicted in, `wind_limit` the strongest wind that the mission keeps.
+    m/s, is what `track` is predicted in, `wind_limit` the strongest wind that the mission keeps,
+    `energy` what the flight takes, None where no plan tells its power.
     """
 
     mission: Mission
@@ -31,6 +33,7 @@ class Check:
     findings: tuple[Finding, ...] = ()
     wind: Vector = (0.0, 0.0)
     wind_limit: WindLimit | None = None
+    energy: EnergyUse | None = None
 
     def of(self, level: Level) -> tuple[Finding, ...]:
         """Return the findings of `level`."""
@@ -65,16 +68,25 @@ def check(
     wind = own if wind is None else wind
     track, unpredicted = _track(mission, vehicle, wind)
     made_for = track if wind == own else _track(mission, vehicle, own)[0]
-    limit = link = None
+    limit = link = energy = None
     if made_for is not None:
         limit = wind_limit(mission, vehicle, made_for, solution=solution, lead=lead)
     if solution is not None and track is not None:
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
 
         link = compare_with_plan(solution, track, lead=lead)
+        energy = energy_use(solution.plan, track, wind)
     airborne = solution is not None and not solution.plan.mission.takeoff
-    findings = validate(mission, vehicle, track=track, limits=limits, link=link, airborne=airborne)
-    return Check(mission, vehicle, track, unpredicted, link, findings, wind, limit)
+    findings = validate(
+        mission,
+        vehicle,
+        track=track,
+        limits=limits,
+        link=link,
+        airborne=airborne,
+        energy=energy,
+    )
+    return Check(mission, vehicle, track, unpredicted, link, findings, wind, limit, energy)
 
 
 def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:

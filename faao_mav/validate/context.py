@@ -12,6 +12,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.validate.demands import Limits, LinkCheck
+from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.fence_map import FenceMap, fence_map
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
 from faao_mav.vehicle import Track, Vehicle
@@ -28,7 +29,8 @@ class ValidationContext:
     """A mission to judge; parameters of its vehicle that are no use count as not given.
 
     `track` is how it is predicted to fly, if that is known; `link` what it is predicted to
-    deliver, if there is a plan to compare with. `airborne`: it is begun in the air.
+    deliver and `energy` what it takes, if there is a plan that tells. `airborne`: it is begun in
+    the air.
     """
 
     mission: Mission
@@ -37,6 +39,7 @@ class ValidationContext:
     limits: Limits = field(default_factory=Limits)
     link: LinkCheck | None = None
     airborne: bool = False
+    energy: EnergyUse | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vehicle", self.vehicle.usable())

@@ -192,6 +192,20 @@ def _too_long(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
+@RULES.error("battery-reserve", "the plan's vehicle.power and vehicle.battery; predicted flight")
+def _reserve(context: ValidationContext) -> Iterator[Issue]:
+    """The flight leaves less than the reserve of the plan's battery."""
+    energy = context.energy
+    if energy is not None and energy.battery is not None and not energy.enough:
+        battery = energy.battery
+        yield Issue(
+            None,
+            f"the flight is predicted to take {energy.total:.4g} Wh; of {battery.capacity_wh:g} Wh "
+            f"{battery.usable:.4g} are above the reserve of {battery.reserve:g} %",
+            "plan with less flight.duration or a nearer start and end, or give a larger battery",
+        )
+
+
 def least_duration(context: ValidationContext) -> float:
     """Return what the legs at the commanded speeds and the holds take, s, without any ramps.
 

@@ -153,3 +153,19 @@ def resampled(kin: Kinematics, flight: Trajectory, other: Kinematics) -> Real:
     elif kin.start_velocity is not None:
         velocities[0] = flight.v[1]
     return velocities
+
+
+def stretched(kin: Kinematics, flight: Trajectory) -> Real:
+    """Return the velocities (slots, 2) at which the path of `flight` takes the time of `kin`.
+
+    The longer it takes the less speed and acceleration it needs. With velocities of the ends that
+    are zero or free, and in calm air, the rates along it have nearly the same means.
+    """
+    share = np.linspace(0, 1, len(flight.v))
+    faster = (len(flight.v) - 1) / (kin.slots - 1)
+    at = np.linspace(0, 1, kin.slots)
+    velocities = faster * np.stack([np.interp(at, share, v) for v in flight.v.T], axis=1)
+    for n, given in ((0, kin.start_velocity), (-1, kin.end_velocity)):
+        if given is not None:
+            velocities[n] = given
+    return velocities

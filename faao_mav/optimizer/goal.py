@@ -1,0 +1,211 @@
+"""The least duration or power that delivers what a plan's `goal` asks for.
+
+Both searches rest on what is delivered growing with either. A flight at the speeds v(t / c) / c
+takes c times as long along the same path: with c > 1 it keeps the limits, with ends that hover or
+are free, and its rates have the same means, so that R_del never falls as T grows and T R_del rises
+with it. A precoder that keeps a power limit keeps a larger one. Each step is a whole optimisation,
+which has the last flight among its starts. Where the growth is not certain (known draws, which
+change with T; wind; a least speed; a buffer that fills), the answer still meets the goal and one
+step less was found not to, but a smaller one may meet it.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from bisect import bisect_left
+from collections.abc import Mapping
+from dataclasses import replace
+
+from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer.direct import direct
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.solution import Least, Observer, Progress, Solution
+from faao_mav.plan import Plan, changed_plan
+from faao_mav.plan.checks import FEWEST_SLOTS, shortest_duration
+from faao_mav.plan.fields import MIN_DBM, dbm
+from faao_mav.plan.keys import ALIASES, POWER
+
+POWER_STEP = 0.01
+"""The step of the least power, dB. Chosen: radios are set to tenths."""
+
+
+def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
+    """Return the solution of `plan` with the least duration or powers that meet its `goal`.
+
+    The solution's plan has them; `Solution.least` tells how they were found. Raises
+    `InfeasibleError` where the goal is out of reach, with what the limits let be delivered.
+
+    >>> from faao_mav.plan import parse_plan
+    >>> plan = parse_plan('''
+    ... site: {origin: {latitude: -35.36, longitude: 149.17}}
+    ... vehicle: {max_speed: 20, max_acceleration: 5}
+    ... flight: {start: [0, 50], end: [50, 0], altitude: 40, duration: 20, time_step: 0.5}
+    ... goal: {rate: 0.6, minimise: duration}
+    ... radio:
+    ...   fading: none
+    ...   base_station: {position: [0, 0], power_dbm: 0}
+    ...   relay: {power_dbm: 0}
+    ...   ground_user: {position: [60, 60]}
+    ... ''')
+    >>> found = least(plan)
+    >>> found.plan.flight.duration, found.delivered_rate >= 0.6
+    (10.0, True)
+    >>> found.least.below.plan.flight.duration, found.least.below.delivered_rate < 0.6
+    (9.5, True)
+    """
+    search = (_Durations if plan.goal.minimise == "duration" else _Powers)(plan, observe)
+    if not search.meets(search.high):
+        raise InfeasibleError(_out_of_reach(plan, search.solved[search.high]))
+    while search.high - search.low > 1:
+        search.meets(min(max(search.guess(), search.low + 1), search.high - 1))
+    best, below = search.solved[search.high], search.solved.get(search.low)
+    assert best is not None
+    return replace(best, least=Least(search.limit, below, len(search.solved)))
+
+
+class _Search(ABC):
+    """Plans by a whole number, `most` for the one given: at `high` the goal is met, at `low` not.
+
+    `limit` is the quantity that is minimised, as the plan has it.
+    """
+
+    limit: float
+
+    def __init__(self, plan: Plan, observe: Observer | None, low: int, high: int) -> None:
+        self.plan, self.observe, self.low, self.high = plan, observe, low, high
+        self.solved: dict[int, Solution | None] = {}
+        self.last, self.repeats = high, 0  # the last number, and how often that end has moved alone
+
+    @abstractmethod
+    def changes(self, number: int) -> Mapping[str, float]:
+        """Return what the plan of `number` has instead, by dotted keys."""
+
+    @abstractmethod
+    def guess(self) -> int:
+        """Return about the least number that meets the goal."""
+
+    def meets(self, number: int) -> bool:
+        """Optimise at `number`, and tell whether the goal is met; without a flight it is not."""
+        changes = self.changes(number)
+        plan, known = changed_plan(self.plan, changes), self.solved.get(self.last)
+        told = ", ".join(f"{key} {value:g}" for key, value in changes.items())
+
+        def tell(now: Progress) -> None:
+            if self.observe is not None:
+                self.observe(replace(now, stage=f"{told}: {now.stage}"))
+
+        found: Solution | None = None
+        try:
+            start = None if known is None else known.trajectory
+            found = direct(build_problem(plan), observe=tell, known=start)
+        except InfeasibleError:
+            if not self.solved:  # the plan as it was given
+                raise
+        met = found is not None and found.delivered_rate >= plan.needed_rate
+        same = self.solved and self.last == (self.high if met else self.low)
+        self.repeats = self.repeats + 1 if same else 0
+        self.solved[number], self.last = found, number
+        if met:
+            self.high = number
+        else:
+            self.low = number
+        return met
+
+
+class _Durations(_Search):
+    """Numbers of slots."""
+
+    def __init__(self, plan: Plan, observe: Observer | None) -> None:
+        shortest = shortest_duration(plan)
+        assert shortest is not None  # the plan's own duration is no shorter
+        fewest = max(round(shortest / plan.flight.time_step), FEWEST_SLOTS)
+        super().__init__(plan, observe, fewest - 1, plan.flight.slots)
+        self.limit = plan.flight.duration
+
+    def changes(self, number: int) -> Mapping[str, float]:
+        return {"flight.duration": round(number * self.plan.flight.time_step, 9)}
+
+    def guess(self) -> int:
+        """Return the root of the chord of T (R_del - needed), which is nearly linear in T.
+
+        Long flights stay where the rate is best. Where the same end moves again and again, half of
+        the other's value is taken (the Illinois rule). R_del is at most that of the longer flight:
+        the first guess for megabytes is the time in which that rate delivers them.
+        """
+        low, high = self.solved.get(self.low), self.solved[self.high]
+        assert high is not None
+        if low is None:
+            return self._without_flight(high)
+        less, more = _surplus(self.low, low), _surplus(self.high, high)
+        if self.last == self.low:
+            more *= 0.5**self.repeats
+        else:
+            less *= 0.5**self.repeats
+        return math.ceil(self.low - less / (more - less) * (self.high - self.low))
+
+    def _without_flight(self, high: Solution) -> int:
+        """Return the guess where nothing is known of shorter times, or there is no flight."""
+        first = self.low not in self.solved
+        if first and self.plan.goal.deliver_mbytes is not None:
+            return int(self.high * high.plan.needed_rate / high.delivered_rate)
+        if first and self.plan.fence is None:
+            return self.low + 1
+        halfway = (self.low + self.high) // 2
+        longer = min((n for n, each in self.solved.items() if each and n > self.high), default=0)
+        beyond = self.solved.get(longer)
+        if beyond is None:
+            return halfway
+        here, there = _surplus(self.high, high), _surplus(longer, beyond)
+        root = self.high - here / max(there - here, 1e-9) * (longer - self.high)
+        return max(math.ceil(root), (self.low + halfway) // 2)
+
+
+def _surplus(slots: int, found: Solution) -> float:
+    return slots * (found.delivered_rate - found.plan.needed_rate)
+
+
+class _Powers(_Search):
+    """Numbers of steps of `POWER_STEP` by which both powers are changed, none or less."""
+
+    def __init__(self, plan: Plan, observe: Observer | None) -> None:
+        self.given = {
+            key: dbm(power) for key, power in zip(ALIASES[POWER], plan.powers, strict=True)
+        }
+        self.limit = self.given[ALIASES[POWER][0]]
+        room = min(self.given.values()) - MIN_DBM
+        super().__init__(plan, observe, -int(room / POWER_STEP) - 1, 0)
+
+    def changes(self, number: int) -> Mapping[str, float]:
+        return {key: round(p + number * POWER_STEP, 6) for key, p in self.given.items()}
+
+    def guess(self) -> int:
+        """Return the number at which the last flight, with its precoders scaled, meets the goal.
+
+        The best rate at another power is no lower, and has the same slope (the envelope theorem):
+        the steps are those of Newton's method or better.
+        """
+        held, needed = self.solved[self.last], self.plan.needed_rate
+        assert held is not None  # power has no part in whether there is a flight
+
+        def met(number: int) -> bool:
+            scale = 10 ** ((number - self.last) * POWER_STEP / 10)
+            return held.relay(*held.recomputed_slots(scale), held.shares).rate >= needed
+
+        between = range(self.low + 1, self.high)
+        return self.low + 1 + bisect_left(between, True, key=met)
+
+
+def _out_of_reach(plan: Plan, best: Solution | None) -> str:
+    assert best is not None
+    goal, R_del = plan.goal, best.delivered_rate
+    if goal.deliver_mbytes is not None:
+        asked = f"goal.deliver_mbytes: {goal.deliver_mbytes:g} megabytes cannot be delivered"
+        most = f"{plan.megabytes(R_del):.4g} megabytes"
+    else:
+        asked = f"goal.rate: {goal.rate:g} bit/s/Hz cannot be delivered"
+        most = f"{R_del:.4f} bit/s/Hz"
+    powers = " and ".join(f"{dbm(power):g}" for power in plan.powers)
+    return (
+        f"{plan.source}: {asked} in {plan.flight.duration:g} s (flight.duration) at {powers} dBm "
+        f"(power_dbm of base_station and relay): at most {most}; "
+        "ask for less, or give more time or power"
+    )

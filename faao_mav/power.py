@@ -1,0 +1,137 @@
+"""The power that flight takes, W, as a function of velocity: rotary and fixed wings.
+
+Rotary wings (Zeng, Xu and Zhang, "Energy Minimization for Wireless Communication With Rotary-Wing
+UAV", IEEE TWC 2019, (12)), at the airspeed v:
+
+    P(v) = P_0 (1 + 3 v^2 / U^2) + P_i ((1 + v^4 / (4 v_0^4))^(1/2) - v^2 / (2 v_0^2))^(1/2)
+           + d_0 rho s A v^3 / 2
+
+are blade profile, induced and parasite power. Fixed wings (Zeng and Zhang, "Energy-Efficient UAV
+Communication With Trajectory Optimization", IEEE TWC 2017, (7)), with the acceleration a across v:
+
+    P(v, a) = c_1 v^3 + (c_2 / v) (1 + a^2 / g^2)
+
+Both are for level flight. Climbing and gaining speed cost the growth of potential and, for fixed
+wings, of kinetic energy; what is set free by descending and slowing is lost.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from faao_mav.arrays import Real
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s^2."""
+
+_PROFILE_DRAG = 0.012
+"""Profile drag coefficient delta of the blades, by the table of 2019."""
+
+_INDUCED_FACTOR = 0.1
+"""Share k by which the induced power is above that of an ideal rotor, by the table of 2019."""
+
+_LEAST_AIRSPEED = 1.0
+"""Airspeed below which a fixed wing is not flying, m/s: c_2 / v is held there. Chosen."""
+
+
+class PowerModel(Protocol):
+    """What a flight takes, W."""
+
+    def __call__(self, velocity: Real, acceleration: Real) -> Real:
+        """Return W (...) at velocities through the air and accelerations (..., 3), m/s, m/s^2."""
+
+
+@dataclass(frozen=True, slots=True)
+class RotaryWing:
+    """P_0 and P_i, W, U and v_0, m/s, the parasite power's factor of v^3, W s^3/m^3, weight, N.
+
+    >>> table = RotaryWing.of(mass=20 / GRAVITY, rotor_area=0.503)
+    >>> speeds = np.array([0.0, 10.0, 18.0])
+    >>> table.level(speeds).round(1).tolist()
+    [168.5, 126.0, 159.0]
+    """
+
+    blade: float
+    induced: float
+    tip_speed: float
+    induced_speed: float
+    parasite: float
+    weight: float
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        mass: float,
+        rotor_area: float,
+        solidity: float = 0.05,
+        tip_speed: float = 120.0,
+        drag_ratio: float = 0.6,
+        air_density: float = 1.225,
+    ) -> "RotaryWing":
+        """Return the model of an aircraft: kg, m^2, 1, m/s, 1, kg/m^3."""
+        weight, swept = mass * GRAVITY, air_density * rotor_area
+        return cls(
+            blade=_PROFILE_DRAG / 8 * swept * solidity * tip_speed**3,
+            induced=(1 + _INDUCED_FACTOR) * weight**1.5 / (2 * swept) ** 0.5,
+            tip_speed=tip_speed,
+            induced_speed=(weight / (2 * swept)) ** 0.5,
+            parasite=drag_ratio * solidity * swept / 2,
+            weight=weight,
+        )
+
+    def fitted(self, hover: float, cruise: float, speed: float) -> "RotaryWing":
+        """Return the model of P(0) = `hover` and P(`speed`) = `cruise`, W.
+
+        Blade profile and induced power keep their ratio and their speeds; the rest is parasite,
+        which is negative where `cruise` is too little.
+        """
+        share = hover / (self.blade + self.induced)
+        bare = replace(self, blade=share * self.blade, induced=share * self.induced, parasite=0.0)
+        return replace(bare, parasite=(cruise - float(bare.level(np.array(speed)))) / speed**3)
+
+    def level(self, speed: Real) -> Real:
+        """Return P(v), W, at airspeeds of level flight, m/s."""
+        ratio = speed**2 / (2 * self.induced_speed**2)
+        # (1 + r^2)^(1/2) - r without the cancellation at high speeds
+        inflow = np.sqrt(1 / (np.sqrt(1 + ratio**2) + ratio))
+        profile = self.blade * (1 + 3 * speed**2 / self.tip_speed**2)
+        return np.asarray(profile + self.induced * inflow + self.parasite * speed**3)
+
+    def __call__(self, velocity: Real, acceleration: Real) -> Real:  # noqa: ARG002
+        """Return W (...): see `PowerModel`; accelerations cost nothing."""
+        speed = np.linalg.norm(velocity[..., :2], axis=-1)
+        return np.asarray(self.level(speed) + self.weight * np.maximum(0.0, velocity[..., 2]))
+
+
+@dataclass(frozen=True, slots=True)
+class FixedWing:
+    """c_1, W s^3/m^3, c_2, W m/s, and the mass, kg.
+
+    >>> float(FixedWing().level(np.array(30.0), np.array(0.0)).round(1))
+    100.0
+    """
+
+    c1: float = 9.26e-4
+    c2: float = 2250.0
+    mass: float = 10.0
+
+    @classmethod
+    def fitted(cls, cruise: float, speed: float, mass: float) -> "FixedWing":
+        """Return the model of least energy per metre at `speed`, where it takes `cruise`, W."""
+        return cls(cruise / (2 * speed**3), cruise * speed / 2, mass)
+
+    def level(self, speed: Real, across: Real) -> Real:
+        """Return P(v, a), W, at airspeeds and accelerations across them, m/s, m/s^2."""
+        lift = self.c2 / np.maximum(speed, _LEAST_AIRSPEED)
+        return np.asarray(self.c1 * speed**3 + lift * (1 + (across / GRAVITY) ** 2))
+
+    def __call__(self, velocity: Real, acceleration: Real) -> Real:
+        """Return W (...): see `PowerModel`."""
+        v, a = velocity[..., :2], acceleration[..., :2]
+        speed = np.linalg.norm(v, axis=-1)
+        across = np.abs(v[..., 0] * a[..., 1] - v[..., 1] * a[..., 0])
+        gained = (v * a).sum(axis=-1) + GRAVITY * velocity[..., 2]
+        turning = across / np.maximum(speed, _LEAST_AIRSPEED)
+        return np.asarray(self.level(speed, turning) + self.mass * np.maximum(0.0, gained))

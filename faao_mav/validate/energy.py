@@ -1,0 +1,70 @@
+"""What a predicted mission takes from the battery, from the climb to the landing."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.plan import Plan, Vector
+from faao_mav.plan.energy import Battery
+from faao_mav.vehicle import Track
+
+_JOULES_PER_WH = 3600.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnergyUse:
+    """The power, W, of flight and relay at the times `t` (n,), s, and what was used by then, Wh.
+
+    `battery` is the plan's, if it has one; `lands` is whether the flight ends on the ground.
+    """
+
+    t: Real
+    power: Real
+    used: Real
+    battery: Battery | None
+    lands: bool
+
+    @property
+    def total(self) -> float:
+        """What the whole flight takes, Wh."""
+        return float(self.used[-1])
+
+    @property
+    def left(self) -> float | None:
+        """The share of the battery that is left at the end; None without a battery."""
+        return None if self.battery is None else 1 - self.total / self.battery.capacity_wh
+
+    @property
+    def enough(self) -> bool:
+        """Whether the battery's reserve is left at the end."""
+        return self.battery is None or self.total <= self.battery.usable
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `energy` of `--json`: Wh, W, a share."""
+        return {
+            "used_wh": self.total,
+            "mean_power_w": float(self.total * _JOULES_PER_WH / self.t[-1]),
+            "capacity_wh": self.battery.capacity_wh if self.battery else None,
+            "reserve": self.battery.reserve / 100 if self.battery else None,
+            "left": self.left,
+            "lands": self.lands,
+        }
+
+
+def energy_use(plan: Plan, track: Track, wind: Vector) -> EnergyUse | None:
+    """Return what the flight `track` of the mission of `plan` takes; None without a power model.
+
+    The velocities are those through the air, which moves with `wind`, m/s. The relay's transmit
+    power counts for as long as the flight lasts.
+    """
+    model = plan.power_model
+    if model is None or len(track.t) < 2:
+        return None
+    air = track.velocity - np.array([*wind, 0.0])
+    acceleration = np.gradient(air, track.t, axis=0)
+    power = model(air, acceleration) + plan.radio.relay.power
+    steps = np.diff(track.t) * (power[1:] + power[:-1]) / 2
+    used = np.concatenate([[0.0], np.cumsum(steps)]) / _JOULES_PER_WH
+    return EnergyUse(track.t, power, used, plan.vehicle.battery, track.lands)

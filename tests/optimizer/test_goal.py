@@ -1,0 +1,127 @@
+"""Goals: the least duration and power are those of trying every step, and grow as they must."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_flights import random_flight
+
+from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer.direct import direct
+from faao_mav.optimizer.kinematics import Kinematics
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.search.multistart import stretched
+from faao_mav.plan import Plan, changed_plan, parse_plan
+from faao_mav.plan.fields import dbm
+from faao_mav.report.summary import result_lines
+from faao_mav.workflow import Result
+
+BASE = parse_plan("""
+site: {origin: {latitude: 47, longitude: 8}}
+vehicle: {max_speed: 12, max_acceleration: 4}
+flight: {start: [0, 60], end: [60, 0], altitude: 40, duration: 18, time_step: 1}
+radio:
+  fading: none
+  bandwidth_mhz: 10
+  base_station: {position: [0, 0], power_dbm: 1}
+  relay: {noise_dbm: -80}
+  ground_user: {position: [80, 60], noise_dbm: -80}
+optimizer: {starts: [straight, bs-user]}
+""")
+
+
+def delivered(changes: dict[str, Any]) -> float:
+    return direct(build_problem(changed_plan(BASE, changes))).delivered_rate
+
+
+@pytest.fixture(scope="module")
+def by_duration() -> dict[int, float]:
+    """What flights of every duration deliver, bit/s/Hz."""
+    return {slots: delivered({"flight.duration": slots}) for slots in range(12, 19)}
+
+
+def test_rate_and_data_grow_with_the_duration(by_duration: dict[int, float]) -> None:
+    rates = np.array(list(by_duration.values()))
+    assert (np.diff(rates) > -1e-4).all()
+    assert (np.diff(rates * list(by_duration)) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("amount", "share"), [("rate", 0.0), ("rate", 0.6), ("deliver_mbytes", 0.3)]
+)
+def test_the_least_duration_is_that_of_trying_all(
+    by_duration: dict[int, float], amount: str, share: float
+) -> None:
+    per_slot = {n: 1.0 if amount == "rate" else 10 * n / 8 for n in by_duration}
+    amounts = {n: rate * per_slot[n] for n, rate in by_duration.items()}
+    low, high = min(amounts.values()), max(amounts.values())
+    asked = low + share * (high - low) - 1e-3  # ends differ by the tolerance
+    found = optimize(changed_plan(BASE, {"goal": {amount: asked, "minimise": "duration"}}))
+    least = min(n for n, reached in amounts.items() if reached >= asked)
+    assert found.plan.flight.duration == least
+    assert found.least is not None
+    assert found.least.optimizations <= 7
+    if least == min(amounts):
+        assert found.least.below is None
+    else:
+        assert found.least.below is not None
+        assert found.least.below.delivered_rate < found.least.below.plan.needed_rate
+
+
+def test_the_least_power_is_just_enough() -> None:
+    share, full = 0.6, delivered({})
+    found = optimize(changed_plan(BASE, {"goal": {"rate": share * full, "minimise": "power"}}))
+    base, relay = found.plan.radio.base_station.power, found.plan.radio.relay.power
+    assert relay / base == pytest.approx(10**1.9, rel=1e-9)  # both by the same dB
+    assert found.delivered_rate >= share * full
+    assert found.least is not None
+    assert found.least.optimizations <= 7
+    assert found.least.below is not None
+    below = found.least.below
+    assert below.plan.radio.relay.power / relay == pytest.approx(10**-0.001, rel=1e-9)
+    assert below.delivered_rate < share * full
+    powers, less = (f"{dbm(base) - db:.2f} and {dbm(relay) - db:.2f} dBm" for db in (0, 0.01))
+    lines = list(result_lines(Result(found)))
+    assert lines[0][0] == "goal"
+    assert lines[0][1].startswith(f"least power for {share * full:.4f} bit/s/Hz: {powers} (1 dBm ")
+    assert lines[1] == ("", f"{less} would deliver {below.delivered_rate:.4f} bit/s/Hz")
+    told = Result(found).as_dict()["goal"]
+    assert told["power_dbm"] == pytest.approx([dbm(base), dbm(relay)])
+    assert told["one_step_less"]["delivered_rate"] == below.delivered_rate
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32), st.integers(0, 40), st.booleans())
+def test_a_flight_that_takes_longer_keeps_the_limits(seed: int, more: int, free: bool) -> None:
+    hover = None if free else np.zeros(2)
+    ends = (np.array([0.0, 60.0]), np.array([60.0, 0.0]))
+    short, long = (
+        Kinematics(*ends, slots, 0.5, 12.0, 4.0, hover, hover, True) for slots in (40, 40 + more)
+    )
+    flight = long.follow(stretched(long, random_flight(short, seed)))
+    speed, acceleration = (np.linalg.norm(each, axis=1).max() for each in (flight.v, flight.a))
+    assert speed <= 12.0 * (1 + 1e-2)  # sampled anew, and led to the end
+    assert acceleration <= 4.0 * (1 + 1e-1)
+
+
+@pytest.mark.parametrize(
+    ("goal", "told"),
+    [
+        ({"rate": 9.0, "minimise": "duration"},
+         "goal.rate: 9 bit/s/Hz cannot be delivered in 18 s (flight.duration) at 1 and 20 dBm"),
+        ({"deliver_mbytes": 900, "minimise": "power"}, "at most "),
+    ],
+)  # fmt: skip
+def test_a_goal_out_of_reach_says_what_is_possible(goal: dict[str, Any], told: str) -> None:
+    with pytest.raises(InfeasibleError) as caught:
+        optimize(changed_plan(BASE, {"goal": goal}))
+    assert told in str(caught.value)
+    assert f"at most {_most(BASE, 'rate' in goal)}" in str(caught.value)
+
+
+def _most(plan: Plan, rate: bool) -> str:
+    R_del = direct(build_problem(plan)).delivered_rate
+    return f"{R_del:.4f} bit/s/Hz" if rate else f"{plan.megabytes(R_del):.4g} megabytes"

@@ -1,0 +1,138 @@
+"""Power of flight against the published curves, and the energy of a flight against its integral."""
+
+import numpy as np
+import pytest
+from conftest import SMALL, edited
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from faao_mav.errors import PlanError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import Mission
+from faao_mav.plan import parse_plan
+from faao_mav.power import GRAVITY, FixedWing, RotaryWing
+from faao_mav.validate import Finding, validate
+from faao_mav.validate.energy import EnergyUse, energy_use
+from faao_mav.vehicle import Track, Vehicle
+
+TABLE = RotaryWing.of(mass=20 / GRAVITY, rotor_area=0.503)
+
+
+def published(v: float) -> float:
+    """P(v) of the paper of 2019 with the rounded numbers of its text."""
+    ratio = v**2 / (2 * 4.03**2)
+    return float(
+        79.86 * (1 + 3 * v**2 / 120**2)
+        + 88.63 * ((1 + ratio**2) ** 0.5 - ratio) ** 0.5
+        + 0.6 * 1.225 * 0.05 * 0.503 * v**3 / 2
+    )
+
+
+def level(v: float) -> float:
+    return float(TABLE.level(np.array(v)))
+
+
+def test_the_rotary_wing_is_that_of_the_paper() -> None:
+    assert level(0) == pytest.approx(168.5, rel=5e-3)
+    for v in np.linspace(0, 30, 61):
+        assert level(v) == pytest.approx(published(v), rel=5e-4)
+    speeds = np.linspace(5, 30, 25001)
+    theirs = np.vectorize(published)(speeds)
+    for per_metre in (1.0, speeds):  # of longest endurance, of longest range
+        best = speeds[(TABLE.level(speeds) / per_metre).argmin()]
+        assert best == pytest.approx(speeds[(theirs / per_metre).argmin()], rel=5e-3)
+
+
+@settings(max_examples=30)
+@given(st.floats(50, 5000), st.floats(1, 20), st.floats(1, 2))
+def test_two_measured_powers_are_kept(hover: float, at: float, more: float) -> None:
+    bare = RotaryWing(TABLE.blade, TABLE.induced, 120.0, TABLE.induced_speed, 0.0, 20.0)
+    cruise = more * hover * float(bare.level(np.array(at))) / level(0)
+    fitted = TABLE.fitted(hover, cruise, at)
+    assert float(fitted.level(np.array(0.0))) == pytest.approx(hover)
+    assert float(fitted.level(np.array(at))) == pytest.approx(cruise)
+    assert fitted.parasite >= -1e-9
+
+
+@settings(max_examples=30)
+@given(*[st.floats(-40, 40)] * 2, *[st.floats(-5, 5)] * 2)
+def test_the_fixed_wing_is_that_of_the_paper(
+    east: float, north: float, a_east: float, a_north: float
+) -> None:
+    v, a = np.array([east, north, 0.0]), np.array([a_east, a_north, 0.0])
+    speed = np.linalg.norm(v)
+    if speed < 3:  # V_min of the paper
+        return
+    across = a @ a - (a @ v) ** 2 / speed**2
+    drag = 9.26e-4 * speed**3 + 2250 / speed * (1 + across / 9.8**2)
+    gained = 10.0 * max(0.0, float(a @ v))
+    assert float(FixedWing()(v, a)) == pytest.approx(drag + gained, rel=1e-3, abs=1e-6)
+
+
+def test_a_plane_flies_farthest_at_the_speed_of_its_measured_power() -> None:
+    model = FixedWing.fitted(100.0, 20.0, 5.0)
+    speeds = np.linspace(10, 40, 3001)
+    power = model.level(speeds, np.zeros_like(speeds))
+    assert speeds[(power / speeds).argmin()] == pytest.approx(20.0, abs=0.01)
+    assert power[1000] == pytest.approx(100.0)
+
+
+def flight(wind: float) -> Track:
+    """Up at 2 m/s for 10 s, east faster and faster for 20 s, down at 1 m/s for 20 s."""
+    t = np.linspace(0, 50, 5001)
+    velocity = np.zeros((len(t), 3))
+    velocity[t <= 10, 2], velocity[t > 30, 2] = 2.0, -1.0
+    east = (t > 10) & (t <= 30)
+    velocity[east, 0] = 0.5 * (t[east] - 10)
+    velocity[:, 0] += wind
+    position = np.zeros((len(t), 3))
+    return Track(t, position, velocity, np.zeros(len(t), int), np.zeros(1), LocalFrame(47, 8))
+
+
+BATTERY = {"vehicle.power": {}, "vehicle.battery": {"capacity_wh": 4, "reserve": "30 %"}}
+
+
+def used(changes: dict[str, object], wind: float = 0.0) -> EnergyUse:
+    found = energy_use(parse_plan(edited(SMALL, BATTERY | changes)), flight(wind), (wind, 0.0))
+    assert found is not None
+    return found
+
+
+def test_energy_is_the_integral_of_power() -> None:
+    ramp = quad(lambda t: published(0.5 * t), 0, 20)[0]
+    by_hand = 10 * (168.49 + 20 * 2) + ramp + 20 * 168.49 + 50 * 0.1  # 0.1 W of the radio
+    found = used({})
+    assert found.total * 3600 == pytest.approx(by_hand, rel=1e-3)
+    assert (np.diff(found.used) > 0).all()
+    assert used({}, wind=3.0).total == pytest.approx(found.total)  # carried along by it
+
+
+def findings(use: EnergyUse) -> list[Finding]:
+    every = validate(Mission(()), Vehicle(), energy=use)
+    return [finding for finding in every if finding.rule == "battery-reserve"]
+
+
+def test_the_reserve_has_to_be_left() -> None:
+    total = used({}).total
+    for capacity, kept in ((total / 0.7 * 1.001, True), (total / 0.7 * 0.999, False)):
+        found = used({"vehicle.battery": {"capacity_wh": capacity, "reserve": "30 %"}})
+        assert found.enough == kept
+        assert [each.level for each in findings(found)] == ([] if kept else ["error"])
+        assert found.left == pytest.approx(1 - total / capacity)
+        assert found.as_dict()["reserve"] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"vehicle.battery": {"capacity_wh": 60}}, "vehicle.battery: what the flight takes"),
+        ({"vehicle.power": {"hover_w": 200}}, "vehicle.power.cruise_w: missing; give hover_w"),
+        ({"vehicle.power": {"hover_w": 200, "cruise_w": 100, "at": 8}}, "at least 14"),
+        (BATTERY | {"vehicle.battery.reserve": "a lot"}, "'a lot' is not accepted"),
+    ],
+)
+def test_power_that_cannot_be(changes: dict[str, object], told: str) -> None:
+    with pytest.raises(PlanError) as caught:
+        parse_plan(edited(SMALL, changes))
+    assert told in str(caught.value)
