@@ -24,7 +24,8 @@ class LocalFrame:
     (projection `aeqd`, Snyder 1987, section 25), which takes what is within 1 mm of the origin
     for the origin, and an origin within 0.7 mm of the equator for one on it.
 
-    `latitude` and `longitude` are the origin, degrees. Raises `InputError` for an origin that
+    `latitude` and `longitude` are the origin, degrees; with a `radius`, m, the plane is that of a
+    sphere instead, as PX4 has it. Raises `InputError` for an origin that
     is not finite or has a latitude beyond ±90.
 
     >>> frame = LocalFrame(-35.363262, 149.165237)
@@ -37,6 +38,7 @@ class LocalFrame:
 
     latitude: float
     longitude: float
+    radius: float | None = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.longitude) and abs(self.latitude) <= 90):
@@ -51,7 +53,7 @@ class LocalFrame:
         Longitudes are in [-180, 180). Positions beyond the antipode (20 000 km) give infinities.
         """
         east, north = np.moveaxis(np.asarray(positions, dtype=float), -1, 0)
-        longitude, latitude = _projection(self.latitude, self.longitude)(east, north, inverse=True)
+        longitude, latitude = self._projection(east, north, inverse=True)
         return np.asarray(latitude), _normalised(np.asarray(longitude))
 
     def to_local(self, latitude: ArrayLike, longitude: ArrayLike) -> Real:
@@ -59,15 +61,20 @@ class LocalFrame:
         lat, lon = np.broadcast_arrays(
             np.asarray(latitude, dtype=float), np.asarray(longitude, dtype=float)
         )
-        east, north = _projection(self.latitude, self.longitude)(lon, lat)
+        east, north = self._projection(lon, lat)
         return np.stack([np.asarray(east), np.asarray(north)], axis=-1)
+
+    @property
+    def _projection(self) -> "Proj":
+        return _projection(self.latitude, self.longitude, self.radius)
 
 
 @lru_cache(maxsize=32)
-def _projection(latitude: float, longitude: float) -> "Proj":
+def _projection(latitude: float, longitude: float, radius: float | None) -> "Proj":
     from pyproj import Proj  # costs more to import than a whole conversion takes
 
-    return Proj(proj="aeqd", lat_0=latitude, lon_0=longitude, datum="WGS84", units="m")
+    earth = {"datum": "WGS84"} if radius is None else {"R": radius}
+    return Proj(proj="aeqd", lat_0=latitude, lon_0=longitude, units="m", **earth)
 
 
 def _normalised(longitude: Real) -> Real:

@@ -1,10 +1,11 @@
 """`fly` and `debrief` on the command line: what they refuse, and what they compare first."""
 
 import json
+import socket
 from pathlib import Path
 
 import pytest
-from conftest import FLYABLE, free_port
+from conftest import FLYABLE, edited, free_port
 from served import running
 from typer.testing import CliRunner, Result
 
@@ -41,6 +42,12 @@ def mission(tmp_path: Path) -> Path:
             ("fly", "{mission}", "--to", "udpout:127.0.0.1:1", "--plan", "a", "--solution", "b"),
             "--plan and --solution: give one",
         ),
+        (
+            ("fly", "{mission}", "--to", "a", "--stream", "--plan", "p.yaml"),
+            "--stream: needs --arm",
+        ),
+        (("fly", "{mission}", "--to", "a", "--stream", "--arm"), "--stream: needs --plan"),
+        (("fly", "{mission}", "--to", "a", "--radio", "udp:h:1"), "--radio: needs --plan"),
         (("debrief", LOG), "--plan or --solution: give the plan that was flown"),
         (("debrief", "flight.txt", "--plan", "a.yaml"), "give a flight log: .bin, .tlog, .ulg"),
         (("debrief", LOG, "--plan", "a.yaml", "--report", "page.txt"), "--report"),
@@ -59,6 +66,31 @@ def test_a_flight_of_another_plan_is_not_in_the_log(tmp_path: Path) -> None:
     result = run("debrief", LOG, "--plan", plan)
     assert result.exit_code == 1
     assert "the plan's flight is not in it" in result.output
+
+
+def test_a_plan_is_streamed_and_its_radio_told(tmp_path: Path) -> None:
+    plan, made, saved = (tmp_path / name for name in ("p.yaml", "m.waypoints", "r.npz"))
+    slow = {"vehicle.max_speed": 6, "flight.duration": 16, "mission.on_finish": "land"}
+    ends = {f"flight.{end}_velocity": "hover" for end in ("start", "end")}
+    plan.write_text(edited(FLYABLE, slow | ends | {"flight.altitude": 10}))
+    assert run(plan, "--out", made, "--save", saved, "--quiet").exit_code == 0
+    port = free_port()
+    to = ("--to", f"udpout:127.0.0.1:{port}", "--json")
+    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1, speedup=8.0)
+    with running(mock, f"udpin:127.0.0.1:{port}"), socket.socket(type=socket.SOCK_DGRAM) as radio:
+        radio.bind(("127.0.0.1", 0))
+        told = ("--radio", f"udp:127.0.0.1:{radio.getsockname()[1]}")
+        assert run("upload", made, *to).exit_code == 0
+        result = run("fly", made, *to, "--solution", saved, "--arm", "--stream", *told)
+        assert result.exit_code == 0, result.output
+        radio.settimeout(0.1)
+        slots = [json.loads(radio.recv(65_536))["slot"] for _ in range(20)]
+    end = json.loads(result.stdout.splitlines()[-1])
+    assert end["ending"] == "finished"
+    flown, planned = end["flight"]["flown"], end["flight"]["planned"]
+    assert flown["delivered_rate"] > 0.97 * planned["delivered_rate"]
+    assert slots[0] == 0
+    assert slots == sorted(set(slots))
 
 
 def test_another_mission_is_not_flown(mission: Path) -> None:

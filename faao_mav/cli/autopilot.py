@@ -5,7 +5,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from faao_mav.cli.shared import File, SigningKey, check_known, exit_status, option
+from faao_mav.cli.shared import (
+    File,
+    SigningKey,
+    check_known,
+    exit_status,
+    option,
+    read_wind,
+)
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -45,6 +52,9 @@ def autopilot(
     parameters: Annotated[
         File, option("FILE", "Its parameters: it flies by them; without: defaults.")
     ] = None,
+    wind: Annotated[
+        str | None, option("SPEED,FROM", "The wind that it flies in, m/s and degrees.")
+    ] = None,
     speedup: Annotated[float, option("X", "Fly X times as fast as predicted.", min=0.01)] = 1.0,
     boot: Annotated[float, option("S", "Boot for S seconds.", min=0)] = 0.0,
     drop: Annotated[float, option("P", "Lose packets, both ways.", min=0, max=1)] = 0.0,
@@ -57,6 +67,8 @@ def autopilot(
     signing_key: SigningKey = None,
 ) -> None:
     """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.
+
+    In GUIDED and Offboard it follows setpoints.
 
     It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
     """
@@ -73,13 +85,15 @@ def autopilot(
     check_known(None, aircraft)
     behaviour = behaviour_of(kind)
     vehicle = Vehicle(behaviour.family.key, aircraft, values, str(parameters or "parameters"))
+    air = read_wind(wind) or (0.0, 0.0)
     vehicle.flight_model()  # useless parameters are refused here, not in flight
     mock = MockAutopilot(
         behaviour,
         aircraft=aircraft,
         address=Address(system, 1),
         home=read_home(home),
-        fly=predicted(vehicle),
+        fly=predicted(vehicle, air),
+        wind=air,
         parameters=values,
         speedup=speedup,
         boot=boot,

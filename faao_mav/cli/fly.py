@@ -13,6 +13,7 @@ from faao_mav.cli.shared import (
     VEHICLE,
     Component,
     Log,
+    Radio,
     SigningKey,
     System,
     Wait,
@@ -21,9 +22,10 @@ from faao_mav.cli.shared import (
     note,
     option,
 )
+from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.flying.telemetry import Samples
+    from faao_mav.mavlink.flying.fly import FlightReport
     from faao_mav.mavlink.flying.watch import Watch
     from faao_mav.mission.formats import MissionFile
     from faao_mav.optimizer.solution import Solution
@@ -32,6 +34,10 @@ if TYPE_CHECKING:
 
 _PERIOD = 1.0
 """Seconds between two lines, by the world's clock and by the vehicle's (a simulator's is quick)."""
+
+_RATE = 5.0
+"""Positions a second that are asked for: at 8 m/s they are 1.6 m apart. With --radio there are two
+for each slot at least. Chosen."""
 
 _NO_VOLTAGE = 65_535
 """What SYS_STATUS says of a voltage that is not known."""
@@ -44,6 +50,11 @@ def fly(
     plan_file: PlanFile = None,
     solution_file: SolutionFile = None,
     arm: Annotated[bool, flag("--arm", "Arm the vehicle and start the mission.")] = False,
+    stream: Annotated[
+        bool, flag("--stream", "Fly the plan by setpoints instead of the mission; needs --arm.")
+    ] = False,
+    rate: Annotated[float, option("HZ", "Setpoints a second of --stream.", min=4, max=50)] = 10.0,
+    radio: Radio = None,
     as_json: Annotated[bool, flag("--json", "Print JSON objects, one a line.")] = False,
     system: System = None,
     component: Component = None,
@@ -57,8 +68,10 @@ def fly(
     battery; with a plan also how late the flight is, how far from plan and path (m), the rates of
     both hops, and what is delivered so far and by the end. It arms and starts only with --arm, once
     the autopilot's own checks pass and no other ground station is on the link. A pilot who changes
-    the mode has the aircraft: nothing more is sent. Ctrl-C asks a flight that was started here to
-    hold, a second one leaves it; in other flights the first one leaves.
+    the mode has the aircraft: nothing more is sent. With --stream a copter that holds the mission
+    flies the trajectory of the plan by setpoints (GUIDED, Offboard), not the mission. Ctrl-C asks a
+    flight that was started here to hold, a second one leaves it; in other flights the first one
+    leaves.
 
     Exit status: 0 the mission was flown to its end; 1 it was not, or that is not known; 2 unusable
     arguments or input.
@@ -68,17 +81,28 @@ def fly(
     from faao_mav.report.summary import debriefing_lines, joined
 
     check_one(plan_file, solution_file)
+    if stream and not arm:
+        raise InputError("--stream: needs --arm: it arms the vehicle, and flies it")
+    for name, given in (("--stream", stream), ("--radio", radio)):
+        if given and plan_file is None and solution_file is None:
+            raise InputError(f"{name}: needs --plan or --solution: the flight that is planned")
     file = read_mission_file(mission_file)
     for line in file.warnings:
         note(line)
     solution = planned(plan_file, solution_file)
-    track = _predicted(mission_file, file, solution)
-    telling = _Telling(solution, track, as_json=as_json)
+    feed = _Feed(solution, radio) if solution is not None and radio is not None else None
+    track = None if stream else _predicted(mission_file, file, solution)
+    telling = _Telling(solution, track, feed, as_json=as_json)
+    rate = rate if stream else _RATE
+    if feed is not None:
+        rate = max(rate, feed.slots_per_second * 2)
     report = run(
         file.mission,
         to,
         arm=arm,
         lands=track is None or track.lands,
+        stream=solution if stream else None,
+        rate=rate,
         watching=telling,
         system=system,
         component=component,
@@ -88,7 +112,7 @@ def fly(
         note=note,
     )
     ending = report.ending
-    found = telling.debriefing(report.samples)
+    found = telling.debriefing(report)
     if as_json:
         from faao_mav.workflow import debriefing_as_dict
 
@@ -140,9 +164,15 @@ class _Telling:
     """Tells what a watch sees: called after its every step, it prints what is new."""
 
     def __init__(
-        self, solution: "Solution | None", track: "Track | None", *, as_json: bool
+        self,
+        solution: "Solution | None",
+        track: "Track | None",
+        feed: "_Feed | None",
+        *,
+        as_json: bool,
     ) -> None:
-        self._solution, self._as_json = solution, as_json
+        self._solution, self._feed, self._as_json = solution, feed, as_json
+        self._start: float | None = None
         self._told, self._next, self._last = 0, 0.0, -_PERIOD
         self._line = None if solution is None else _predicted_line(solution, track)
 
@@ -152,34 +182,62 @@ class _Telling:
         for text in seen.told[self._told :]:
             typer.echo(json.dumps({"note": text}) if self._as_json else f"-- {text}")
         self._told = len(seen.told)
+        if self._feed is not None:
+            self._feed(watch, self._start if watch.relay_start is None else watch.relay_start)
         now, t = time.monotonic(), seen.samples.t[-1] if seen.samples.t else float("-inf")
         if seen.heartbeat is None or now < self._next or t < self._last + _PERIOD:
             return
         self._next, self._last = now + _PERIOD, t
         stands = None
-        if watch.phase not in ("checking", "arming", "starting", "waiting"):
-            stands = self._standing(seen.samples)
+        if watch.phase not in ("checking", "engaging", "arming", "starting", "waiting"):
+            stands = self._standing(watch)
         told = _as_dict(watch, stands, self._solution)
         typer.echo(json.dumps(told, allow_nan=False) if self._as_json else _as_text(told))
 
-    def debriefing(self, samples: "Samples") -> "Debriefing | None":
+    def debriefing(self, report: "FlightReport") -> "Debriefing | None":
         """Return what became of the plan; None without one, or without its flight."""
-        if self._solution is None or self._line is None or not samples.t:
+        if self._solution is None or self._line is None or not report.samples.t:
             return None
-        return samples.record().debriefing(self._solution, self._line)
+        record = report.samples.record()
+        return record.debriefing(self._solution, self._line, report.relay_start)
 
-    def _standing(self, samples: "Samples") -> "Standing | None":
+    def _standing(self, watch: "Watch") -> "Standing | None":
         """Return how the flight stands; None before it has left w_I, and when it is over."""
         from faao_mav.validate.flown import Line, plan_start, standing
 
         if self._solution is None or self._line is None:
             return None
-        flight = samples.record().line(self._solution)
-        start = plan_start(self._solution, self._line, flight)
+        flight = watch.seen.samples.record().line(self._solution)
+        start = watch.relay_start
+        if start is None and not watch.streams:
+            self._start = start = plan_start(self._solution, self._line, flight)
         if start is None:
             return None
         stands = standing(self._solution, self._line, Line(flight.t - start, flight.w))
         return None if stands.over else stands
+
+
+class _Feed:
+    """Tells radios the slots that are reached: called after every step of a watch."""
+
+    def __init__(self, solution: "Solution", to: str) -> None:
+        from faao_mav.mavlink.flying.radio import RadioFeed, UdpRadio
+
+        self._solution = solution
+        self._feed, self._radio = RadioFeed(solution), UdpRadio(to)
+        self._seen = 0
+        self.slots_per_second = 1 / solution.plan.flight.time_step
+
+    def __call__(self, watch: "Watch", start: float | None) -> None:
+        """Send what is new; the plan's clock read 0 at `start`, s on the vehicle's."""
+        samples = watch.seen.samples
+        if len(samples.t) == self._seen:
+            return
+        self._seen = len(samples.t)
+        t = None if start is None else samples.t[-1] - start
+        place = samples.record(-1).line(self._solution).w[0]
+        if (line := self._feed.line(t, place)) is not None:
+            self._radio.send(line)
 
 
 def _as_dict(

@@ -3,11 +3,14 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
 from faao_mav.errors import FaaoError, InputError
+
+if TYPE_CHECKING:
+    from faao_mav.plan import Vector
 
 
 def option(value: str, text: str, *names: str, **limits: Any) -> Any:
@@ -33,6 +36,9 @@ AllowArmed: TypeAlias = Annotated[
 ]
 Component: TypeAlias = Annotated[
     int | None, option("N", "The autopilot's component number.", min=1, max=255)
+]
+Radio: TypeAlias = Annotated[
+    str | None, option("udp:HOST:PORT", "Tell radios the precoders of each slot, in JSON lines.")
 ]
 Log: TypeAlias = Annotated[File, option("F.tlog", "Write a log of the exchange.")]
 Wait: TypeAlias = Annotated[float, option("S", "How long to wait for the vehicle, s.", min=0.1)]
@@ -68,6 +74,25 @@ def check_known(autopilot: str | None, kind: str | None) -> None:
     for name, value, known in (("autopilot", autopilot, autopilots()), ("type", kind, types())):
         if value is not None and value not in known:
             raise InputError(f"--{name} {value}: expected {' or '.join(known)}")
+
+
+def read_wind(given: str | None) -> "Vector | None":
+    """Return the velocity of the air, m/s east and north, of --wind; raises `InputError`."""
+    if given is None:
+        return None
+    from pydantic import TypeAdapter
+
+    from faao_mav.plan import Wind
+    from faao_mav.plan.keys import reference
+
+    parts, keys = given.split(","), ("site.wind.speed", "site.wind.from")
+    try:
+        speed, start = map(float, parts)
+        wind = TypeAdapter(Wind).validate_python({"speed": speed, "from": start})
+    except ValueError:
+        wanted = " and ".join(reference()[key].accepted for key in keys)
+        raise InputError(f"--wind {given}: expected SPEED,FROM: {wanted}") from None
+    return wind.velocity
 
 
 def note(message: str) -> None:

@@ -19,6 +19,7 @@ from faao_mav.cli.shared import (
     flag,
     note,
     option,
+    read_wind,
 )
 from faao_mav.errors import InputError, printable
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
@@ -83,7 +84,7 @@ def validate(
     check_one(plan_file, solution_file)
     check_known(autopilot, kind)
     _check_options((max_duration, max_distance, max_altitude), report)
-    air = _wind(wind)
+    air = read_wind(wind)
     read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
     check_apart({"--report": report}, read)
     solution = planned(plan_file, solution_file)
@@ -118,25 +119,6 @@ def _check_options(
     if report is not None:
         check_ending(report, "--report", PAGES)
         check_writable(report)
-
-
-def _wind(given: str | None) -> "Vector | None":
-    """Return the velocity of the air, m/s, of --wind."""
-    if given is None:
-        return None
-    from pydantic import TypeAdapter
-
-    from faao_mav.plan import Wind
-    from faao_mav.plan.keys import reference
-
-    parts, keys = given.split(","), ("site.wind.speed", "site.wind.from")
-    try:
-        speed, start = map(float, parts)
-        wind = TypeAdapter(Wind).validate_python({"speed": speed, "from": start})
-    except ValueError:
-        wanted = " and ".join(reference()[key].accepted for key in keys)
-        raise InputError(f"--wind {given}: expected SPEED,FROM: {wanted}") from None
-    return wind.velocity
 
 
 def _judge(

@@ -229,6 +229,34 @@ class GlobalPositionInt(Message):
     hdg: int
 
 
+class GpsGlobalOrigin(Message):
+    """GPS_GLOBAL_ORIGIN: of the vehicle's local frame, 1e-7 degrees, mm above mean sea level."""
+
+    latitude: int
+    longitude: int
+    altitude: int
+
+
+class SetPositionTargetLocalNed(Addressed):
+    """SET_POSITION_TARGET_LOCAL_NED: m, m/s and m/s² north, east, down of the local origin.
+
+    `type_mask` says which of them are to be ignored, yaw among them.
+    """
+
+    time_boot_ms: int
+    coordinate_frame: int
+    type_mask: int
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    vz: float
+    afx: float
+    afy: float
+    afz: float
+
+
 class LocalPositionNed(Message):
     """LOCAL_POSITION_NED: metres and m/s north, east, down of home."""
 

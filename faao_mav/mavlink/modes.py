@@ -1,7 +1,7 @@
 """The flight modes that the package asks for, by the numbers that heartbeats carry."""
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from types import MappingProxyType
 
 from faao_mav.mavlink.messages import Heartbeat
@@ -16,13 +16,15 @@ class Modes:
     """Custom modes of an autopilot that flies one type of vehicle.
 
     `rest` is one to stand on the ground in, `mission` flies the mission, `hold` stays at the place
-    (a plane circles there) without sticks. `at_fence` are those after a breach of the fence.
+    (a plane circles there) without sticks, `guided` flies by setpoints (None: streams are not flown
+    by that type). `at_fence` are those that hold, return and land, as after a breach of the fence.
     """
 
     rest: int
     mission: int
     hold: int
     at_fence: Mapping[FenceAction, int] = field(default_factory=dict)
+    guided: int | None = None
 
 
 def px4_mode(main: int, sub: int) -> int:
@@ -38,13 +40,14 @@ _PX4 = Modes(
     mission=px4_mode(4, 4),
     hold=_HOLD,
     at_fence=MappingProxyType({"hold": _HOLD, "return": px4_mode(4, 5), "land": px4_mode(4, 6)}),
+    guided=px4_mode(6, 0),
 )
 _BRAKE, _LOITER = 17, 12
 _MODES = {
-    (ARDUPILOT, "copter"): Modes(0, 3, _BRAKE, {"return": 6, "land": 9, "hold": _BRAKE}),
+    (ARDUPILOT, "copter"): Modes(0, 3, _BRAKE, {"return": 6, "land": 9, "hold": _BRAKE}, guided=4),
     (ARDUPILOT, "plane"): Modes(2, 10, _LOITER, {"return": 11}),
     (PX4, "copter"): _PX4,
-    (PX4, "plane"): _PX4,
+    (PX4, "plane"): replace(_PX4, guided=None),
 }
 """COPTER_MODE and PLANE_MODE of MAVLink; PX4's main and sub modes in one number."""
 

@@ -22,6 +22,15 @@ def taken_by(plan: Plan) -> Literal["time", "place"]:
     return "time" if plan.radio.fading == "realization" else "place"
 
 
+def check_of_slots(solution: Solution) -> None:
+    """Raise `InputError` for precoders that know the fading's draw: they are not one per slot."""
+    if solution.P_B.ndim != 3 or solution.P_U.ndim != 3:
+        raise InputError(
+            "precoders that know the draw of the fading (radio.csi: instantaneous) have no table; "
+            "use csi: statistical"
+        )
+
+
 def precoder_table(solution: Solution) -> str:
     """Return a CSV text with a row for each slot.
 
@@ -31,13 +40,9 @@ def precoder_table(solution: Solution) -> str:
     row, sqrt(W), each as `P_B_1_1_re`, `P_B_1_1_im`; and `taken_by`: `time` where a late aircraft
     takes the row of the time, `place` where that of the nearest place (see `taken_by`).
 
-    Raises `InputError` for precoders that know the fading's draw: they are no table of slots.
+    Raises `InputError` as `check_of_slots` does.
     """
-    if solution.P_B.ndim != 3 or solution.P_U.ndim != 3:
-        raise InputError(
-            "precoders that know the draw of the fading (radio.csi: instantaneous) have no table; "
-            "use csi: statistical"
-        )
+    check_of_slots(solution)
     origin = solution.plan.origin
     frame = LocalFrame(origin.latitude, origin.longitude)
     latitude, longitude = frame.to_geodetic(solution.w)

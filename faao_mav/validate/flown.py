@@ -130,9 +130,9 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
     predicted from where the plan stands.
     """
     now, place = float(flight.t[-1]), flight.w[-1]
-    late = _late(solution, now, place)
-    ahead = predicted.t + late > now
-    t = np.concatenate([flight.t, predicted.t[ahead] + late])
+    behind = late(solution, now, place)
+    ahead = predicted.t + behind > now
+    t = np.concatenate([flight.t, predicted.t[ahead] + behind])
     priced = price_flight(solution, t, np.concatenate([flight.w, predicted.w[ahead]]))
     step = float(solution.t[1] - solution.t[0])
     slot = int(np.clip(now / step, 0, len(solution.t) - 1))
@@ -140,7 +140,7 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
     over = slot if now < solution.plan.flight.duration else len(solution.t)
     return Standing(
         time=now,
-        late=late,
+        late=behind,
         apart=float(lengths(place - positions_at(np.array([now]), *planned_line(solution)))[0]),
         astray=float(distances_to_path(place[None], solution.w)[0]),
         I_U=float(priced.I_U[slot]),
@@ -152,10 +152,14 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
 
 
 def debriefing(
-    solution: Solution, predicted: Line, flight: Line, height: Real
+    solution: Solution, predicted: Line, flight: Line, height: Real, start: float | None = None
 ) -> Debriefing | None:
-    """Return what became of the plan in `flight`, at `height` (k,) m; None: it is not in there."""
-    start = plan_start(solution, predicted, flight)
+    """Return what became of the plan in `flight`, at `height` (k,) m; None: it is not in there.
+
+    `start` is when the plan's clock read 0, s on the flight's; None: that is searched.
+    """
+    if start is None:
+        start = plan_start(solution, predicted, flight)
     if start is None:
         return None
     t = flight.t - start
@@ -176,8 +180,8 @@ def _has_arrived(solution: Solution, flight: Line) -> bool:
     return bool((lengths(flight.w[due] - solution.w[-1]) < _AT_END).any())
 
 
-def _late(solution: Solution, now: float, place: Real) -> float:
-    """Return by how many seconds an aircraft at `place` (2,) is later than planned."""
+def late(solution: Solution, now: float, place: Real) -> float:
+    """Return by how many seconds an aircraft at `place` (2,), m, is later than planned at `now`."""
     t = np.arange(0.0, float(solution.t[-1]) + 0.05, 0.1)
     apart = lengths(positions_at(t, *planned_line(solution)) - place)
     return now - float(t[np.argmin(apart + _METRES_PER_SECOND * np.abs(t - now))])

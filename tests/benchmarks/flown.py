@@ -1,9 +1,10 @@
 """Missions that real autopilots flew in their simulators, beside their plans.
 
     FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/flown.py [ardupilot | px4 | plane] [PLAN ...]
-        [--wind SPEED,FROM]
+        [--wind SPEED,FROM] [--stream]
 
-With a wind, m/s and degrees, plans are made for it, and flown in it; else in calm air.
+With a wind, m/s and degrees, plans are made for it, and flown in it; else in calm air. With
+--stream copters fly the plans by setpoints, and what is predicted is of the mission still.
 
 One row for each plan: rms position error at equal times (m), how much later than planned the flight
 is over (s), the delivered rate over the planned one; each as predicted and as flown.
@@ -20,11 +21,14 @@ from typing import Any
 import numpy as np
 import record_plane
 from record_px4 import in_wind
+from simulators import simulated
 
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mavlink.client import upload
+from faao_mav.mavlink.flying.fly import fly
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
 from missions import PLANS, plan_of
@@ -123,6 +127,29 @@ def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Pre
     return on_the_plans_clock(result.solution, table[:, 0], frame.to_local(*table[:, 1:].T))
 
 
+def streamed(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Prediction:
+    """Fly the plan of `result` by setpoints, and return what it delivers by the stream's clock."""
+    solution, wind = result.solution, result.solution.plan.site.wind
+    assert result.conversion is not None
+    files, script = result.write(folder / "mission.waypoints"), autopilots / RUNNERS[autopilot][0]
+    kind, options = "px4", ["--speedup", "5", "--params", "SIH_KDV=0.2", *in_wind(script, wind)]
+    if autopilot == "px4":
+        options += ["--param-file", str(files[1])] if len(files) > 1 else []
+    else:
+        timed = [f"{name} {value}" for name, value in result.conversion.parameters.items()]
+        air = [f"SIM_WIND_SPD {wind.speed}", f"SIM_WIND_DIR {wind.from_degrees}"]
+        (folder / "own.parm").write_text("\n".join([*timed, *air]))
+        defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
+        kind, options = "arducopter", ["--speedup", "5", "--defaults", defaults]
+    with simulated(autopilots, kind, folder, *options) as connection:
+        upload(result.conversion.mission, connection, wait=60)
+        report = fly(result.conversion.mission, connection, stream=solution, rate=10, wait=60)
+    if report.relay_start is None or report.ending is None or report.ending.kind != "finished":
+        raise SystemExit(f"not flown: {report.ending}")
+    t, w = report.samples.record().line(solution)
+    return price_flight(solution, t - report.relay_start, w)
+
+
 def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
     """Price a flight whose clock is shifted so that it is nearest to the plan at equal times."""
 
@@ -135,7 +162,9 @@ def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
     return price_flight(solution, t - begin, w)
 
 
-def row(name: str, autopilots: Path, autopilot: str, wind: dict[str, Any]) -> str:
+def row(
+    name: str, autopilots: Path, autopilot: str, wind: dict[str, Any], *, stream: bool = False
+) -> str:
     """Plan, fly and compare."""
     try:
         if autopilot == "plane":
@@ -148,7 +177,8 @@ def row(name: str, autopilots: Path, autopilot: str, wind: dict[str, Any]) -> st
         return f"{autopilot:<10}{name:<28}refused: {error}"
     assert result.prediction is not None
     with tempfile.TemporaryDirectory() as folder:
-        real = flown(autopilots, autopilot, result, Path(folder))
+        run = streamed if stream else flown
+        real = run(autopilots, autopilot, result, Path(folder))
     cells = [f"{autopilot:<10}{name:<28}"]
     for found in (result.prediction, real):
         late = found.duration - plan.flight.duration
@@ -168,7 +198,8 @@ def main() -> None:
     for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
         plans = PLANES if autopilot == "plane" else FLOWN
         for name in [each for each in plans if each in chosen] or plans:
-            print(row(name, autopilots, autopilot, wind), flush=True)
+            stream = "--stream" in chosen
+            print(row(name, autopilots, autopilot, wind, stream=stream), flush=True)
 
 
 if __name__ == "__main__":

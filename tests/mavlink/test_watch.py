@@ -1,35 +1,28 @@
 """Watching a flight: every end has its name, and nothing is sent that was not asked for."""
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 from mock_flights import fly
-from simulate import Station, simulate
-from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, rows_for, vehicle_of
+from scenes import AnotherStation, Scene
+from simulate import Station
+from stations import FOREIGN, HOME, a_mission, rows_for
 
 from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.flying.watch import Watch
-from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import (
     CommandAck,
     CommandLong,
     Envelope,
-    Heartbeat,
     Message,
-    MissionRequestInt,
-    SetMode,
 )
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.mock import MockAutopilot
 from faao_mav.mavlink.protocol import (
     GROUND_STATION,
-    GROUND_STATION_TYPE,
-    NO_AUTOPILOT,
     MavCommand,
     MissionType,
 )
-from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence
 
@@ -39,72 +32,6 @@ AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
 HOLD = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
 LOITER = 5
 """A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
-
-
-class Scene:
-    """A mock autopilot that holds a mission, and a watch of it on a simulated link."""
-
-    def __init__(
-        self, kind: str, mission: Mission | None = None, *, lands: bool = True, **options: Any
-    ) -> None:
-        self.arm = bool(options.pop("arm", False))
-        mission = mission or a_mission(12)
-        behaviour = behaviour_of(cast(MockKind, kind))
-        self.mock = MockAutopilot(behaviour, home=HOME, fly=fly, **options)
-        for part in MissionType:
-            self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
-        rows = self.mock.lists.items(MissionType.MISSION)
-        self.watch = Watch(peer_of(kind), rows, arm=self.arm, lands=lands)
-        self.client = Counted(self.watch)
-
-    def run(self, faults: Faults | None = None, until: float = 300.0, **more: Any) -> str:
-        """Return the kind of the ending, "" for none."""
-        stations = Station(self.client, GROUND_STATION), Station(self.mock, VEHICLE)
-        simulate(*stations, faults, until, **more)
-        return self.watch.outcome.kind if self.watch.outcome is not None else ""
-
-    @property
-    def orders(self) -> list[Message]:
-        """What was sent that moves the vehicle: everything but requests for telemetry."""
-        return [each for each in self.client.sent if not harmless(each)]
-
-    def does(self, number: int, *params: float) -> Any:
-        """Return an event: somebody else gives a command."""
-        message = CommandLong(VEHICLE, number, 0, *map(float, params))
-        return lambda now: self.mock.on(Envelope(FOREIGN, message), now)
-
-    def sets(self, mode: int) -> Any:
-        """Return an event: the pilot sets a mode."""
-        return lambda now: self.mock.on(Envelope(FOREIGN, SetMode(1, 1, mode)), now)
-
-    def told(self, words: str) -> bool:
-        return any(words in text for text in self.watch.seen.told)
-
-
-def harmless(message: Message) -> bool:
-    asks = isinstance(message, CommandLong) and message.command == MavCommand.SET_INTERVAL
-    return asks or isinstance(message, MissionRequestInt)
-
-
-class AnotherStation(Machine[None]):
-    """A ground station that says once a second, from a given time on, that it is there."""
-
-    progress = ("being there", 0, 0)
-
-    def __init__(self, since: float = 0.0) -> None:
-        super().__init__()
-        self._since = since
-
-    def start(self, now: float) -> Sequence[Message]:
-        self._due = now + self._since
-        return ()
-
-    def _receive(self, *_: object) -> Sequence[Message]:
-        return ()
-
-    def _time_out(self, now: float) -> Sequence[Message]:
-        self._due = now + 1.0
-        return [Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, 4)]
 
 
 @KINDS

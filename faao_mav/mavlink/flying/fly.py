@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.client import LinkOptions, Session
@@ -16,18 +16,23 @@ from faao_mav.mavlink.transfer.verify import Difference, compare
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission.item import Mission
 
+if TYPE_CHECKING:
+    from faao_mav.optimizer.solution import Solution
+
 
 @dataclass(frozen=True, slots=True)
 class FlightReport:
     """How a flight was watched: `ending` is None where the vehicle does not hold the mission.
 
-    `differences` are what it holds instead; `samples` is where it was.
+    `differences` are what it holds instead; `samples` is where it was. `relay_start` is when the
+    clock of a streamed plan read 0, s on the vehicle's.
     """
 
     vehicle: FoundVehicle
     differences: tuple[Difference, ...]
     ending: Ending | None
     samples: Samples
+    relay_start: float | None = None
 
 
 def fly(
@@ -36,14 +41,19 @@ def fly(
     *,
     arm: bool = False,
     lands: bool = True,
+    stream: "Solution | None" = None,
+    rate: float = 5.0,
     watching: Callable[[Watch], object] = lambda _: None,
     **options: Unpack[LinkOptions],
 ) -> FlightReport:
     """Watch the vehicle at `connection` fly `mission`, which it has to hold already.
 
     It is armed and started only with `arm`; `lands` tells whether the flight ends on the ground:
-    see `Watch`. `watching` is called after every step. `options` are those of `LinkOptions`. Raises
-    `LinkError` if there is no such vehicle, none that is known here, or its mission cannot be read.
+    see `Watch`. With `stream` it is armed and flies that solution by setpoints, `rate` a second,
+    instead of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
+    that it is asked for. `watching` is called after every
+    step. `options` are those of `LinkOptions`. Raises `LinkError` if there is no such vehicle, none
+    that is known here, or its mission cannot be read.
     """
     with Session(connection, options) as session:
         vehicle, peer = session.found, session.peer
@@ -62,9 +72,15 @@ def fly(
         )
         if wrong:
             return FlightReport(vehicle, wrong, None, Samples())
-        watch = Watch(peer, held.items[MissionType.MISSION], arm=arm, lands=lands)
+        if stream is not None:
+            from faao_mav.mavlink.flying.stream import Stream
+
+            watch: Watch = Stream(peer, stream, rate=rate)
+        else:
+            rows = held.items[MissionType.MISSION]
+            watch = Watch(peer, rows, arm=arm, lands=lands, period=1 / rate)
         try:
             ending = session.link.watch(watch, lambda: watching(watch))
         except LinkError as error:
             ending = Ending("lost", str(error))
-    return FlightReport(vehicle, (), ending, watch.seen.samples)
+    return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start)

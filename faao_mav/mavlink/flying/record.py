@@ -45,6 +45,8 @@ class FlightRecord:
         frame = LocalFrame(origin.latitude, origin.longitude)
         return Line(self.t, np.asarray(frame.to_local(self.latitude, self.longitude)))
 
-    def debriefing(self, solution: Solution, predicted: Line) -> Debriefing | None:
+    def debriefing(
+        self, solution: Solution, predicted: Line, start: float | None = None
+    ) -> Debriefing | None:
         """Return what became of the plan: see `faao_mav.validate.flown.debriefing`."""
-        return debriefing(solution, predicted, self.line(solution), self.height)
+        return debriefing(solution, predicted, self.line(solution), self.height, start)

@@ -41,9 +41,14 @@ Kind: TypeAlias = Literal[
 _SILENT = 5.0
 """Seconds without any message after which the link counts as interrupted: five heartbeats."""
 
-_RATES = {POSITION: 0.2, SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
-"""Messages that are needed, and the seconds between two of them that are asked for. Chosen: at
-8 m/s positions are 1.6 m apart."""
+_PERIOD = 0.2
+"""Seconds between two positions that are asked for. Chosen: at 8 m/s they are 1.6 m apart."""
+
+_PERIODS = {SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
+"""Other messages that are needed, and the seconds between two of them that are asked for."""
+
+_SLOW = 1.5
+"""Positions that come with so many times the period between them are asked for again; chosen."""
 
 _MISSED = 3.0
 """Seconds without one of these after which it is asked for again; chosen."""
@@ -79,29 +84,36 @@ class Samples:
     longitude: list[float] = field(default_factory=list)
     height: list[float] = field(default_factory=list)
 
-    def record(self) -> "FlightRecord":
-        """Return them as arrays."""
+    def record(self, first: int = 0) -> "FlightRecord":
+        """Return them as arrays, from number `first` on; -1: the last one alone."""
         import numpy as np
 
         from faao_mav.mavlink.flying.record import FlightRecord
 
-        place = np.array(self.latitude), np.array(self.longitude)
-        return FlightRecord(np.array(self.t), *place, np.array(self.height))
+        t, *place = (
+            np.array(column[first:])
+            for column in (self.t, self.latitude, self.longitude, self.height)
+        )
+        return FlightRecord(t, place[0], place[1], place[2])
 
 
 class Telemetry:
     """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
 
+    Without `rows` its mission is not looked at. It is asked for a position every `period` s.
+
     Attributes:
         told: what has happened, in words, one after the other.
         said: what the vehicle said that is a warning or worse.
         samples: where it was.
-        heartbeat, current, status: the last of these messages, None before the first.
+        heartbeat, current, status, position: the last of these messages, None before the first.
         stations: other ground stations that were heard.
         ending: why nothing more can be known, None as long as something can.
     """
 
-    def __init__(self, peer: Peer, rows: Sequence[WireItem], patience: float) -> None:
+    def __init__(
+        self, peer: Peer, rows: Sequence[WireItem], patience: float, period: float = _PERIOD
+    ) -> None:
         self._peer, self._rows, self._patience = peer, tuple(rows), patience
         self._home = home_items(peer.vehicle, MissionType.MISSION)
         self.told: list[str] = []
@@ -110,6 +122,8 @@ class Telemetry:
         self.heartbeat: Heartbeat | None = None
         self.current: MissionCurrent | None = None
         self.status: SysStatus | None = None
+        self.position: GlobalPositionInt | None = None
+        self._periods = {POSITION: period} | _PERIODS
         self.stations: set[str] = set()
         self.ending: Ending | None = None
         self._next_item = self._home
@@ -118,7 +132,7 @@ class Telemetry:
     def start(self, now: float) -> None:
         """Begin to listen."""
         self._heard, self._silent = now, False
-        self._needed = dict.fromkeys(_RATES, now - _MISSED)
+        self._needed = dict.fromkeys(self._periods, now - _MISSED)
         self._next_reading = now
 
     @property
@@ -156,8 +170,7 @@ class Telemetry:
             case Heartbeat():
                 self.heartbeat = message
             case GlobalPositionInt():
-                self._needed[POSITION] = now
-                self._on_position(message)
+                self._on_position(message, now)
             case SysStatus():
                 self._needed[SYSTEM_STATUS], self.status = now, message
             case MissionCurrent():
@@ -178,26 +191,30 @@ class Telemetry:
             self._silent = True
             self.told.append(f"nothing heard for {quiet:.0f} s")
         out: list[Message] = []
-        for kind, period in _RATES.items():
+        for kind, period in self._periods.items():
             if now - self._needed[kind] >= _MISSED:
                 self._needed[kind] = now
                 ask = (MavCommand.SET_INTERVAL, 0, float(kind), period * 1e6)
                 out.append(CommandLong(self._peer.address, *ask))
         # ArduPilot has no number for its mission, and answers each request by itself: its mission
         # is read again item by item, which disturbs nobody.
-        if self._peer.manners.any_request_order and now >= self._next_reading:
+        reads = self._peer.manners.any_request_order and self._rows
+        if reads and now >= self._next_reading:
             self._next_reading = now + _READ_AGAIN
             out.append(MissionRequestInt(self._peer.address, MissionType.MISSION, self._next_item))
             beyond = self._next_item + 1
             self._next_item = beyond if beyond < len(self._rows) else self._home
         return out
 
-    def _on_position(self, message: GlobalPositionInt) -> None:
+    def _on_position(self, message: GlobalPositionInt, now: float) -> None:
         t, samples = message.time_boot_ms, self.samples
         last = 1000 * samples.t[-1] if samples.t else -1.0
         if t < last - _BACK:
             self._end("rebooted", "the vehicle has rebooted: what it flies now is not known")
         elif t > last:
+            self.position = message
+            if t < last + 1000 * _SLOW * self._periods[POSITION]:
+                self._needed[POSITION] = now
             samples.t.append(t / 1000)
             samples.latitude.append(message.lat / 1e7)
             samples.longitude.append(message.lon / 1e7)
@@ -206,7 +223,7 @@ class Telemetry:
     def _on_current(self, message: MissionCurrent) -> None:
         known, self.current = self.current or message, message
         same = (message.total, message.mission_id) == (known.total, known.mission_id)
-        if not same or message.total not in (0, self.items):
+        if self._rows and not (same and message.total in (0, self.items)):
             self._end("changed", "the vehicle's mission is another one now than the file's")
 
     def _on_item(self, seq: int, item: WireItem) -> None:

@@ -21,10 +21,10 @@ from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.wire_items import home_items
 
 Phase: TypeAlias = Literal[
-    "checking", "arming", "starting", "waiting", "flying", "holding", "ending", "aside"
+    "checking", "engaging", "arming", "starting", "waiting", "flying", "holding", "ending", "aside"
 ]
 
-_ACCEPTED, _IN_PROGRESS = 0, 5
+ACCEPTED, IN_PROGRESS = 0, 5
 """MAV_RESULT."""
 
 _TICK = 0.5
@@ -55,16 +55,19 @@ class Watch(Machine[Ending]):
     `rows` are the items that it holds, the home row included where it has one. With `arm` it arms
     and starts the mission once the autopilot's own checks pass and no other ground station was
     heard; else somebody else does. `lands`: the flight ends on the ground. After `patience` seconds
-    without a message, or of checks that do not pass, it ends. `seen` is what it has heard.
+    without a message, or of checks that do not pass, it ends. `seen` is what it has heard; it asks
+    for a position every `period` s. `relay_start` is when the plan's clock read 0, s on the
+    vehicle's, where that is known: in a `Stream`.
 
     Nothing is sent but what asks for telemetry, until `arm` or `cancel` has a reason; and nothing
     ever again once the mode is one that was not asked for: then the pilot, or a failsafe, has the
     aircraft. `cancel` asks a flight that was started here to hold; a second time, and in any other
     flight, it leaves.
 
-    The phases: "checking", "arming" and "starting", with `arm`, or "waiting" for others to start
-    it; "flying" the mission; "ending", when that is over; "holding", as `cancel` asked for;
-    "aside", when the pilot has the aircraft. Raises `ValueError` for a vehicle that is not known.
+    The phases: "checking", "engaging" (a `Stream` only), "arming" and "starting", with `arm`, or
+    "waiting" for others to start it; "flying" the mission; "ending", when that is over; "holding",
+    as `cancel` asked for; "aside", when the pilot has the aircraft. Raises `ValueError` for a
+    vehicle that is not known.
     """
 
     def __init__(
@@ -75,6 +78,7 @@ class Watch(Machine[Ending]):
         arm: bool = False,
         lands: bool = True,
         patience: float = 60.0,
+        period: float = 0.2,
     ) -> None:
         super().__init__()
         if peer.vehicle is None:
@@ -84,8 +88,9 @@ class Watch(Machine[Ending]):
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
         self._arm, self._lands, self._patience = arm, lands, patience
-        self.seen = Telemetry(peer, rows, patience)
+        self.seen = Telemetry(peer, rows, patience, period)
         self.phase: Phase = "checking" if arm else "waiting"
+        self.relay_start: float | None = None
         self._begun = 0.0
         self._furthest = 0
         self._armed = False
@@ -94,6 +99,11 @@ class Watch(Machine[Ending]):
         self._mode_before = -1
         self._command: Callable[[], Message] | None = None
         self._sent, self._next_try = 0, 0.0
+
+    @property
+    def streams(self) -> bool:
+        """Whether it is not the mission that is flown, but a plan by setpoints."""
+        return False
 
     @property
     def progress(self) -> Progress:
@@ -125,7 +135,7 @@ class Watch(Machine[Ending]):
             return ()
         match envelope.message:
             case Heartbeat() as heartbeat:
-                self._on_heartbeat(heartbeat, now)
+                return self._on_heartbeat(heartbeat, now)
             case MissionCurrent() as current:
                 self._on_current(current, now)
             case CommandAck(target, command, result) if self._peer.own.takes(target):
@@ -158,11 +168,14 @@ class Watch(Machine[Ending]):
         if current.mission_state == MISSION_COMPLETE and self.phase == "flying":
             self._over()
 
-    def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> None:
+    def _on_heartbeat(self, heartbeat: Heartbeat, now: float) -> Sequence[Message]:
         if self._armed != heartbeat.armed:
             self._armed = heartbeat.armed
             self._disarmed_at = None if self._armed else now
-        mode, mission, hold = heartbeat.custom_mode, self._modes.mission, self._modes.hold
+        return self._on_mode(heartbeat.custom_mode, now)
+
+    def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
+        mission, hold = self._modes.mission, self._modes.hold
         match self.phase:
             case "arming" if mode != self._mode_before:
                 self._step_aside()
@@ -183,12 +196,13 @@ class Watch(Machine[Ending]):
                 mode == mission and self._command is None
             ):
                 self._step_aside()
+        return ()
 
     def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
         awaited = {"arming": MavCommand.ARM, "starting": MavCommand.START}.get(self.phase)
-        if command != awaited or result == _IN_PROGRESS:
+        if command != awaited or result == IN_PROGRESS:
             return ()
-        if result != _ACCEPTED:
+        if result != ACCEPTED:
             return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
         if self.phase == "arming":
             self.phase = "starting"
@@ -233,7 +247,7 @@ class Watch(Machine[Ending]):
         elif seen.stations:
             names = "; ".join(sorted(seen.stations))
             self._end("contested", f"nothing was started: another ground station ({names})")
-        elif current is not None and current.seq > self._first:
+        elif self._last >= 0 and current is not None and current.seq > self._first:
             text = f"it would go on at item {seen.row}, not at the beginning"
             self._end("refused", f"nothing was started: {text}; set the first item (or reboot)")
         elif waited >= self._patience:
@@ -243,8 +257,13 @@ class Watch(Machine[Ending]):
             return ()
         if seen.status is None or not seen.status.may_arm:
             return ()
-        self.phase, self._mode_before = "arming", beat.custom_mode
-        seen.told.append(f"its own checks pass: arming, and starting {seen.items} items")
+        self._mode_before = beat.custom_mode
+        return self._set_out(now)
+
+    def _set_out(self, now: float) -> Sequence[Message]:
+        """Arm, now that nothing is against it."""
+        self.phase = "arming"
+        self.seen.told.append(f"its own checks pass: arming, and starting {self.seen.items} items")
         return self._say(lambda: self._arming(True), now)
 
     def _arming(self, wanted: bool) -> Message:
@@ -256,7 +275,10 @@ class Watch(Machine[Ending]):
         return CommandLong(self._peer.address, MavCommand.START, max(0, self._sent - 1))
 
     def _hold(self) -> Message:
-        return SetMode(self._peer.address.system, 1, self._modes.hold)
+        return self._mode(self._modes.hold)
+
+    def _mode(self, mode: int) -> Message:
+        return SetMode(self._peer.address.system, 1, mode)
 
     def _say(self, command: Callable[[], Message], now: float) -> Sequence[Message]:
         """Send `command`, and repeat it until it is answered."""
@@ -270,7 +292,7 @@ class Watch(Machine[Ending]):
             self._command = None
             self.seen.told.append("it does not confirm that it holds")
             return ()
-        if self._sent == _TRIES:
+        if self._sent >= _TRIES and self.phase != "ending":
             return self._refused("does not answer")
         self._sent, self._next_try = self._sent + 1, now + _AGAIN
         return [self._command()]

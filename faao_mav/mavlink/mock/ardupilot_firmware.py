@@ -52,7 +52,8 @@ class ArduPilotFirmware(MockFirmware):
     fence_texts = (Statustext(MavSeverity.NOTICE, "Polygon fence breached"),)
     armed_inside_only = True
     returns_by_mode = frozenset({"plane"})
-    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
+    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "GUID_TIMEOUT": 3.0})
+    setpoint_timeout = "GUID_TIMEOUT"
     misplaced = MavResult.UNSUPPORTED
     nonsense = MavResult.INVALID
 

@@ -14,6 +14,7 @@ from faao_mav.mavlink.messages import (
     CommandAck,
     CommandLong,
     Envelope,
+    GpsGlobalOrigin,
     Heartbeat,
     HomePosition,
     Message,
@@ -23,12 +24,14 @@ from faao_mav.mavlink.messages import (
     ParamRequestRead,
     ParamSet,
     SetMode,
+    SetPositionTargetLocalNed,
     Statustext,
     SysStatus,
     Timesync,
 )
 from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
 from faao_mav.mavlink.mock.flight import MockFlight, Posture, telemetry
+from faao_mav.mavlink.mock.guided import Guided
 from faao_mav.mavlink.mock.parameter_protocol import ParameterServer
 from faao_mav.mavlink.mock.turn_back import home_outside, kept_inside
 from faao_mav.mavlink.modes import modes_of
@@ -36,6 +39,7 @@ from faao_mav.mavlink.protocol import (
     ARMED,
     GROUND_STATION,
     HOME_POSITION,
+    LOCAL_ORIGIN,
     MISSION_COMPLETE,
     POSITION,
     PREARM_CHECK,
@@ -76,7 +80,8 @@ class MockAutopilot(Machine[None]):
     it is, and flies on when set to the mission again. It reports its position `rate` times a
     second until it is asked for another rate. Its clock runs `speedup` times as fast as the
     world's, as those of simulators do. Heartbeats are `beat` of the world's seconds apart.
-    `parameters` are told beside its defaults; what they do to the flight is up to `fly`. `armed`
+    `parameters` are told beside its defaults; what they do to the flight is up to `fly`. In GUIDED
+    and Offboard it follows setpoints, in a `wind`, m/s east and north: see `Guided`. `armed`
     tells whether the motors may turn.
     """
 
@@ -95,6 +100,7 @@ class MockAutopilot(Machine[None]):
         rate: float = 4.0,
         beat: float = 1.0,
         boot: float = 0.0,
+        wind: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         super().__init__()
         self.behaviour, self.address, self.home = behaviour, address, home
@@ -116,6 +122,8 @@ class MockAutopilot(Machine[None]):
         self._flight: MockFlight | None = None
         self._rest = _AT_HOME
         self._broken_off: tuple[MockFlight, float] | None = None
+        told = self.parameters.values
+        self._guided = Guided(self._firmware, told, home, self._modes, wind, speedup)
 
     @property
     def deadline(self) -> float | None:
@@ -139,6 +147,7 @@ class MockAutopilot(Machine[None]):
         """Begin anew; what is stored stays, what is under way is lost."""
         self._firmware.reset()
         self.armed, self._flight, self._current = False, None, 0
+        self._guided.reset()
         self._rest, self._broken_off = _AT_HOME, None
         self._booted, self._ready_at = now, now + self._boot
 
@@ -147,6 +156,8 @@ class MockAutopilot(Machine[None]):
         out: list[Message] = list(self._firmware.tick(now))
         if self._flight is not None:
             out += self._follow(self._flight, now)
+        if self._guided.flying:
+            out += self._follow_setpoints(now)
         if now >= self._next_beat:
             self._next_beat = now + self._beat
             out += [self._heartbeat(), self._mission_current(now), self._system_status()]
@@ -160,7 +171,8 @@ class MockAutopilot(Machine[None]):
         self._now = now
         sender, message = envelope.sender, envelope.message
         if isinstance(message, Timesync):
-            return [Timesync(int(now * 1e9) + 1, message.ts1)] if message.tc1 == 0 else ()
+            here = int((now - self._booted) * self._speedup * 1e9) + 1
+            return [Timesync(here, message.ts1)] if message.tc1 == 0 else ()
         if isinstance(message, SetMode):
             target = Address(message.target_system, 0)
         elif isinstance(message, Addressed):
@@ -181,6 +193,9 @@ class MockAutopilot(Machine[None]):
                 return self.parameters.on(message)
             case MissionSetCurrent(seq=seq):
                 return self._set_current(seq, now)
+            case SetPositionTargetLocalNed():
+                self._guided.hear(message, self._mode, now)
+                return ()
         if self._firmware.silent_at_boot and not self._is_ready():
             return ()
         return self._firmware.on(envelope, now)
@@ -210,6 +225,9 @@ class MockAutopilot(Machine[None]):
         match command.command:
             case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
+            case MavCommand.TAKEOFF:
+                climbs = self._guided.take_off(command.param7, self._mode, now)
+                result = ACCEPTED if climbs else DENIED
             case MavCommand.START:
                 self._mode = self._modes.mission
                 result = self._begin(now)
@@ -238,25 +256,37 @@ class MockAutopilot(Machine[None]):
     def _asked_for(self, kind: int) -> list[Message]:
         if kind == _AUTOPILOT_VERSION:
             return [AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
-        if kind == HOME_POSITION:
+        if kind in (HOME_POSITION, LOCAL_ORIGIN):
             home = self.home
             place = (round(home.latitude * 1e7), round(home.longitude * 1e7))
-            return [HomePosition(*place, round(home.altitude * 1000))]
+            told = HomePosition if kind == HOME_POSITION else GpsGlobalOrigin
+            return [told(*place, round(home.altitude * 1000))]
         return []
 
     def _arm(self, wanted: bool, now: float) -> int:
         if not wanted:
             self.armed, self._flight, self._broken_off = False, None, None
+            self._guided.reset()
             return ACCEPTED
         if not self._is_ready() or self._is_kept_on_ground():
             return REJECTED
         self.armed = True
+        if self._mode == self._modes.guided:
+            self._begin_guided(now)
         return self._begin(now) if self._is_mission else ACCEPTED
 
     def _set_mode(self, mode: int, now: float) -> int:
         if mode == self._modes.mission and self._problem() is not None:
             return DENIED
+        if mode == self._modes.guided and not self._guided.accepts(now):
+            return DENIED
+        if mode == self._modes.mission and self._guided.flying:
+            return DENIED  # the mock has no way back into its mission from there
         self._mode = mode
+        if self._guided.flying and mode != self._modes.guided:
+            self._guided.leave(mode, now)
+        elif self.armed and mode == self._modes.guided:
+            self._begin_guided(now)
         if not self._is_mission:
             if self._flight is not None:
                 self._rest = replace(self._flight.at(now), velocity=np.zeros(3))
@@ -310,6 +340,19 @@ class MockAutopilot(Machine[None]):
             out.append(self._heartbeat())
         return out
 
+    def _begin_guided(self, now: float) -> None:
+        if not self._guided.flying:
+            self._guided.begin(self._posture(now), self._vehicle_now(), now)
+            self._flight = self._broken_off = None
+
+    def _follow_setpoints(self, now: float) -> list[Message]:
+        if self._guided.landed(now):
+            self._rest, self.armed = self._guided.at(now), False
+            self._guided.reset()
+            return [Statustext(MavSeverity.INFO, "Landed, disarming"), self._heartbeat()]
+        before, self._mode = self._mode, self._guided.lost(self._mode, now)
+        return [self._heartbeat()] if self._mode != before else []
+
     def _is_return(self, seq: int) -> bool:
         rows = self.lists.items(MissionType.MISSION)
         return seq < len(rows) and rows[seq].command == Command.NAV_RETURN_TO_LAUNCH
@@ -332,6 +375,8 @@ class MockAutopilot(Machine[None]):
         return home_items(self.vehicle, MissionType.MISSION)
 
     def _posture(self, now: float) -> Posture:
+        if self._guided.flying:
+            return self._guided.at(now)
         return self._rest if self._flight is None else self._flight.at(now)
 
     def _set_current(self, seq: int, now: float) -> list[Message]:

@@ -1,0 +1,314 @@
+"""Flying a plan by setpoints: the trajectory itself, not way points along it."""
+
+import struct
+from collections import deque
+from collections.abc import Sequence
+from statistics import median
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mavlink.flying.course import Setpoint
+from faao_mav.mavlink.flying.itinerary import Itinerary
+from faao_mav.mavlink.flying.watch import ACCEPTED, IN_PROGRESS, Watch
+from faao_mav.mavlink.local_frame import frame_of
+from faao_mav.mavlink.messages import (
+    CommandLong,
+    Envelope,
+    GlobalPositionInt,
+    GpsGlobalOrigin,
+    Message,
+    MissionCurrent,
+    ParamRequestRead,
+    ParamValue,
+    SetPositionTargetLocalNed,
+    Timesync,
+)
+from faao_mav.mavlink.protocol import LOCAL_ORIGIN, MavCommand
+from faao_mav.mavlink.transfer.exchange import Peer
+from faao_mav.optimizer.solution import Solution
+from faao_mav.vehicle.px4 import PX4
+
+LOCAL_NED = 1
+"""MAV_FRAME_LOCAL_NED."""
+
+_NO_YAW = 1 << 10 | 1 << 11
+"""POSITION_TARGET_TYPEMASK: yaw and yaw rate are ignored, all else counts."""
+
+_INT32 = 6
+"""MAV_PARAM_TYPE of whole numbers, which PX4 sends as their bits."""
+
+_PX4_TIMEOUT, _TIMEOUT = ("COM_OF_LOSS_T", "COM_OBL_RC_ACT"), ("GUID_TIMEOUT",)
+"""The parameters that say what PX4 and ArduPilot do when setpoints cease."""
+
+_ACTIONS = ("Position", "Altitude", "Stabilized", "Return", "Land", "Hold", "Terminate", "Disarm")
+"""What the values of COM_OBL_RC_ACT mean, in PX4 1.14 to 1.16."""
+
+_ANSWER = 10.0
+"""Seconds in which these parameters are asked for; chosen."""
+
+_STREAMED = 1.5
+"""Seconds, by the vehicle's clock, of setpoints before PX4 is asked for Offboard: it wants more
+than one."""
+
+_AT_HOME = 20.0
+"""The aircraft has to stand within so many metres of the plan's home; chosen."""
+
+_ROUND_TRIPS, _LONGEST_TRIP = 9, 1.0
+"""How many round trips on the link are kept, one each half second, whose median counts; and the
+most that counts, s. Chosen."""
+
+_ARM_AGAIN = 2.0
+"""Seconds after which it is asked to arm again that refused; chosen."""
+
+_OFF_GROUND = 0.3
+"""Metres above home from which on a take-off is under way, though its answer is lost; chosen."""
+
+_EARLY = 0.8
+"""The share of a period after which the next setpoint may go: they come irregularly; chosen."""
+
+_PARTS = {
+    "out": "on the way to flight.start",
+    "relay": "the relay flight begins",
+    "back": "the relay flight is over",
+    "over": "setpoints end",
+}
+
+
+class Stream(Watch):
+    """A watch that arms the vehicle of `peer`, and flies `solution` by setpoints.
+
+    `rate` times a second of the vehicle's own clock, whenever it tells where it is, it is told
+    where to be: see `Itinerary`, of which `flight` is one; in the end what `mission.on_finish`
+    says. While nothing is heard of it nothing is sent, and it does what its parameters say. A mode
+    that was not asked for ends the setpoints for good.
+
+    Raises `InputError` for a vehicle that is not flown by setpoints, and what `Itinerary` raises.
+    """
+
+    def __init__(
+        self, peer: Peer, solution: Solution, *, rate: float = 10.0, patience: float = 60.0
+    ) -> None:
+        plan = solution.plan
+        finish = plan.mission.on_finish
+        lands = finish != "hover"
+        super().__init__(peer, (), arm=True, lands=lands, patience=patience, period=1 / rate)
+        if self._modes.guided is None or peer.vehicle is None:
+            raise InputError("--stream: only copters fly by setpoints")
+        self._family = peer.vehicle.family
+        self._is_px4, self._guided = self._family == PX4, self._modes.guided
+        after = self._modes.at_fence
+        self._finish = after["return" if finish == "rtl" else "land" if lands else "hold"]
+        self._height, self._period = plan.flight.altitude, 1 / rate
+        # PX4 goes where it is told until it is told another place; ArduPilot goes on from there.
+        self._held = self._period / 2 if self._is_px4 else 0.0
+        self._round_trips: deque[tuple[float, int, float]] = deque(maxlen=_ROUND_TRIPS)
+        self.flight = Itinerary(solution, takes_off=not self._is_px4)
+        self._frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+        self._origin: GpsGlobalOrigin | None = None
+        self._timeouts: dict[str, float] = {}
+        self._asked = _PX4_TIMEOUT if self._is_px4 else _TIMEOUT
+        self._ground: Setpoint | None = None
+        self._first_sent, self._last_sent = float("inf"), float("-inf")
+
+    @property
+    def streams(self) -> bool:
+        """Whether it is not the mission that is flown, but a plan by setpoints."""
+        return True
+
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        out = super()._receive(envelope, now)
+        if self.outcome is not None or envelope.sender != self._peer.address:
+            return out
+        match envelope.message:
+            case GpsGlobalOrigin() as origin:
+                self._origin = origin
+            case ParamValue(name, value, kind) if name in self._asked:
+                if self._is_px4 and kind == _INT32:
+                    (value,) = struct.unpack("<i", struct.pack("<f", value))
+                self._timeouts[name] = value
+            case Timesync(tc1, ts1) if tc1 and 0 < ts1 / 1e9 <= now:
+                self._round_trips.append((now, tc1, now - ts1 / 1e9))
+            case GlobalPositionInt() as position:
+                return [*out, *self._on_position(position, now)]
+        return out
+
+    def _time_out(self, now: float) -> Sequence[Message]:
+        out = super()._time_out(now)
+        if self.outcome is not None or self.phase in ("holding", "aside"):
+            return out
+        return [*out, Timesync(0, int(now * 1e9))]
+
+    # ---- before the flight
+
+    def _check(self, now: float) -> Sequence[Message]:
+        out, target = list(super()._check(now)), self._peer.address
+        if self._origin is None:
+            ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
+            out.append(CommandLong(target, *ask))
+        unread = [name for name in self._asked if name not in self._timeouts]
+        return [*out, *(ParamRequestRead(target, name, -1) for name in unread)]
+
+    def _set_out(self, now: float) -> Sequence[Message]:
+        position, known = self.seen.position, len(self._timeouts) == len(self._asked)
+        if position is None or self._origin is None:
+            return ()
+        if not known and now < self._begun + _ANSWER:
+            return ()
+        away = float(np.linalg.norm(self._place(position)[:2]))
+        if away > _AT_HOME:
+            text = f"it stands {away:.0f} m from the plan's home (site.origin)"
+            self._end("refused", f"nothing was started: {text}, not within {_AT_HOME:.0f} m")
+            return ()
+        self.seen.told.append(f"without setpoints {self._without()}")
+        self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
+        self.phase = "engaging"
+        if self._is_px4:
+            return ()  # setpoints come first
+        return self._say(lambda: self._mode(self._guided), now)
+
+    def _without(self) -> str:
+        """Return in words what the vehicle does when setpoints cease."""
+        told = [f"{name} {value:g}" for name, value in self._timeouts.items()]
+        if len(told) < len(self._asked):
+            return "it does what it does: it does not tell its parameters"
+        if not self._is_px4:
+            return f"it stops after {self._timeouts['GUID_TIMEOUT']:g} s (GUID_TIMEOUT)"
+        action = int(self._timeouts["COM_OBL_RC_ACT"])
+        name = _ACTIONS[action] if 0 <= action < len(_ACTIONS) else "another mode"
+        after = self._timeouts["COM_OF_LOSS_T"]
+        return f"it changes to {name} after {after:g} s ({', '.join(told)})"
+
+    def _starting(self) -> Message:
+        again = max(0, self._sent - 1)
+        return CommandLong(self._peer.address, MavCommand.TAKEOFF, again, param7=self._height)
+
+    # ---- what the vehicle does
+
+    def _on_current(self, current: MissionCurrent, now: float) -> None:
+        """It has a mission, which is not what is flown."""
+
+    def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
+        match self.phase:
+            case "engaging" if mode == self._guided:
+                self.phase = "arming"
+                return self._say(lambda: self._arming(True), now)
+            case "engaging" if mode != self._mode_before:
+                self._step_aside()
+            case "arming" | "starting" | "flying" if mode != self._guided:
+                self._step_aside()
+            case "ending" if mode == self._finish:
+                self._command = None
+                if not self._lands:
+                    self._over()
+            case "ending" if self._armed and mode != self._guided:  # that may be a late packet
+                self._step_aside()
+            case "holding" if mode == self._modes.hold and self._command is not None:
+                self._command = None
+                self.seen.told.append("it holds; interrupt again to leave it")
+            case "holding" if mode not in (self._guided, self._modes.hold) or (
+                mode == self._guided and self._command is None
+            ):
+                self._step_aside()
+        return ()
+
+    def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
+        awaited = {"arming": MavCommand.ARM, "starting": MavCommand.TAKEOFF}.get(self.phase)
+        if command != awaited or result == IN_PROGRESS:
+            return ()
+        if result != ACCEPTED and self.phase == "arming" and now < self._begun + self._patience:
+            # In this mode it may need what its checks did not ask for before, a position above all.
+            self._sent, self._next_try = 0, now + _ARM_AGAIN
+            return ()
+        if result != ACCEPTED:
+            return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
+        if self.phase == "arming" and not self._is_px4:
+            self.phase = "starting"
+            return self._say(self._starting, now)
+        self._fly()
+        return ()
+
+    def _on_disarmed(self) -> Sequence[Message]:
+        if self.phase == "flying":
+            self._end("taken over", "disarmed in the middle of the flight")
+            return ()
+        return super()._on_disarmed()
+
+    def _fly(self) -> None:
+        self.phase, self._command = "flying", None
+        self.seen.told.append("taking off")
+
+    # ---- where it is to be
+
+    def _on_position(self, position: GlobalPositionInt, now: float) -> Sequence[Message]:
+        t, place = position.time_boot_ms / 1000, self._place(position)
+        if self.phase == "starting" and place[2] > _OFF_GROUND:
+            self._fly()
+        setpoint, out = self._setpoint(t, place, position), list[Message]()
+        if self.phase == "flying" and self.flight.part == "over":
+            self.phase = "ending"
+            out += self._say(lambda: self._mode(self._finish), now)
+        if self.phase == "engaging" and self._command is None and self._streamed(t):
+            out += self._say(lambda: self._mode(self._guided), now)
+        if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
+            self._last_sent = t
+            self._first_sent = min(self._first_sent, t)
+            out.append(self._message(setpoint, position))
+        return out
+
+    def _streamed(self, t: float) -> bool:
+        """Tell whether PX4 has had setpoints for long enough."""
+        return t >= self._first_sent + _STREAMED
+
+    def _setpoint(self, t: float, place: Real, position: GlobalPositionInt) -> Setpoint | None:
+        """Return where the aircraft is to be at `t`; None while nothing is to be sent."""
+        guided = self.seen.heartbeat is None or self.seen.heartbeat.custom_mode == self._guided
+        asked = self.phase == "ending" and self._command is not None
+        if self.phase == "flying" or (asked and guided):
+            part = self.flight.part
+            velocity = np.array([position.vy, position.vx, -position.vz]) / 100
+            setpoint = self.flight.setpoint(t + self._lead(), place, velocity)
+            if self.flight.part != part:
+                self.seen.told.append(_PARTS[self.flight.part])
+                self.relay_start = self.flight.relay_start
+            return setpoint
+        if self._is_px4 and self.phase in ("engaging", "arming"):
+            if self._ground is None:
+                self._ground = Setpoint(place, np.zeros(3), np.zeros(3))
+            return self._ground
+        return None
+
+    def _lead(self) -> float:
+        """Return by how much later than a position was told the setpoint for it counts, s.
+
+        That is a round trip on the link, by the vehicle's clock.
+        """
+        if len(self._round_trips) < 2:
+            return self._held
+        (first, there_first, _), (last, there_last, _) = self._round_trips[0], self._round_trips[-1]
+        speed = (there_last - there_first) / 1e9 / max(last - first, 1e-9)
+        trip = median(trip for _, _, trip in self._round_trips)
+        return self._held + min(max(speed, 0.0) * trip, _LONGEST_TRIP)
+
+    def _place(self, position: GlobalPositionInt) -> Real:
+        """Return where it is: (3,) m east, north, up of the plan's origin, which is its home."""
+        level = self._frame.to_local(position.lat / 1e7, position.lon / 1e7)
+        return np.append(level, position.relative_alt / 1000)
+
+    def _message(self, setpoint: Setpoint, position: GlobalPositionInt) -> Message:
+        """Return `setpoint` in the vehicle's own local frame."""
+        assert self._origin is not None
+        origin = frame_of(self._family, self._origin.latitude / 1e7, self._origin.longitude / 1e7)
+        p, v, a = setpoint
+        east, north = origin.to_local(*self._frame.to_geodetic(p[:2]))
+        home = (position.alt - position.relative_alt - self._origin.altitude) / 1000
+        values = (north, east, -(p[2] + home), v[1], v[0], -v[2], a[1], a[0], -a[2])
+        return SetPositionTargetLocalNed(
+            self._peer.address,
+            position.time_boot_ms,
+            LOCAL_NED,
+            _NO_YAW,
+            *map(float, values),
+        )
