@@ -136,8 +136,9 @@ WARM_START = StartStrategy(mu=0.1, margin=0.03)
 """For starts that are nearly optimal."""
 
 WARM_SHARES = StartStrategy(mu=0.1, margin=0.1)
-"""The same in half duplex. Measured on seven plans (T = 40 to 120 s, BPSK to 16-QAM): a third of this
-margin takes 24 iterations for 12 at T = 70 s. Ten times mu leaves two starts unconverged at 20 MB."""
+"""The same in half duplex. Measured on seven plans (T = 40 to 120 s, BPSK to 16-QAM): a third of
+this margin takes 24 iterations for 12 at T = 70 s. Ten times mu leaves two starts unconverged with
+a buffer of 20 MB."""
 
 
 FINISHES = StartStrategy(mu=1e-3, margin=0.0), WARM_START
