@@ -24,6 +24,13 @@ SLOWEST = 0.1  # the least speed, m/s, that any autopilot is commanded: a slower
 _WIDEST_HOVER = 1.5
 
 _SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
+# A plan that brakes as hard as it may swings past a hover and comes back, or backs up to leave it.
+# Reversals on legs of a metre or two took ArduCopter up to 0.9 s longer than predicted, measured in
+# its simulator, so swings of up to so many times a hover's radius belong to the hover.
+_SWING = 1.5
+_SHIFTS = 10  # shifts of a hover towards its farthest swing, until that is at its radius,
+_NEARLY = 1e-3  # or beyond it by this share
+
 _SPEED_WINDOW = 1.0  # s, over which a speed is averaged: it hides a trajectory's chatter
 _SAME_POINT = 1e-3  # the distance, m, within which both ends of a trajectory are one waypoint
 _BISECTIONS = 8  # halvings of the tolerance that evens out legs: it is found to 1/256
@@ -104,6 +111,9 @@ def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[
             merged[-1] = Waypoint(before.first, hover.last, position)
         else:
             merged.append(hover)
+    for k in range(1, len(merged) - 1):
+        begin, end = merged[k - 1].last + 1, merged[k + 1].first - 1
+        merged[k] = _with_swings(w, merged[k], begin, end, radius)
     return merged
 
 
@@ -179,6 +189,38 @@ def _middle(w: Real, radius: float) -> Real:
     median: Real = np.median(w, axis=0)
     near = lengths(w - median).max() <= radius
     return median if near else (w.min(axis=0) + w.max(axis=0)) / 2
+
+
+def _with_swings(w: Real, hover: Waypoint, begin: int, end: int, radius: float) -> Waypoint:
+    """Return `hover` with the swings around it, moved so that they stay within `radius` m.
+
+    A swing leaves it by up to `_SWING` radii and comes back; it is among the samples `begin` to
+    `end` of `w` (n, 2) m. Where no place is near enough to all swings the hover is left alone.
+    """
+    apart, position = lengths(w - hover.position), hover.position
+    first, last = _around(apart <= _SWING * radius, hover.first, begin, end)
+    inside = first + np.flatnonzero(apart[first : last + 1] <= radius)
+    swings = np.arange(inside[0], inside[-1] + 1)
+    swings = swings[apart[swings] > radius]
+    if len(swings) == 0:
+        return hover
+    for _ in range(_SHIFTS):
+        away = w[swings] - position
+        farthest = away[np.argmax(lengths(away))]
+        position = position + max(0.0, 1 - radius / lengths(farthest)) * farthest
+    near = lengths(w - position) <= (1 + _NEARLY) * radius
+    if not (near[hover.first : hover.last + 1].all() and near[swings].all()):
+        return hover
+    return Waypoint(*_around(near, hover.first, first, last), position)
+
+
+def _around(mask: Flags, at: int, begin: int, end: int) -> tuple[int, int]:
+    """Return first and last index of the run of True about `at`, within `begin` and `end`."""
+    outside = np.flatnonzero(~mask)
+    k = int(np.searchsorted(outside, at))
+    first = int(outside[k - 1]) + 1 if k else 0
+    last = int(outside[k]) - 1 if k < len(outside) else len(mask) - 1
+    return max(first, begin), min(last, end)
 
 
 def _stay(w: Real, radius: float) -> int:

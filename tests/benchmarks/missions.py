@@ -1,16 +1,17 @@
-"""How well missions keep their plans: predicted flights of hover-to-hover relay plans.
+"""How well missions keep their plans: predicted flights of relay plans.
 
-    python tests/benchmarks/missions.py [--px4] [--keep]
+    python tests/benchmarks/missions.py [--px4] [--keep] [--random FIRST,COUNT]
 
 One row for each plan: CPU seconds of the conversion, items with home, rms and largest position
 error at equal times, path error (m), how much later than planned the flight is over (s), the
 delivered rate over the planned one. Everything printed is predicted; `flights.py` says how well
-predictions agree with recorded flights.
+predictions agree with recorded flights. `--random` draws plans from seeds instead.
 """
 
 import argparse
 import time
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from faao_mav.optimizer.optimize import optimize
@@ -85,17 +86,48 @@ def plan_of(changes: dict[str, Any], autopilot: str, parameters: str) -> Plan:
     return parse_plan(dump_yaml(data))
 
 
+def random_changes(seed: int) -> dict[str, Any]:
+    """Return changes of the sample plan that nobody chose: 60 to 240 s at 3 to 9.5 m/s."""
+    random = Random(seed)
+    speed = round(random.uniform(3, 9.5), 1)
+    duration = random.randrange(60, 241, 10)
+    reach = min(450.0, 0.35 * speed * duration)
+
+    def place(reach: float) -> list[int]:
+        return [round(random.uniform(-reach, reach)) for _ in range(2)]
+
+    ends = ["free" if random.random() < 0.2 else "hover" for _ in range(2)]
+    return {
+        "flight.duration": duration,
+        "flight.start": place(reach),
+        "flight.end": place(reach),
+        "flight.altitude": random.choice((40, 60, 80, 100, 120)),
+        "flight.start_velocity": ends[0],
+        "flight.end_velocity": ends[1],
+        "vehicle.max_speed": speed,
+        "vehicle.max_acceleration": round(random.uniform(0.8, 2.5), 1),
+        "radio.ground_user.position": place(500.0),
+        "radio.modulation": random.choice(("bpsk", "qpsk", "8psk", "16qam")),
+        "radio.relay.noise_dbm": random.choice((-80, -85, -91)),
+    }
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--px4", action="store_true")
     parser.add_argument("--keep", action="store_true", help="the autopilot's default parameters")
+    parser.add_argument("--random", metavar="FIRST,COUNT", help="plans drawn from these seeds")
     options = parser.parse_args()
+    plans = PLANS
+    if options.random:
+        first, count = map(int, options.random.split(","))
+        plans = {f"random {seed}": random_changes(seed) for seed in range(first, first + count)}
     autopilot = "px4" if options.px4 else "ardupilot"
     parameters = "keep" if options.keep else "recommend"
     print(f"{autopilot}, {parameters}")
     print(f"{'plan':28}      s  items   rms    max   path    late    rate")
-    for name, changes in PLANS.items():
+    for name, changes in plans.items():
         plan = plan_of(changes, autopilot, parameters)
         solution = optimize(plan)
         started = time.process_time()

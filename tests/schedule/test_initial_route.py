@@ -113,6 +113,18 @@ def test_dash_hover_dash() -> None:
     assert route.positions == pytest.approx(np.array([w[0], [150.0, 150.0], w[-1]]), abs=0.05)
 
 
+@pytest.mark.parametrize("far", [1.0, 2.1, 2.6])
+def test_a_swing_past_a_hover_belongs_to_it(far: float) -> None:
+    # Such a plan brakes as hard as it may, `far` past the hover, and comes back to it.
+    t = np.arange(0, 100, STEP)
+    there = dash(0, 200 + far, 8, 2.0, t) - dash(0, far, 8, 0.8, np.maximum(t - 29.5, 0))
+    on = dash(0, 200, 8, 2.0, np.maximum(t - 65, 0))
+    route = check(t, np.outer(there, [0.6, 0.8]) + np.outer(on, [0.8, -0.6]), plan_with())
+    assert len(route.positions) == 3
+    assert route.waits[1] > 30
+    assert np.hypot(*(route.positions[1] - [120, 160])) < 1
+
+
 def test_hovers_at_both_ends_are_holds() -> None:
     t = np.arange(0, 100, STEP)
     w = np.outer(dash(0, 200, 8, 1.5, np.maximum(t - 20.3, 0)), [1.0, 0.0])

@@ -133,6 +133,20 @@ def test_recommended_parameters_have_the_names_of_both_generations() -> None:
     assert conversion.vehicle.parameters == found
 
 
+def test_a_sharp_turn_at_speed_is_flown_with_the_greatest_jerk() -> None:
+    # a quarter circle of 18 m between two straights of 150 m
+    arc = 18 * np.pi / 2
+    t = np.arange(0, 54, STEP)
+    s = dash(0, 300 + arc, 7, 2.0, t)
+    angle = np.clip((s - 150) / 18, 0, np.pi / 2)
+    east = np.minimum(s, 150) + 18 * np.sin(angle)
+    north = 18 * (1 - np.cos(angle)) + np.maximum(s - 150 - arc, 0)
+    w = np.column_stack([east, north])
+    conversion = converted(t, w, plan_with(recommend=True))
+    assert conversion.parameters["WPNAV_JERK"] == 20
+    assert conversion.schedule.deviation.rms < 0.8
+
+
 def test_recommended_parameters_stand_beside_those_of_the_vehicle() -> None:
     own = {"WPNAV_ACCEL": 120.0, "RTL_ALT": 4000.0}
     conversion = converted(*dash_hover_dash(), plan_with(recommend=True, parameters=own))

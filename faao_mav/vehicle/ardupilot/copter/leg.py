@@ -116,7 +116,7 @@ def at_speed(leg: StraightLeg, speed: float, elapsed: float) -> StraightLeg:
     if speed < up.high and up.steady > 0 and elapsed <= late:
         slowest = up.high - up.peak * (late - max(elapsed, early))
         up = ramp_from_rest(limits.at(max(speed, slowest)), leg.length / 2)
-    cruise = leg.length - up.length - ramp_from_rest(limits.at(up.high), leg.length / 2).length
+    cruise = leg.length - up.length - leg.down.length  # the ramp down is the one that was planned
     phases, covered, reached = up.phases(), up.length, up.high
     if (second := _second(up.high, limits, cruise)) is not None:
         slower = second.low < up.high
