@@ -258,10 +258,14 @@ def _energy(check: Check | None) -> Iterator[Line]:
 
 def _of_limit(limit: WindLimit, link: LinkCheck | None) -> str:
     rate = f"{100 * LEAST_RATE:g} % of the rate and " if link is not None else ""
-    promise = f"{rate}its time within {MOST_LATE:g} s"
+    kept = f"keeps {rate}its time within {MOST_LATE:g} s"
+    if any(limit.beside):
+        return (
+            f"{kept} while the wind is within {limit.speed:g} m/s of the planned one; the worst "
+            f"change is wind from {limit.from_degrees:g} degrees"
+        )
     if limit.speed == 0:
-        return f"keeps {promise} in no wind from {limit.from_degrees:g} degrees"
-    kept = f"keeps {promise}"
+        return f"{kept} in no wind from {limit.from_degrees:g} degrees"
     if limit.speed >= MOST_WIND:
         return f"{kept} in {MOST_WIND:g} m/s from any direction"
     worst = f"the worst is {limit.from_degrees:g} degrees"

@@ -55,7 +55,7 @@ def initial_route(
     The polyline through the waypoints passes every sample of `w` within `share` of
     `plan.mission.path_tolerance`. Hovers are one waypoint with a wait of whole seconds; what
     rounding leaves over is carried to the next wait. Each leg's speed is its length over its
-    planned duration, to 0.001 m/s, at most `plan.vehicle.max_speed`: the time that it takes to
+    planned duration, to 0.001 m/s, at most `plan.max_ground_speed`: the time that it takes to
     speed up and slow down is not allowed for.
 
     `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
@@ -77,7 +77,7 @@ def initial_route(
         waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
         curved += marked
-    return _timed(times, waypoints, curved, slowest, plan.vehicle.max_speed)
+    return _timed(times, waypoints, curved, slowest, plan.max_ground_speed)
 
 
 def slowest_leg(plan: Plan) -> float:

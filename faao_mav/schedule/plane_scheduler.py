@@ -13,7 +13,7 @@ import numpy as np
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import Scheduler
-from faao_mav.vector import distances_to_path
+from faao_mav.vector import distances_to_path, lengths
 
 _MOVES = 12  # times that the waypoints are moved; twice as many bring a tenth at most
 
@@ -36,7 +36,10 @@ class PlaneScheduler(Scheduler):
         Its speeds are the airspeeds to command for the plan's.
         """
         ratio = self.vehicle.type.true_over_commanded(self.vehicle, self.altitude)
-        best = self._kept(replace(route, speeds=route.speeds / ratio))
+        ways = np.diff(route.positions, axis=0)
+        ground = ways * (route.speeds / lengths(ways))[:, None]
+        speeds = np.clip(lengths(ground - self.wind) / ratio, self.min_speed, self.max_speed)
+        best = self._kept(replace(route, speeds=speeds))
         for _ in range(_SPLITS):
             if best.deviation.path <= self.tolerance:
                 break

@@ -8,7 +8,7 @@ import numpy as np
 
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
-from faao_mav.plan import Wind
+from faao_mav.plan import Vector, Wind
 from faao_mav.vector import lengths
 from faao_mav.vehicle import Track, Vehicle
 
@@ -39,11 +39,14 @@ class WindLimit:
     """The strongest steady wind, m/s, that a mission keeps from the worst of eight directions.
 
     It keeps 95 % of the planned rate, and its end within 5 s; without a plan its end alone.
-    `from_degrees` is where the worst wind comes from; `speed` is at most 20 m/s.
+    `from_degrees` is where the worst wind comes from; `speed` is at most 20 m/s. An aeroplane holds
+    its airspeed, so that what counts is the change from the wind that its mission is timed for:
+    `beside`, east and north, m/s; of what hovers it is zero.
     """
 
     speed: float
     from_degrees: float
+    beside: Vector = (0.0, 0.0)
 
 
 def wind_limit(
@@ -56,29 +59,33 @@ def wind_limit(
 ) -> WindLimit | None:
     """Return the wind limit of `mission`.
 
-    None for a vehicle whose airspeed has no limit, and for flights of more than an hour. `track` is
-    its predicted flight in the air that it is made for, `solution` the plan that it carries out:
-    without one only the time counts, beside that of `track`. `lead` is as in `check.check`.
+    None for a vehicle of which it is not known what a wind does to it, and for flights of more than
+    an hour. `track` is its predicted flight in the air that it is made for, `solution` the plan
+    that it carries out: without one only the time counts, beside that of `track`. `lead` is as in
+    `check.check`.
 
-    Within the vehicle's airspeed a wind changes nothing. From the strongest wind in which all of
-    `track` is within that, the limit is sought upwards by predicted flights: in the direction
-    where that wind is weakest, then in those where less than the limit found so far is kept.
+    Within the airspeed of a vehicle that hovers a wind changes nothing; an aeroplane's flight is
+    changed by any. From the strongest wind in which all of `track` is within that, the limit is
+    sought upwards by predicted flights: in the direction where that wind is weakest, then in those
+    where less than the limit found so far is kept.
     """
-    top = vehicle.type.max_airspeed(vehicle)
-    if not math.isfinite(top) or track.t[-1] > _LONGEST:
+    top, hovers = vehicle.type.max_airspeed(vehicle), vehicle.type.hovers
+    known = math.isfinite(top) if hovers else vehicle.type.models_wind
+    if not known or track.t[-1] > _LONGEST:
         return None
-    trial = _Trial(mission, vehicle, float(track.t[-1]), solution, lead)
+    beside = (0.0, 0.0) if hovers or solution is None else solution.plan.wind
+    trial = _Trial(mission, vehicle, float(track.t[-1]), solution, lead, beside)
     degrees = [360.0 / _DIRECTIONS * k for k in range(_DIRECTIONS)]
-    harmless = sorted((_harmless(track, top, each), each) for each in degrees)
-    found = WindLimit(MOST_WIND, harmless[0][1])
+    harmless = sorted((_harmless(track, top, each) if hovers else 0.0, each) for each in degrees)
+    found = WindLimit(MOST_WIND, harmless[0][1], beside)
     if not trial.fulfilled(track):
         return replace(found, speed=0.0)
     for least, start in harmless:
         kept = min(least, found.speed)
-        if kept < found.speed and vehicle.type.models_lean_limit:
+        if kept < found.speed and vehicle.type.models_wind:
             kept = trial.strongest(kept, found.speed, start)
         if kept < found.speed:
-            found = WindLimit(kept, start)
+            found = WindLimit(kept, start, beside)
     return replace(found, speed=_STEP * math.floor(found.speed / _STEP + 1e-9))
 
 
@@ -97,13 +104,17 @@ def _harmless(track: Track, top: float, degrees: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """A mission that is predicted in one wind after the other; `duration`, s, is what it takes."""
+    """A mission that is predicted in one wind after the other; `duration`, s, is what it takes.
+
+    Winds add to that `beside`, m/s.
+    """
 
     mission: Mission
     vehicle: Vehicle
     duration: float
     solution: "Solution | None"
     lead: float | None
+    beside: Vector
 
     def strongest(self, low: float, high: float, degrees: float) -> float:
         """Return the strongest wind from `degrees` that is kept, between `low` and `high` m/s.
@@ -128,11 +139,12 @@ class _Trial:
         """Tell whether the mission keeps rate and time in a wind of `speed`, m/s."""
         from faao_mav.vehicle.predict import predict
 
+        east, north = Wind(speed, degrees).velocity
         try:
             track = predict(
                 self.mission,
                 self.vehicle,
-                wind=Wind(speed, degrees).velocity,
+                wind=(self.beside[0] + east, self.beside[1] + north),
                 longest=_SLOWER * self.duration,
             )
         except FaaoError:

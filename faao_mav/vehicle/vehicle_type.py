@@ -138,7 +138,8 @@ class VehicleType:
         ceilings: how far a plan may go for the vehicle to keep it, beside `fastest`; the least of
             those with one key counts.
         max_airspeed: the greatest airspeed, m/s, that it holds in wind with room to correct.
-        models_lean_limit: its flight model knows what becomes of a flight beyond that.
+        models_wind: its flight model knows what becomes of a flight beyond that, or of a plane in
+            any wind.
         true_over_commanded: true airspeed over the one that a mission commands, at a height in m
             above sea level; 1 where missions command ground speeds.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
@@ -166,7 +167,7 @@ class VehicleType:
     recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
     ceilings: Callable[[ParameterValues], Sequence[Ceiling]] = lambda _: ()
     max_airspeed: Callable[[ParameterValues], float] = lambda _: math.inf
-    models_lean_limit: bool = False
+    models_wind: bool = False
     true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
     corner_speed: Callable[[ParameterValues, float], float] | None = None
 

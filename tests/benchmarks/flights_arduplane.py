@@ -1,11 +1,11 @@
-"""Predicted against recorded ArduPlane flights (tests/data/flights/arduplane), without wind.
+"""Predicted against recorded ArduPlane flights (tests/data/flights/arduplane).
 
     python tests/benchmarks/flights_arduplane.py
 
 The constants of the model are fitted to flights from sea level (`FITTED`); the other flights from
-there, and all from 584 m, are held out of every fit. Predictions begin where the take-off was over,
-at the recorded velocity. They are aligned at the second waypoint, where the speed of the take-off
-is spent: a plan begins after such a run-in, too.
+there, all from 584 m and all in wind, are held out of every fit. Predictions begin where the
+take-off was over, at the recorded velocity. They are aligned at the second waypoint, where the
+speed of the take-off is spent: a plan begins after such a run-in, too.
 """
 
 import csv
@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 from record_plane import ELEVATIONS, PARAMETERS, PLACE
-from recorded import FLIGHTS, Row, compared, read, show
+from recorded import FLIGHTS, Row, compared, read, show, wind_of
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
@@ -59,12 +59,15 @@ def row(name: str) -> Row:
         radii=np.append(0.0, path.radii),
         elevation=ELEVATIONS[name.split("-")[0]],
         entry=velocity,
+        wind=path.wind,
     )
     flown = plane.fly(whole)
     run_in = recorded.left[1]
     recorded = replace(recorded, t=recorded.t - run_in, left=recorded.left[1:] - run_in)
     after = replace(flown, arrivals=flown.arrivals[2:], departures=flown.departures[2:])
     use = "fitted" if name in FITTED else f"held out, {name.split('-')[0]}"
+    if "wind" in name:
+        use = f"in {wind_of(name).speed:g} m/s"
     return compared(name, use, recorded, after)
 
 

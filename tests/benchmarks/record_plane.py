@@ -10,6 +10,7 @@ take-off is over.
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -147,11 +148,16 @@ def record(name: str, runner: Path) -> None:
     """Fly the mission called `name` and keep its track; again if the simulator fails."""
     target = FOLDER / f"{name}.waypoints"
     target.write_text(write_wpl(made(name)))
-    options = ["--vehicle", "plane", "--speedup", "20", "--tail", "3"]
-    rows = flown_by(runner, target, options)
+    fly(runner, target, target.with_suffix(".csv"))
+
+
+def fly(runner: Path, mission: Path, track: Path, options: Sequence[str] = ()) -> None:
+    """Fly the file `mission` by `runner` with `options` too, and keep the thinned track."""
+    options = ["--vehicle", "plane", "--speedup", "20", "--tail", "3", *options]
+    rows = flown_by(runner, mission, options)
     taken_off = next(float(row["t_s"]) for row in rows if int(row["seq"]) > 1)
     rows = [row for row in rows if float(row["t_s"]) >= taken_off - 1]
-    keep(rows, target, ("t_s", "lat", "lon", "alt_rel_m", "vx", "vy", "vz", "seq"))
+    keep(rows, track, ("t_s", "lat", "lon", "alt_rel_m", "vx", "vy", "vz", "seq"))
 
 
 def main() -> None:

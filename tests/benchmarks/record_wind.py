@@ -1,10 +1,10 @@
-"""Fly recorded missions again in wind, in real copters' simulators, and keep the thinned tracks.
+"""Fly recorded missions again in wind, in real autopilots' simulators, and keep the thinned tracks.
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/record_wind.py [ardupilot | px4] [NAME ...]
+    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/record_wind.py [FOLDER ...] [NAME ...]
 
-A flight NAME-windSPEEDfromDEGREES is that of the mission NAME (tests/data/flights/arducopter, px4)
-in a steady wind, m/s and degrees clockwise from north; ArduCopter's parameters are those that the
-mission's name tells.
+A flight NAME-windSPEEDfromDEGREES is that of the mission NAME (of the folders arducopter, arduplane
+and px4 in tests/data/flights) in a steady wind, m/s and degrees clockwise from north; ArduCopter's
+parameters are those that the mission's name tells.
 """
 
 import os
@@ -12,13 +12,26 @@ import sys
 from pathlib import Path
 
 from flights_arducopter import parameters_of
+from record_plane import fly
 from record_px4 import flown_by, in_wind, keep
 from recorded import FLIGHTS, mission_of, wind_of
 
 COLUMNS = ("t_s", "lat", "lon", "alt_rel_m", "seq")
-WINDS = ("wind3from250", "wind6from20", "wind9from130")
+WINDS = {
+    "arducopter": ("wind3from250", "wind6from20", "wind9from130"),
+    "arduplane": ("wind3from250", "wind6from20"),
+    "px4": ("wind3from250", "wind6from20", "wind9from130"),
+}
 MISSIONS = {
     "arducopter": ("line-80m-8ms", "zigzag-100m-8ms", "holds-100m-8ms", "speeds-150m"),
+    "arduplane": (
+        "sea-corners-500m-16",
+        "sea-wandering-2",
+        "high-bends-1",
+        "sea-circle-120m-15",
+        "sea-steps-300m",
+        "high-zigzag-300m-14",
+    ),
     "px4": ("zigzag-100m-lively", "holds-100m", "long-300m", "corners-60m-suited"),
 }
 
@@ -36,14 +49,18 @@ def main() -> None:
     """Record the flights that are named, or all."""
     autopilots = Path(os.environ["FAAO_AUTOPILOTS"])
     for folder, missions in MISSIONS.items():
-        runner = autopilots / f"fly_{folder}.py"
-        for name in [f"{mission}-{wind}" for mission in missions for wind in WINDS]:
-            if not set(sys.argv[1:]) or {folder, name} & set(sys.argv[1:]):
-                mission = FLIGHTS / folder / f"{mission_of(name)}.waypoints"
-                given = [*options(folder, name), *in_wind(runner, wind_of(name))]
-                rows = flown_by(runner, mission, given)
+        runner = autopilots / ("fly_px4.py" if folder == "px4" else "fly_arducopter.py")
+        for name in [f"{mission}-{wind}" for mission in missions for wind in WINDS[folder]]:
+            if set(sys.argv[1:]) and not {folder, name} & set(sys.argv[1:]):
+                continue
+            mission = FLIGHTS / folder / f"{mission_of(name)}.waypoints"
+            wind = in_wind(runner, wind_of(name))
+            if folder == "arduplane":
+                fly(runner, mission, FLIGHTS / folder / f"{name}.csv", wind)
+            else:
+                rows = flown_by(runner, mission, [*options(folder, name), *wind])
                 keep(rows, FLIGHTS / folder / f"{name}.csv", COLUMNS)
-                print(name, flush=True)
+            print(name, flush=True)
 
 
 if __name__ == "__main__":

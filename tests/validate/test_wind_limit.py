@@ -61,8 +61,14 @@ def test_a_flight_that_the_wind_carries_away_ends() -> None:
     assert carried.wind_limit is not None
 
 
-def test_a_plane_has_no_limit_yet() -> None:
-    assert check(there_and_back(16), PLANE).wind_limit is None
+def test_a_plane_keeps_its_time_up_to_its_limit_and_no_farther() -> None:
+    mission = there_and_back(16)
+    limit = check(mission, PLANE).wind_limit
+    assert limit is not None
+    calm = lasting(mission, PLANE, 0, 0)
+    worst = [abs(lasting(mission, PLANE, limit.speed, 45 * k) - calm) for k in range(8)]
+    assert max(worst) <= 5
+    assert abs(lasting(mission, PLANE, limit.speed + 0.5, limit.from_degrees) - calm) > 5
 
 
 def test_a_wind_across_is_held_without_a_trace() -> None:

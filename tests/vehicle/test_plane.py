@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from flight_paths import line, path_of, wandering
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from faao_mav.errors import InputError
+from faao_mav.plan import Wind
 from faao_mav.vehicle import ARDUPLANE, Vehicle
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane
 from faao_mav.vehicle.ardupilot.plane.parameters import true_over_commanded
@@ -39,6 +41,26 @@ def test_a_straight_line_at_the_commanded_airspeed() -> None:
     flown = PLANE.fly(line(500, 2, 15.0))
     assert flown.arrivals[1] == pytest.approx(500 / 15, abs=0.2)
     np.testing.assert_allclose(flown.position[:, 1], 0, atol=1e-6)
+
+
+@given(speed=st.floats(0, 8), degrees=st.floats(0, 360))
+def test_a_wind_shifts_the_velocity_and_the_track_is_kept(speed: float, degrees: float) -> None:
+    """The airspeed V leads along the track at sqrt(V^2 - across^2) + along."""
+    wind = Wind(speed, degrees).velocity
+    flown = PLANE.fly(replace(line(500, 2, 15.0), wind=wind))
+    np.testing.assert_allclose(flown.position[:, 1], 0, atol=0.05)
+    ground = math.sqrt(15**2 - wind[1] ** 2) + wind[0]
+    assert flown.arrivals[1] == pytest.approx(500 / ground, abs=0.25)
+    entered = replace(line(1000, 2, 15.0), wind=wind, entry=np.array([0.0, 14.0, 0.0]))
+    settled = PLANE.fly(entered)
+    np.testing.assert_allclose(settled.velocity[0, :2], [0, 14], atol=1e-9)
+    np.testing.assert_allclose(settled.velocity[-1, :2], [ground, 0], atol=0.2)
+    assert abs(settled.position[-1, 1]) < 1
+
+
+def test_a_wind_that_carries_it_away_is_told() -> None:
+    with pytest.raises(InputError, match="perhaps for the wind"):
+        PLANE.fly(replace(line(500, 1, 15.0), wind=(-20.0, 0.0), longest=600.0))
 
 
 @pytest.mark.parametrize(("command", "flown"), [(3, 9), (40, 22), (0, 12), (15, 15)])

@@ -88,6 +88,6 @@ ARDUCOPTER = VehicleType(
     recommended=lambda *limits: tuple(_recommended(*limits)),
     ceilings=_ceilings,
     max_airspeed=_max_airspeed,
-    models_lean_limit=True,
+    models_wind=True,
 )
 """ArduCopter 4.1 and later; measured on 4.7."""

@@ -58,6 +58,7 @@ ARDUPLANE = VehicleType(
     flight_model=_model,
     ceilings=_ceilings,
     calibrated=True,
+    models_wind=True,
     true_over_commanded=_true_over_commanded,
 )
 """ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.errors import InputError
 from faao_mav.vehicle.ardupilot.plane.motion import STEP, Motion
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.atmosphere import density_ratio
@@ -42,10 +43,13 @@ _HEADED = math.radians(10)
 _NOTICED = 0.12
 """How long after it is passed a waypoint counts as reached, s. Fitted as `motion`'s constants."""
 
+_LONGEST = 21_600.0
+"""The longest flight that is followed, s. Chosen: it takes some seconds of processor time."""
+
 
 @dataclass(frozen=True, slots=True)
 class ArduPlane(ArduPlaneLimits):
-    """How ArduPlane flies plain waypoints in AUTO, without wind.
+    """How ArduPlane flies plain waypoints in AUTO, in a steady wind.
 
     After ArduPilot's documentation (Plane: navigation tuning, parameter list), with constants from
     flights of its simulator: lateral guidance `NAVL1` within the roll limit, airspeed and height by
@@ -64,6 +68,9 @@ class ArduPlane(ArduPlaneLimits):
         the first leg's speed and course. A hold counts from when the circle is reached, and ends
         when the course is within 10 degrees of the next waypoint. Speeds of 0 or less mean
         `cruise_speed`.
+
+        Raises `InputError` for a flight that takes more than `path.longest`, or six hours, as in a
+        wind that carries it away.
         """
         return _Flight(self, path).flown(step)
 
@@ -79,15 +86,15 @@ class _Flight:
         self._speeds = [plane.true_airspeed(command, altitude) for command in commands]
         self._full_radius = plane.waypoint_radius / density_ratio(altitude)
         height = float(path.points[0, 2])
+        wind, climb, demanded = complex(*path.wind), 0.0, None
         if path.entry is None:
             moves = [b - a for a, b in pairwise(self._places) if b != a]
-            course = moves[0] / abs(moves[0]) if moves else 1j
-            velocity, climb, demanded = course * self._speeds[0], 0.0, None
+            airspeed = _headed(moves[0] if moves else 1j, self._speeds[0], wind)
         else:
             east, north, climb = path.entry.tolist()
-            velocity, demanded = complex(east, north), plane.true_airspeed(0.0, altitude)
+            airspeed, demanded = complex(east, north) - wind, plane.true_airspeed(0.0, altitude)
         self._motion = Motion(
-            plane, altitude, self._places[0], height, velocity, climb, speed=demanded
+            plane, altitude, self._places[0], height, airspeed, climb, speed=demanded, wind=wind
         )
         self._track = [self._motion.sample()]
 
@@ -159,9 +166,9 @@ class _Flight:
             return until
         onward = self._places[k + 1]
         if abs(onward - self._places[k]) > abs(self._motion.place - self._places[k]):
-            full_turn = self._motion.course - math.copysign(2 * math.pi, self._plane.loiter_radius)
+            full_turn = self._motion.heading - math.copysign(2 * math.pi, self._plane.loiter_radius)
             while abs(self._motion.bearing_to(onward)) > _HEADED and (
-                (self._motion.course - full_turn) * self._plane.loiter_radius > 0
+                (self._motion.heading - full_turn) * self._plane.loiter_radius > 0
             ):
                 self._step_round(k)
         return max(until, self._motion.time)
@@ -178,14 +185,22 @@ class _Flight:
             self._motion.along(
                 self._places[k - 1], self._places[k], (begin, end), self._speeds[k - 1], step
             )
-        self._track.append(self._motion.sample())
+        self._keep()
 
     def _step_round(self, k: int) -> bool:
         """Go on by one step round point `k` and return whether the circle is being flown."""
         height, speed = float(self._path.points[k, 2]), self._speeds[max(k - 1, 0)]
         circling = self._motion.round(self._places[k], height, speed, STEP)
-        self._track.append(self._motion.sample())
+        self._keep()
         return circling
+
+    def _keep(self) -> None:
+        """Keep where the aircraft is now."""
+        if self._motion.time > min(self._path.longest, _LONGEST):
+            raise InputError(
+                f"the flight would take more than {self._motion.time:.0f} s, perhaps for the wind"
+            )
+        self._track.append(self._motion.sample())
 
     def _sampled(self, arrivals: Real, departures: Real, t: Real) -> Flown:
         track = np.array(self._track)
@@ -193,3 +208,14 @@ class _Flight:
         return Flown(
             arrivals, departures, t, np.stack(columns[:3], axis=-1), np.stack(columns[3:], axis=-1)
         )
+
+
+def _headed(course: complex, speed: float, wind: complex) -> complex:
+    """Return the velocity through the air that leads along `course` at an airspeed of `speed`, m/s.
+
+    In a `wind` across that is stronger, the aircraft heads against it.
+    """
+    along = course / abs(course)
+    across = (wind * along.conjugate()).imag
+    against = math.asin(min(max(across / speed, -1.0), 1.0))
+    return along * cmath.rect(speed, -against)

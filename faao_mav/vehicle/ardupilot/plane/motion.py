@@ -67,7 +67,11 @@ class Motion:
     of the errors of kinetic and potential energy, pitch by their difference, both for a demanded
     speed that changes no faster than the aircraft may gain and lose energy.
 
-    Places are complex, east + i north, m; `climb` is m/s, angles are rad, positive to the left.
+    Banks and energy turn and speed up the flight through the air, which moves steadily at `wind`;
+    guidance sees the flight over ground, the sum of both.
+
+    Places and horizontal velocities are complex, east + i north, m and m/s; `climb` is m/s, angles
+    are rad, positive to the left.
     """
 
     def __init__(
@@ -76,20 +80,21 @@ class Motion:
         altitude: float,
         place: complex,
         height: float,
-        course: complex,
+        airspeed: complex,
         climb: float = 0.0,
         speed: float | None = None,
+        wind: complex = 0j,
     ) -> None:
-        """Start at `place` and `height` with the ground velocity `course` and a `climb`, m/s.
+        """Start at `place` and `height` with the velocity `airspeed` through the air and a `climb`.
 
         `altitude`, m above sea level, is that of the air. `speed` is the true airspeed that is
         demanded so far, m/s; the flown one if it is not given.
         """
         self.time = 0.0
-        self.place, self.course = place, cmath.phase(course)
-        self._limits, self._height = limits, height
+        self.place, self.heading = place, cmath.phase(airspeed)
+        self._limits, self._height, self._wind = limits, height, wind
         self._level = height  # the demanded height
-        self._speed = math.hypot(abs(course), climb)
+        self._speed = math.hypot(abs(airspeed), climb)
         self._demand = self._speed if speed is None else speed
         self._bank, self._climb = 0.0, climb
         # A climb is flown at full power: twice what it takes (fitted).
@@ -98,21 +103,25 @@ class Motion:
 
     def sample(self) -> tuple[float, ...]:
         """Return time, place (east, north, up) and velocity, SI."""
-        velocity = cmath.rect(self.ground_speed(), self.course)
+        velocity = self._velocity()
         place = (self.place.real, self.place.imag, self._height)
         return (self.time, *place, velocity.real, velocity.imag, self._climb)
 
-    def ground_speed(self) -> float:
-        """Return the speed over ground, m/s, in calm."""
+    def _airspeed(self) -> float:
+        """Return the horizontal part of the airspeed, m/s."""
         return math.sqrt(max(self._speed**2 - self._climb**2, 1.0))
+
+    def _velocity(self) -> complex:
+        """Return the velocity over ground."""
+        return cmath.rect(self._airspeed(), self.heading) + self._wind
 
     def look_ahead(self) -> float:
         """Return L, m."""
-        return self._limits.look_ahead * self.ground_speed()
+        return self._limits.look_ahead * abs(self._velocity())
 
     def bearing_to(self, place: complex) -> float:
-        """Return the angle from the course to `place`."""
-        return cmath.phase((place - self.place) * cmath.rect(1.0, -self.course))
+        """Return the angle from the course over ground to `place`."""
+        return cmath.phase((place - self.place) * self._velocity().conjugate())
 
     def along(
         self, start: complex, end: complex, heights: tuple[float, float], speed: float, step: float
@@ -126,7 +135,7 @@ class Motion:
         offset = (self.place - start) * track.conjugate()
         limit = math.sin(_INTERCEPT)
         approach = math.asin(min(max(offset.imag / self.look_ahead(), -limit), limit))
-        eta = cmath.phase(track * cmath.rect(1.0, -approach - self.course))
+        eta = cmath.phase(track * cmath.rect(1.0, -approach) * self._velocity().conjugate())
         done = min(max(offset.real / abs(leg), 0.0), 1.0)
         height = heights[0] + done * (heights[1] - heights[0])
         self._go(self._lateral(eta), height, speed, step)
@@ -147,7 +156,7 @@ class Motion:
         side = -math.copysign(1.0, limits.loiter_radius)
         offset, radius = self.place - centre, abs(limits.loiter_radius)
         distance = max(abs(offset), radius / 2)
-        velocity = cmath.rect(self.ground_speed(), self.course)
+        velocity = self._velocity()
         outward = (velocity * offset.conjugate()).real / distance
         stiffness = 2 * math.pi / limits.period
         excess = abs(offset) - radius
@@ -161,8 +170,8 @@ class Motion:
     def _lateral(self, eta: float) -> float:
         """Return the acceleration to the left that turns the course by `eta`, m/s²."""
         bounded = min(max(eta, -math.pi / 2), math.pi / 2)
-        gain = 4 * self._limits.damping**2
-        return gain * self.ground_speed() ** 2 / self.look_ahead() * math.sin(bounded)
+        gain = 4 * self._limits.damping**2 / self._limits.look_ahead
+        return gain * abs(self._velocity()) * math.sin(bounded)
 
     def _go(self, lateral: float, height: float, speed: float, step: float) -> None:
         """Move on with `lateral` acceleration to the left, m/s², as far as it goes."""
@@ -173,11 +182,11 @@ class Motion:
         bank = min(max(bank, -limits.roll_limit), limits.roll_limit)
         change = (bank - self._bank) * -math.expm1(-step / limits.roll_time)
         self._bank += change
-        ground = self.ground_speed()
+        airspeed = self._airspeed()
         lift = _GRAVITY + (self._climb - before) / step
-        turn = self._turning * lift * math.tan(self._bank) / ground * step + _ROLL_TURN * change
-        self.place += cmath.rect(ground * step, self.course + turn / 2)
-        self.course += turn
+        turn = self._turning * lift * math.tan(self._bank) / airspeed * step + _ROLL_TURN * change
+        self.place += (cmath.rect(airspeed, self.heading + turn / 2) + self._wind) * step
+        self.heading += turn
         self.time += step
 
     def _hold(self, height: float, speed: float, step: float) -> None:
