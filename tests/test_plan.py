@@ -489,7 +489,8 @@ def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
     assert all(key.description and key.accepted for key in keys.values())
     assert [path for path, key in keys.items() if key.required and not key.inside] == [
         "site.origin.latitude", "site.origin.longitude", "site.wind.speed", "site.wind.from",
-        "vehicle.max_speed", "vehicle.max_acceleration", "flight.start", "flight.end",
+        "vehicle.max_speed", "vehicle.max_acceleration", "vehicle.battery.capacity_wh",
+        "flight.start", "flight.end",
         "flight.altitude", "flight.duration", "radio.base_station.position",
         "radio.ground_user.position",
         "fence.inclusion.center", "fence.inclusion.radius", "fence.inclusion.polygon",

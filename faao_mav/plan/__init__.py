@@ -1,22 +1,23 @@
 """The plan: `plan.yaml` read, checked and turned into SI units.
 
-`model` declares the keys and what they mean, `reader` reads them, `keys.reference` lists them.
+`sections`, `radio` and `zones` declare the keys and what they mean, `model` has the whole plan,
+`reader` reads it, `keys.reference` lists them.
 """
 
 from faao_mav.plan.fields import Vector as Vector
 from faao_mav.plan.keys import reference as reference
+from faao_mav.plan.model import Plan as Plan
+from faao_mav.plan.radio import BaseStation as BaseStation
+from faao_mav.plan.radio import GroundUser as GroundUser
+from faao_mav.plan.radio import Radio as Radio
 from faao_mav.plan.reader import changed_plan as changed_plan
 from faao_mav.plan.reader import parse_plan as parse_plan
 from faao_mav.plan.reader import read_plan as read_plan
-from faao_mav.plan.sections import BaseStation as BaseStation
 from faao_mav.plan.sections import Flight as Flight
 from faao_mav.plan.sections import Goal as Goal
-from faao_mav.plan.sections import GroundUser as GroundUser
 from faao_mav.plan.sections import MissionOptions as MissionOptions
 from faao_mav.plan.sections import Optimizer as Optimizer
 from faao_mav.plan.sections import Origin as Origin
-from faao_mav.plan.sections import Plan as Plan
-from faao_mav.plan.sections import Radio as Radio
 from faao_mav.plan.sections import Site as Site
 from faao_mav.plan.sections import VehicleOptions as VehicleOptions
 from faao_mav.plan.sections import Wind as Wind

@@ -11,7 +11,8 @@ from faao_mav.plan.autopilots import VEHICLES
 from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
-from faao_mav.plan.sections import Flight, Plan
+from faao_mav.plan.model import Plan
+from faao_mav.plan.sections import Flight
 from faao_mav.power import RotaryWing
 from faao_mav.vector import chord
 

@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 
 from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
 from faao_mav.plan.fields import Written, listed
-from faao_mav.plan.sections import PlanFile
+from faao_mav.plan.model import PlanFile
 
 POWER = "power_dbm"
 """The key of a study that stands for the powers of the base station and of the relay."""

@@ -15,8 +15,9 @@ from faao_mav.files import read_text
 from faao_mav.plan.checks import problems
 from faao_mav.plan.fence import geofence, written_out
 from faao_mav.plan.keys import PlanKey, reference
-from faao_mav.plan.sections import CHOICES, Plan, PlanFile
+from faao_mav.plan.model import Plan, PlanFile
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
+from faao_mav.plan.zones import CHOICES
 
 _MAX_LINES = 6
 """Lines of a message; chosen to fit a small terminal."""

@@ -1,0 +1,164 @@
+"""The plan itself: all its sections, and what follows from them.
+
+`Plan` is what the rest of the program sees: validated, SI and linear units, frozen. The same
+declarations say what `plan.yaml` may hold: each field is a key, with what it means, its unit and
+its limits. `fields` says how, `keys.reference` lists them all.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Annotated
+
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import Area, FreeArea, areas_of
+from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.plan.fields import (
+    Section,
+    Text,
+    Vector,
+    key,
+)
+from faao_mav.plan.radio import Radio
+from faao_mav.plan.sections import (
+    Flight,
+    Goal,
+    MissionOptions,
+    Optimizer,
+    Origin,
+    Site,
+    Study,
+    VehicleOptions,
+)
+from faao_mav.plan.zones import FenceOptions
+from faao_mav.power import PowerModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanFile(Section):
+    """What the file of a plan holds."""
+
+    name: Annotated[
+        Text,
+        key(
+            "Name, for the summary.",
+            "",
+            "one line of at most 200 printable characters",
+            max_length=200,
+        ),
+    ] = ""
+    site: Site
+    vehicle: VehicleOptions
+    flight: Flight
+    radio: Radio
+    optimizer: Optimizer = field(default_factory=Optimizer)
+    goal: Goal = field(default_factory=Goal)
+    fence: FenceOptions | None = None
+    mission: MissionOptions = field(default_factory=MissionOptions)
+    study: Study | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan(PlanFile):
+    """A validated plan; `text` is the YAML that it was read from, `source` the name of its file.
+
+    `geofence` has the zones of `fence` and of its file, in degrees.
+    """
+
+    text: str = ""
+    source: str = "plan"
+    geofence: Fence = field(default_factory=Fence)
+
+    @property
+    def origin(self) -> Origin:
+        """The point of local [0, 0]."""
+        return self.site.origin
+
+    @property
+    def power_model(self) -> PowerModel | None:
+        """What flight takes; None where the plan does not say."""
+        asked = self.vehicle.power
+        return None if asked is None else asked.model(hovers=self._known.hovers)
+
+    @property
+    def powers(self) -> tuple[float, float]:
+        """W_B and W_U, W."""
+        return self.radio.base_station.power, self.radio.relay.power
+
+    @property
+    def wind(self) -> Vector:
+        """The velocity of the air over the ground, [east, north] m/s."""
+        return self.site.wind.velocity
+
+    @property
+    def max_ground_speed(self) -> float:
+        """The greatest speed over the ground, m/s: a plane's may be above `vehicle.max_speed`."""
+        most = self.vehicle.max_speed
+        return most if self._known.hovers else most + self.site.wind.speed
+
+    @property
+    def max_airspeed(self) -> float:
+        """The greatest airspeed in the mean wind, m/s, with what gusts take off.
+
+        Infinite where the limit on the speed over the ground is enough.
+        """
+        wind, most = self.site.wind, self.vehicle.max_airspeed
+        gusts = max(0.0, wind.gust - wind.speed)
+        if most is None:
+            most = self._known.max_airspeed if wind.speed or gusts else math.inf
+        if not self._known.hovers:
+            most = min(most, self.vehicle.max_speed)
+        return most - gusts if most - gusts < self.max_ground_speed + wind.speed else math.inf
+
+    @property
+    def _known(self) -> PlannedVehicle:
+        return VEHICLES[self.vehicle.autopilot, self.vehicle.type]
+
+    @property
+    def zones(self) -> tuple[Area, ...]:
+        """The zones of `geofence` in local metres."""
+        return _zones(self.geofence, LocalFrame(self.origin.latitude, self.origin.longitude))
+
+    @property
+    def any_inclusion(self) -> bool:
+        """Whether the vehicle's fence asks for one of several inclusions, not for all of them."""
+        return self._known.any_inclusion
+
+    @property
+    def keep_in(self) -> FreeArea | None:
+        """Where `geofence` lets the aircraft be, local metres; None without a fence.
+
+        `fence.margin` is not taken off.
+        """
+        if not self.geofence:
+            return None
+        return _free_area(self.zones, self.any_inclusion)
+
+    def megabits(self, rate: float) -> float | None:
+        """Return `rate`, bit/s/Hz, in Mbit/s; None without `radio.bandwidth_mhz`."""
+        bandwidth = self.radio.bandwidth_mhz
+        return None if bandwidth is None else rate * bandwidth
+
+    def megabytes(self, rate: float) -> float | None:
+        """Return what `rate`, bit/s/Hz, carries in the duration T, 10^6 bytes, as `megabits`."""
+        megabits = self.megabits(rate)
+        return None if megabits is None else megabits * self.flight.duration / 8
+
+    @property
+    def needed_rate(self) -> float:
+        """The delivered rate that `goal` asks for in the duration T, bit/s/Hz; 0 if for none."""
+        asked, bandwidth = self.goal.deliver_mbytes, self.radio.bandwidth_mhz
+        if asked is None or bandwidth is None:
+            return self.goal.rate or 0.0
+        return 8 * asked / (bandwidth * self.flight.duration)
+
+
+@lru_cache(maxsize=16)
+def _zones(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
+    return areas_of(fence, frame)
+
+
+@lru_cache(maxsize=16)
+def _free_area(zones: tuple[Area, ...], any_inclusion: bool) -> FreeArea:
+    return FreeArea.of(zones, any_inclusion=any_inclusion)
