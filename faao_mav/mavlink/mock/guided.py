@@ -22,8 +22,12 @@ from faao_mav.mission.item import Home
 from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.vehicle_type import FenceAction
 
-_STEP = 0.05
-"""Seconds between two steps of the flight; chosen."""
+_STEP, _STEPS, _LONGEST_STEP = 0.05, 1000, 0.5
+"""Seconds between two steps of the flight; after a longer silence it is about so many steps, none
+longer than the last. Chosen: at 1.5 / s it is stable."""
+
+_SETTLED = 60.0
+"""Seconds after the end of its way, or after a setpoint, from which on it moves no more; chosen."""
 
 _STIFFNESS = 1.5
 """Of how it corrects an error, 1/s, damped critically; chosen: as slow as those simulated."""
@@ -79,7 +83,7 @@ class Guided:
     def begin(self, posture: Posture, vehicle: Vehicle, now: float) -> None:
         """Follow setpoints from `posture` on."""
         self.reset()
-        self.flying, self._vehicle, self._time = True, vehicle, now
+        self.flying, self._vehicle, self._time, self._since = True, vehicle, now, now
         self._item = posture.item
         self._p, self._v = posture.position.astype(float), posture.velocity.astype(float)
         self._stop(now)
@@ -169,10 +173,14 @@ class Guided:
 
     def _advance(self, now: float) -> None:
         """Fly until `now`."""
-        left = (now - self._time) * self._speedup if self.flying else 0.0
+        if not self.flying:
+            return
+        lasts = _SETTLED + (0.0 if self._course is None else self._course.end)
+        left = min((now - self._time) * self._speedup, lasts - self._elapsed(self._time))
         most = self._of.type.max_airspeed(self._of) if left > 0 else 0.0
+        longest = min(max(_STEP, left / _STEPS), _LONGEST_STEP)
         while left > 0:
-            step = min(_STEP, left)
+            step = min(longest, left)
             self._time += step / self._speedup
             left -= step
             p, v, a = self._target(self._elapsed(self._time))
@@ -182,8 +190,8 @@ class Guided:
             through_air *= min(1.0, most / max(float(np.linalg.norm(through_air)), 1e-9))
             after = through_air + self._wind
             self._p, self._v = self._p + (self._v + after) / 2 * step, after
-        if self.flying:
-            self._p[2] = max(self._p[2], 0.0)
+        self._time = max(self._time, now)
+        self._p[2] = max(self._p[2], 0.0)
 
     def _target(self, since: float) -> Setpoint:
         if self._course is not None:
