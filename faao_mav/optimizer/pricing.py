@@ -24,15 +24,17 @@ from faao_mav.radio.rate import cutoff_rate
 SATURATED = 0.999
 """Share of N log2(rho) from which a link counts as saturated. Chosen."""
 
-# Chosen: with these, where slots and draws are sampled, the stated error is some 5e-3 bit/s/Hz.
+# Chosen: with these, where slots and draws are sampled, the stated error is 1 to 4e-3 bit/s/Hz.
 _MOST_PAIRS = 1000  # pairs of slot and draw up to which all are averaged
-_PART_PAIRS, _PARTS = 150, 6  # pairs per sample and samples beyond
-_COARSER = 6.0  # tolerance of the noise average of a sample, in that of the result
+_SAMPLED_PAIRS = 200  # pairs of the sample beyond
+_COARSER = 3.0  # tolerance of the noise average of a sample, in that of the result
+_DEGREE = 5  # of the polynomial from cutoff rates to mutual information
 _FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
 _FRESH_SEARCHES = 128  # slots with new draws where their rates take long: a search, or noises
 
 _MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
-_BISECTIONS = 60  # bisections of the spare power: 300 dB / 2^60 is rounding
+_SPARE_ERROR = 0.001  # error of the spare power, dB: it is printed to 0.1. Chosen
+_FIRST_SPARE_DB = 5.0  # spare power that is tried first, then twice that; chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +82,9 @@ def _information(
 ) -> tuple[float, Real, float]:
     """Return the mean of (5) or (6) over slots and draws, that of each slot (n,), and the error.
 
-    Many pairs of slot and draw are sampled evenly in the order of their cutoff rates, which nearly
-    is the order of their mutual information: those between are interpolated. The spread of several
-    samples is the error of the mean, bits.
+    Many pairs of slot and draw are sampled evenly in the order of their cutoff rates. The mutual
+    information is nearly a function of the cutoff rate: a polynomial through the sample, by least
+    squares, stands for all pairs, and the error of the mean, bits, is that of its residuals.
     """
     pairs = H.shape[:-2]
     wide = np.broadcast_to(P, (*H.shape[:-2], *P.shape[-2:]))
@@ -94,23 +96,17 @@ def _information(
         each = np.maximum(0.0, all_pairs.value).reshape(-1, pairs[-1]).mean(axis=0)
         return float(np.mean(all_pairs.value)), each, all_pairs.mean_error
     cutoff = cutoff_rate(H, P, link.classes, link.noise)
-    order = np.argsort(cutoff, kind="stable")
-    step = len(H) // _PART_PAIRS
-    coarse = _COARSER * tolerance * float(np.sqrt(_PARTS))
-    means, errors, known = [], [], []
-    for offset in rng.permutation(step)[:_PARTS]:
-        part = order[offset::step]
-        sample = pooled_mutual_information(
-            H[part], P[part], link.modulation, link.noise, rng=rng, tolerance=coarse
-        )
-        means.append(float(np.mean(sample.value)))
-        errors.append(sample.mean_error)
-        known.append(np.stack([cutoff[part], np.maximum(0.0, sample.value)]))
-    spread = float(np.std(means, ddof=1))
-    at, values = np.concatenate(known, axis=1)
-    ranked = np.argsort(at, kind="stable")
-    between = np.interp(cutoff, at[ranked], values[ranked]).reshape(pairs).mean(axis=0)
-    return float(np.mean(means)), between, max(spread, *errors) / float(np.sqrt(len(means)))
+    evenly = np.linspace(0, len(H) - 1, _SAMPLED_PAIRS).astype(np.intp)  # both ends among them
+    part = np.argsort(cutoff, kind="stable")[evenly]
+    sample = pooled_mutual_information(
+        H[part], P[part], link.modulation, link.noise, rng=rng, tolerance=_COARSER * tolerance
+    )
+    powers = np.vander(cutoff / link.classes.bits, _DEGREE + 1)
+    fit, *_ = np.linalg.lstsq(powers[part], sample.value)
+    missed = sample.value - powers[part] @ fit
+    error = float(np.sqrt(np.sum(missed**2) / (len(part) - _DEGREE - 1) / len(part)))
+    each = np.clip(powers @ fit, 0.0, link.classes.bits).reshape(pairs).mean(axis=0)
+    return float(each.mean()), each, max(error, sample.mean_error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,8 +210,10 @@ def saturation(solution: Solution) -> Saturation:
 
     if not enough(0.0):
         return Saturation(ceiling, 0.0)
-    low, high = 0.0, _MAX_SPARE_DB
-    for _ in range(_BISECTIONS):
+    low, high = 0.0, _FIRST_SPARE_DB
+    while high < _MAX_SPARE_DB and enough(high):
+        low, high = high, min(2 * high, _MAX_SPARE_DB)
+    while high - low > _SPARE_ERROR:
         middle = (low + high) / 2
         low, high = (middle, high) if enough(middle) else (low, middle)
     return Saturation(ceiling, low)

@@ -155,6 +155,56 @@ def by_quadrature(maps: Real, inputs: RealInputs, tolerance: float) -> tuple[Rea
     return value, error
 
 
+def gaussian_controls(
+    inputs: RealInputs, maps: Real, moment: Real, sent: Integers, z: Real
+) -> Real:
+    """Return terms of mean 0 that vary like ``log_ratio`` at the same arguments, (n, q, 2).
+
+    Were the inputs Gaussian, ln p(y) / p(y|s_m) would be a constant and Σ_d (z_d² - y_d² / E y_d²)
+    / 2. Its means are exact for any alphabet, as they take second moments only: `moment` (D, D) is
+    the mean of x x^T over the vectors ``inputs.sent``. The columns of `maps` are orthogonal; the
+    sum over the stronger half of them and that over the weaker half are a term each.
+
+    >>> from faao_mav.radio.real_channel import real_inputs
+    >>> inputs, z = real_inputs("bpsk", 1), np.array([[[1.0], [-1.0]]])
+    >>> maps, sent = np.array([[[1.0]]]), np.array([[1, 1]])
+    >>> gaussian_controls(inputs, maps, np.eye(1), sent, z)[0, :, 0].tolist()
+    [0.5, -0.5]
+    """
+    variance = 1.0 + inputs.variance * np.sum(maps**2, axis=1)[:, None]
+    y = (inputs.points @ maps)[np.arange(len(maps))[:, None], sent] + z
+    received = 1.0 + np.sum(maps * (moment @ maps), axis=1)[:, None]
+    terms = 0.5 * (y**2 / variance - z**2 + 1.0 - received / variance)
+    half = (maps.shape[-1] + 1) // 2
+    halves = [part.sum(axis=-1) for part in (terms[..., :half], terms[..., half:])]
+    return np.asarray(np.stack(halves, axis=-1))
+
+
+def _both_signs(x: Real, points: int) -> Real:
+    """Return the means over the signs of the noises, (n, shifts, points, ...)."""
+    return np.asarray(x.reshape(len(x), _SHIFTS, 2, points, *x.shape[2:]).mean(axis=2))
+
+
+def _controlled(logs: Real, controls: Real) -> Real:
+    """Return the means over the points, (n, shifts), less what the `controls` of mean 0 explain.
+
+    `logs` are (n, shifts, points), `controls` (n, shifts, points, 2). Each half of the shifts takes
+    its coefficients from the regression of the other half, so that the means stay unbiased.
+    """
+    means: Real = logs.mean(axis=2)
+    half = _SHIFTS // 2
+    for here, other in ((slice(half), slice(half, None)), (slice(half, None), slice(half))):
+        x = controls[:, other].reshape(len(logs), -1, controls.shape[-1])
+        x = x - x.mean(axis=1, keepdims=True)
+        gram = x.mT @ x
+        scale = np.trace(gram, axis1=1, axis2=2)[:, None, None] + 1e-300
+        along = x.mT @ logs[:, other].reshape(len(logs), -1, 1)
+        ridge = 1e-9 * np.eye(gram.shape[-1])
+        slope = np.linalg.solve(gram / scale + ridge, along / scale)[:, None]
+        means[:, here] -= (controls[:, here].mean(axis=2)[:, :, None] @ slope)[..., 0, 0]
+    return means
+
+
 def by_lattice(
     maps: Real,
     inputs: RealInputs,
@@ -178,7 +228,10 @@ def by_lattice(
             plain samples may contain none, and their spread would then be zero.
         pooled: refine all slots until their root mean square error meets the tolerance. Slots that
             stop one by one stop too early where their samples met few errors: a bias that the mean
-            over many slots does not take away.
+            over many slots does not take away. `gaussian_controls` then take away what Gaussian
+            inputs share with the alphabet: 2 to 4 times smaller errors with BPSK to 64-QAM at half
+            the rate that they allow, and more below. Where single slots stop, it is left in: the
+            regression's own error is not in their spread.
 
     Returns:
         Values and standard errors (n,), bits.
@@ -192,6 +245,7 @@ def by_lattice(
     n, _, d = maps.shape
     antennas = len(inputs.choices)
     coordinates = antennas + d + d % 2
+    moment = inputs.points[inputs.sent].T @ inputs.points[inputs.sent] / len(inputs.sent)
     shift = rng.random((n, _SHIFTS, 1, coordinates))
 
     def means(slots: Integers, grid: Real) -> Real:
@@ -203,12 +257,14 @@ def by_lattice(
         sent = np.concatenate([sent, sent], axis=-1).reshape(len(slots), -1)
         z = np.concatenate([z, -z], axis=-2).reshape(len(slots), -1, d)
         logs = log_ratio(inputs.points, maps[slots], sent, z)
+        if pooled and not rare:
+            controls = gaussian_controls(inputs, maps[slots], moment, sent, z)
+            return _controlled(*(_both_signs(x, len(grid)) for x in (logs, controls)))
         if rare:
             logs *= _mixture_weight(z)
             wide = log_ratio(inputs.points, maps[slots], sent, _WIDE * z)
             logs = 0.5 * (logs + wide * _mixture_weight(_WIDE * z))
-        mean: Real = logs.reshape(len(slots), _SHIFTS, -1).mean(axis=-1)
-        return mean
+        return np.asarray(logs.reshape(len(slots), _SHIFTS, -1).mean(axis=-1))
 
     def all_means(slots: Integers, grid: Real) -> Real:
         step = max(1, _CHUNK // (2 * _SHIFTS * len(grid)))

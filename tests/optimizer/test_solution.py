@@ -219,7 +219,7 @@ def test_spare_power_is_what_could_be_saved(paper_plan: MakePlan) -> None:
     assert limit.ceiling == 2
     assert 5 < limit.spare_db < 40
     at_limit = found.recomputed(10 ** (-limit.spare_db / 10)).R_avg
-    assert at_limit == pytest.approx(SATURATED * 2, abs=1e-6)
+    assert 0 <= at_limit - SATURATED * 2 < 1e-5
 
 
 def test_a_plan_in_the_active_region_has_no_power_to_spare(solution: Solution) -> None:

@@ -7,7 +7,13 @@ from faao_mav.arrays import Complex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import MODULATIONS, difference_classes, symbol_vectors
 from faao_mav.radio.mutual_information import mutual_information, pooled_mutual_information
-from faao_mav.radio.noise_average import by_lattice, by_quadrature, lattice, normal_grid
+from faao_mav.radio.noise_average import (
+    by_lattice,
+    by_quadrature,
+    gaussian_controls,
+    lattice,
+    normal_grid,
+)
 from faao_mav.radio.precoder import bpsk_two_antennas
 from faao_mav.radio.rate import cutoff_rate
 from faao_mav.radio.real_channel import real_channel, real_inputs
@@ -261,3 +267,29 @@ def test_refined_lattice_is_the_finer_lattice(dimensions: int) -> None:
     np.testing.assert_array_equal(np.unique(both, axis=0), np.unique(finer, axis=0))
     for column in finer.T:  # every projection on one axis is evenly spaced
         np.testing.assert_array_equal(np.sort(column), np.arange(128) / 128)
+
+
+@pytest.mark.parametrize("modulation", ["bpsk", "qpsk", "8psk", "16qam"])
+def test_gaussian_controls_have_mean_zero(modulation: str) -> None:
+    inputs = real_inputs(modulation, 1)
+    _, maps = real_channel(channel(5, 3, 1, 1), np.ones((3, 1, 1)), 0.2, modulation == "bpsk")
+    z, weight = normal_grid(maps.shape[-1], 0.5)
+    sent = np.repeat(inputs.sent, len(z))[None].repeat(3, axis=0)
+    noises = np.tile(z, (len(inputs.sent), 1))[None].repeat(3, axis=0)
+    moment = inputs.points[inputs.sent].T @ inputs.points[inputs.sent] / len(inputs.sent)
+    terms = gaussian_controls(inputs, maps, moment, sent, noises)
+    mean = weight @ terms.reshape(3, len(inputs.sent), len(z), 2).mean(axis=1)
+    assert np.abs(mean).max() < 1e-7
+
+
+def test_pooled_errors_are_those_beside_quadrature() -> None:
+    n, inputs = 400, real_inputs("qpsk", 2)
+    P = np.eye(2)[None].repeat(n, axis=0)
+    for snr in (0.1, 1.0):
+        H = np.sqrt(snr) * channel(6, n, 1, 2)
+        maps = real_channel(H, P, 1.0, real=False)[1]
+        exact, _ = by_quadrature(maps, inputs, 1e-6)
+        value, error = by_lattice(maps, inputs, 0.05, np.random.default_rng(7), pooled=True)
+        stated = np.sqrt(np.mean(error**2))
+        assert np.sqrt(np.mean((value - exact) ** 2)) < 1.25 * stated
+        assert abs(np.mean(value - exact)) < 4 * stated / np.sqrt(n)
