@@ -229,8 +229,8 @@ def by_lattice(
         pooled: refine all slots until their root mean square error meets the tolerance. Slots that
             stop one by one stop too early where their samples met few errors: a bias that the mean
             over many slots does not take away. `gaussian_controls` then take away what Gaussian
-            inputs share with the alphabet: 1.5 to 3.4 times smaller errors with BPSK to 64-QAM at half
-            the rate that they allow, and more below. Where single slots stop, it is left in: the
+            inputs share with the alphabet: errors are 1.5 to 3.4 times smaller with QPSK to 64-QAM
+            at half the rate that they allow, and more below. Where single slots stop, it is left in: the
             regression's own error is not in their spread.
 
     Returns:

@@ -196,6 +196,6 @@ def test_a_path_that_ignores_dynamics_becomes_a_flight_on_its_side() -> None:
 
 
 def test_no_time_for_the_way_round_is_said() -> None:
+    hasty = QUICK | {"flight.time_step": 1.5, "flight.duration": 70.5}
     with pytest.raises(InfeasibleError, match="inside the fence"):
-        hasty = QUICK | {"flight.time_step": 1.5, "flight.duration": 70.5}
         optimize(fenced("two ways round of different worth", **hasty))
