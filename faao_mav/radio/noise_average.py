@@ -230,8 +230,8 @@ def by_lattice(
             stop one by one stop too early where their samples met few errors: a bias that the mean
             over many slots does not take away. `gaussian_controls` then take away what Gaussian
             inputs share with the alphabet: errors are 1.5 to 3.4 times smaller with QPSK to 64-QAM
-            at half the rate that they allow, and more below. Where single slots stop, it is left in: the
-            regression's own error is not in their spread.
+            at half the rate that they allow, and more below. Where single slots stop, it is left
+            in: the regression's own error is not in their spread.
 
     Returns:
         Values and standard errors (n,), bits.

@@ -11,6 +11,7 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.validate import Finding, Limits, LinkCheck, validate
+from faao_mav.validate.energy import EnergyUse
 from faao_mav.vehicle import Track, Vehicle
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -177,6 +178,7 @@ class Given:
     limits: Limits | None = None
     link: LinkCheck | None = None
     airborne: bool = False
+    energy: EnergyUse | None = None
 
     def findings(self) -> tuple[Finding, ...]:
         return validate(
@@ -186,6 +188,7 @@ class Given:
             limits=self.limits,
             link=self.link,
             airborne=self.airborne,
+            energy=self.energy,
         )
 
     def by(self, rule: str) -> list[Finding]:

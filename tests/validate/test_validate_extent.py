@@ -1,14 +1,23 @@
 """How high, how far, how long."""
 
+import numpy as np
 import pytest
 from judged import COPTER, LAND, PX4, Given, at, check, flown, having, mission, track
 
+from faao_mav.plan.energy import Battery
 from faao_mav.validate import Limits
+from faao_mav.validate.energy import EnergyUse
 from faao_mav.vehicle import Track
 
 
 def flight(*points: tuple[float, float, float]) -> Track:
     return track(points, range(len(points) - 1), 5.0)
+
+
+def taking(watt_hours: float) -> EnergyUse:
+    """A flight of an hour at an even power, with a battery of 100 Wh of which 20 % are kept."""
+    t, power = np.array([0.0, 3600.0]), np.full(2, watt_hours)
+    return EnergyUse(t, power, np.array([0.0, watt_hours]), Battery(capacity_wh=100), lands=True)
 
 
 # the rule, what it speaks about, the item that it names, what it lets pass
@@ -86,6 +95,12 @@ CASES = [
         Given(flown(), track=flight((0, 0, 0), (0, 50, 0)), limits=Limits(max_duration=9.8)),
         None,
         Given(flown(), track=flight((0, 0, 0), (0, 50, 0)), limits=Limits(max_duration=10.2)),
+    ),
+    (
+        "battery-reserve",
+        Given(flown(), energy=taking(80.1)),
+        None,
+        Given(flown(), energy=taking(79.9)),
     ),
 ]
 
