@@ -9,6 +9,9 @@ at in their own storage. Real autopilots (`arducopter`, `arduplane`, `px4`) are 
 every session that was verified, over a link without faults. One line for each kind of session:
 verified, reported as not verified, verified though the vehicle holds something else ("wrong"), and
 without an end after `LONGEST`.
+
+With `--items 200` each session uploads so many items to a real autopilot, over a link that loses
+20 % each way and nothing else, and is timed: from the first packet to the last item read back.
 """
 
 import argparse
@@ -30,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
 from joblib import Parallel, delayed
 from mavsdk.plugins.mission_raw import MissionRaw
 from simulate import Station, simulate
-from simulators import KINDS, simulated
+from simulators import KINDS, simulated, usable
 from stations import HOME, a_mission, mock_of, peer_of
 from uploads import a_mavsdk
 
@@ -96,6 +99,11 @@ def session(seed: int) -> Session:
     return Session(a_mission(random.randint(3, 40), shift, **beside), faults)
 
 
+def timed_session(seed: int, items: int) -> Session:
+    """Return a session of `items` items over a link that loses 20 % each way."""
+    return Session(a_mission(items), Faults(loss=0.2, seed=seed))
+
+
 def parts(mission: Mission, vehicle: VehicleType | None) -> dict[MissionType, tuple[WireItem, ...]]:
     """Return the lists of `mission` that are not empty, as `vehicle` is sent them."""
     lists = {part: wire_items(mission, part, vehicle) for part in MissionType}
@@ -137,15 +145,18 @@ def on_mock(seed: int) -> str:
     return f"{kind}: not verified ({failed[0].verdict})" if failed else f"{kind}: verified"
 
 
-def on_real(kind: str, seeds: range) -> Iterator[str]:
-    """Yield how each session went on the real autopilot `kind`."""
+def on_real(kind: str, seeds: range, items: int) -> Iterator[str]:
+    """Yield how each session went on the real autopilot `kind`: drawn ones, or of `items` items."""
     with (
         tempfile.TemporaryDirectory() as where,
-        simulated(Path(os.environ["FAAO_AUTOPILOTS"]), kind, Path(where)) as connection,
+        simulated(
+            usable(Path(os.environ["FAAO_AUTOPILOTS"]), Path(where)), kind, Path(where)
+        ) as connection,
     ):
         port = int(connection.rpartition(":")[2])
         for seed in seeds:
-            drawn, begun = session(seed), time.monotonic()
+            drawn = timed_session(seed, items) if items else session(seed)
+            begun = time.monotonic()
             try:
                 with patch.object(link, "open_transport", over(drawn.faults)):
                     report = upload(drawn.mission, connection, wait=30)
@@ -153,7 +164,9 @@ def on_real(kind: str, seeds: range) -> Iterator[str]:
                 yield f"{kind}: no session ({error})"
                 continue
             took = time.monotonic() - begun
-            if took > LONGEST:
+            if items and report.verified:
+                yield f"{kind}: verified in {took:.1f} s"
+            elif took > LONGEST:
                 yield f"{kind}: without an end"
             elif not report.verified:
                 yield f"{kind}: not verified ({report.problems[0]})"
@@ -201,6 +214,7 @@ def main() -> None:
     parser.add_argument("where", choices=("mocks", *KINDS))
     parser.add_argument("--sessions", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--items", type=int, default=0, help="of each, timed at 20 %% loss")
     parser.add_argument("--seconds", type=float, default=math.inf, help="begin none after that")
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
@@ -210,7 +224,7 @@ def main() -> None:
     else:
         went = []
         end = time.monotonic() + options.seconds
-        for seed, how in zip(seeds, on_real(options.where, seeds), strict=False):
+        for seed, how in zip(seeds, on_real(options.where, seeds, options.items), strict=False):
             went.append(how)
             print(seed, how, flush=True)
             if time.monotonic() > end:

@@ -115,7 +115,7 @@ def test_schemes_keep_their_precoder_fly_for_it_and_are_beaten_by_faao(
         {"radio.base_station.power_dbm": -60, "radio.relay.power_dbm": -60},
         {"radio.base_station.power_dbm": 60, "radio.relay.power_dbm": -20},
         {"radio.base_station.power_dbm": 30, "radio.relay.power_dbm": 30},
-        {"flight.duration": 1.5, "flight.end": [0.5, 49.5]},
+        {"flight.duration": 1.5, "flight.end": [0.5, 49.5], "flight.time_step": 0.5},
     ],
 )
 def test_unusual_plans_are_solved(paper_plan: MakePlan, changes: dict[str, Any]) -> None:

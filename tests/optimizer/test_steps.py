@@ -1,5 +1,7 @@
 """(27) and (35) as convex problems."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closed_forms import bpsk_two_antennas_rate
@@ -83,6 +85,24 @@ def test_27_reaches_a_stationary_point(paper_plan: MakePlan) -> None:
             gains.append(best - xi(sums, candidate.w))
     assert len(gains) > 20
     assert max(gains) < 1e-3 * sum(s.value(flight.w) for s in sums)
+
+
+def test_rounding_errors_do_not_change_a_digit(paper_plan: MakePlan) -> None:
+    """Another processor's last bits in the exponents and slopes leave flight and precoders."""
+    problem = build_problem(paper_plan({"flight.duration": 20}))
+    start, noise = straight_flight(problem.kinematics), np.random.default_rng(0)
+    sums = sums_of(problem)
+    off = [1 + 1e-15 * noise.standard_normal(s.A.shape) for s in sums]
+    others = tuple(replace(s, A=s.A * each) for s, each in zip(sums, off, strict=True))
+    flights = [optimize_trajectory(problem, each, start) for each in (sums, others)]
+    assert flights[0].w.tobytes() == flights[1].w.tobytes()
+
+    link, w = problem.bs_uav, start.w
+    H = link.channel(w, link.small_scale(w))
+    P = np.tile(np.sqrt(link.power / 2) * np.eye(2, dtype=complex), (len(w), 1, 1))
+    channels = (H, H * (1 + 1e-15 * noise.standard_normal(H.shape)))
+    ends = [optimize_precoders(link, each, P) for each in channels]
+    assert ends[0].tobytes() == ends[1].tobytes()
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -14,7 +14,12 @@ import scipy.sparse as sp
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import SolverError
-from faao_mav.optimizer.algorithm1.successive import Observer, shrink, successive_approximation
+from faao_mav.optimizer.algorithm1.successive import (
+    Observer,
+    rounded,
+    shrink,
+    successive_approximation,
+)
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.scaled import solve
 
@@ -81,7 +86,7 @@ def _solve_35(link: Link, M: Complex, P_i: Complex, scale: float) -> Complex:
     terms = c.size
     rows = sp.csr_array(
         (
-            (slope * factor[..., None]).ravel(),
+            rounded(slope * factor[..., None]).ravel(),
             (np.repeat(np.arange(slots), c.shape[1])[:, None] * width + np.arange(width)).ravel(),
             np.arange(terms + 1) * width,
         ),
@@ -89,7 +94,8 @@ def _solve_35(link: Link, M: Complex, P_i: Complex, scale: float) -> Complex:
     )
     p = cp.Variable((slots, width))
     weight = np.log(np.tile(link.classes.multiplicity, slots) / scale)
-    total = cp.sum(cp.exp((factor * c).ravel() + weight - rows @ cp.vec(p, order="C")))
+    at_zero = rounded((factor * c).ravel() + weight)
+    total = cp.sum(cp.exp(at_zero - rows @ cp.vec(p, order="C")))
     if solve(cp.Problem(cp.Minimize(total), [cp.norm(p, axis=1) <= 1])) == cp.INFEASIBLE:
         raise SolverError("Clarabel calls (35) infeasible, although precoders are known")
     solved = np.asarray(p.value).reshape(slots, 2, N, N)

@@ -15,7 +15,12 @@ import scipy.sparse as sp
 
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import SolverError
-from faao_mav.optimizer.algorithm1.successive import Observer, shrink, successive_approximation
+from faao_mav.optimizer.algorithm1.successive import (
+    Observer,
+    rounded,
+    shrink,
+    successive_approximation,
+)
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.scaled import flight_variables, solve
@@ -108,11 +113,11 @@ def convex_bound(
     y_i = np.sum((w_i - link.station) ** 2, axis=1)
     d2 = y_i + link.altitude**2
     c = s.A / d2[:, None]
-    slot, c, multiplicity = merge_equal(c * shrink(c), link.classes.multiplicity)
+    slot, c, multiplicity = merge_equal(rounded(c * shrink(c)), link.classes.multiplicity)
     q = cp.Variable(len(w_i))
     offset = cp.multiply(LENGTH / np.sqrt(d2)[:, None] * np.ones(2), w - link.station / LENGTH)
     select = sp.csr_array((c, (np.arange(len(c)), slot)), shape=(len(c), len(w_i)))
-    terms = cp.exp(select @ q - c + np.log(multiplicity / gap))
+    terms = cp.exp(select @ q - c + rounded(np.log(multiplicity / gap)))
     return cp.sum(terms), [cp.sum(cp.square(offset), axis=1) - y_i / d2 <= q]
 
 
