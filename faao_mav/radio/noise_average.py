@@ -169,7 +169,7 @@ def gaussian_controls(
     >>> inputs, z = real_inputs("bpsk", 1), np.array([[[1.0], [-1.0]]])
     >>> maps, sent = np.array([[[1.0]]]), np.array([[1, 1]])
     >>> gaussian_controls(inputs, maps, np.eye(1), sent, z)[0, :, 0].tolist()
-    [0.5, -0.5]
+    [-0.5, 0.5]
     """
     variance = 1.0 + inputs.variance * np.sum(maps**2, axis=1)[:, None]
     y = (inputs.points @ maps)[np.arange(len(maps))[:, None], sent] + z
