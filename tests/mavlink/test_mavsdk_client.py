@@ -104,9 +104,9 @@ def test_mavsdk_arms_and_flies_the_mission(flown: Any) -> None:
     Action(client.system).arm()
     assert mock.armed
     client.start_mission()
-    assert reached.wait(10)
+    assert reached.wait(30)
     client.unsubscribe_mission_progress(handle)
-    for _ in range(50):
+    for _ in range(200):
         if not mock.armed:
             break
         time.sleep(0.1)

@@ -66,6 +66,9 @@ _AUTOPILOT_VERSION = 148
 _CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
 """MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
 
+_LATE = 0.05
+"""Seconds by which `tick` is overdue that make a sped up flight stand still; chosen."""
+
 # MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
 _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
 _AT_HOME = Posture(np.zeros(3), np.zeros(3), 0)
@@ -79,7 +82,8 @@ class MockAutopilot(Machine[None]):
     what it holds, and disarms where the flight ends on the ground; in another mode it stays where
     it is, and flies on when set to the mission again. It reports its position `rate` times a
     second until it is asked for another rate. Its clock runs `speedup` times as fast as the
-    world's, as those of simulators do. Heartbeats are `beat` of the world's seconds apart.
+    world's, as those of simulators do; on a mission it then stands still while `tick` is late,
+    rather than jump, as theirs do. Heartbeats are `beat` of the world's seconds apart.
     `parameters` are told beside its defaults; what they do to the flight is up to `fly`. In GUIDED
     and Offboard it follows setpoints, in a `wind`, m/s east and north: see `Guided`. `armed`
     tells whether the motors may turn.
@@ -152,6 +156,10 @@ class MockAutopilot(Machine[None]):
         self._booted, self._ready_at = now, now + self._boot
 
     def _time_out(self, now: float) -> Sequence[Message]:
+        late = now - (self.deadline or now)
+        if self._speedup > 1 and self._flight is not None and late > _LATE:
+            self._flight.delay(late)
+            self._booted += late
         self._now = now
         out: list[Message] = list(self._firmware.tick(now))
         if self._flight is not None:
