@@ -209,4 +209,6 @@ def _show(
         return
     typer.echo(summary(result, written, precoders))
     if uploaded is not None:
-        typer.echo(upload.as_text(uploaded))
+        from faao_mav.mavlink.upload_text import upload_text
+
+        typer.echo(upload_text(uploaded))
