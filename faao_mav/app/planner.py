@@ -89,8 +89,8 @@ class Planner:
             answered = self._asked
             answer = await self._answer("rough", answers.rough, *self._plan, self._near)
             finished = self._tasks.get("finished")
-            if answered == self._asked and finished is not None and finished.done():
-                return  # the finished answer was quicker
+            if finished is not None and finished.done():
+                return  # the finished answer to the newest question was quicker
             self._take(answer)
 
     async def _finish(self, rest: float) -> None:
