@@ -44,18 +44,31 @@ class Document:
     '120'
     """
 
-    def __init__(self, text: str, source: str = "plan.yaml") -> None:
-        """Raise `PlanError` for a `text` that is no YAML mapping; `source` names it."""
+    def __init__(self, text: str, source: str = "plan.yaml", path: File | None = None) -> None:
+        """Raise `PlanError` for a `text` that is no YAML mapping; `source` names it.
+
+        `path` is the file that has the text, where `save` writes it.
+        """
         load_yaml(text, source)
-        self.source = source
+        self.source, self.path = source, path
         self._texts, self._at = [text], 0
         self._gesture: object = None
         self._on_disk = text
+
+    @classmethod
+    def open(cls, path: File) -> "Document":
+        """Return the plan of the file `path`; raises `PlanError` where it is none."""
+        return cls(_read(path), str(path), path)
 
     @property
     def text(self) -> str:
         """The text as it is now."""
         return self._texts[self._at]
+
+    @property
+    def saved(self) -> bool:
+        """Whether the text is that of the file."""
+        return self.text == self._on_disk
 
     @property
     def can_undo(self) -> bool:
@@ -143,23 +156,23 @@ class Document:
     def replace(self, text: str, source: str) -> None:
         """Take another plan, `text`, of the name `source`; the old one can be had by undo.
 
-        Raises `PlanError` as the constructor does.
+        It is of no file that `save` may write. Raises `PlanError` as the constructor does.
         """
         load_yaml(text, source)
-        self.source, self._gesture = source, None
+        self.source, self.path, self._gesture = source, None, None
         self._texts = [*self._texts[: self._at + 1], text]
         self._at += 1
 
-    def save(self, path: File) -> None:
-        """Write the text to the file `path`, unless that was changed by something else.
+    def save(self) -> None:
+        """Write the text to its file, unless that was changed by something else.
 
         Raises `InputError` where it was, and where the file cannot be read or written.
         """
-        if read_text(path, 4 * MAX_CHARACTERS, "a plan", PlanError) != self._on_disk:
+        if self.path is None or _read(self.path) != self._on_disk:
             raise PlanError(
-                f"{path.name} was changed since it was opened here; download the plan instead"
+                f"{self.source} was changed since it was opened here; download the plan instead"
             )
-        write_whole(path, self.text.encode())
+        write_whole(self.path, self.text.encode())
         self._on_disk = self.text
 
     def _loaded(self) -> tuple[Any, Any]:
@@ -182,6 +195,10 @@ class Document:
         kept = self._texts[: self._at if again else self._at + 1]
         self._texts = [*kept, text.getvalue()][-_MOST_UNDONE:]
         self._at, self._gesture = len(self._texts) - 1, gesture
+
+
+def _read(path: File) -> str:
+    return read_text(path, 4 * MAX_CHARACTERS, "a plan", PlanError)
 
 
 @lru_cache(maxsize=16)

@@ -34,7 +34,7 @@ def fields() -> tuple[PlanKey, ...]:
 class Form:
     """The fields of a document; `changed` is called after one was written."""
 
-    def __init__(self, document: Callable[[], Document], changed: Callable[[], None]) -> None:
+    def __init__(self, document: Document, changed: Callable[[], None]) -> None:
         self._document, self._changed = document, changed
         self._inputs: dict[str, ui.input | ui.select] = {}
 
@@ -57,7 +57,7 @@ class Form:
     def show(self) -> None:
         """Show the values of the document."""
         for name, shown in self._inputs.items():
-            value = self._document().shown(_path(name))
+            value = self._document.shown(_path(name))
             held = value or None if isinstance(shown, ui.select) else value
             if shown.value != held:
                 shown.value = held
@@ -77,8 +77,8 @@ class Form:
 
         def commit() -> None:
             value = shown.value or ""
-            if str(value) != self._document().shown(_path(key.path)):
-                self._document().write(_path(key.path), str(value))
+            if str(value) != self._document.shown(_path(key.path)):
+                self._document.write(_path(key.path), str(value))
                 self._changed()
 
         shown: ui.input | ui.select

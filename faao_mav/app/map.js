@@ -30,6 +30,9 @@ export default {
     this.map = L.map(this.$el, { zoomSnap: 0.25, doubleClickZoom: false, center: [0, 0], zoom: 2 });
     this.map.attributionControl.setPrefix(false);
     L.control.scale({ imperial: false }).addTo(this.map);
+    const legend = L.control({ position: "topright" });
+    legend.onAdd = () => (this.speeds = L.DomUtil.create("div", "speeds"));
+    legend.addTo(this.map);
     const group = () => L.layerGroup().addTo(this.map);
     Object.assign(this, { zones: group(), route: group(), marks: group(), handles: group() });
     this.aircraft = L.marker([0, 0], { icon: icon("aircraft", "✈"), interactive: false, zIndexOffset: 900 });
@@ -175,11 +178,13 @@ export default {
         line([places[k], places[k + 1]], "route", { color: colour(speed / top), weight: 5 });
       }
       if (track.length) line(track, "track");
-      let labelled = null;
+      const shades = VIRIDIS.map((_, k) => colour(k / (VIRIDIS.length - 1)));
+      this.speeds.innerHTML = `0<b style="background: linear-gradient(to right, ${shades})"></b>${Number(top).toFixed(1)} m/s`;
+      const labelled = [];
       for (const [number, at] of waypoints) {
         const here = this.map.latLngToContainerPoint(at);
-        const apart = !labelled || here.distanceTo(labelled) > 16; // pixels; numbers do not overlap
-        if (apart) labelled = here;
+        const apart = labelled.every((other) => here.distanceTo(other) > 18); // pixels; numbers do not overlap
+        if (apart) labelled.push(here);
         const html = `<b></b>${apart ? `<i>${Number(number)}</i>` : ""}`;
         L.marker(at, { icon: L.divIcon({ className: "waypoint", html, iconSize: [0, 0] }), interactive: false, keyboard: false }).addTo(this.route);
       }
@@ -187,10 +192,12 @@ export default {
     },
     clear_flight() {
       this.route.clearLayers();
+      this.speeds.innerHTML = "";
       this.aircraft.remove();
     },
     place_aircraft(at) {
-      this.aircraft.setLatLng(at).addTo(this.map);
+      if (at) this.aircraft.setLatLng(at).addTo(this.map);
+      else this.aircraft.remove();
     },
     focus(at) {
       this.map.setView(at, Math.max(this.map.getZoom(), 17));

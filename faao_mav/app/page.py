@@ -1,6 +1,7 @@
 """The page of one window: the map, the plan beside it, what the flight delivers, and its files."""
 
 from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -9,21 +10,32 @@ import numpy as np
 from nicegui import events, run, ui
 
 from faao_mav.app import charts
-from faao_mav.app.answers import FILES, Answer, made
+from faao_mav.app.answers import FILES, Answer, made, uploaded
 from faao_mav.app.document import Document, problems_of
 from faao_mav.app.form import Form, fields
 from faao_mav.app.guard import TILES
 from faao_mav.app.map import PlannerMap
-from faao_mav.app.planner import Planner, Workers
+from faao_mav.app.planner import Planner
 from faao_mav.app.scene import STATIONS, Scene
-from faao_mav.app.uploading import uploaded
+from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.plan.yaml_text import MAX_CHARACTERS
 
 _ATTRIBUTION = '&copy; <a href="https://openstreetmap.org/copyright">OpenStreetMap</a> contributors'
 
-_DRAWN = (("circle", False), ("polygon", False), ("circle", True), ("polygon", True))
-"""Zones that can be drawn: shape, and whether the aircraft has to stay inside."""
+_HINTS = {
+    "circle": "Click the center, then the edge; Esc ends.",
+    "polygon": "Click the corners, the last one twice; Esc ends.",
+}
+
+_STATES = {
+    "computing": "computing",
+    "rough": "rough, computing",
+    "finished": "finished",
+    "refused": "not a plan yet",
+    "failed": "no flight",
+}
+"""What the page says of the answer that it shows."""
 
 
 class Page:
@@ -33,11 +45,11 @@ class Page:
     for answers; `_show` takes them.
     """
 
-    def __init__(self, document: Document, path: Path | None, workers: Workers) -> None:
-        self._document, self._path, self._workers = document, path, workers
+    def __init__(self, document: Document, workers: Workers) -> None:
+        self._document, self._workers = document, workers
         self._planner = Planner(workers, self._show)
         self._answer, self._gestures = Answer(), 0
-        self._form = Form(lambda: self._document, self._changed)
+        self._form = Form(document, self._changed)
 
     def build(self) -> None:
         """Make the elements of the page."""
@@ -50,54 +62,59 @@ class Page:
             with ui.element("section").classes("right"):
                 self._side_part()
         ui.keyboard(self._key)
-        ui.context.client.on_disconnect(self._planner.close)
+        # not on_disconnect: a connection that was lost for a moment comes back
+        ui.context.client.on_delete(self._planner.close)
 
     def _bar(self) -> None:
         with ui.element("header").classes("bar"):
             self._name = ui.label().classes("name")
-            self._told = ui.label().classes("rate").props('aria-live="polite"')
+            with ui.element("div").classes("told").props('aria-live="polite"'):
+                self._rate = ui.label().classes("rate")
+                self._state = ui.label().classes("state")
             ui.space()
-            self._undo = _button("undo", "Undo (Ctrl+Z)", lambda: self._step(self._document.undo))
-            self._redo = _button("redo", "Redo (Ctrl+Y)", lambda: self._step(self._document.redo))
+            self._undo = _button("undo", "Undo (Ctrl+Z)", self._document.undo, self._changed)
+            self._redo = _button("redo", "Redo (Ctrl+Y)", self._document.redo, self._changed)
             _button("folder_open", "Open a plan", self._open_dialog)
-            if self._path is not None:
-                _button("save", f"Save {self._path.name} (Ctrl+S)", self._save)
-            with _button("download", "Download", lambda: None), ui.menu():
-                name = Path(self._document.source).name
-                ui.menu_item("Plan (.yaml)", lambda: ui.download.content(self._document.text, name))
-                for wanted, label in FILES.items():
-                    ui.menu_item(label, lambda wanted=wanted: self._download(wanted))
+            self._save_button = _button("save", "Save (Ctrl+S)", self._save)
+            with _button("download", "Download"), ui.menu():
+                ui.menu_item("Plan (.yaml)", self._download_plan)
+                for wanted, (label, _) in FILES.items():
+                    ui.menu_item(label, partial(self._download, wanted))
             _button("dark_mode", "Light or dark", self._dark.toggle)
 
     def _map_part(self) -> None:
+        self._map = PlannerMap()
+        call = self._map.run_method
         with ui.element("div").classes("tools"):
-            for shape, inside in _DRAWN:
-                label = f"{'Stay in' if inside else 'Stay out of'} a {shape}: click on the map"
-                icon = "crop_square" if shape == "polygon" else "circle"
-                draw = self._method("draw", shape, inside)
-                _button(icon, label, draw).classes("in" if inside else "out")
-            _button("delete", "Delete the chosen zone (Del)", self._method("remove_selected"))
-            _button("center_focus_strong", "Show all", lambda: self._draw_scene(fit=True))
+            for inside, name in ((False, "Stay out"), (True, "Stay in")):
+                with ui.element("div").classes("in" if inside else "out"):
+                    ui.label(name)
+                    for shape, icon in (("circle", "o_circle"), ("polygon", "o_hexagon")):
+                        _button(icon, f"{name} of a {shape}" if not inside else f"{name} a {shape}",
+                                partial(call, "draw", shape, inside),
+                                partial(self._hint, _HINTS[shape]))  # fmt: skip
+            _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
+            _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
             ui.switch("Background", on_change=self._background).tooltip(
                 "OpenStreetMap: the parts of the map that you look at are asked for from "
                 f"{TILES.removeprefix('https://')}"
             )
-        self._map = PlannerMap()
+        self._map.move(target_index=-1)
         self._map.on("ready", self._ready)
         self._map.on("moved", self._moved)
         self._map.on("zone", self._zone)
-        self._map.on("removed", lambda e: self._remove(e.args["key"]))
+        self._map.on("removed", self._removed)
         self._map.on("cursor", lambda e: self._cursor(e.args["at"]))
-        self._where = ui.label().classes("where")
+        self._where = ui.label("Drag the stations and the ends, or draw zones.").classes("where")
         with ui.element("div").classes("time"):
             self._slider = ui.slider(min=0, max=1, value=0, on_change=self._at_time)
             self._slider.props('aria-label="Time of the flight"')
-            self._now = ui.label().classes("where")
-        self._chart = ui.echart(charts.options({}, "")).style(f"height: {charts.HEIGHT}px")
+            self._now = ui.label().classes("now")
+        self._chart = ui.echart(charts.options({}, "")).classes("charts")
 
     def _side_part(self) -> None:
         self._failed = ui.label().classes("failed").props('role="alert"')
-        with ui.tabs().props("dense align=justify") as tabs:
+        with ui.tabs().props("dense no-caps align=justify") as tabs:
             for tab in ("Plan", "Result", "Findings", "Upload"):
                 ui.tab(tab)
         with ui.tab_panels(tabs, value="Plan", keep_alive=True).classes("w-full"):
@@ -113,23 +130,31 @@ class Page:
                 self._connection = ui.input("Connection", value="udpout:127.0.0.1:14550")
                 self._connection.classes("w-full")
                 self._upload_button = ui.button("Upload and verify", on_click=self._upload)
+                self._upload_button.props("no-caps unelevated").classes("mt-2")
                 self._uploaded = ui.label().classes("uploaded").props('aria-live="polite"')
 
     def _ready(self) -> None:
-        self._form.show()
         self._draw_scene(fit=True)
         self._changed(soon=False)
 
     def _changed(self, *, soon: bool = True) -> None:
         """Ask for what the document leads to; what was found before is no longer of it."""
+        document = self._document
         self._answer = Answer(drawing=self._answer.drawing, series=self._answer.series)
         self._form.show()
         self._draw_scene()
-        self._name.text = self._document.shown(("name",)) or Path(self._document.source).name
-        self._undo.set_enabled(self._document.can_undo)
-        self._redo.set_enabled(self._document.can_redo)
+        self._name.text = document.shown(("name",)) or Path(document.source).name
+        self._undo.set_enabled(document.can_undo)
+        self._redo.set_enabled(document.can_redo)
+        self._save_button.set_enabled(document.path is not None and not document.saved)
         self._upload_button.set_enabled(False)
-        self._planner.ask(self._document.text, self._document.source, soon=soon)
+        self._say("computing")
+        self._planner.ask(document.text, document.source, soon=soon)
+
+    def _say(self, state: str) -> None:
+        self._state.text = _STATES[state]
+        self._state.props["data-state"] = state
+        self._state.update()
 
     def _show(self, answer: Answer) -> None:
         problems = {}
@@ -141,20 +166,24 @@ class Page:
             f"{path}: {problem}" if path else problem for path, problem in problems.items()
         )
         if not answer.drawing:
-            self._told.text = "no flight"
+            self._rate.text = ""
+            self._say("refused" if problems else "failed")
             self._map.run_method("clear_flight")
             return
         self._answer = answer
         data = "" if answer.megabytes is None else f", {answer.megabytes:,.1f} MB"
-        state = "" if answer.result is not None else " (rough)"
-        self._told.text = f"delivers {answer.delivered:.4f} bit/s/Hz{data}{state}"
-        self._told.props["data-delivered"] = repr(answer.delivered)
+        self._rate.text = f"{answer.delivered:.4f} bit/s/Hz{data}"
+        self._rate.props["data-delivered"] = repr(answer.delivered)
+        self._say("finished" if answer.result is not None else "rough")
         self._map.run_method("flight", answer.drawing)
+        self._chart.options.clear()
         unit = "bit/Hz" if answer.megabytes is None else "MB"
         self._chart.options.update(charts.options(answer.series, unit))
+        self._chart.style(charts.heights(answer.series))
         self._chart.update()
         self._slider.props["max"] = len(answer.series["t"]) - 1
         self._slider.update()
+        self._at_time()
         if answer.result is not None:
             self._show_result(answer)
 
@@ -167,25 +196,26 @@ class Page:
         self._facts.clear()
         with self._facts:
             for label, text in result_lines(result):
-                _text("dt", label)
-                _text("dd", text)
+                for tag, words in (("dt", label), ("dd", text)):
+                    with ui.element(tag):
+                        ui.label(str(words))
         self._findings.clear()
         with self._findings:
             if result.no_mission is not None:
-                ui.label(str(result.no_mission)).classes("error")
+                ui.label(str(result.no_mission)).classes("finding error")
             elif not result.findings:
                 ui.label("None: nothing speaks against the mission.")
             for group in by_rule(result.findings):
                 with ui.element("div").classes(f"finding {group[0].level}"):
                     ui.label(f"{group[0].level}: {message_of(group)}")
                     ui.label(group[0].action).classes("about")
-                    for each in group:
-                        place = self._place_of_item(each.item)
-                        if place:
-                            focus = self._method("focus", place)
-                            ui.button(f"item {each.item}", on_click=focus).props("flat dense")
+                    for number in dict.fromkeys(each.item for each in group):
+                        if place := self._place_of(number):
+                            focus = partial(self._map.run_method, "focus", place)
+                            button = ui.button(f"item {number}", on_click=focus)
+                            button.props("flat dense no-caps icon=place")
 
-    def _place_of_item(self, number: int | None) -> list[float] | None:
+    def _place_of(self, number: int | None) -> list[float] | None:
         result = self._answer.result
         if number is None or result is None or result.conversion is None:
             return None
@@ -213,55 +243,46 @@ class Page:
         self._gestures += bool(done)
         self._changed()
 
-    def _remove(self, key: str) -> None:
-        Scene(self._document).remove(key)
+    def _removed(self, event: events.GenericEventArguments) -> None:
+        Scene(self._document).remove(event.args["key"])
         self._changed()
 
     def _cursor(self, at: list[float]) -> None:
-        frame = Scene(self._document).frame
-        if frame is None:
+        if (frame := (scene := Scene(self._document)).frame) is None:
             return
-        east, north = frame.to_local(*at).tolist()
-        scene = Scene(self._document)
-        text = f"{east:.1f} m east, {north:.1f} m north ({at[0]:.6f}, {at[1]:.6f})"
+        here = frame.to_local(*at)
+        text = f"{here[0]:.1f} m east, {here[1]:.1f} m north ({at[0]:.6f}, {at[1]:.6f})"
         for station in scene.stations()[:2]:
-            apart = np.hypot(*(frame.to_local(*at) - frame.to_local(*station["at"])))
+            apart = np.hypot(*(here - frame.to_local(*station["at"])))
             text += f"; {station['label'].lower()} {apart:.0f} m"
+        self._hint(text)
+
+    def _hint(self, text: str) -> None:
         self._where.text = text
 
-    def _at_time(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        series, k = self._answer.series, int(event.value)
-        if not series or k >= len(series["t"]):
+    def _at_time(self) -> None:
+        series, k = self._answer.series, int(self._slider.value)
+        if not k or k >= len(series.get("t", ())):
+            self._map.run_method("place_aircraft", None)
             return
         self._map.run_method("place_aircraft", self._answer.drawing["places"][k])
-        self._chart.run_chart_method(
-            "dispatchAction", {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
-        )
-        self._now.text = (
-            f"{series['t'][k]:.1f} s: {series['east'][k]:.1f} m east, {series['north'][k]:.1f} m "
-            f"north, {series['speed'][k]:.2f} m/s"
-        )
+        tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
+        self._chart.run_chart_method("dispatchAction", tip)
+        self._now.text = f"{series['t'][k]:.1f} s, {series['speed'][k]:.2f} m/s"
 
     def _background(self, event: events.ValueChangeEventArguments[Any]) -> None:
         url = f"{TILES}/{{z}}/{{x}}/{{y}}.png" if event.value else None
         self._map.run_method("background", url, _ATTRIBUTION)
 
-    def _method(self, name: str, *arguments: object) -> Callable[[], object]:
-        return lambda: self._map.run_method(name, *arguments)
-
-    def _step(self, step: Callable[[], None]) -> None:
-        step()
-        self._changed()
-
     def _key(self, event: events.KeyEventArguments) -> None:
         if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):
             return
-        if event.key == "z" and not event.modifiers.shift:
-            self._step(self._document.undo)
-        elif event.key in ("y", "Z", "z"):
-            self._step(self._document.redo)
-        elif event.key == "s" and self._path is not None:
+        if event.key == "s":
             self._save()
+        elif event.key in ("y", "Z", "z"):
+            back = event.key == "z" and not event.modifiers.shift
+            (self._document.undo if back else self._document.redo)()
+            self._changed()
 
     def _open_dialog(self) -> None:
         async def opened(event: events.UploadEventArguments) -> None:
@@ -269,56 +290,56 @@ class Page:
                 content = (await event.file.read()).decode("utf-8-sig")
                 self._document.replace(content, event.file.name)
             except (PlanError, UnicodeDecodeError) as error:
-                ui.notify(str(error), type="negative", multi_line=True)
+                _complain(error)
                 return
             dialog.close()
-            self._changed(soon=False)
-            self._draw_scene(fit=True)
+            self._ready()
 
         with ui.dialog() as dialog, ui.card():
             ui.label("Open a plan")
-            ui.upload(on_upload=opened, auto_upload=True, max_file_size=4 * MAX_CHARACTERS).props(
-                "accept=.yaml,.yml"
-            )
+            chosen = ui.upload(on_upload=opened, auto_upload=True, max_file_size=4 * MAX_CHARACTERS)
+            chosen.props("accept=.yaml,.yml flat bordered")
         dialog.open()
 
     def _save(self) -> None:
-        assert self._path is not None
-        try:
-            self._document.save(self._path)
-        except FaaoError as error:
-            ui.notify(str(error), type="negative", multi_line=True)
+        if self._document.path is None:
+            ui.notify("This plan is of no file here: download it", type="warning")
             return
-        ui.notify(f"{self._path.name} saved", type="positive")
+        try:
+            self._document.save()
+        except FaaoError as error:
+            _complain(error)
+            return
+        self._save_button.set_enabled(False)
+        ui.notify(f"{self._document.path.name} saved", type="positive")
+
+    def _download_plan(self) -> None:
+        ui.download.content(self._document.text, Path(self._document.source).name)
 
     async def _download(self, wanted: str) -> None:
-        result = self._answer.result
-        if result is None:
+        if self._answer.result is None:
             ui.notify("The flight is not finished yet", type="warning")
             return
         try:
-            name, content = await self._workers.run("finished", made, result, wanted)
+            name, content = await self._workers.long(made, self._answer.result, wanted)
         except FaaoError as error:
-            ui.notify(str(error), type="negative", multi_line=True)
+            _complain(error)
             return
         ui.download.content(content, name)
 
     async def _upload(self) -> None:
-        if self._answer.result is None:
+        if (result := self._answer.result) is None:
             return
         self._upload_button.disable()
         self._uploaded.text = "Uploading"
-        where = str(self._connection.value)
-        self._uploaded.text = await run.io_bound(uploaded, self._answer.result, where) or ""
+        self._uploaded.text = await run.io_bound(uploaded, result, str(self._connection.value))
         self._upload_button.set_enabled(self._answer.result is not None)
 
 
-def _button(icon: str, tip: str, act: Callable[[], object]) -> ui.button:
-    button = ui.button(icon=icon, on_click=act).props(f'flat dense round aria-label="{tip}"')
-    return button.tooltip(tip)
+def _button(icon: str, tip: str, *acts: Callable[[], object]) -> ui.button:
+    button = ui.button(icon=icon, on_click=lambda: [act() for act in acts])
+    return button.props(f'flat dense round aria-label="{tip}"').tooltip(tip)
 
 
-def _text(tag: str, text: Any) -> None:
-    """Add an element with a text, which is no HTML."""
-    with ui.element(tag):
-        ui.label(str(text))
+def _complain(error: Exception) -> None:
+    ui.notify(str(error), type="negative", multi_line=True)

@@ -11,9 +11,7 @@ from html import escape
 from pathlib import Path
 
 from faao_mav.app.document import Document
-from faao_mav.app.guard import Guard
-from faao_mav.app.planner import Workers
-from faao_mav.errors import InputError
+from faao_mav.errors import FaaoError, InputError
 
 LOOPBACK = ("127.0.0.1", "localhost")
 """The names under which this machine reaches itself."""
@@ -22,15 +20,14 @@ _TOKEN_BYTES = 24
 
 
 def serve(
-    document: Document,
-    path: Path | None,
+    begin: Callable[[], Document],
     *,
     host: str,
     port: int,
     browser: bool,
     note: Callable[[str], None],
 ) -> None:
-    """Serve the page for `document`, the plan of the file `path`, until interrupted.
+    """Serve the page until interrupted; each window `begin`s with a document of its own.
 
     `port` 0 stands for any that is free. `note` is told the address, with the token in it; with
     `browser` that is opened. Raises `InputError` where the port cannot be had, or NiceGUI, which
@@ -46,7 +43,9 @@ def serve(
     from fastapi import FastAPI
     from nicegui import ui
 
+    from faao_mav.app.guard import Guard
     from faao_mav.app.page import Page
+    from faao_mav.app.workers import Workers
 
     listening = _bound(host, port)
     port = listening.getsockname()[1]
@@ -54,7 +53,10 @@ def serve(
 
     @ui.page("/", title="faao-mission")
     def page() -> None:
-        Page(Document(document.text, document.source), path, workers).build()
+        try:
+            Page(begin(), workers).build()
+        except FaaoError as error:  # the file is another one by now
+            ui.label(str(error))
 
     inner = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     ui.run_with(inner, dark=None, show_welcome_message=False)
@@ -64,7 +66,6 @@ def serve(
     server = uvicorn.Server(config)
     address = f"http://{host}:{port}/?token={token}"
     note(f"the page is at {address}")
-    workers.start()
     try:
         with _opened(address) if browser else contextlib.nullcontext():
             asyncio.run(server.serve(sockets=[listening]))

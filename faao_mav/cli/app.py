@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from faao_mav.cli.shared import exit_status, flag, note, option
-from faao_mav.errors import PlanError
 
 _EMPTY = """\
 name: new relay
@@ -44,12 +43,9 @@ def app(
     """
     from faao_mav.app.document import Document
     from faao_mav.app.serve import serve
-    from faao_mav.files import read_text
-    from faao_mav.plan.yaml_text import MAX_CHARACTERS
 
-    text, source = _EMPTY, "plan.yaml"
-    if plan_file is not None:
-        text = read_text(plan_file, 4 * MAX_CHARACTERS, "a plan", PlanError)
-        source = str(plan_file)
-    document = Document(text, source)
-    serve(document, plan_file, host=host, port=port, browser=not no_browser, note=note)
+    def begin() -> Document:
+        return Document(_EMPTY) if plan_file is None else Document.open(plan_file)
+
+    begin()  # what is no plan is refused at once
+    serve(begin, host=host, port=port, browser=not no_browser, note=note)

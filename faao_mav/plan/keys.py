@@ -97,7 +97,11 @@ def _sections(annotation: Any) -> Iterator[Any]:
 def _choices(annotation: Any) -> tuple[str, ...]:
     if annotation is bool:
         return ("true", "false")
-    return get_args(annotation) if get_origin(annotation) is Literal else ()
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    if type(None) in get_args(annotation):
+        return _choices(get_args(annotation)[0])
+    return ()
 
 
 def _as_yaml(value: object) -> str:

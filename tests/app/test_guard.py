@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("starlette", reason="the extra app is not installed")
 from faao_mav.app.guard import Guard
 
 TOKEN, HOST = "s3cret", "127.0.0.1:8000"
@@ -51,7 +52,8 @@ def test_the_token_in_the_address_becomes_a_cookie_and_leaves_the_address() -> N
     headers = dict(start["headers"])
     assert start["status"] == 303
     assert headers[b"location"] == b"/elsewhere.org?a=b"
-    assert headers[b"set-cookie"].decode() == f"{COOKIE}; Path=/; HttpOnly; SameSite=Lax"
+    cookie = {*headers[b"set-cookie"].decode().split("; ")}
+    assert cookie == {COOKIE, "Path=/", "HttpOnly", "SameSite=lax"}
 
 
 @pytest.mark.parametrize(
@@ -87,8 +89,8 @@ def test_the_page_itself_is_served_with_its_policy() -> None:
 def test_a_page_from_elsewhere_can_neither_post_nor_open_a_websocket(origin: str) -> None:
     assert status(method="POST", origin=origin, cookie=COOKIE) == 403
     assert status(origin=origin, cookie=COOKIE) == 403
-    closed = ask(kind="websocket", origin=origin, cookie=COOKIE)
-    assert closed == [{"type": "websocket.close", "code": 1008}]
+    (closed,) = ask(kind="websocket", origin=origin, cookie=COOKIE)
+    assert (closed["type"], closed["code"]) == ("websocket.close", 1008)
 
 
 def test_a_post_without_an_origin_is_refused() -> None:

@@ -22,23 +22,20 @@ PLAN = Path(__file__).parents[2] / "missions" / "copter_relay.yaml"
 RUN = "from faao_mav.cli.main import run\nif __name__ == '__main__':\n    run()\n"
 
 WATCH = """() => {
-  const map = document.querySelector('.planner-map'), told = document.querySelector('.rate');
+  const map = document.querySelector('.planner-map'), state = document.querySelector('.state');
   window.moved = window.drawn = window.ended = null;
   map.addEventListener('mousemove', () => { window.moved ??= performance.now() }, true);
   new MutationObserver(() => { if (window.moved) window.drawn ??= performance.now() })
     .observe(map, {attributes: true, attributeFilter: ['data-drawn']});
   new MutationObserver(() => {
-    const done = told.textContent.endsWith('bit/s/Hz');
-    if (window.drawn && done) window.ended ??= performance.now() })
-    .observe(told, {childList: true, characterData: true, subtree: true});
+    if (window.drawn && state.dataset.state === 'finished') window.ended ??= performance.now() })
+    .observe(state, {attributes: true});
 }"""
 
 
 def measure(page: Page, drags: int) -> list[tuple[float, float]]:
     """Return for each drag the milliseconds to the redrawn route and to the finished one."""
-    page.wait_for_function(
-        "document.querySelector('.rate')?.textContent.endsWith('bit/s/Hz')", timeout=120_000
-    )
+    page.wait_for_selector(".state[data-state=finished]", timeout=120_000)
     page.evaluate(WATCH)
     times = []
     for k in range(drags):
@@ -48,6 +45,7 @@ def measure(page: Page, drags: int) -> list[tuple[float, float]]:
         page.mouse.move(x, y)
         page.mouse.down()
         page.mouse.move(x + 4, y)  # a marker moves from 3 pixels on
+        page.wait_for_selector(".state[data-state=rough]", timeout=120_000)
         page.evaluate("window.moved = window.drawn = window.ended = null")
         way = 12 if k % 10 < 5 else -12
         page.mouse.move(x + way, y + way / 2)
