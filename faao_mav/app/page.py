@@ -16,6 +16,7 @@ from faao_mav.app.form import Form, fields
 from faao_mav.app.guard import TILES
 from faao_mav.app.map import PlannerMap
 from faao_mav.app.planner import Planner
+from faao_mav.app.results import Results
 from faao_mav.app.scene import STATIONS, Scene
 from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError, PlanError
@@ -77,7 +78,12 @@ class Page:
             _button("folder_open", "Open a plan", self._open_dialog)
             self._save_button = _button("save", "Save (Ctrl+S)", self._save)
             with _button("download", "Download"), ui.menu():
-                ui.menu_item("Plan (.yaml)", self._download_plan)
+                ui.menu_item(
+                    "Plan (.yaml)",
+                    lambda: ui.download.content(
+                        self._document.text, Path(self._document.source).name
+                    ),
+                )
                 for wanted, (label, _) in FILES.items():
                     ui.menu_item(label, partial(self._download, wanted))
             _button("dark_mode", "Light or dark", self._dark.toggle)
@@ -102,7 +108,7 @@ class Page:
         self._map.move(target_index=-1)
         self._map.on("ready", self._ready)
         self._map.on("moved", self._moved)
-        self._map.on("zone", self._zone)
+        self._map.on("zone", self._moved)
         self._map.on("removed", self._removed)
         self._map.on("cursor", lambda e: self._cursor(e.args["at"]))
         self._where = ui.label("Drag the stations and the ends, or draw zones.").classes("where")
@@ -120,10 +126,7 @@ class Page:
         with ui.tab_panels(tabs, value="Plan", keep_alive=True).classes("w-full"):
             with ui.tab_panel("Plan"):
                 self._form.build()
-            with ui.tab_panel("Result"):
-                self._facts = ui.element("dl").classes("facts")
-            with ui.tab_panel("Findings"):
-                self._findings = ui.column().classes("findings")
+            self._results = Results(partial(self._map.run_method, "focus"))
             with ui.tab_panel("Upload"):
                 ui.label("The mission is put on the vehicle, read back and compared. It is not "
                          "armed or started.")  # fmt: skip
@@ -185,62 +188,23 @@ class Page:
         self._slider.update()
         self._at_time()
         if answer.result is not None:
-            self._show_result(answer)
-
-    def _show_result(self, answer: Answer) -> None:
-        from faao_mav.report.summary import by_rule, message_of, result_lines
-
-        result = answer.result
-        assert result is not None
-        self._upload_button.set_enabled(result.flyable)
-        self._facts.clear()
-        with self._facts:
-            for label, text in result_lines(result):
-                for tag, words in (("dt", label), ("dd", text)):
-                    with ui.element(tag):
-                        ui.label(str(words))
-        self._findings.clear()
-        with self._findings:
-            if result.no_mission is not None:
-                ui.label(str(result.no_mission)).classes("finding error")
-            elif not result.findings:
-                ui.label("None: nothing speaks against the mission.")
-            for group in by_rule(result.findings):
-                with ui.element("div").classes(f"finding {group[0].level}"):
-                    ui.label(f"{group[0].level}: {message_of(group)}")
-                    ui.label(group[0].action).classes("about")
-                    for number in dict.fromkeys(each.item for each in group):
-                        if place := self._place_of(number):
-                            focus = partial(self._map.run_method, "focus", place)
-                            button = ui.button(f"item {number}", on_click=focus)
-                            button.props("flat dense no-caps icon=place")
-
-    def _place_of(self, number: int | None) -> list[float] | None:
-        result = self._answer.result
-        if number is None or result is None or result.conversion is None:
-            return None
-        item = result.conversion.mission.items[number - 1]
-        return [item.x, item.y] if item.x or item.y else None
+            self._upload_button.set_enabled(answer.result.flyable)
+            self._results.show(answer.result)
 
     def _draw_scene(self, *, fit: bool = False) -> None:
         scene = Scene(self._document)
         self._map.run_method("scene", scene.stations(), scene.zones(), fit)
 
     def _moved(self, event: events.GenericEventArguments) -> None:
-        kind, at, done = (event.args[key] for key in ("key", "at", "done"))
-        if kind in STATIONS:
-            Scene(self._document).move(kind, at, (kind, self._gestures))
-            self._cursor(at)
-            self._end(done)
-
-    def _zone(self, event: events.GenericEventArguments) -> None:
-        told = event.args
-        Scene(self._document).change(told, (told["key"], self._gestures))
-        self._end(told["done"])
-
-    def _end(self, done: bool) -> None:
-        """Take what comes next for another step of undo where a drag is done."""
-        self._gestures += bool(done)
+        """Take a station, or a zone, to where it was dragged; a whole drag is one step of undo."""
+        told, scene = event.args, Scene(self._document)
+        gesture = (told["key"], self._gestures)
+        if told["key"] in STATIONS:
+            scene.move(told["key"], told["at"], gesture)
+            self._cursor(told["at"])
+        else:
+            scene.change(told, gesture)
+        self._gestures += bool(told["done"])
         self._changed()
 
     def _removed(self, event: events.GenericEventArguments) -> None:
@@ -312,9 +276,6 @@ class Page:
             return
         self._save_button.set_enabled(False)
         ui.notify(f"{self._document.path.name} saved", type="positive")
-
-    def _download_plan(self) -> None:
-        ui.download.content(self._document.text, Path(self._document.source).name)
 
     async def _download(self, wanted: str) -> None:
         if self._answer.result is None:

@@ -2,11 +2,11 @@
 
 import asyncio
 import multiprocessing
+import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
-from os import cpu_count
 from typing import Any, TypeVar
 
 from faao_mav.errors import FaaoError
@@ -15,6 +15,9 @@ T = TypeVar("T")
 
 _PRELOADED = ("faao_mav.app.answers", "faao_mav.report", "scipy.interpolate", "shapely", "pyproj")
 """What a job would else import again: modules that `plan_mission` and the report page use."""
+
+_NICE = 10
+"""By how much long jobs give way to the page and to short ones. Chosen."""
 
 _ENDED = "the process that computes has ended; change the plan again"
 
@@ -36,7 +39,7 @@ class Workers:
             self._context.set_forkserver_preload(["__main__", *_PRELOADED])
             ensure_running()
         self._pool: ProcessPoolExecutor | None = None
-        self._free = asyncio.Semaphore(max(1, (cpu_count() or 2) - 1))
+        self._free = asyncio.Semaphore(max(1, (os.cpu_count() or 2) - 1))
 
     async def short(self, work: Callable[..., T], *arguments: Any) -> T:
         """Return what `work` returns of the process that stays; where that died, of a new one."""
@@ -74,6 +77,8 @@ class Workers:
 
 
 def _job(sender: Connection, work: Callable[..., object], arguments: tuple[object, ...]) -> None:
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
     try:
         outcome: tuple[bool, object] = True, work(*arguments)
     except Exception as error:  # told to whom has asked

@@ -34,7 +34,9 @@ def test_the_last_question_wins_and_finished_beats_rough(data: st.DataObject) ->
     if order.asked:  # the finished answer to the last question is shown, once
         last = (order.asked, True)
         assert order.take(order.asked, finished=True) == (shown != last)
-        assert not any(order.take(k + 1, finished=f) for k in range(order.asked) for f in (0, 1))
+        assert not any(
+            order.take(k + 1, finished=f) for k in range(order.asked) for f in (False, True)
+        )
 
 
 class Held:
