@@ -1,6 +1,7 @@
 """The plan's keys as fields, generated from the schema: unit, help, default, and what is wrong."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from nicegui import ui
 
@@ -32,27 +33,40 @@ def fields() -> tuple[PlanKey, ...]:
 
 
 class Form:
-    """The fields of a document; `changed` is called after one was written."""
+    """The fields of a document; `changed` is called after one was written.
+
+    Those of a section are made when it is opened: each element on the page slows every change.
+    """
 
     def __init__(self, document: Document, changed: Callable[[], None]) -> None:
         self._document, self._changed = document, changed
         self._inputs: dict[str, ui.input | ui.select] = {}
+        self._sections: dict[str, ui.expansion] = {}
+        self._problems: Mapping[str, str] = {}
 
     def build(self) -> None:
-        """Make the fields, one panel for each section of the file."""
-        known = reference()
-        panels: dict[str, ui.element] = {}
+        """Make one panel for each section of the file, with the fields of the first ones."""
         for key in fields():
             section = key.path.rpartition(".")[0]
-            if section not in panels:
-                panel = ui.expansion(section or "plan", value=section in ("", "flight"))
-                panel.classes("w-full section").props("dense header-class=section-head")
-                panels[section] = panel
-                if section:
-                    with panel:
-                        ui.label(known[section].description).classes("about")
-            with panels[section]:
+            if section not in self._sections:
+                panel = ui.expansion(section or "plan").classes("w-full section")
+                panel.props("dense header-class=section-head")
+                panel.on_value_change(partial(self._open, section))
+                self._sections[section] = panel
+        for section in ("", "flight"):
+            self._sections[section].open()
+
+    def _open(self, section: str) -> None:
+        held = [key for key in fields() if key.path.rpartition(".")[0] == section]
+        if held[0].path in self._inputs:
+            return
+        with self._sections[section]:
+            if section:
+                ui.label(reference()[section].description).classes("about")
+            for key in held:
                 self._inputs[key.path] = self._field(key)
+        self.show()
+        self.tell(self._problems)
 
     def show(self) -> None:
         """Show the values of the document."""
@@ -64,6 +78,10 @@ class Form:
 
     def tell(self, problems: Mapping[str, str]) -> None:
         """Show what is wrong with the fields, by their paths, and only that."""
+        self._problems = problems
+        for name in problems:
+            if (panel := self._sections.get(name.rpartition(".")[0])) is not None:
+                panel.open()
         for name, shown in self._inputs.items():
             problem = problems.get(name)
             if (shown.props.get("error-message") or None) != problem:

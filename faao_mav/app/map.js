@@ -4,6 +4,7 @@ import { leaflet as L } from "nicegui-leaflet";
 import { loadResource } from "../../static/utils/resources.js";
 
 const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [200, 220, 50]];
+const SHADES = 20; // colours of the route
 const PERIOD = 50; // milliseconds between two reports of one drag
 const NUDGE = 10, FINE = 1; // pixels by which an arrow key moves a marker, and with Shift
 
@@ -173,9 +174,11 @@ export default {
         L.polyline(points, { className, interactive: false, ...more }).addTo(this.route);
       for (const ring of margin) line(ring, "margin");
       for (const ring of fixed) line(ring, "zone-file");
-      for (let k = 0; k + 1 < places.length; k++) {
-        const speed = (speeds[k] + speeds[k + 1]) / 2;
-        line([places[k], places[k + 1]], "route", { color: colour(speed / top), weight: 5 });
+      const shade = (k) => Math.round((SHADES * (speeds[k] + speeds[k + 1])) / (2 * top));
+      for (let k = 0, from = 0; k + 1 < places.length; k++) {
+        if (k + 2 < places.length && shade(k + 1) === shade(k)) continue;
+        line(places.slice(from, k + 2), "route", { color: colour(shade(k) / SHADES), weight: 5 });
+        from = k + 1;
       }
       if (track.length) line(track, "track");
       const shades = VIRIDIS.map((_, k) => colour(k / (VIRIDIS.length - 1)));

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from nicegui import events, run, ui
+from nicegui import events, ui
 
 from faao_mav.app import charts
-from faao_mav.app.answers import FILES, Answer, made, uploaded
+from faao_mav.app.answers import FILES, Answer, made
 from faao_mav.app.document import Document, problems_of
 from faao_mav.app.form import Form, fields
 from faao_mav.app.guard import TILES
@@ -116,7 +116,7 @@ class Page:
             self._slider = ui.slider(min=0, max=1, value=0, on_change=self._at_time)
             self._slider.props('aria-label="Time of the flight"')
             self._now = ui.label().classes("now")
-        self._chart = ui.echart(charts.options({}, "")).classes("charts")
+        self._chart, self._heights = ui.echart({}).classes("charts"), ""
 
     def _side_part(self) -> None:
         self._failed = ui.label().classes("failed").props('role="alert"')
@@ -127,14 +127,6 @@ class Page:
             with ui.tab_panel("Plan"):
                 self._form.build()
             self._results = Results(partial(self._map.run_method, "focus"))
-            with ui.tab_panel("Upload"):
-                ui.label("The mission is put on the vehicle, read back and compared. It is not "
-                         "armed or started.")  # fmt: skip
-                self._connection = ui.input("Connection", value="udpout:127.0.0.1:14550")
-                self._connection.classes("w-full")
-                self._upload_button = ui.button("Upload and verify", on_click=self._upload)
-                self._upload_button.props("no-caps unelevated").classes("mt-2")
-                self._uploaded = ui.label().classes("uploaded").props('aria-live="polite"')
 
     def _ready(self) -> None:
         self._draw_scene(fit=True)
@@ -150,7 +142,7 @@ class Page:
         self._undo.set_enabled(document.can_undo)
         self._redo.set_enabled(document.can_redo)
         self._save_button.set_enabled(document.path is not None and not document.saved)
-        self._upload_button.set_enabled(False)
+        self._results.stale()
         self._say("computing")
         self._planner.ask(document.text, document.source, soon=soon)
 
@@ -179,16 +171,20 @@ class Page:
         self._rate.props["data-delivered"] = repr(answer.delivered)
         self._say("finished" if answer.result is not None else "rough")
         self._map.run_method("flight", answer.drawing)
-        self._chart.options.clear()
-        unit = "bit/Hz" if answer.megabytes is None else "MB"
-        self._chart.options.update(charts.options(answer.series, unit))
-        self._chart.style(charts.heights(answer.series))
-        self._chart.update()
+        unit, heights = (
+            "bit/Hz" if answer.megabytes is None else "MB",
+            charts.heights(answer.series),
+        )
+        others = heights != self._heights  # other plots than before
+        if others:
+            self._heights = heights
+            self._chart.style(replace=heights)
+        # behind the route, which is to be drawn first
+        self._chart.run_chart_method("setOption", charts.options(answer.series, unit), others)
         self._slider.props["max"] = len(answer.series["t"]) - 1
         self._slider.update()
         self._at_time()
         if answer.result is not None:
-            self._upload_button.set_enabled(answer.result.flyable)
             self._results.show(answer.result)
 
     def _draw_scene(self, *, fit: bool = False) -> None:
@@ -287,14 +283,6 @@ class Page:
             _complain(error)
             return
         ui.download.content(content, name)
-
-    async def _upload(self) -> None:
-        if (result := self._answer.result) is None:
-            return
-        self._upload_button.disable()
-        self._uploaded.text = "Uploading"
-        self._uploaded.text = await run.io_bound(uploaded, result, str(self._connection.value))
-        self._upload_button.set_enabled(self._answer.result is not None)
 
 
 def _button(icon: str, tip: str, *acts: Callable[[], object]) -> ui.button:
