@@ -170,3 +170,29 @@ def test_a_station_in_degrees_stays_in_degrees() -> None:
 def test_without_a_sound_origin_nothing_is_on_the_map(origin: str) -> None:
     scene = Scene(Document(f"site: {{origin: {origin}}}\nfence: {{exclusion: 3}}\n"))
     assert (scene.frame, scene.stations(), scene.zones()) == (None, [], [])
+
+
+def test_only_the_file_that_was_opened_is_saved_and_no_newer_one(tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    path.write_text(SMALL)
+    first, second = Document.open(path), Document.open(path)
+    for document, name in ((first, "a"), (second, "b")):
+        document.write(("name",), name)
+        assert not document.saved
+    first.save()
+    assert first.saved
+    assert path.read_text() == first.text
+    with pytest.raises(PlanError, match="was changed since"):
+        second.save()
+    first.replace("name: other\n", "other.yaml")
+    with pytest.raises(PlanError):
+        first.save()
+    assert load_yaml(path.read_text(), "p")["name"] == "a"
+
+
+def test_keys_of_one_word_have_choices() -> None:
+    known = reference()
+    assert known["goal.minimise"].choices == ("duration", "power")
+    assert known["radio.causal"].choices == ("true", "false")
+    assert known["optimizer.starts"].choices == ()  # a list of words
+    assert known["flight.start_velocity"].choices == ()  # a word or a velocity
