@@ -35,10 +35,10 @@ class Document:
 
     What is not changed stays as it was written: comments, order, the style of each value.
 
-    >>> document = Document("flight: {duration: 120}  # s\\n")
-    >>> document.put(("flight", "duration"), 90)
+    >>> document = Document("flight: {duration: 120}  # s\n")
+    >>> document.put(("flight", "duration"), 150)
     >>> print(document.text, end="")
-    flight: {duration: 90}  # s
+    flight: {duration: 150}  # s
     >>> document.undo()
     >>> document.shown(("flight", "duration"))
     '120'
@@ -209,7 +209,7 @@ def _parsed(text: str, source: str) -> Any:
 def problems_of(error: PlanError, source: str, paths: Sequence[str]) -> dict[str, str]:
     r"""Return what `error` says by the path, of `paths`, that each line is about; "": of none.
 
-    >>> problems_of(PlanError("p: flight.start[0]: bad\\np: odd"), "p", ["flight.start"])
+    >>> problems_of(PlanError("p: flight.start: bad\np: odd"), "p", ["flight.start"])
     {'flight.start': 'bad', '': 'odd'}
     """
     found: dict[str, str] = {}
