@@ -25,6 +25,7 @@ FLOORS = (
     ("workflow",),
     ("report",),
     ("study",),
+    ("app",),
     ("cli",),
 )
 """Rooms from the ground up: none imports from its own floor or one above it, but from itself."""
@@ -99,6 +100,9 @@ def test_every_public_name_can_be_had() -> None:
         ("import faao_mav.cli.upload, faao_mav.cli.download", {"numpy", "pymavlink"}),
         ("import faao_mav.cli.fly, faao_mav.cli.debrief", {"numpy", "pymavlink", "pydantic"}),
         ("import faao_mav.cli.autopilot", {"numpy", "pymavlink"}),
+        ("import faao_mav.cli.app", {"numpy", "nicegui", "ruamel", "pydantic"}),
+        ("import faao_mav.app.guard, faao_mav.app.document", {"nicegui", "scipy", "pyproj"}),
+        ("import faao_mav.app.planner", {"nicegui", "cvxpy", "matplotlib"}),
         ("import faao_mav.cli.study", {"numpy", "joblib", "matplotlib"}),
         ("import faao_mav.study", {"scipy", "cvxpy", "joblib", "matplotlib", "pyproj"}),
         ("import faao_mav.report", {"scipy", "cvxpy", "matplotlib"}),

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from faao_mav.cli.app import app as page
 from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.convert import convert
 from faao_mav.cli.debrief import debrief
@@ -65,7 +66,7 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (plan, validate, upload, download, fly, debrief, convert, autopilot, study):
+for command in (plan, validate, upload, download, fly, debrief, convert, autopilot, study, page):
     app.command(command.__name__)(command)
 
 

@@ -11,7 +11,7 @@ import typer
 
 from faao_mav.cli.shared import AllowArmed, AsJson, File, System, exit_status, flag, note, option
 from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
+from faao_mav.files import PAGES, check_apart, check_ending, check_writable
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
@@ -60,6 +60,7 @@ def plan(
     input.
     """
     from faao_mav.cli.progress import optimizer_progress
+    from faao_mav.report.parts import write_part
     from faao_mav.workflow import plan_mission
 
     if upload is None and (system is not None or allow_armed):
@@ -76,7 +77,7 @@ def plan(
         result = plan_mission(plan, bound=bound, observe=observe)
         for name, path in files.items():
             if path is not None:
-                _write(result, name, path)
+                write_part(result, name.removeprefix("--"), path)
         mission = result.write(out) if out is not None else ()
     result = replace(result, seconds_total=time.perf_counter() - started)
     written = [*mission, *filter(None, files.values())]
@@ -140,29 +141,6 @@ def _checked_plan(
     return plan
 
 
-def _write(result: "Result", option: str, path: Path) -> None:
-    """Write what `option` asks for to `path`."""
-    solution, conversion = result.solution, result.conversion
-    match option:
-        case "--save":
-            from faao_mav.optimizer.solution import save_solution
-
-            save_solution(solution, path, conversion.schedule.track() if conversion else None)
-        case "--precoders":
-            from faao_mav.schedule.precoder_table import precoder_table
-
-            write_whole(path, precoder_table(solution).encode())
-        case "--report":
-            from faao_mav.report import render_report
-
-            write_whole(path, render_report(result).encode())
-        case "--figure":
-            from faao_mav.report.figures import flight_figure
-            from faao_mav.report.style import save_figure
-
-            save_figure(flight_figure(solution, conversion, result.prediction), path)
-
-
 def _sound(result: "Result") -> bool:
     """Say the errors that validation found, and whether there are none."""
     from faao_mav.report.summary import by_rule, line_of
@@ -209,4 +187,6 @@ def _show(
         return
     typer.echo(summary(result, written, precoders))
     if uploaded is not None:
-        typer.echo(upload.as_text(uploaded))
+        from faao_mav.mavlink.upload_text import upload_text
+
+        typer.echo(upload_text(uploaded))

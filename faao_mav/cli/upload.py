@@ -23,8 +23,6 @@ from faao_mav.cli.shared import (
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.client import UploadReport
-    from faao_mav.mavlink.transfer.session import PartReport
-    from faao_mav.mavlink.transfer.verify import Difference
 
 
 @exit_status()
@@ -46,6 +44,7 @@ def upload(
     """
     from faao_mav.cli.progress import transfer_progress
     from faao_mav.mavlink.client import upload as run
+    from faao_mav.mavlink.upload_text import upload_text
     from faao_mav.mission.formats import read_mission_file
 
     file = read_mission_file(mission_file)
@@ -64,23 +63,11 @@ def upload(
             observe=observe,
             note=note,
         )
-    typer.echo(json.dumps(as_dict(report), allow_nan=False) if as_json else as_text(report))
+    typer.echo(json.dumps(as_dict(report), allow_nan=False) if as_json else upload_text(report))
     if not report.verified:
         if not as_json:
             typer.echo("faao-mission: the mission is not verified; do not fly it", err=True)
         raise typer.Exit(1)
-
-
-def as_text(report: "UploadReport") -> str:
-    """Return `report` for people."""
-    lines = [f"vehicle      {report.vehicle}"]
-    lines += [_part_line(part) for part in report.parts if part.verified]
-    for part in report.parts:
-        lines += [f"not kept     {text}" for text in _dropped(part)]
-    lines += [f"failed       {problem}" for problem in report.problems]
-    if report.verified:
-        lines.append(f"verified     read back and compared, {report.seconds:.1f} s")
-    return "\n".join(lines)
 
 
 def as_dict(report: "UploadReport") -> dict[str, Any]:
@@ -113,25 +100,6 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
 def _fields(record: object, *names: str) -> dict[str, Any]:
     """Return fields of `record` by name, as JSON takes them."""
     return {name: _plain(getattr(record, name)) for name in names}
-
-
-def _dropped(part: "PartReport") -> list[str]:
-    """Return what storage lost, one line for each field."""
-    lost: dict[str, list[Difference]] = {}
-    for each in part.differences:
-        if each.kind == "dropped":
-            lost.setdefault(each.field, []).append(each)
-    return [
-        str(each[0]) + (f" (and so in {len(each) - 1} more items)" if len(each) > 1 else "")
-        for each in lost.values()
-    ]
-
-
-def _part_line(part: "PartReport") -> str:
-    what = "items" if part.items != 1 else "item"
-    again = "" if part.attempts == 1 else f", in {part.attempts} attempts"
-    title = {"rally points": "rally"}.get(part.part.title, part.part.title)
-    return f"{title:<13}{part.items} {what} stored{again}"
 
 
 def _plain(value: Any) -> Any:

@@ -166,6 +166,14 @@ class FreeArea:
         """Return the places at least `margin` metres from the edge, but for 0.1 mm a metre."""
         return FreeArea(_polygonal(self.shape.buffer(-margin * OUTSIDE, quad_segs=_SEGMENTS)))
 
+    def edges(self) -> list[Real]:
+        """Return the closed rings (k, 2), m, that bound the area; of the plane's square none."""
+        import shapely
+
+        rings = shapely.get_rings(shapely.get_parts(self.shape))
+        corners = map(shapely.get_coordinates, rings)
+        return [ring for ring in corners if np.abs(ring).max() < FARTHEST / 2]
+
     def covers(self, points: Real) -> Flags:
         """Return which of `points` (n, 2) lie inside or on the edge, (n,)."""
         import shapely

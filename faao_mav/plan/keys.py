@@ -28,7 +28,8 @@ class PlanKey:
     """One key of a plan.
 
     `path` has dots between the keys, `default` is what the file would say (empty: nothing, or the
-    key is `required`), `accepted` completes "give ...", and `inside` are the keys of a section.
+    key is `required`), `accepted` completes "give ...", `inside` are the keys of a section, and
+    `choices` the words that are accepted, empty where any other value is.
     """
 
     path: str
@@ -38,6 +39,7 @@ class PlanKey:
     required: bool
     accepted: str
     inside: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()
 
 
 def reference() -> Mapping[str, PlanKey]:
@@ -78,6 +80,7 @@ def _below(section: type, prefix: str) -> Iterator[PlanKey]:
             required,
             extra["accepted"] or in_file or _accepted(info, extra["unit"], inside),
             inside,
+            _choices(info.annotation),
         )
         for one in inner:
             yield from _below(one, f"{path}.")
@@ -89,6 +92,16 @@ def _sections(annotation: Any) -> Iterator[Any]:
         yield annotation
     for part in get_args(annotation):
         yield from _sections(part)
+
+
+def _choices(annotation: Any) -> tuple[str, ...]:
+    if annotation is bool:
+        return ("true", "false")
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    if type(None) in get_args(annotation):
+        return _choices(get_args(annotation)[0])
+    return ()
 
 
 def _as_yaml(value: object) -> str:

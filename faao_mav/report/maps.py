@@ -155,14 +155,10 @@ def _draw_margin(plot: "Axes", plan: Plan) -> None:
     area, fence = plan.keep_in, plan.fence
     if area is None or fence is None:
         return
-    import shapely
-
     name: str | None = f"margin {fence.margin:g} m"
-    for part in shapely.get_parts(area.inside(fence.margin).shape):
-        for ring in shapely.get_rings(part)[0 if any(z.inclusion for z in plan.zones) else 1 :]:
-            edge = shapely.get_coordinates(ring)
-            plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
-            name = None  # once in the legend
+    for edge in area.inside(fence.margin).edges():
+        plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
+        name = None  # once in the legend
 
 
 def _show_all(plot: "Axes", seen: Real, outlines: Sequence[_Outline], title: str = "") -> None:

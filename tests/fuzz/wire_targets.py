@@ -8,7 +8,7 @@ from typing import Any
 from harness import Target
 from tapes import answer, converse, datagrams, mutated, packed, recorded, tape_of
 
-from faao_mav.cli.upload import as_dict, as_text
+from faao_mav.cli.upload import as_dict
 from faao_mav.errors import FaaoError
 from faao_mav.mavlink.client import UploadReport
 from faao_mav.mavlink.codec import Codec
@@ -45,6 +45,7 @@ from faao_mav.mavlink.transfer.session import (
     explain,
     upload_parts,
 )
+from faao_mav.mavlink.upload_text import upload_text
 from faao_mav.mavlink.wire_items import mission_of, wire_items
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
@@ -162,7 +163,7 @@ def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
     elif isinstance(outcome, tuple):
         problems = tuple(explain(each, peer, 650, str) for each in outcome if not each.verified)
         report = UploadReport(found, outcome, 1.0, problems)
-        lines = as_text(report).split("\n")
+        lines = upload_text(report).split("\n")
         assert all(line.isprintable() for line in lines), lines
         assert report.verified == any(line.startswith("verified") for line in lines), lines
         json.dumps(as_dict(report), allow_nan=False)

@@ -1,0 +1,197 @@
+"""What the page shows of a plan, computed in another process: a rough answer and the finished one.
+
+Everything here takes and returns what can be sent between processes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import FaaoError, PlanError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import Command
+from faao_mav.optimizer.rough import RoughFlight, rough_flight
+from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan, parse_plan
+from faao_mav.report.parts import write_part
+from faao_mav.validate.energy import energy_use
+from faao_mav.vector import lengths
+from faao_mav.vehicle import Track
+from faao_mav.workflow import Result, plan_mission
+
+_MOST_DRAWN = 400
+"""Points of a line on the map and of a chart; chosen: more cannot be told apart."""
+
+_WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+"""The commands of a relay route, whose items are numbered on the map."""
+
+FILES = {
+    "mission.waypoints": ("Mission, QGC WPL 110 (.waypoints)", ""),
+    "mission.plan": ("Mission, QGroundControl (.plan)", ""),
+    "mission.kml": ("Mission to look at (.kml)", ""),
+    ".param": ("Parameters", ""),
+    ".fence": ("Fence", ""),
+    "report.html": ("Report page (.html)", "report"),
+    "precoders.csv": ("Precoders (.csv)", "precoders"),
+    "result.npz": ("Result (.npz)", "save"),
+}
+"""What can be had of a finished answer: by its name, or for what lies beside a mission what is in
+its name, what it is called, and which part of `write_part` it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a plan leads to, or why it leads to nothing.
+
+    `refused` is the error of a plan that cannot be used, `failed` that of one without a flight.
+    `delivered` is in bit/s/Hz, `megabytes` None without a bandwidth. `drawing` has the lines of
+    the map in [latitude, longitude], `series` the charts' values by name over `t`, s. `result` is
+    there in the finished answer only.
+    """
+
+    refused: str = ""
+    failed: str = ""
+    delivered: float = 0.0
+    megabytes: float | None = None
+    drawing: dict[str, Any] = field(default_factory=dict)
+    series: dict[str, list[float]] = field(default_factory=dict)
+    velocities: Real | None = None
+    result: Result | None = None
+
+
+def rough(text: str, source: str, near: Real | None) -> Answer:
+    """Return the rough answer to the plan `text`, from a flight `near` it where there is one."""
+    return _answered(text, source, partial(rough_flight, near=near))
+
+
+def finished(text: str, source: str) -> Answer:
+    """Return the answer of the command line to the plan `text`."""
+    return _answered(text, source, plan_mission)
+
+
+def _answered(text: str, source: str, solve: Callable[[Plan], RoughFlight | Result]) -> Answer:
+    try:
+        found = solve(parse_plan(text, source))
+    except PlanError as error:
+        return Answer(refused=str(error))
+    except FaaoError as error:
+        return Answer(failed=str(error))
+    result = found if isinstance(found, Result) else None
+    flight = found.solution if isinstance(found, Result) else found
+    return Answer(
+        delivered=flight.delivered_rate,
+        megabytes=flight.plan.megabytes(flight.delivered_rate),
+        drawing=_drawing(flight, result),
+        series=_series(flight),
+        velocities=flight.v,
+        result=result,
+    )
+
+
+def _series(flight: RoughFlight | Solution) -> dict[str, list[float]]:
+    """Return the charts' values: bit/s/Hz, m/s, W, Wh; bit/Hz, or megabytes with a bandwidth."""
+    plan, relayed = flight.plan, flight.relayed
+    bandwidth, step = plan.radio.bandwidth_mhz, plan.flight.time_step
+    held = step * (1.0 if bandwidth is None else bandwidth / 8)
+    values = {
+        "t": flight.t,
+        "base station to UAV": flight.I_U,
+        "UAV to user": flight.I_G,
+        "queue": held * relayed.queue,
+        "delivered": held * np.cumsum(relayed.forwarded),
+        "speed": lengths(flight.v),
+        "east": flight.w[:, 0],
+        "north": flight.w[:, 1],
+    }
+    level = np.zeros((len(flight.t), 1))
+    position, velocity = np.hstack([flight.w, level]), np.hstack([flight.v, level])
+    frame, items = LocalFrame(plan.origin.latitude, plan.origin.longitude), level[:, 0].astype(int)
+    track = Track(flight.t, position, velocity, items, np.empty(0), frame)
+    if (use := energy_use(plan, track, plan.wind)) is not None:
+        values |= {"power": use.power, "energy": use.used}
+    return {name: _thinned(np.asarray(each)).round(4).tolist() for name, each in values.items()}
+
+
+def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str, Any]:
+    plan = flight.plan
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+
+    def degrees(places: Real) -> list[list[float]]:
+        return np.stack(frame.to_geodetic(places), axis=1).round(8).tolist()  # type: ignore[no-any-return]
+
+    speeds = lengths(flight.v)
+    drawn = {
+        "places": degrees(_thinned(flight.w)),
+        "speeds": _thinned(speeds).round(3).tolist(),
+        "top": max(float(speeds.max()), 0.01),
+        "track": [],
+        "waypoints": [],
+        "margin": [],
+        "fixed": [],
+    }
+    if plan.fence is not None and (area := plan.keep_in) is not None:
+        drawn["margin"] = [degrees(edge) for edge in area.inside(plan.fence.margin).edges()]
+        if plan.fence.file is not None:
+            drawn["fixed"] = [degrees(edge) for edge in area.edges()]
+    if result is not None and result.conversion is not None:
+        drawn["track"] = degrees(_thinned(result.conversion.schedule.track()["predicted_w"]))
+        drawn["waypoints"] = [
+            [number, [item.x, item.y]]
+            for number, item in enumerate(result.conversion.mission.items, 1)
+            if item.command in _WAYPOINTS and (item.x or item.y)
+        ]
+    return drawn
+
+
+def _thinned(values: Real) -> Real:
+    """Return at most `_MOST_DRAWN` of `values` (n, ...), the first and the last among them."""
+    kept = np.linspace(0, len(values) - 1, min(len(values), _MOST_DRAWN)).round().astype(int)
+    return np.asarray(values[kept])
+
+
+def made(result: Result, wanted: str) -> tuple[str, bytes]:
+    """Return name and content of one of `FILES`: what the command line writes.
+
+    Raises `FaaoError` where there is no such file: no mission, no fence, precoders without table.
+    """
+    _, part = FILES[wanted]
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / ("mission.waypoints" if wanted.startswith(".") else wanted)
+        if part:
+            write_part(result, part, path)
+            return wanted, path.read_bytes()
+        mission, *beside = result.write(path)
+        if wanted.startswith("."):
+            found = [each for each in beside if wanted in each.name]
+            if not found:
+                raise PlanError(f"the mission has no {wanted.removeprefix('.')} file")
+            mission = found[0]
+        return mission.name, mission.read_bytes()
+
+
+def uploaded(result: Result, connection: str) -> str:
+    """Upload the mission of `result` to `connection`, read it back, compare; return what to tell.
+
+    What the command line would not upload is not uploaded: a mission with errors, or that of a plan
+    beyond its vehicle. Nothing is armed or started.
+    """
+    from faao_mav.mavlink.client import upload
+    from faao_mav.mavlink.upload_text import upload_text
+    from faao_mav.schedule.conversion import beyond_vehicle
+
+    try:
+        if result.conversion is None or not result.flyable:
+            raise PlanError("the mission does not pass validation; do not fly it")
+        if beyond := beyond_vehicle(result.solution.plan):
+            raise PlanError("\n".join(beyond))
+        report = upload(result.conversion.mission, connection, note=lambda _: None)
+    except FaaoError as error:
+        return f"failed       {error}"
+    told = upload_text(report)
+    return told if report.verified else f"{told}\nthe mission is not verified; do not fly it"

@@ -1,0 +1,114 @@
+"""The plan's keys as fields, generated from the schema: unit, help, default, and what is wrong."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from nicegui import ui
+
+from faao_mav.app.document import Document, Path
+from faao_mav.plan.keys import PlanKey, reference
+
+_LEFT_OUT = ("study",)
+"""Sections that the page takes no notice of."""
+
+
+def _is_field(key: PlanKey, known: Mapping[str, PlanKey]) -> bool:
+    above = known.get(key.path.rpartition(".")[0])
+    in_list = above is not None and above.inside and not _is_section(above)
+    return not _is_section(key) and not in_list and key.path.split(".")[0] not in _LEFT_OUT
+
+
+def _is_section(key: PlanKey) -> bool:
+    return bool(key.inside) and key.accepted.startswith("a mapping")
+
+
+def fields() -> tuple[PlanKey, ...]:
+    """Return the keys that have a field, in the order of the plan reference.
+
+    >>> [key.path for key in fields()][:3]
+    ['name', 'site.origin.latitude', 'site.origin.longitude']
+    """
+    known = reference()
+    return tuple(key for key in known.values() if _is_field(key, known))
+
+
+class Form:
+    """The fields of a document; `changed` is called after one was written.
+
+    Those of a section are made when it is opened: each element on the page slows every change.
+    """
+
+    def __init__(self, document: Document, changed: Callable[[], None]) -> None:
+        self._document, self._changed = document, changed
+        self._inputs: dict[str, ui.input | ui.select] = {}
+        self._sections: dict[str, ui.expansion] = {}
+        self._problems: Mapping[str, str] = {}
+
+    def build(self) -> None:
+        """Make one panel for each section of the file, with the fields of the first ones."""
+        for key in fields():
+            section = key.path.rpartition(".")[0]
+            if section not in self._sections:
+                panel = ui.expansion(section or "plan").classes("w-full section")
+                panel.props("dense header-class=section-head")
+                panel.on_value_change(partial(self._open, section))
+                self._sections[section] = panel
+        for section in ("", "flight"):
+            self._sections[section].open()
+
+    def _open(self, section: str) -> None:
+        held = [key for key in fields() if key.path.rpartition(".")[0] == section]
+        if held[0].path in self._inputs:
+            return
+        with self._sections[section]:
+            if section:
+                ui.label(reference()[section].description).classes("about")
+            for key in held:
+                self._inputs[key.path] = self._field(key)
+        self.show()
+        self.tell(self._problems)
+
+    def show(self) -> None:
+        """Show the values of the document."""
+        for name, shown in self._inputs.items():
+            value = self._document.shown(_path(name))
+            held = value or None if isinstance(shown, ui.select) else value
+            if shown.value != held:
+                shown.value = held
+
+    def tell(self, problems: Mapping[str, str]) -> None:
+        """Show what is wrong with the fields, by their paths, and only that."""
+        self._problems = problems
+        for name in problems:
+            if (panel := self._sections.get(name.rpartition(".")[0])) is not None:
+                panel.open()
+        for name, shown in self._inputs.items():
+            problem = problems.get(name)
+            if (shown.props.get("error-message") or None) != problem:
+                shown.props["error"], shown.props["error-message"] = problem is not None, problem
+                shown.update()
+
+    def _field(self, key: PlanKey) -> ui.input | ui.select:
+        name = key.path.rpartition(".")[2]
+        label = f"{name}, {key.unit}" if key.unit else name
+        default = "Required." if key.required else f"Default: {key.default or 'none'}."
+
+        def commit() -> None:
+            value = shown.value or ""
+            if str(value) != self._document.shown(_path(key.path)):
+                self._document.write(_path(key.path), str(value))
+                self._changed()
+
+        shown: ui.input | ui.select
+        if key.choices:
+            shown = ui.select([*key.choices], label=label, clearable=True)
+            shown.on_value_change(commit)
+        else:
+            shown = ui.input(label=label).on("keydown.enter", commit).on("blur", commit)
+        shown.props["hint"] = f"{key.description} {default}"
+        shown.props(f'dense bottom-slots data-key="{key.path}"').classes("w-full")
+        return shown
+
+
+def _path(name: str) -> Path:
+    return tuple(name.split("."))

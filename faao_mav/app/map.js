@@ -1,0 +1,215 @@
+// The map of the planner page: what is dragged and drawn here is told to the server, which answers
+// with the flight. Coordinates are [latitude, longitude] in degrees, radii metres.
+import { leaflet as L } from "nicegui-leaflet";
+import { loadResource } from "../../static/utils/resources.js";
+
+const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [200, 220, 50]];
+const SHADES = 20; // colours of the route
+const PERIOD = 50; // milliseconds between two reports of one drag
+const NUDGE = 10, FINE = 1; // pixels by which an arrow key moves a marker, and with Shift
+
+function colour(share) {
+  const x = Math.min(0.999, Math.max(0, share)) * (VIRIDIS.length - 1), k = Math.floor(x);
+  const mixed = VIRIDIS[k].map((c, i) => Math.round(c + (x - k) * (VIRIDIS[k + 1][i] - c)));
+  return `rgb(${mixed.join(",")})`;
+}
+
+const pair = (p) => [p.lat, p.lng];
+
+function icon(kind, label = "") {
+  const text = document.createElement("span");
+  text.textContent = label;
+  return L.divIcon({ className: `mark mark-${kind}`, html: text, iconSize: [18, 18] });
+}
+
+export default {
+  template: '<div class="planner-map" role="application" aria-label="Map"></div>',
+  props: { resourcePath: String },
+  async mounted() {
+    await this.$nextTick();
+    await loadResource(`${window.path_prefix}${this.resourcePath}/leaflet/leaflet.css`);
+    this.map = L.map(this.$el, { zoomSnap: 0.25, doubleClickZoom: false, center: [0, 0], zoom: 2 });
+    this.map.attributionControl.setPrefix(false);
+    L.control.scale({ imperial: false }).addTo(this.map);
+    const legend = L.control({ position: "topright" });
+    legend.onAdd = () => (this.speeds = L.DomUtil.create("div", "speeds"));
+    legend.addTo(this.map);
+    const group = () => L.layerGroup().addTo(this.map);
+    Object.assign(this, { zones: group(), route: group(), marks: group(), handles: group() });
+    this.aircraft = L.marker([0, 0], { icon: icon("aircraft", "✈"), interactive: false, zIndexOffset: 900 });
+    this.map.on("mousemove", (e) => this.tell("cursor", { at: pair(e.latlng) }));
+    this.map.on("click", (e) => (this.drawing ? this.corner(e.latlng) : this.select(null)));
+    this.map.on("dblclick", () => this.finish());
+    this.$el.addEventListener("keydown", (e) => {
+      if (e.key === "Escape") this.draw(null);
+      if (e.key === "Enter" && this.drawing) this.finish();
+      if (e.key === "Delete" && this.selected) this.$emit("removed", { key: this.selected });
+    });
+    this.watching = new ResizeObserver(() => this.map.invalidateSize());
+    this.watching.observe(this.$el);
+    this.$emit("ready");
+  },
+  unmounted() {
+    this.watching?.disconnect();
+    this.map?.remove();
+  },
+  methods: {
+    // Report at most every PERIOD, and the last of several always.
+    tell(event, what) {
+      const last = (this.told ??= {})[event] ?? { at: -PERIOD };
+      clearTimeout(last.waiting);
+      const wait = what.done ? 0 : PERIOD - (performance.now() - last.at);
+      const waiting = wait > 0 ? setTimeout(() => this.tell(event, what), wait) : null;
+      this.told[event] = { at: waiting ? last.at : performance.now(), waiting };
+      if (!waiting) this.$emit(event, what);
+    },
+    draggable(at, kind, label, title, moved) {
+      const marker = L.marker(at, { icon: icon(kind, label), draggable: true, title, alt: title, keyboard: true });
+      marker.on("dragstart", () => (this.dragging = true));
+      marker.on("drag", () => moved(marker.getLatLng(), false));
+      marker.on("dragend", () => {
+        this.dragging = false;
+        moved(marker.getLatLng(), true);
+      });
+      marker.on("keydown", (e) => {
+        const way = { ArrowUp: [0, -1], ArrowDown: [0, 1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] }[e.originalEvent.key];
+        if (!way) return;
+        L.DomEvent.stop(e.originalEvent);
+        const size = e.originalEvent.shiftKey ? FINE : NUDGE;
+        const place = this.map.latLngToContainerPoint(marker.getLatLng()).add(L.point(way).multiplyBy(size));
+        marker.setLatLng(this.map.containerPointToLatLng(place));
+        moved(marker.getLatLng(), true);
+      });
+      return marker;
+    },
+    // What the plan says: stations, ends and zones. During a drag the page knows better.
+    scene(stations, zones, fit) {
+      if (this.dragging) return;
+      const focused = document.activeElement?.title;
+      this.marks.clearLayers();
+      for (const { key, kind, label, at } of stations) {
+        const moved = (to, done) => this.tell("moved", { key, at: pair(to), done });
+        this.draggable(at, kind, label, label, moved).addTo(this.marks);
+      }
+      if (focused) this.$el.querySelector(`[title="${CSS.escape(focused)}"]`)?.focus();
+      this.shapes = zones;
+      this.show_zones();
+      if (fit && stations.length) this.map.fitBounds(L.latLngBounds(stations.map((s) => s.at)).pad(0.35));
+    },
+    show_zones() {
+      this.zones.clearLayers();
+      for (const zone of this.shapes) {
+        const style = { className: zone.inclusion ? "zone-in" : "zone-out", bubblingMouseEvents: false, fill: !zone.inclusion };
+        const shape = zone.center ? L.circle(zone.center, { ...style, radius: zone.radius }) : L.polygon(zone.corners, style);
+        shape.on("click", (e) => (this.drawing ? this.corner(e.latlng) : this.select(zone.key))).addTo(this.zones);
+        zone.shape = shape;
+      }
+      this.select(this.shapes.some((zone) => zone.key === this.selected) ? this.selected : null);
+    },
+    select(key) {
+      this.selected = key;
+      this.handles.clearLayers();
+      const zone = this.shapes?.find((each) => each.key === key);
+      if (!zone) return;
+      const change = (done) => {
+        const { inclusion, center, radius, corners } = zone;
+        this.tell("zone", { key, inclusion, center, radius, corners, done });
+      };
+      const middle = zone.center ?? pair(zone.shape.getBounds().getCenter());
+      let last = middle;
+      this.draggable(middle, "move", "✥", "Move the zone", (to, done) => {
+        const by = [to.lat - last[0], to.lng - last[1]];
+        last = pair(to);
+        if (zone.center) zone.shape.setLatLng((zone.center = pair(to)));
+        else zone.shape.setLatLngs((zone.corners = zone.corners.map((c) => [c[0] + by[0], c[1] + by[1]])));
+        change(done);
+      }).addTo(this.handles);
+      if (zone.center) {
+        const edge = [middle[0], zone.shape.getBounds().getEast()];
+        this.draggable(edge, "corner", "", "Radius", (to, done) => {
+          zone.shape.setRadius((zone.radius = this.map.distance(zone.center, to)));
+          change(done);
+        }).addTo(this.handles);
+      }
+      zone.corners?.forEach((corner, k) =>
+        this.draggable(corner, "corner", "", `Corner ${k + 1}`, (to, done) => {
+          zone.corners[k] = pair(to);
+          zone.shape.setLatLngs(zone.corners);
+          change(done);
+        }).addTo(this.handles),
+      );
+    },
+    remove_selected() {
+      if (this.selected) this.$emit("removed", { key: this.selected });
+    },
+    // Begin to draw a "polygon" or a "circle" to stay in or out of; null ends without one.
+    draw(kind, inclusion) {
+      this.drawing = kind ? { kind, inclusion, points: [] } : null;
+      this.handles.clearLayers();
+      this.$el.classList.toggle("drawing", !!kind);
+    },
+    corner(at) {
+      const { kind, points } = this.drawing;
+      const last = points.at(-1);
+      if (last && this.map.latLngToContainerPoint(last).distanceTo(this.map.latLngToContainerPoint(at)) < 4) return;
+      points.push(at);
+      L.circleMarker(at, { radius: 4, interactive: false }).addTo(this.handles);
+      if (points.length > 1) L.polyline(points.slice(-2), { interactive: false, dashArray: "4" }).addTo(this.handles);
+      if (kind === "circle" && points.length === 2) this.finish();
+    },
+    finish() {
+      if (!this.drawing) return;
+      const { kind, inclusion, points } = this.drawing;
+      this.draw(null);
+      if (kind === "circle" && points.length === 2) {
+        this.$emit("zone", { key: null, inclusion, center: pair(points[0]), radius: this.map.distance(...points), done: true });
+      } else if (kind === "polygon" && points.length > 2) {
+        this.$emit("zone", { key: null, inclusion, corners: points.map(pair), done: true });
+      }
+    },
+    // The flight: planned route coloured by speed, predicted track, waypoints, margin of the fence.
+    flight({ places, speeds, top, track, waypoints, margin, fixed }) {
+      this.route.clearLayers();
+      const line = (points, className, more = {}) =>
+        L.polyline(points, { className, interactive: false, ...more }).addTo(this.route);
+      for (const ring of margin) line(ring, "margin");
+      for (const ring of fixed) line(ring, "zone-file");
+      const shade = (k) => Math.round((SHADES * (speeds[k] + speeds[k + 1])) / (2 * top));
+      for (let k = 0, from = 0; k + 1 < places.length; k++) {
+        if (k + 2 < places.length && shade(k + 1) === shade(k)) continue;
+        line(places.slice(from, k + 2), "route", { color: colour(shade(k) / SHADES), weight: 5 });
+        from = k + 1;
+      }
+      if (track.length) line(track, "track");
+      const shades = VIRIDIS.map((_, k) => colour(k / (VIRIDIS.length - 1)));
+      this.speeds.innerHTML = `0<b style="background: linear-gradient(to right, ${shades})"></b>${Number(top).toFixed(1)} m/s`;
+      const labelled = [];
+      for (const [number, at] of waypoints) {
+        const here = this.map.latLngToContainerPoint(at);
+        const apart = labelled.every((other) => here.distanceTo(other) > 18); // pixels; numbers do not overlap
+        if (apart) labelled.push(here);
+        const html = `<b></b>${apart ? `<i>${Number(number)}</i>` : ""}`;
+        L.marker(at, { icon: L.divIcon({ className: "waypoint", html, iconSize: [0, 0] }), interactive: false, keyboard: false }).addTo(this.route);
+      }
+      this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;
+    },
+    clear_flight() {
+      this.route.clearLayers();
+      this.speeds.innerHTML = "";
+      this.aircraft.remove();
+    },
+    place_aircraft(at) {
+      if (at) this.aircraft.setLatLng(at).addTo(this.map);
+      else this.aircraft.remove();
+    },
+    focus(at) {
+      this.map.setView(at, Math.max(this.map.getZoom(), 17));
+      const ring = L.circleMarker(at, { radius: 16, className: "found", interactive: false }).addTo(this.map);
+      setTimeout(() => ring.remove(), 2500);
+    },
+    background(url, attribution) {
+      this.tiles?.remove();
+      this.tiles = url ? L.tileLayer(url, { attribution, maxZoom: 22, maxNativeZoom: 19 }).addTo(this.map) : null;
+    },
+  },
+};

@@ -1,0 +1,294 @@
+"""The page of one window: the map, the plan beside it, what the flight delivers, and its files."""
+
+from collections.abc import Callable
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from nicegui import events, ui
+
+from faao_mav.app import charts
+from faao_mav.app.answers import FILES, Answer, made
+from faao_mav.app.document import Document, problems_of
+from faao_mav.app.form import Form, fields
+from faao_mav.app.guard import TILES
+from faao_mav.app.map import PlannerMap
+from faao_mav.app.planner import Planner
+from faao_mav.app.results import Results
+from faao_mav.app.scene import STATIONS, Scene
+from faao_mav.app.workers import Workers
+from faao_mav.errors import FaaoError, PlanError
+from faao_mav.plan.yaml_text import MAX_CHARACTERS
+
+_ATTRIBUTION = '&copy; <a href="https://openstreetmap.org/copyright">OpenStreetMap</a> contributors'
+
+_HINTS = {
+    "circle": "Click the center, then the edge; Esc ends.",
+    "polygon": "Click the corners, the last one twice; Esc ends.",
+}
+
+_STATES = {
+    "computing": "computing",
+    "rough": "rough, computing",
+    "finished": "finished",
+    "refused": "not a plan yet",
+    "failed": "no flight",
+}
+"""What the page says of the answer that it shows."""
+
+
+class Page:
+    """One window: its own document, its own answers.
+
+    Setup, once: `build`; then each event changes the document and ends in `_changed`, which asks
+    for answers; `_show` takes them.
+    """
+
+    def __init__(self, document: Document, workers: Workers) -> None:
+        self._document, self._workers = document, workers
+        self._planner = Planner(workers, self._show)
+        self._answer, self._gestures = Answer(), 0
+        self._form = Form(document, self._changed)
+
+    def build(self) -> None:
+        """Make the elements of the page."""
+        ui.add_css(files("faao_mav.app").joinpath("page.css").read_text(encoding="utf-8"))
+        self._dark = ui.dark_mode(None)
+        self._bar()
+        with ui.element("main").classes("planner"):
+            with ui.element("section").classes("left"):
+                self._map_part()
+            with ui.element("section").classes("right"):
+                self._side_part()
+        ui.keyboard(self._key)
+        # not on_disconnect: a connection that was lost for a moment comes back
+        ui.context.client.on_delete(self._planner.close)
+
+    def _bar(self) -> None:
+        with ui.element("header").classes("bar"):
+            self._name = ui.label().classes("name")
+            with ui.element("div").classes("told").props('aria-live="polite"'):
+                self._rate = ui.label().classes("rate")
+                self._state = ui.label().classes("state")
+            ui.space()
+            self._undo = _button("undo", "Undo (Ctrl+Z)", self._document.undo, self._changed)
+            self._redo = _button("redo", "Redo (Ctrl+Y)", self._document.redo, self._changed)
+            _button("folder_open", "Open a plan", self._open_dialog)
+            self._save_button = _button("save", "Save (Ctrl+S)", self._save)
+            with _button("download", "Download"), ui.menu():
+                ui.menu_item(
+                    "Plan (.yaml)",
+                    lambda: ui.download.content(
+                        self._document.text, Path(self._document.source).name
+                    ),
+                )
+                for wanted, (label, _) in FILES.items():
+                    ui.menu_item(label, partial(self._download, wanted))
+            _button("dark_mode", "Light or dark", self._dark.toggle)
+
+    def _map_part(self) -> None:
+        self._map = PlannerMap()
+        call = self._map.run_method
+        with ui.element("div").classes("tools"):
+            for inside, name in ((False, "Stay out"), (True, "Stay in")):
+                with ui.element("div").classes("in" if inside else "out"):
+                    ui.label(name)
+                    for shape, icon in (("circle", "o_circle"), ("polygon", "o_hexagon")):
+                        _button(icon, f"{name} of a {shape}" if not inside else f"{name} a {shape}",
+                                partial(call, "draw", shape, inside),
+                                partial(self._hint, _HINTS[shape]))  # fmt: skip
+            _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
+            _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
+            ui.switch("Background", on_change=self._background).tooltip(
+                "OpenStreetMap: the parts of the map that you look at are asked for from "
+                f"{TILES.removeprefix('https://')}"
+            )
+        self._map.move(target_index=-1)
+        self._map.on("ready", self._ready)
+        self._map.on("moved", self._moved)
+        self._map.on("zone", self._moved)
+        self._map.on("removed", self._removed)
+        self._map.on("cursor", lambda e: self._cursor(e.args["at"]))
+        self._where = ui.label("Drag the stations and the ends, or draw zones.").classes("where")
+        with ui.element("div").classes("time"):
+            self._slider = ui.slider(min=0, max=1, value=0, on_change=self._at_time)
+            self._slider.props('aria-label="Time of the flight"')
+            self._now = ui.label().classes("now")
+        self._chart, self._heights = ui.echart({}).classes("charts"), ""
+
+    def _side_part(self) -> None:
+        self._failed = ui.label().classes("failed").props('role="alert"')
+        with ui.tabs().props("dense no-caps align=justify") as tabs:
+            for tab in ("Plan", "Result", "Findings", "Upload"):
+                ui.tab(tab)
+        with ui.tab_panels(tabs, value="Plan", keep_alive=True).classes("w-full"):
+            with ui.tab_panel("Plan"):
+                self._form.build()
+            self._results = Results(partial(self._map.run_method, "focus"))
+
+    def _ready(self) -> None:
+        self._draw_scene(fit=True)
+        self._changed(soon=False)
+
+    def _changed(self, *, soon: bool = True) -> None:
+        """Ask for what the document leads to; what was found before is no longer of it."""
+        document = self._document
+        self._answer = Answer(drawing=self._answer.drawing, series=self._answer.series)
+        self._form.show()
+        self._draw_scene()
+        self._name.text = document.shown(("name",)) or Path(document.source).name
+        self._undo.set_enabled(document.can_undo)
+        self._redo.set_enabled(document.can_redo)
+        self._save_button.set_enabled(document.path is not None and not document.saved)
+        self._results.stale()
+        self._say("computing")
+        self._planner.ask(document.text, document.source, soon=soon)
+
+    def _say(self, state: str) -> None:
+        self._state.text = _STATES[state]
+        self._state.props["data-state"] = state
+        self._state.update()
+
+    def _show(self, answer: Answer) -> None:
+        problems = {}
+        if answer.refused:
+            paths = [key.path for key in fields()]
+            problems = problems_of(PlanError(answer.refused), self._document.source, paths)
+        self._form.tell(problems)
+        self._failed.text = answer.failed or "\n".join(
+            f"{path}: {problem}" if path else problem for path, problem in problems.items()
+        )
+        if not answer.drawing:
+            self._rate.text = ""
+            self._say("refused" if problems else "failed")
+            self._map.run_method("clear_flight")
+            return
+        self._answer = answer
+        data = "" if answer.megabytes is None else f", {answer.megabytes:,.1f} MB"
+        self._rate.text = f"{answer.delivered:.4f} bit/s/Hz{data}"
+        self._rate.props["data-delivered"] = repr(answer.delivered)
+        self._say("finished" if answer.result is not None else "rough")
+        self._map.run_method("flight", answer.drawing)
+        unit, heights = (
+            "bit/Hz" if answer.megabytes is None else "MB",
+            charts.heights(answer.series),
+        )
+        others = heights != self._heights  # other plots than before
+        if others:
+            self._heights = heights
+            self._chart.style(replace=heights)
+        # behind the route, which is to be drawn first
+        self._chart.run_chart_method("setOption", charts.options(answer.series, unit), others)
+        self._slider.props["max"] = len(answer.series["t"]) - 1
+        self._slider.update()
+        self._at_time()
+        if answer.result is not None:
+            self._results.show(answer.result)
+
+    def _draw_scene(self, *, fit: bool = False) -> None:
+        scene = Scene(self._document)
+        self._map.run_method("scene", scene.stations(), scene.zones(), fit)
+
+    def _moved(self, event: events.GenericEventArguments) -> None:
+        """Take a station, or a zone, to where it was dragged; a whole drag is one step of undo."""
+        told, scene = event.args, Scene(self._document)
+        gesture = (told["key"], self._gestures)
+        if told["key"] in STATIONS:
+            scene.move(told["key"], told["at"], gesture)
+            self._cursor(told["at"])
+        else:
+            scene.change(told, gesture)
+        self._gestures += bool(told["done"])
+        self._changed()
+
+    def _removed(self, event: events.GenericEventArguments) -> None:
+        Scene(self._document).remove(event.args["key"])
+        self._changed()
+
+    def _cursor(self, at: list[float]) -> None:
+        if (frame := (scene := Scene(self._document)).frame) is None:
+            return
+        here = frame.to_local(*at)
+        text = f"{here[0]:.1f} m east, {here[1]:.1f} m north ({at[0]:.6f}, {at[1]:.6f})"
+        for station in scene.stations()[:2]:
+            apart = np.hypot(*(here - frame.to_local(*station["at"])))
+            text += f"; {station['label'].lower()} {apart:.0f} m"
+        self._hint(text)
+
+    def _hint(self, text: str) -> None:
+        self._where.text = text
+
+    def _at_time(self) -> None:
+        series, k = self._answer.series, int(self._slider.value)
+        if not k or k >= len(series.get("t", ())):
+            self._map.run_method("place_aircraft", None)
+            return
+        self._map.run_method("place_aircraft", self._answer.drawing["places"][k])
+        tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
+        self._chart.run_chart_method("dispatchAction", tip)
+        self._now.text = f"{series['t'][k]:.1f} s, {series['speed'][k]:.2f} m/s"
+
+    def _background(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        url = f"{TILES}/{{z}}/{{x}}/{{y}}.png" if event.value else None
+        self._map.run_method("background", url, _ATTRIBUTION)
+
+    def _key(self, event: events.KeyEventArguments) -> None:
+        if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):
+            return
+        if event.key == "s":
+            self._save()
+        elif event.key in ("y", "Z", "z"):
+            back = event.key == "z" and not event.modifiers.shift
+            (self._document.undo if back else self._document.redo)()
+            self._changed()
+
+    def _open_dialog(self) -> None:
+        async def opened(event: events.UploadEventArguments) -> None:
+            try:
+                content = (await event.file.read()).decode("utf-8-sig")
+                self._document.replace(content, event.file.name)
+            except (PlanError, UnicodeDecodeError) as error:
+                _complain(error)
+                return
+            dialog.close()
+            self._ready()
+
+        with ui.dialog() as dialog, ui.card():
+            ui.label("Open a plan")
+            chosen = ui.upload(on_upload=opened, auto_upload=True, max_file_size=4 * MAX_CHARACTERS)
+            chosen.props("accept=.yaml,.yml flat bordered")
+        dialog.open()
+
+    def _save(self) -> None:
+        if self._document.path is None:
+            ui.notify("This plan is of no file here: download it", type="warning")
+            return
+        try:
+            self._document.save()
+        except FaaoError as error:
+            _complain(error)
+            return
+        self._save_button.set_enabled(False)
+        ui.notify(f"{self._document.path.name} saved", type="positive")
+
+    async def _download(self, wanted: str) -> None:
+        if self._answer.result is None:
+            ui.notify("The flight is not finished yet", type="warning")
+            return
+        try:
+            name, content = await self._workers.long(made, self._answer.result, wanted)
+        except FaaoError as error:
+            _complain(error)
+            return
+        ui.download.content(content, name)
+
+
+def _button(icon: str, tip: str, *acts: Callable[[], object]) -> ui.button:
+    button = ui.button(icon=icon, on_click=lambda: [act() for act in acts])
+    return button.props(f'flat dense round aria-label="{tip}"').tooltip(tip)
+
+
+def _complain(error: Exception) -> None:
+    ui.notify(str(error), type="negative", multi_line=True)

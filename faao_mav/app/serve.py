@@ -1,0 +1,100 @@
+"""The server of the page: a port on loopback, and the address with the token in it."""
+
+import asyncio
+import contextlib
+import secrets
+import socket
+import tempfile
+import webbrowser
+from collections.abc import Callable, Iterator
+from html import escape
+from pathlib import Path
+
+from faao_mav.app.document import Document
+from faao_mav.errors import FaaoError, InputError
+
+LOOPBACK = ("127.0.0.1", "localhost")
+"""The names under which this machine reaches itself."""
+
+_TOKEN_BYTES = 24
+
+
+def serve(
+    begin: Callable[[], Document],
+    *,
+    host: str,
+    port: int,
+    browser: bool,
+    note: Callable[[str], None],
+) -> None:
+    """Serve the page until interrupted; each window `begin`s with a document of its own.
+
+    `port` 0 stands for any that is free. `note` is told the address, with the token in it; with
+    `browser` that is opened. Raises `InputError` where the port cannot be had, or NiceGUI, which
+    the extra `app` brings, is not installed.
+    """
+    try:
+        import nicegui  # noqa: F401
+        import uvicorn
+    except ImportError:
+        raise InputError(
+            "faao-mission app: the page is served by nicegui: pip install 'faao-mav[app]'"
+        ) from None
+    from fastapi import FastAPI
+    from nicegui import ui
+
+    from faao_mav.app.guard import Guard
+    from faao_mav.app.page import Page
+    from faao_mav.app.workers import Workers
+
+    listening = _bound(host, port)
+    port = listening.getsockname()[1]
+    token, workers = secrets.token_urlsafe(_TOKEN_BYTES), Workers()
+
+    @ui.page("/", title="faao-mission")
+    def page() -> None:
+        try:
+            Page(begin(), workers).build()
+        except FaaoError as error:  # the file is another one by now
+            ui.label(str(error))
+
+    inner = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    ui.run_with(inner, dark=None, show_welcome_message=False)
+    names = LOOPBACK if host in LOOPBACK else (host, *LOOPBACK)
+    guarded = Guard(inner, token, names, port)
+    config = uvicorn.Config(guarded, log_level="warning", server_header=False, lifespan="on")
+    server = uvicorn.Server(config)
+    address = f"http://{host}:{port}/?token={token}"
+    note(f"the page is at {address}")
+    try:
+        with _opened(address) if browser else contextlib.nullcontext():
+            asyncio.run(server.serve(sockets=[listening]))
+    except KeyboardInterrupt:
+        note("ended")
+    finally:
+        workers.stop()
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listening = socket.socket(family, kind)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+    except OSError as error:
+        raise InputError(f"--host {host} --port {port}: {error.strerror or error}") from None
+    return listening
+
+
+@contextlib.contextmanager
+def _opened(address: str) -> Iterator[None]:
+    """Open `address` in the browser by way of a file that its user alone can read.
+
+    The arguments of a process are seen by every user of the machine, and so would be the token.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "open.html"
+        page.touch(mode=0o600)
+        page.write_text(f'<meta http-equiv="refresh" content="0;url={escape(address)}">')
+        webbrowser.open(page.as_uri())
+        yield

@@ -1,0 +1,86 @@
+"""The processes that compute for the page, so that nothing blocks it and what is stale ends."""
+
+import asyncio
+import multiprocessing
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+from faao_mav.errors import FaaoError
+
+T = TypeVar("T")
+
+_PRELOADED = ("faao_mav.app.answers", "faao_mav.report", "scipy.interpolate", "shapely", "pyproj")
+"""What a job would else import again: modules that `plan_mission` and the report page use."""
+
+_NICE = 10
+"""By how much long jobs give way to the page and to short ones. Chosen."""
+
+_ENDED = "the process that computes has ended; change the plan again"
+
+
+class Workers:
+    """One process that stays, for short jobs that share tables, and one for each long job.
+
+    Setup, once: `Workers()`, which begins to load what jobs need; per job: `short` or `long`;
+    at the end: `stop`. A long job whose wait is cancelled ends at once: its process is killed.
+    """
+
+    def __init__(self) -> None:
+        # a fork of a server with threads may deadlock; Windows has no server to fork from
+        forks = "forkserver" in multiprocessing.get_all_start_methods()
+        self._context: Any = multiprocessing.get_context("forkserver" if forks else "spawn")
+        if forks:
+            from multiprocessing.forkserver import ensure_running
+
+            self._context.set_forkserver_preload(["__main__", *_PRELOADED])
+            ensure_running()
+        self._pool: ProcessPoolExecutor | None = None
+        self._free = asyncio.Semaphore(max(1, (os.cpu_count() or 2) - 1))
+
+    async def short(self, work: Callable[..., T], *arguments: Any) -> T:
+        """Return what `work` returns of the process that stays; where that died, of a new one."""
+        pool = self._pool = self._pool or ProcessPoolExecutor(1, mp_context=self._context)
+        try:
+            return await asyncio.get_running_loop().run_in_executor(pool, work, *arguments)
+        except BrokenProcessPool:
+            if self._pool is pool:
+                self._pool = None
+            raise FaaoError(_ENDED) from None
+
+    async def long(self, work: Callable[..., T], *arguments: Any) -> T:
+        """Return what `work` returns, or raise what it raises, of a process of its own."""
+        async with self._free:
+            receiver, sender = self._context.Pipe(duplex=False)
+            process = self._context.Process(target=_job, args=(sender, work, arguments))
+            process.daemon = True
+            process.start()
+            sender.close()
+            try:
+                # a process that is killed closes its end: the thread that waits ends too
+                done, value = await asyncio.to_thread(receiver.recv)
+            except EOFError:
+                raise FaaoError(_ENDED) from None
+            finally:
+                process.kill()
+        if not done:
+            raise value
+        return value  # type: ignore[no-any-return]
+
+    def stop(self) -> None:
+        """End the process that stays; those of long jobs end with their waits."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _job(sender: Connection, work: Callable[..., object], arguments: tuple[object, ...]) -> None:
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    try:
+        outcome: tuple[bool, object] = True, work(*arguments)
+    except Exception as error:  # told to whom has asked
+        outcome = False, error
+    sender.send(outcome)

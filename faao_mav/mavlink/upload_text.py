@@ -1,0 +1,36 @@
+"""An upload in words: the lines of the terminal and of the planner page."""
+
+from faao_mav.mavlink.client import UploadReport
+from faao_mav.mavlink.transfer.session import PartReport
+from faao_mav.mavlink.transfer.verify import Difference
+
+
+def upload_text(report: UploadReport) -> str:
+    """Return `report` for people."""
+    lines = [f"vehicle      {report.vehicle}"]
+    lines += [_part_line(part) for part in report.parts if part.verified]
+    for part in report.parts:
+        lines += [f"not kept     {text}" for text in _dropped(part)]
+    lines += [f"failed       {problem}" for problem in report.problems]
+    if report.verified:
+        lines.append(f"verified     read back and compared, {report.seconds:.1f} s")
+    return "\n".join(lines)
+
+
+def _dropped(part: PartReport) -> list[str]:
+    """Return what storage lost, one line for each field."""
+    lost: dict[str, list[Difference]] = {}
+    for each in part.differences:
+        if each.kind == "dropped":
+            lost.setdefault(each.field, []).append(each)
+    return [
+        str(each[0]) + (f" (and so in {len(each) - 1} more items)" if len(each) > 1 else "")
+        for each in lost.values()
+    ]
+
+
+def _part_line(part: PartReport) -> str:
+    what = "items" if part.items != 1 else "item"
+    again = "" if part.attempts == 1 else f", in {part.attempts} attempts"
+    title = {"rally points": "rally"}.get(part.part.title, part.part.title)
+    return f"{title:<13}{part.items} {what} stored{again}"

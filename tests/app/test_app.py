@@ -1,0 +1,312 @@
+"""The planner page in a real Chromium: what is dragged and drawn, told, downloaded and uploaded."""
+
+import json
+import math
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import FLYABLE, free_port
+from served import running
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.errors import PlanError
+from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mission.item import Home
+from faao_mav.plan import parse_plan
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext, Page
+
+CHROMIUM = shutil.which("chromium")
+pytest.importorskip("nicegui", reason="the extra app is not installed")
+playwright = pytest.importorskip("playwright.sync_api", reason="no playwright to drive a browser")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium to show the page with")
+
+PLAN = "# a comment that stays" + FLYABLE.replace("  causal: false\n", "").replace(
+    "duration: 10", "duration: 14"
+)
+HOME = Home(-35.363262, 149.165237, 584.0)
+RUN = "from faao_mav.cli.main import run\nif __name__ == '__main__':\n    run()\n"
+WAIT = 40_000
+"""Milliseconds until something on the page has happened: the machine may be busy."""
+
+
+@dataclass
+class Served:
+    """A server of the page for `plan`, at `address` with the token."""
+
+    plan: Path
+    address: str
+    context: "BrowserContext"
+    troubles: list[str] = field(default_factory=list)
+
+    def window(self, width: int = 1200) -> "Page":
+        """A new window that shows the finished flight; what goes wrong in it is a trouble."""
+        page = self.context.new_page()
+        page.set_default_timeout(WAIT)
+        page.set_viewport_size({"width": width, "height": 800})
+        page.on("pageerror", lambda error: self.troubles.append(f"error: {error}"))
+        page.on("console", lambda said: self._said(said.type, said.text))
+        page.on("request", lambda request: self._requested(request.url))
+        page.goto(self.address)
+        finished(page)
+        return page
+
+    def _said(self, kind: str, text: str) -> None:
+        if kind in ("error", "warning"):
+            self.troubles.append(f"console: {text}")
+
+    def _requested(self, url: str) -> None:
+        here = self.address.partition("?")[0]
+        if not url.startswith((here, "data:", "blob:")):
+            self.troubles.append(f"request: {url}")
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("app")
+    plan, script = folder / "plan.yaml", folder / "run.py"
+    plan.write_text(PLAN)
+    script.write_text(RUN)
+    server = subprocess.Popen(
+        [sys.executable, str(script), "app", str(plan), "--no-browser"],
+        stderr=subprocess.PIPE, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )  # fmt: skip
+    try:
+        assert server.stderr is not None
+        found = re.search(r"http://\S+", server.stderr.readline())
+        assert found is not None
+        with playwright.sync_playwright() as driver:
+            browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            yield (here := Served(plan, found[0], browser.new_context()))
+            browser.close()
+        assert here.troubles == []
+    finally:
+        server.terminate()
+        server.communicate(timeout=60)
+
+
+@pytest.fixture
+def window(served: Served) -> Iterator["Page"]:
+    served.plan.write_text(PLAN)
+    page = served.window()
+    yield page
+    page.close()
+
+
+def finished(page: "Page") -> float:
+    """Wait until the page says that its answer is finished; return the delivered rate."""
+    page.wait_for_selector(".state[data-state=finished]")
+    return float(page.locator(".rate").get_attribute("data-delivered") or "nan")
+
+
+def route_of(page: "Page") -> list[str]:
+    """Return the lines of the route as they are drawn."""
+    lines = page.locator("path.route").evaluate_all("all => all.map(x => x.getAttribute('d'))")
+    assert lines
+    return [str(line) for line in lines]
+
+
+def drag(page: "Page", title: str, east: float, north: float) -> None:
+    """Drag a marker by some pixels, in steps as a hand does."""
+    box = page.locator(f'.mark[title="{title}"]').bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in range(1, 6):
+        page.mouse.move(x + k * east / 5, y - k * north / 5)
+    page.mouse.up()
+
+
+def saved(page: "Page", served: Served) -> str:
+    """Save what was changed; return the file's text. The server has then seen every change."""
+    page.locator(".bar .name").click()
+    save = page.locator('[aria-label="Save (Ctrl+S)"]')
+    save.and_(page.locator(":enabled")).wait_for()
+    page.keyboard.press("Control+s")
+    save.and_(page.locator(":disabled")).wait_for()
+    return served.plan.read_text()
+
+
+def command_line(*arguments: object) -> dict[str, Any]:
+    result = CliRunner().invoke(app, [*map(str, arguments), "--json"])
+    assert result.exit_code == 0, result.output
+    told: dict[str, Any] = json.loads(result.stdout)
+    return told
+
+
+def downloaded(page: "Page", label: str) -> bytes:
+    page.locator('[aria-label="Download"]').click()
+    with page.expect_download() as waiting:
+        page.get_by_text(label, exact=True).click()
+    path = waiting.value.path()
+    return Path(path).read_bytes()
+
+
+def test_a_dragged_user_changes_flight_and_rate_as_the_command_line_says(
+    window: "Page", served: Served, tmp_path: Path
+) -> None:
+    first, route = finished(window), route_of(window)
+    drag(window, "User", 200, 60)
+    text = saved(window, served)
+    rate = finished(window)
+    assert abs(rate - first) > 0.01
+    assert route_of(window) != route
+    assert text.startswith("# a comment that stays")
+    moved = parse_plan(text).radio.ground_user.position
+    assert math.dist(moved, (60, 60)) > 30
+    out = tmp_path / "mission.waypoints"
+    told = command_line(served.plan, "--out", out, "--precoders", tmp_path / "precoders.csv")
+    assert rate == pytest.approx(told["delivered_rate"], abs=1e-6)
+
+    # what is downloaded is what the command line writes
+    assert downloaded(window, "Mission, QGC WPL 110 (.waypoints)") == out.read_bytes()
+    assert downloaded(window, "Parameters") == (tmp_path / "mission.param").read_bytes()
+    assert downloaded(window, "Precoders (.csv)") == (tmp_path / "precoders.csv").read_bytes()
+    assert downloaded(window, "Plan (.yaml)").decode() == text
+
+    # one drag is one step back
+    window.locator('[aria-label="Undo (Ctrl+Z)"]').click()
+    assert saved(window, served) == PLAN
+    assert finished(window) == pytest.approx(first, abs=1e-9)
+
+
+def test_the_route_goes_round_a_zone_that_is_drawn(
+    window: "Page", served: Served, tmp_path: Path
+) -> None:
+    ends = [window.locator(f'.mark[title="{name}"]').bounding_box() for name in ("Start", "End")]
+    assert all(ends)
+    x, y = (sum(box[axis] + 9 for box in ends if box) / 2 for axis in ("x", "y"))
+    window.locator('[aria-label="Stay out of a circle"]').click()
+    window.locator(".planner-map.drawing").wait_for()
+    window.mouse.click(x, y)
+    window.mouse.click(x + 40, y)
+    text = saved(window, served)
+    finished(window)
+    (zone,) = parse_plan(text).zones
+    assert zone.disc is not None
+    command_line(served.plan, "--save", tmp_path / "r.npz")
+    with np.load(tmp_path / "r.npz") as archive:
+        away = np.hypot(*(archive["w"] - zone.disc[:2]).T)
+    assert away.min() >= zone.disc[2] + 5 - 1e-6  # the margin
+    assert window.locator("path.margin").count() == 1
+    assert downloaded(window, "Fence")
+    window.locator("path.zone-out").click(position={"x": 3, "y": 40})
+    window.locator('.mark[title="Radius"]').wait_for()
+    window.locator('[aria-label^="Delete the chosen zone"]').click()
+    assert saved(window, served) == PLAN
+    assert window.locator("path.zone-out").count() == 0
+
+
+def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
+    window: "Page",
+) -> None:
+    window.get_by_text("vehicle", exact=True).click()
+    entry = window.locator('[data-key="vehicle.max_speed"]')
+    box = window.get_by_label("max_speed, m/s")
+    box.fill("-1")
+    box.press("Enter")
+    window.locator(".state[data-state=refused]").wait_for()
+    with pytest.raises(PlanError) as error:
+        parse_plan(PLAN.replace("max_speed: 10", "max_speed: -1"), "plan.yaml")
+    said = str(error.value).removeprefix("plan.yaml: vehicle.max_speed: ")
+    assert said in window.locator(".q-field--error").inner_text()
+    assert entry.count() == 1
+    box.fill("9.9")
+    box.press("Enter")
+    finished(window)
+    assert window.locator(".q-field--error").count() == 0
+
+
+def test_an_upload_to_the_mock_is_verified(window: "Page") -> None:
+    port = free_port()
+    with running(
+        MockAutopilot(behaviour_of("ardupilot"), home=HOME), f"udpin:127.0.0.1:{port}"
+    ) as mock:
+        window.get_by_role("tab", name="Upload").click()
+        window.get_by_label("Connection").fill(f"udpout:127.0.0.1:{port}")
+        window.get_by_role("button", name="Upload and verify").click()
+        told = window.locator(".uploaded", has_text="verified")
+        told.wait_for()
+        assert "read back and compared" in told.inner_text()
+    assert mock is not None
+
+
+def test_two_windows_do_not_disturb_each_other(window: "Page", served: Served) -> None:
+    other = served.window(width=390)
+    rate = finished(other)
+    drag(window, "Start", 60, 10)
+    saved(window, served)
+    assert finished(window) != rate
+    assert finished(other) == rate
+    # a phone shows it without scrolling sideways
+    assert other.evaluate("document.documentElement.scrollWidth") <= 390
+    # what another window has saved is not overwritten
+    text = served.plan.read_text()
+    other.locator(".bar .name").click()
+    other.keyboard.press("Control+s")
+    other.get_by_text("was changed since it was opened").wait_for()
+    assert served.plan.read_text() == text
+    other.close()
+
+
+def test_without_the_token_there_is_nothing_and_no_other_page_gets_in(served: Served) -> None:
+    here, _, query = served.address.partition("?")
+
+    def answer(address: str, **headers: str) -> int:
+        try:
+            with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as got:
+                return int(got.status)
+        except urllib.error.HTTPError as error:
+            return error.code
+
+    assert answer(here) == answer(f"{here}_nicegui/static/nicegui.js") == 403
+    socket_io = "_nicegui_ws/socket.io/?EIO=4&transport=polling"
+    assert answer(here + socket_io) == 403
+    port = here.rpartition(":")[2].strip("/")
+    cookie = f"faao-app-{port}={query.removeprefix('token=')}"
+    assert answer(here + socket_io, Cookie=cookie) == 200
+    assert answer(here + socket_io, Cookie=cookie, Origin="http://evil.org") == 403
+    with socket.socket() as elsewhere:  # it listens on loopback alone
+        elsewhere.settimeout(2)
+        with pytest.raises(OSError):
+            elsewhere.connect((_own_address(), int(port)))
+
+
+def _own_address() -> str:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # sends nothing
+        except OSError:
+            pytest.skip("no address beside loopback")
+        return str(probe.getsockname()[0])
+
+
+@pytest.mark.parametrize("arguments", [("--host", "256.1.1.1"), ("no.yaml",)])
+def test_what_cannot_be_served_is_refused(arguments: tuple[str, ...]) -> None:
+    result = CliRunner().invoke(app, ["app", "--no-browser", *arguments])
+    assert result.exit_code == 2
+    assert arguments[-1] in result.stderr
+
+
+def test_without_the_extra_the_command_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "nicegui", None)
+    result = CliRunner().invoke(app, ["app", "--no-browser"])
+    assert result.exit_code == 2
+    assert "pip install 'faao-mav[app]'" in result.stderr

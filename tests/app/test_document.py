@@ -1,0 +1,198 @@
+"""A plan that is edited: comments stay, changes are undone, zones are as plans have them."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import MISSIONS, SMALL
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.app.document import Document, problems_of
+from faao_mav.app.scene import Scene
+from faao_mav.errors import PlanError
+from faao_mav.plan import parse_plan
+from faao_mav.plan.keys import reference
+from faao_mav.plan.yaml_text import load_yaml
+
+SAMPLES = sorted(MISSIONS.glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
+def test_a_change_leaves_comments_and_all_other_values(path: Path) -> None:
+    text = path.read_text()
+    document = Document(text)
+    document.write(("flight", "altitude"), "77.5")
+    assert parse_plan(document.text).flight.altitude == 77.5
+    assert re.findall("#.*", document.text) == re.findall("#.*", text)
+    wanted = load_yaml(text, "p")
+    wanted["flight"]["altitude"] = 77.5
+    assert load_yaml(document.text, "p") == wanted
+
+
+def test_a_change_leaves_other_lines_as_they_were_written() -> None:
+    text = (MISSIONS / "fenced_relay.yaml").read_text()
+    document = Document(text)
+    document.write(("flight", "altitude"), "77.5")
+    assert document.text == text.replace("altitude: 100", "altitude: 77.5")
+
+
+def test_values_are_written_removed_undone_and_done_again() -> None:
+    document = Document("# top\nflight: {duration: 120}  # s\n")
+    document.write(("optimizer", "tolerance"), "1e-3")
+    document.write(("flight", "start"), "[0, 350]")
+    assert document.text == (
+        "# top\nflight: {duration: 120, start: [0, 350]} # s\noptimizer:\n  tolerance: 1e-3\n"
+    )
+    assert document.shown(("flight", "start")) == "[0, 350]"
+    document.write(("flight", "duration"), " ")
+    assert document.value(("flight", "duration")) is None
+    document.undo()
+    document.undo()
+    assert document.shown(("flight", "start")) == ""
+    assert (document.can_undo, document.can_redo) == (True, True)
+    document.redo()
+    assert document.shown(("flight", "start")) == "[0, 350]"
+    document.write(("name",), "x")
+    assert not document.can_redo
+    for _ in range(9):
+        document.undo()
+    assert document.text == "# top\nflight: {duration: 120}  # s\n"
+
+
+def test_a_drag_is_one_step_of_undo() -> None:
+    document = Document(SMALL)
+    for k in range(5):
+        document.put(("flight", "start"), [k, 50], "drag 1")
+    document.put(("flight", "start"), [9, 50], "drag 2")
+    document.undo()
+    assert document.value(("flight", "start")) == [4, 50]
+    document.undo()
+    assert document.text == SMALL
+
+
+@pytest.mark.parametrize("text", ["!!set {a}", "*a", "[1", "{a: 1, a: 2}", "- 1\n- "])
+def test_what_plans_do_not_hold_is_kept_as_text(text: str) -> None:
+    document = Document(SMALL)
+    document.write(("name",), text)
+    assert document.value(("name",)) in (text, [1, None])
+    document.undo()
+    assert document.text == SMALL
+
+
+def test_what_is_no_yaml_is_told_in_the_words_of_the_command_line() -> None:
+    document = Document(SMALL)
+    document.write(("flight", "start"), "[0, 3")
+    with pytest.raises(PlanError) as error:
+        parse_plan(document.text, "plan.yaml")
+    told = problems_of(error.value, "plan.yaml", [*reference()])
+    assert told.keys() == {"flight.start"}
+    assert told["flight.start"].startswith("'[0, 3': not two numbers")
+    assert str(error.value) == f"plan.yaml: flight.start: {told['flight.start']}"
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    value=st.recursive(
+        st.integers(-(10**6), 10**6)
+        | st.floats(-1e6, 1e6)
+        | st.booleans()
+        | st.text("ab:#- é", max_size=9),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from("abc"), inner),
+        max_leaves=6,
+    )
+)
+def test_what_is_put_in_is_read_again(value: Any) -> None:
+    document = Document(SMALL)
+    document.put(("vehicle", "parameters"), value)
+    read = load_yaml(document.text, "p")
+    assert read["vehicle"]["parameters"] == value
+    assert read["flight"] == load_yaml(SMALL, "p")["flight"]
+
+
+def test_zones_are_drawn_changed_and_removed() -> None:
+    document = Document(SMALL)
+    scene = Scene(document)
+    frame = scene.frame
+    assert frame is not None
+
+    def degrees(*place: float) -> list[float]:
+        return [float(x) for x in frame.to_geodetic(place)]
+
+    circle = {"center": degrees(20, 30), "radius": 4.0, "inclusion": False, "key": None}
+    square = [degrees(*p) for p in ((-90, -90), (90, -90), (90, 90), (-90, 90))]
+    inside = {"corners": square, "inclusion": True, "key": None}
+    for zone in (circle, inside):
+        scene.change(zone, None)
+    plan = parse_plan(document.text)
+    assert [zone.inclusion for zone in plan.zones] == [True, False]
+    assert document.value(("fence", "exclusion")) == [{"center": [20.0, 30.0], "radius": 4.0}]
+    shown = scene.zones()
+    assert [zone["key"] for zone in shown] == ["fence/inclusion/0", "fence/exclusion/0"]
+    scene.change({**shown[1], "radius": 7.0}, None)
+    assert document.value(("fence", "exclusion", 0, "radius")) == 7.0
+    scene.remove("fence/inclusion/0")
+    assert document.value(("fence", "inclusion")) is None
+    scene.remove("fence/exclusion/0")
+    assert document.value(("fence",)) is None
+    for _ in range(5):
+        document.undo()
+    assert document.text == SMALL
+
+
+def test_the_short_form_of_an_inclusion_becomes_a_list_with_a_second_one() -> None:
+    document = Document((MISSIONS / "fenced_relay.yaml").read_text())
+    scene = Scene(document)
+    (first, *_) = scene.zones()
+    assert first["key"] == "fence/inclusion"
+    scene.change(first, None)
+    assert len(document.value(("fence", "inclusion"))) == 4
+    scene.change({**first, "key": None}, None)
+    assert [len(zone["polygon"]) for zone in document.value(("fence", "inclusion"))] == [4, 4]
+    assert parse_plan(document.text).zones[0].inclusion
+
+
+def test_a_station_in_degrees_stays_in_degrees() -> None:
+    place = "{latitude: -35.363, longitude: 149.166}"
+    document = Document(SMALL.replace("position: [60, 60]", f"position: {place}"))
+    scene = Scene(document)
+    scene.move("user", [-35.3625, 149.1662], None)
+    scene.move("base", [-35.363262, 149.165237], None)
+    assert document.value(("radio", "ground_user", "position")) == {
+        "latitude": -35.3625,
+        "longitude": 149.1662,
+    }
+    assert document.value(("radio", "base_station", "position")) == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("origin", ["", "{latitude: 91, longitude: 1}", "[1]", "{latitude: a}"])
+def test_without_a_sound_origin_nothing_is_on_the_map(origin: str) -> None:
+    scene = Scene(Document(f"site: {{origin: {origin}}}\nfence: {{exclusion: 3}}\n"))
+    assert (scene.frame, scene.stations(), scene.zones()) == (None, [], [])
+
+
+def test_only_the_file_that_was_opened_is_saved_and_no_newer_one(tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    path.write_text(SMALL)
+    first, second = Document.open(path), Document.open(path)
+    for document, name in ((first, "a"), (second, "b")):
+        document.write(("name",), name)
+        assert not document.saved
+    first.save()
+    assert first.saved
+    assert path.read_text() == first.text
+    with pytest.raises(PlanError, match="was changed since"):
+        second.save()
+    first.replace("name: other\n", "other.yaml")
+    with pytest.raises(PlanError):
+        first.save()
+    assert load_yaml(path.read_text(), "p")["name"] == "a"
+
+
+def test_keys_of_one_word_have_choices() -> None:
+    known = reference()
+    assert known["goal.minimise"].choices == ("duration", "power")
+    assert known["radio.causal"].choices == ("true", "false")
+    assert known["optimizer.starts"].choices == ()  # a list of words
+    assert known["flight.start_velocity"].choices == ()  # a word or a velocity

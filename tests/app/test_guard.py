@@ -1,0 +1,103 @@
+"""Who may use the page: without the token, by another name or from another page nobody."""
+
+import asyncio
+from typing import Any
+
+import pytest
+
+pytest.importorskip("starlette", reason="the extra app is not installed")
+from faao_mav.app.guard import Guard
+
+TOKEN, HOST = "s3cret", "127.0.0.1:8000"
+COOKIE = f"faao-app-8000={TOKEN}"
+
+
+async def behind(scope: Any, receive: Any, send: Any) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.accept"})
+    else:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b"the page"})
+
+
+def ask(
+    path: str = "/", *, kind: str = "http", method: str = "GET", query: str = "", **headers: str
+) -> list[dict[str, Any]]:
+    scope = {
+        "type": kind,
+        "method": method,
+        "path": path,
+        "query_string": query.encode(),
+        "headers": [(k.encode(), v.encode()) for k, v in {"host": HOST, **headers}.items()],
+    }
+    sent: list[dict[str, Any]] = []
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    async def receive() -> Any:
+        raise AssertionError
+
+    guard = Guard(behind, TOKEN, ("127.0.0.1", "localhost"), 8000)
+    asyncio.run(guard(scope, receive, send))
+    return sent
+
+
+def status(*answer: Any, **asked: Any) -> int:
+    return int(ask(*answer, **asked)[0]["status"])
+
+
+def test_the_token_in_the_address_becomes_a_cookie_and_leaves_the_address() -> None:
+    start, _ = ask("//elsewhere.org", query=f"token={TOKEN}&a=b")
+    headers = dict(start["headers"])
+    assert start["status"] == 303
+    assert headers[b"location"] == b"/elsewhere.org?a=b"
+    cookie = {*headers[b"set-cookie"].decode().split("; ")}
+    assert cookie == {COOKIE, "Path=/", "HttpOnly", "SameSite=lax"}
+
+
+@pytest.mark.parametrize(
+    ("query", "cookie"),
+    [("", ""), ("token=", ""), ("token=s3cre", ""), ("", "faao-app-8000=x"),
+     ("", "faao-app-1=s3cret"), ("", "\x7f;;=")],
+)  # fmt: skip
+def test_another_user_of_the_machine_gets_nothing(query: str, cookie: str) -> None:
+    for path in ("/", "/_nicegui/x.js"):
+        answer = ask(path, query=query, cookie=cookie)
+        assert answer[0]["status"] == 403
+        assert b"the page" not in answer[1]["body"]
+    assert ask(kind="websocket", origin=f"http://{HOST}", cookie=cookie)[0]["type"] == (
+        "websocket.close"
+    )
+
+
+def test_the_page_itself_is_served_with_its_policy() -> None:
+    start, body = ask(cookie=f"other=1; {COOKIE}")
+    assert (start["status"], body["body"]) == (200, b"the page")
+    policy = dict(start["headers"])[b"content-security-policy"].decode()
+    assert "default-src 'self'" in policy
+    assert status(method="POST", origin=f"http://{HOST}", cookie=COOKIE) == 200
+    accepted = ask(
+        kind="websocket", origin="http://localhost:8000", host="localhost:8000", cookie=COOKIE
+    )
+    assert accepted[0]["type"] == "websocket.accept"
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.org", "null", "http://127.0.0.1:8001", f"http://{HOST}.evil.org"]
+)
+def test_a_page_from_elsewhere_can_neither_post_nor_open_a_websocket(origin: str) -> None:
+    assert status(method="POST", origin=origin, cookie=COOKIE) == 403
+    assert status(origin=origin, cookie=COOKIE) == 403
+    (closed,) = ask(kind="websocket", origin=origin, cookie=COOKIE)
+    assert (closed["type"], closed["code"]) == ("websocket.close", 1008)
+
+
+def test_a_post_without_an_origin_is_refused() -> None:
+    assert status(method="POST", cookie=COOKIE) == 403
+    assert ask(kind="websocket", cookie=COOKIE)[0]["type"] == "websocket.close"
+
+
+def test_no_other_name_leads_to_the_page() -> None:
+    assert status(host="evil.org:8000", cookie=COOKIE) == 403
+    assert status(host="127.0.0.1:1", query=f"token={TOKEN}") == 403

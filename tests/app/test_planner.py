@@ -1,0 +1,149 @@
+"""Which answers are shown, in whatever order they come, and what becomes of stale questions."""
+
+import asyncio
+import os
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from faao_mav.app import answers, planner
+from faao_mav.app.answers import Answer
+from faao_mav.app.planner import Order, Planner
+from faao_mav.app.workers import Workers
+from faao_mav.errors import FaaoError
+
+
+@given(st.data())
+def test_the_last_question_wins_and_finished_beats_rough(data: st.DataObject) -> None:
+    order, shown = Order(), (0, False)
+    for asks in data.draw(st.lists(st.booleans(), min_size=1, max_size=20)):
+        if asks:
+            order.ask()
+            continue
+        question = data.draw(st.integers(1, max(1, order.asked)))
+        answer = (question, data.draw(st.booleans()))
+        if order.take(question, finished=answer[1]):
+            assert answer > shown
+            assert not answer[1] or question == order.asked
+            shown = answer
+    if order.asked:  # the finished answer to the last question is shown, once
+        last = (order.asked, True)
+        assert order.take(order.asked, finished=True) == (shown != last)
+        assert not any(
+            order.take(k + 1, finished=f) for k in range(order.asked) for f in (False, True)
+        )
+
+
+class Held:
+    """Workers whose jobs are answered when the test says so."""
+
+    def __init__(self) -> None:
+        self.jobs: list[tuple[str, str, asyncio.Future[Answer]]] = []
+
+    async def short(self, work: Callable[..., Any], text: str, *_: Any) -> Answer:
+        self.jobs.append((work.__name__, text, asyncio.get_running_loop().create_future()))
+        return await self.jobs[-1][2]
+
+    long = short
+
+    async def answer(self, kind: str, text: str, answer: Answer | Exception | None = None) -> None:
+        await asyncio.sleep(0.001)
+        (future,) = [job for *asked, job in self.jobs if asked == [kind, text]]
+        if isinstance(answer, Exception):
+            future.set_exception(answer)
+        else:
+            future.set_result(answer or Answer(refused=f"{kind} {text}"))
+        await asyncio.sleep(0.001)
+
+    def kinds(self) -> list[tuple[str, str]]:
+        return [(kind, text) for kind, text, job in self.jobs if not job.done()]
+
+
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> Held:
+    monkeypatch.setattr(planner, "_REST", 0.0)
+    return Held()
+
+
+def shown_by(held: Held, script: Callable[[Planner], Any]) -> list[str]:
+    shown: list[str] = []
+
+    async def run() -> None:
+        asked = Planner(held, lambda a: shown.append(a.refused or a.failed))  # type: ignore[arg-type]
+        await script(asked)
+        asked.close()
+
+    asyncio.run(run())
+    return shown
+
+
+def test_a_rough_answer_after_the_finished_one_is_not_shown(held: Held) -> None:
+    async def script(asked: Planner) -> None:
+        asked.ask("a", "p")
+        await held.answer("finished", "a")
+        await held.answer("rough", "a")
+
+    assert shown_by(held, script) == ["finished a"]
+
+
+def test_a_drag_shows_rough_answers_and_the_finished_one_of_its_end(held: Held) -> None:
+    async def script(asked: Planner) -> None:
+        asked.ask("a", "p")
+        await asyncio.sleep(0.001)
+        asked.ask("b", "p")
+        asked.ask("c", "p")
+        await held.answer("rough", "a")  # of an older question, and the next is of the newest
+        await held.answer("finished", "c")
+        await held.answer("rough", "c")
+        assert held.kinds() == []
+        asked.ask("d", "p")
+        await held.answer("rough", "d")
+        await held.answer("finished", "d")
+
+    assert shown_by(held, script) == ["rough a", "finished c", "rough d", "finished d"]
+
+
+def test_a_question_that_goes_wrong_is_told_and_the_next_one_answered(held: Held) -> None:
+    async def script(asked: Planner) -> None:
+        asked.ask("a", "p")
+        await held.answer("rough", "a", ValueError("bug"))
+        await held.answer("finished", "a", ValueError("bug"))
+        asked.ask("b", "p")
+        await held.answer("rough", "b", Answer(failed="no flight, roughly"))
+        await held.answer("finished", "b", FaaoError("no flight"))
+
+    wrong, right = shown_by(held, script)
+    assert "ValueError('bug')" in wrong
+    assert right == "no flight"
+
+
+def test_a_long_job_ends_with_its_wait_and_its_death_is_told() -> None:
+    async def run() -> None:
+        workers = Workers()
+        try:
+            workers._free = asyncio.Semaphore(1)
+            stale = asyncio.create_task(workers.long(time.sleep, 3600))
+            await asyncio.sleep(0)
+            stale.cancel()
+            assert await workers.long(os.path.join, "a", "b") == "a/b"
+            with pytest.raises(FaaoError, match="has ended"):
+                await workers.long(os._exit, 3)
+            with pytest.raises(ZeroDivisionError):
+                await workers.long(divmod, 1, 0)
+            with pytest.raises(FaaoError, match="has ended"):
+                await workers.short(os._exit, 3)
+            assert await workers.short(partial(max, 1), 2) == 2
+        finally:
+            workers.stop()
+
+    asyncio.run(run())
+
+
+def test_answers_are_errors_where_a_plan_is_none() -> None:
+    assert "site" in answers.rough("name: x\n", "p", None).refused
+    assert "site" in answers.finished("name: x\n", "p").refused
