@@ -35,10 +35,6 @@ if TYPE_CHECKING:
 _PERIOD = 1.0
 """Seconds between two lines, by the world's clock and by the vehicle's (a simulator's is quick)."""
 
-_RATE = 5.0
-"""Positions a second that are asked for: at 8 m/s they are 1.6 m apart. With --radio there are two
-for each slot at least. Chosen."""
-
 _NO_VOLTAGE = 65_535
 """What SYS_STATUS says of a voltage that is not known."""
 
@@ -77,6 +73,7 @@ def fly(
     arguments or input.
     """
     from faao_mav.mavlink.flying.fly import fly as run
+    from faao_mav.mavlink.flying.telemetry import POSITION_RATE
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.report.summary import debriefing_lines, joined
 
@@ -93,9 +90,9 @@ def fly(
     feed = _Feed(solution, radio) if solution is not None and radio is not None else None
     track = None if stream else _predicted(mission_file, file, solution)
     telling = _Telling(solution, track, feed, as_json=as_json)
-    rate = rate if stream else _RATE
+    rate = rate if stream else POSITION_RATE
     if feed is not None:
-        rate = max(rate, feed.slots_per_second * 2)
+        rate = max(rate, feed.slots_per_second * 2)  # two positions for each slot at least
     report = run(
         file.mission,
         to,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.client import LinkOptions, Session
 from faao_mav.mavlink.discover import FoundVehicle
-from faao_mav.mavlink.flying.telemetry import Ending, Samples
+from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Samples
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Script
 from faao_mav.mavlink.protocol import MissionType
@@ -42,7 +42,7 @@ def fly(
     arm: bool = False,
     lands: bool = True,
     stream: "Solution | None" = None,
-    rate: float = 5.0,
+    rate: float = POSITION_RATE,
     watching: Callable[[Watch], object] = lambda _: None,
     **options: Unpack[LinkOptions],
 ) -> FlightReport:
@@ -51,9 +51,9 @@ def fly(
     It is armed and started only with `arm`; `lands` tells whether the flight ends on the ground:
     see `Watch`. With `stream` it is armed and flies that solution by setpoints, `rate` a second,
     instead of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
-    that it is asked for. `watching` is called after every
-    step. `options` are those of `LinkOptions`. Raises `LinkError` if there is no such vehicle, none
-    that is known here, or its mission cannot be read.
+    that it is asked for. `watching` is called after every step. `options` are those of
+    `LinkOptions`. Raises `LinkError` if there is no such vehicle, none that is known here, or its
+    mission cannot be read.
     """
     with Session(connection, options) as session:
         vehicle, peer = session.found, session.peer
@@ -78,7 +78,7 @@ def fly(
             watch: Watch = Stream(peer, stream, rate=rate)
         else:
             rows = held.items[MissionType.MISSION]
-            watch = Watch(peer, rows, arm=arm, lands=lands, period=1 / rate)
+            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate)
         try:
             ending = session.link.watch(watch, lambda: watching(watch))
         except LinkError as error:

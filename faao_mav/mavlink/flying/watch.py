@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias
 
-from faao_mav.mavlink.flying.telemetry import Ending, Kind, Telemetry
+from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.mavlink.machine import Machine, Progress
 from faao_mav.mavlink.messages import (
     CommandAck,
@@ -56,7 +56,7 @@ class Watch(Machine[Ending]):
     and starts the mission once the autopilot's own checks pass and no other ground station was
     heard; else somebody else does. `lands`: the flight ends on the ground. After `patience` seconds
     without a message, or of checks that do not pass, it ends. `seen` is what it has heard; it asks
-    for a position every `period` s. `relay_start` is when the plan's clock read 0, s on the
+    for `rate` positions a second. `relay_start` is when the plan's clock read 0, s on the
     vehicle's, where that is known: in a `Stream`.
 
     Nothing is sent but what asks for telemetry, until `arm` or `cancel` has a reason; and nothing
@@ -70,6 +70,8 @@ class Watch(Machine[Ending]):
     vehicle that is not known.
     """
 
+    _start_command = MavCommand.START
+
     def __init__(
         self,
         peer: Peer,
@@ -78,7 +80,7 @@ class Watch(Machine[Ending]):
         arm: bool = False,
         lands: bool = True,
         patience: float = 60.0,
-        period: float = 0.2,
+        rate: float = POSITION_RATE,
     ) -> None:
         super().__init__()
         if peer.vehicle is None:
@@ -88,7 +90,7 @@ class Watch(Machine[Ending]):
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
         self._arm, self._lands, self._patience = arm, lands, patience
-        self.seen = Telemetry(peer, rows, patience, period)
+        self.seen = Telemetry(peer, rows, patience, rate)
         self.phase: Phase = "checking" if arm else "waiting"
         self.relay_start: float | None = None
         self._begun = 0.0
@@ -199,15 +201,21 @@ class Watch(Machine[Ending]):
         return ()
 
     def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
-        awaited = {"arming": MavCommand.ARM, "starting": MavCommand.START}.get(self.phase)
+        awaited = {"arming": MavCommand.ARM, "starting": self._start_command}.get(self.phase)
         if command != awaited or result == IN_PROGRESS:
             return ()
-        if result != ACCEPTED:
-            return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
-        if self.phase == "arming":
-            self.phase = "starting"
-            return self._say(self._starting, now)
-        return ()
+        return self._accepted(now) if result == ACCEPTED else self._denied(command, result, now)
+
+    def _accepted(self, now: float) -> Sequence[Message]:
+        """Go on, now that arming or starting has been accepted."""
+        if self.phase != "arming":
+            return ()
+        self.phase = "starting"
+        return self._say(self._starting, now)
+
+    def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:  # noqa: ARG002
+        """End, now that arming or starting has been denied."""
+        return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
 
     def _on_disarmed(self) -> Sequence[Message]:
         match self.phase:
@@ -272,7 +280,7 @@ class Watch(Machine[Ending]):
         )
 
     def _starting(self) -> Message:
-        return CommandLong(self._peer.address, MavCommand.START, max(0, self._sent - 1))
+        return CommandLong(self._peer.address, self._start_command, max(0, self._sent - 1))
 
     def _hold(self) -> Message:
         return self._mode(self._modes.hold)
