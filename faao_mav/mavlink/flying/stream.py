@@ -12,6 +12,7 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.flying.course import Setpoint
 from faao_mav.mavlink.flying.itinerary import Itinerary
+from faao_mav.mavlink.flying.replan import Replan, Solver
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.local_frame import frame_of
 from faao_mav.mavlink.messages import (
@@ -30,6 +31,7 @@ from faao_mav.mavlink.protocol import LOCAL_ORIGIN, MavCommand
 from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
+from faao_mav.validate.flown import Line
 from faao_mav.vehicle.px4 import PX4
 
 LOCAL_NED = 1
@@ -61,6 +63,10 @@ _ARM_AGAIN = 2.0
 _OFF_GROUND = 0.3
 """Metres above home from which on a take-off is under way, though its answer is lost; chosen."""
 
+_BACK = 1.5
+"""Seconds for which the mode has to be the one for setpoints again until an aircraft counts as
+handed back: two heartbeats, for one may be a late packet. Chosen."""
+
 _EARLY = 0.8
 """The share of a period after which the next setpoint may go: they come irregularly; chosen."""
 
@@ -78,7 +84,9 @@ class Stream(Watch):
     `rate` times a second of the vehicle's own clock, whenever it tells where it is, it is told
     where to be: see `Itinerary`, of which `flight` is one; in the end what `mission.on_finish`
     says. While nothing is heard of it nothing is sent, and it does what its parameters say. A mode
-    that was not asked for ends the setpoints for good.
+    that was not asked for ends the setpoints for good, but for a relay flight that has a `solver`:
+    whoever then sets the mode back hands it back, if no other ground station was heard. With
+    `solver` the rest is solved again where the flight is off its plan: see `Replan`.
 
     Raises `InputError` for a vehicle that is not flown by setpoints, and what `Itinerary` raises.
     """
@@ -86,7 +94,13 @@ class Stream(Watch):
     _start_command = MavCommand.TAKEOFF
 
     def __init__(
-        self, peer: Peer, solution: Solution, *, rate: float = 10.0, patience: float = 60.0
+        self,
+        peer: Peer,
+        solution: Solution,
+        *,
+        rate: float = 10.0,
+        patience: float = 60.0,
+        solver: Solver | None = None,
     ) -> None:
         plan = solution.plan
         finish = plan.mission.on_finish
@@ -102,6 +116,9 @@ class Stream(Watch):
         self._held = 0.0 if self._rules.carries_on else self._period / 2
         self._round_trips: deque[tuple[float, int, float]] = deque(maxlen=_ROUND_TRIPS)
         self.flight = Itinerary(solution, takes_off=not self._rules.takes_off_by_setpoints)
+        self._replan = None if solver is None else Replan(self.flight, solver)
+        self._handed_back = False
+        self._back_since: float | None = float("inf")
         self._frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
         self._origin: GpsGlobalOrigin | None = None
         self._timeouts: dict[str, float] = {}
@@ -109,9 +126,9 @@ class Stream(Watch):
         self._first_sent, self._last_sent = float("inf"), float("-inf")
 
     @property
-    def streams(self) -> bool:
-        """Whether it is not the mission that is flown, but a plan by setpoints."""
-        return True
+    def solution(self) -> Solution:
+        """What is flown by setpoints."""
+        return self.flight.solution
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         out = super()._receive(envelope, now)
@@ -180,6 +197,13 @@ class Stream(Watch):
                 return self._say(lambda: self._arming(True), now)
             case "engaging" if mode != self._mode_before:
                 self._step_aside()
+            case "aside" if mode != self._guided:
+                self._back_since = None
+            case "aside" if self._back_since is None:
+                self._back_since = now
+            case "aside" if now - (self._back_since or 0.0) >= _BACK and self._may_go_on():
+                self.phase, self._handed_back = "flying", True
+                self.seen.told.append("handed back: it holds until there is a new course")
             case "arming" | "starting" | "flying" if mode != self._guided:
                 self._step_aside()
             case "ending" if mode == self._finish:
@@ -220,6 +244,11 @@ class Stream(Watch):
         self.phase, self._command = "flying", None
         self.seen.told.append("taking off")
 
+    def _may_go_on(self) -> bool:
+        """Tell whether an aircraft that somebody else has flown may be flown on."""
+        relay = self.flight.part == "relay" and self._armed
+        return self._replan is not None and relay and not self.seen.stations
+
     # ---- where it is to be
 
     def _on_position(self, position: GlobalPositionInt, now: float) -> Sequence[Message]:
@@ -248,8 +277,10 @@ class Stream(Watch):
         asked = self.phase == "ending" and self._command is not None
         if self.phase == "flying" or (asked and guided):
             part = self.flight.part
-            velocity = np.array([position.vy, position.vx, -position.vz]) / 100
-            setpoint = self.flight.setpoint(t + self._lead(), place, velocity)
+            now = Setpoint.of(place[:2], position)
+            if not self._on_course(t, now):
+                return None
+            setpoint = self.flight.setpoint(t + self._lead(), place, now.velocity)
             if self.flight.part != part:
                 self.seen.told.append(_PARTS[self.flight.part])
                 self.relay_start = self.flight.relay_start
@@ -260,6 +291,41 @@ class Stream(Watch):
             return self._ground
         return None
 
+    def _on_course(self, t: float, now: Setpoint) -> bool:
+        """See to it that the course leads on from `now` where it may; tell whether it does."""
+        replan, start = self._replan, self.relay_start
+        if replan is None or start is None or self.flight.part != "relay":
+            return True
+        begin = replan.begin if self._handed_back and not replan.asking else replan.step
+        begin(self._flown, t - start, now, self._clock_speed())
+        self.seen.told += replan.told
+        replan.told.clear()
+        if not self._handed_back or replan.asking:
+            return True
+        self._handed_back = False
+        if replan.failed:
+            self._step_aside()
+        return not replan.failed
+
+    def _step_aside(self) -> None:
+        super()._step_aside()
+        self._handed_back, self._back_since = False, float("inf")
+        if self._replan is not None:
+            self._replan.forget()
+
+    def _flown(self) -> Line:
+        """Return where it was, on the plan's clock."""
+        assert self.relay_start is not None
+        t, w = self.seen.samples.record().line(self.flight.solution)
+        return Line(t - self.relay_start, w)
+
+    def _clock_speed(self) -> float:
+        """Return how many seconds of the vehicle's clock a second of the world's has."""
+        if len(self._round_trips) < 2:
+            return 1.0
+        (first, there_first, _), (last, there_last, _) = self._round_trips[0], self._round_trips[-1]
+        return max((there_last - there_first) / 1e9 / max(last - first, 1e-9), 0.0)
+
     def _lead(self) -> float:
         """Return by how much later than a position was told the setpoint for it counts, s.
 
@@ -267,10 +333,8 @@ class Stream(Watch):
         """
         if len(self._round_trips) < 2:
             return self._held
-        (first, there_first, _), (last, there_last, _) = self._round_trips[0], self._round_trips[-1]
-        speed = (there_last - there_first) / 1e9 / max(last - first, 1e-9)
         trip = median(trip for _, _, trip in self._round_trips)
-        return self._held + min(max(speed, 0.0) * trip, _LONGEST_TRIP)
+        return self._held + min(self._clock_speed() * trip, _LONGEST_TRIP)
 
     def _place(self, position: GlobalPositionInt) -> Real:
         """Return where it is: (3,) m east, north, up of the plan's origin, which is its home."""

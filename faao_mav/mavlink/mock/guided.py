@@ -2,8 +2,8 @@
 
 Measured in simulation: ArduCopter 4.7 arms and takes off in GUIDED by a command, and stops in its
 place when setpoints cease; PX4 1.16.1 takes Offboard after a second of setpoints, takes off by
-them, and changes its mode when they cease, by default to Position, where it stays at its place: see
-`SetpointRules`.
+them, and changes its mode when they cease, by default to Position, where it sinks without sticks:
+see `SetpointRules`.
 """
 
 import math
@@ -104,15 +104,14 @@ class Guided:
 
     def leave(self, mode: int, now: float) -> None:
         """Do what another `mode` asks for: return, land, or stay there."""
-        vertical, (east, north, up) = self._of.vertical, self._p
         self._advance(now)
+        vertical, (east, north, up) = self._of.vertical, self._p
         if mode == self._modes.at_fence.get("return"):
             high = vertical.returns_at(up)
             self._go(now, [east, north, high], [0.0, 0.0, high], [0.0, 0.0, 0.0])
             self._lands = vertical.lands_on_return
         elif mode == self._modes.at_fence.get("land"):
-            self._go(now, [east, north, 0.0])
-            self._lands = True
+            self._land(now)
         else:
             self._stop(now)
 
@@ -126,6 +125,8 @@ class Guided:
         action = self._rules.actions.get(whole(self._parameters[self._rules.loss]))
         after = self._modes.hold if action is None else action.mode
         self.leave(after, now)
+        if action is not None and action.by_sticks:
+            self._land(now)
         return after
 
     def landed(self, now: float) -> bool:
@@ -158,6 +159,10 @@ class Guided:
                 Course.through(leg, speed=speed if level else climb, acceleration=1.0)
             )
         self._aim, self._course, self._since = None, course, now
+
+    def _land(self, now: float) -> None:
+        self._go(now, [*self._p[:2], 0.0])
+        self._lands = True
 
     def _stop(self, now: float) -> None:
         self._advance(now)
