@@ -147,9 +147,11 @@ def fly(
 
 
 def _solver(*, wanted: bool) -> "AbstractContextManager[ProcessSolver | None]":
+    if not wanted:
+        return nullcontext()
     from faao_mav.mavlink.flying.solving import ProcessSolver
 
-    return ProcessSolver() if wanted else nullcontext()
+    return ProcessSolver()
 
 
 def _predicted(

@@ -291,7 +291,7 @@ def test_another_process_answers_and_says_why_not() -> None:
             else:
                 assert isinstance(answer, Solution)
                 assert answer.w.tobytes() == own.w.tobytes()
-        for process in (solver._pool._processes or {}).values():
+        for process in list(solver._pool._processes.values()):
             process.terminate()
             process.join()
         rest = Rest(solution, 30, solution.w[:30], solution.w[30], np.zeros(2))

@@ -26,7 +26,7 @@ long. Chosen: the sample's rest takes 1 s of a processor."""
 _QUESTIONS = 2
 """How often it is asked until the old course is kept for good; chosen."""
 
-_APART = 5.0
+_APART = 15.0
 """Seconds, by the vehicle's clock, between a new course and the next question; chosen."""
 
 _FORESIGHT = 10.0

@@ -1,9 +1,10 @@
 """Solving the rest of a flight in a process of its own, so that setpoints go out meanwhile."""
 
 import signal
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+
+from joblib.externals.loky import ProcessPoolExecutor
 
 from faao_mav.errors import FaaoError
 from faao_mav.optimizer.rest import Rest, solve_rest
@@ -17,9 +18,8 @@ class ProcessSolver:
     """
 
     def __init__(self) -> None:
-        # a forked process would hold the link's sockets, and the locks of other threads
-        context = get_context("spawn")
-        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_prepare)
+        # not forked, it holds none of the link's sockets; it does not import the program that runs
+        self._pool = ProcessPoolExecutor(1, initializer=_prepare)
         self._answer: Future[Solution] | None = None
         self._pool.submit(_prepare)
 
@@ -27,10 +27,7 @@ class ProcessSolver:
         return self
 
     def __exit__(self, *_: object) -> None:
-        processes = list((self._pool._processes or {}).values())
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:  # an answer that nobody waits for any more
-            process.terminate()
+        self._pool.shutdown(wait=False, kill_workers=True)
 
     def ask(self, rest: Rest) -> None:
         """Begin to solve `rest`, when what was asked before is solved."""
