@@ -160,7 +160,9 @@ def telling(disturbance: Disturbance, told: list[str]) -> Callable[[Watch], None
 
 def delivered(result: Result, report: FlightReport) -> str:
     """Return how the flight ended, and what it delivered of the plan."""
-    ending = report.ending.kind if report.ending is not None else "different"
+    ending: str = report.ending.kind if report.ending is not None else "different"
+    if report.ending is not None and ending != "finished":
+        ending += f" ({report.ending.text})"
     if report.relay_start is None or report.solution is None:
         return f"{ending}, -"
     t, w = report.samples.record().line(report.solution)
