@@ -2,7 +2,8 @@
 
 import json
 import time
-from dataclasses import asdict
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,6 +27,8 @@ from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.flying.fly import FlightReport
+    from faao_mav.mavlink.flying.replan import Foresight, Solver
+    from faao_mav.mavlink.flying.solving import ProcessSolver
     from faao_mav.mavlink.flying.watch import Watch
     from faao_mav.mission.formats import MissionFile
     from faao_mav.optimizer.solution import Solution
@@ -34,10 +37,6 @@ if TYPE_CHECKING:
 
 _PERIOD = 1.0
 """Seconds between two lines, by the world's clock and by the vehicle's (a simulator's is quick)."""
-
-_RATE = 5.0
-"""Positions a second that are asked for: at 8 m/s they are 1.6 m apart. With --radio there are two
-for each slot at least. Chosen."""
 
 _NO_VOLTAGE = 65_535
 """What SYS_STATUS says of a voltage that is not known."""
@@ -54,6 +53,10 @@ def fly(
         bool, flag("--stream", "Fly the plan by setpoints instead of the mission; needs --arm.")
     ] = False,
     rate: Annotated[float, option("HZ", "Setpoints a second of --stream.", min=4, max=50)] = 10.0,
+    replan: Annotated[
+        bool,
+        flag("--replan", "Solve the rest again where the flight is off its plan; needs a plan."),
+    ] = False,
     radio: Radio = None,
     as_json: Annotated[bool, flag("--json", "Print JSON objects, one a line.")] = False,
     system: System = None,
@@ -69,7 +72,9 @@ def fly(
     both hops, and what is delivered so far and by the end. It arms and starts only with --arm, once
     the autopilot's own checks pass and no other ground station is on the link. A pilot who changes
     the mode has the aircraft: nothing more is sent. With --stream a copter that holds the mission
-    flies the trajectory of the plan by setpoints (GUIDED, Offboard), not the mission. Ctrl-C asks a
+    flies the trajectory of the plan by setpoints (GUIDED, Offboard), not the mission; with --replan
+    the rest is solved again, and flown, where wind or a pause has put it off its plan by more than
+    a second. Of a mission --replan only says what that would deliver. Ctrl-C asks a
     flight that was started here to hold, a second one leaves it; in other flights the first one
     leaves.
 
@@ -77,13 +82,14 @@ def fly(
     arguments or input.
     """
     from faao_mav.mavlink.flying.fly import fly as run
+    from faao_mav.mavlink.flying.telemetry import POSITION_RATE
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.report.summary import debriefing_lines, joined
 
     check_one(plan_file, solution_file)
     if stream and not arm:
         raise InputError("--stream: needs --arm: it arms the vehicle, and flies it")
-    for name, given in (("--stream", stream), ("--radio", radio)):
+    for name, given in (("--stream", stream), ("--replan", replan), ("--radio", radio)):
         if given and plan_file is None and solution_file is None:
             raise InputError(f"{name}: needs --plan or --solution: the flight that is planned")
     file = read_mission_file(mission_file)
@@ -93,24 +99,28 @@ def fly(
     feed = _Feed(solution, radio) if solution is not None and radio is not None else None
     track = None if stream else _predicted(mission_file, file, solution)
     telling = _Telling(solution, track, feed, as_json=as_json)
-    rate = rate if stream else _RATE
+    rate = rate if stream else POSITION_RATE
     if feed is not None:
-        rate = max(rate, feed.slots_per_second * 2)
-    report = run(
-        file.mission,
-        to,
-        arm=arm,
-        lands=track is None or track.lands,
-        stream=solution if stream else None,
-        rate=rate,
-        watching=telling,
-        system=system,
-        component=component,
-        log=log,
-        signing_key=signing_key,
-        wait=timeout,
-        note=note,
-    )
+        rate = max(rate, feed.slots_per_second * 2)  # two positions for each slot at least
+    with _solver(wanted=replan) as solver:
+        if solver is not None and solution is not None and not stream:
+            telling.foresee(solver)
+        report = run(
+            file.mission,
+            to,
+            arm=arm,
+            lands=track is None or track.lands,
+            stream=solution if stream else None,
+            solver=solver,
+            rate=rate,
+            watching=telling,
+            system=system,
+            component=component,
+            log=log,
+            signing_key=signing_key,
+            wait=timeout,
+            note=note,
+        )
     ending = report.ending
     found = telling.debriefing(report)
     if as_json:
@@ -134,6 +144,14 @@ def fly(
             note("the vehicle holds another mission than the file: upload it first")
     if ending is None or ending.kind != "finished":
         raise typer.Exit(1)
+
+
+def _solver(*, wanted: bool) -> "AbstractContextManager[ProcessSolver | None]":
+    if not wanted:
+        return nullcontext()
+    from faao_mav.mavlink.flying.solving import ProcessSolver
+
+    return ProcessSolver()
 
 
 def _predicted(
@@ -171,14 +189,28 @@ class _Telling:
         *,
         as_json: bool,
     ) -> None:
-        self._solution, self._feed, self._as_json = solution, feed, as_json
+        self._solution, self._flown, self._feed = solution, solution, feed
+        self._as_json = as_json
         self._start: float | None = None
         self._told, self._next, self._last = 0, 0.0, -_PERIOD
         self._line = None if solution is None else _predicted_line(solution, track)
+        self._foresight: Foresight | None = None
+
+    def foresee(self, solver: "Solver") -> None:
+        """Tell what a new course would deliver where a mission's flight is off its plan."""
+        from faao_mav.mavlink.flying.replan import Foresight
+
+        if self._solution is not None:
+            self._foresight = Foresight(self._solution, solver)
 
     def __call__(self, watch: "Watch") -> None:
         """Print what has happened since the last call, and once a second how the flight stands."""
         seen = watch.seen
+        if watch.solution is not None and watch.solution is not self._flown:
+            self._flown = watch.solution
+            self._line = _predicted_line(watch.solution, None)
+            if self._feed is not None:
+                self._feed.follow(watch.solution)
         for text in seen.told[self._told :]:
             typer.echo(json.dumps({"note": text}) if self._as_json else f"-- {text}")
         self._told = len(seen.told)
@@ -191,7 +223,9 @@ class _Telling:
         stands = None
         if watch.phase not in ("checking", "engaging", "arming", "starting", "waiting"):
             stands = self._standing(watch)
-        told = _as_dict(watch, stands, self._solution)
+        if stands is not None and self._foresight is not None:
+            self._foresee(self._foresight, watch, stands)
+        told = _as_dict(watch, stands, self._flown)
         typer.echo(json.dumps(told, allow_nan=False) if self._as_json else _as_text(told))
 
     def debriefing(self, report: "FlightReport") -> "Debriefing | None":
@@ -199,22 +233,36 @@ class _Telling:
         if self._solution is None or self._line is None or not report.samples.t:
             return None
         record = report.samples.record()
-        return record.debriefing(self._solution, self._line, report.relay_start)
+        flown = report.solution or self._solution
+        found = record.debriefing(flown, self._line, report.relay_start)
+        return None if found is None else replace(found, solution=self._solution)
 
     def _standing(self, watch: "Watch") -> "Standing | None":
         """Return how the flight stands; None before it has left w_I, and when it is over."""
         from faao_mav.validate.flown import Line, plan_start, standing
 
-        if self._solution is None or self._line is None:
+        if self._flown is None or self._line is None:
             return None
-        flight = watch.seen.samples.record().line(self._solution)
+        flight = watch.seen.samples.record().line(self._flown)
         start = watch.relay_start
-        if start is None and not watch.streams:
-            self._start = start = plan_start(self._solution, self._line, flight)
+        if start is None and watch.solution is None:
+            self._start = start = plan_start(self._flown, self._line, flight)
         if start is None:
             return None
-        stands = standing(self._solution, self._line, Line(flight.t - start, flight.w))
+        stands = standing(self._flown, self._line, Line(flight.t - start, flight.w))
         return None if stands.over else stands
+
+    def _foresee(self, foresight: "Foresight", watch: "Watch", stands: "Standing") -> None:
+        from faao_mav.mavlink.flying.course import Setpoint
+        from faao_mav.validate.flown import Line
+
+        if self._flown is None or self._start is None or watch.seen.position is None:
+            return
+        flight, position = watch.seen.samples.record().line(self._flown), watch.seen.position
+        now = Setpoint.of(flight.w[-1], position)
+        told = foresight.step(Line(flight.t - self._start, flight.w), now, stands, 1.0)
+        if told is not None:
+            watch.seen.told.append(told)
 
 
 class _Feed:
@@ -227,6 +275,12 @@ class _Feed:
         self._feed, self._radio = RadioFeed(solution), UdpRadio(to)
         self._seen = 0
         self.slots_per_second = 1 / solution.plan.flight.time_step
+
+    def follow(self, solution: "Solution") -> None:
+        """Go on with the slots of `solution`, whose clock is the same."""
+        from faao_mav.mavlink.flying.radio import RadioFeed
+
+        self._solution, self._feed = solution, RadioFeed(solution)
 
     def __call__(self, watch: "Watch", start: float | None) -> None:
         """Send what is new; the plan's clock read 0 at `start`, s on the vehicle's."""

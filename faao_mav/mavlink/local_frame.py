@@ -9,10 +9,8 @@ from numpy.typing import ArrayLike
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.vehicle import AutopilotFamily
+from faao_mav.vehicle.ardupilot import DEGREE
 from faao_mav.vehicle.px4 import PX4
-
-_DEGREE = 111318.84502145034
-"""ArduPilot's degree of latitude, and of longitude at the equator, m."""
 
 _PX4_RADIUS = 6_371_000.0
 """The radius of PX4's Earth, m."""
@@ -47,11 +45,11 @@ class ArduPilotFrame:
         """Return positions (..., 2) in metres."""
         lat, turned = np.asarray(latitude, dtype=float), np.asarray(longitude) - self.longitude
         east = self._shrunk(lat) * ((turned + 180) % 360 - 180)
-        return _DEGREE * np.stack([east, lat - self.latitude], axis=-1)
+        return DEGREE * np.stack([east, lat - self.latitude], axis=-1)
 
     def to_geodetic(self, positions: ArrayLike) -> tuple[Real, Real]:
         """Return latitude and longitude in degrees."""
-        east, north = np.moveaxis(np.asarray(positions, dtype=float) / _DEGREE, -1, 0)
+        east, north = np.moveaxis(np.asarray(positions, dtype=float) / DEGREE, -1, 0)
         lat = self.latitude + north
         return lat, (self.longitude + east / self._shrunk(lat) + 180) % 360 - 180
 

@@ -229,12 +229,16 @@ class GlobalPositionInt(Message):
     hdg: int
 
 
-class GpsGlobalOrigin(Message):
-    """GPS_GLOBAL_ORIGIN: of the vehicle's local frame, 1e-7 degrees, mm above mean sea level."""
+class Spot(Message):
+    """A place on Earth: 1e-7 degrees, mm above mean sea level."""
 
     latitude: int
     longitude: int
     altitude: int
+
+
+class GpsGlobalOrigin(Spot):
+    """GPS_GLOBAL_ORIGIN: the origin of the vehicle's local frame."""
 
 
 class SetPositionTargetLocalNed(Addressed):
@@ -294,12 +298,8 @@ class SysStatus(Message):
         return bool(self.onboard_control_sensors_health & PREARM_CHECK)
 
 
-class HomePosition(Message):
-    """HOME_POSITION: 1e-7 degrees, mm above mean sea level."""
-
-    latitude: int
-    longitude: int
-    altitude: int
+class HomePosition(Spot):
+    """HOME_POSITION: where the vehicle returns to."""
 
 
 @dataclass(frozen=True, slots=True)

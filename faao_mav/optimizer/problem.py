@@ -154,12 +154,16 @@ class Link:
 
 @dataclass(frozen=True)
 class Problem:
-    """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue."""
+    """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue.
+
+    The relay holds `held`, bit/Hz, when the flight begins.
+    """
 
     plan: Plan
     kinematics: Kinematics
     bs_uav: Link
     uav_user: Link
+    held: float = 0.0
 
     @cached_property
     def free_area(self) -> FreeArea | None:
@@ -191,7 +195,7 @@ class Problem:
         radio = self.plan.radio
         room, bandwidth = radio.relay.buffer_mbytes, radio.bandwidth_mhz
         buffer = math.inf if room is None or bandwidth is None else 8 * room / bandwidth
-        return RelayQueue(half=radio.duplex == "half", buffer=buffer)
+        return RelayQueue(half=radio.duplex == "half", buffer=buffer, held=self.held)
 
     @property
     def links(self) -> tuple[Link, Link]:

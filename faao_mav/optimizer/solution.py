@@ -3,7 +3,7 @@
 import io
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -73,10 +73,11 @@ class Solution:
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end. `shares` (n,) of each slot are those in which a
-    half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
-    `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
-    by how much the rate that it maximises is above that of the plan for the cutoff rate. `least`
-    tells of a plan whose `goal` minimises; it is not saved.
+    half-duplex relay receives; it sends in the rest. The relay holds `held`, bit/Hz, when the
+    flight begins: not 0 for the rest of a flight only, and not saved. All rates are those that the
+    plan counts, `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6),
+    and `gain` is by how much the rate that it maximises is above that of the plan for the cutoff
+    rate. `least` tells of a plan whose `goal` minimises; it is not saved.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -113,6 +114,7 @@ class Solution:
     shares: Real | None = None
     gain: float | None = None
     least: Least | None = None
+    held: float = 0.0
 
     @property
     def rates(self) -> Rates:
@@ -126,8 +128,8 @@ class Solution:
 
     def relay(self, I_U: Real, I_G: Real, shares: Real | None = None) -> Relayed:
         """Return what the plan's relay makes of rates (n,), bits, with these or the best shares."""
-        queue, step = build_problem(self.plan).relay, self.plan.flight.time_step
-        return queue.relayed(I_U, I_G, step, shares)
+        queue = replace(build_problem(self.plan).relay, held=self.held)
+        return queue.relayed(I_U, I_G, self.plan.flight.time_step, shares)
 
     @property
     def delivered_rate(self) -> float:
@@ -253,6 +255,7 @@ def make_solution(
         ending=ending,
         starts=starts or {},
         shares=problem.relay.best_shares(I_U, I_G, problem.kinematics.time_step),
+        held=problem.held,
     )
 
 

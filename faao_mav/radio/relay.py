@@ -3,9 +3,10 @@
 Per slot n the relay receives r_n and forwards f_n, and q_n waits in its queue, all in bits per
 slot and hertz of bandwidth:
 
-    q_0 = 0,    q_{n+1} = q_n + r_n - f_n,    0 <= f_n <= q_n,    0 <= r_n,    q_n <= buffer
+    q_0 = held,  q_{n+1} = q_n + r_n - f_n,  0 <= f_n <= q_n,  0 <= r_n,  q_n <= buffer for n > 0
 
-so that what comes in during slot n leaves from slot n + 1 on. A relay on two bands (full duplex)
+so that what comes in during slot n leaves from slot n + 1 on. A flight begins with an empty queue
+(`held` = 0), the rest of one with what the relay then holds. A relay on two bands (full duplex)
 has r_n <= I_U,n and f_n <= I_G,n of (7), (8); one that shares a band between both hops (half
 duplex) has r_n / I_U,n + f_n / I_G,n <= 1. The delivered rate is the mean of f_n, bit/s/Hz.
 
@@ -48,43 +49,48 @@ class Relayed:
 class RelayQueue:
     """How a relay forwards: sharing one band between both hops if `half`; its buffer, bit/Hz.
 
-    In slots of `time_step` seconds the buffer is that of `buffer / time_step` bits per slot.
+    It holds `held`, bit/Hz, when the flight begins. In slots of `time_step` seconds these are
+    `buffer / time_step` and `held / time_step` bits per slot.
     """
 
     half: bool = False
     buffer: float = math.inf
+    held: float = 0.0
 
     def best_shares(self, I_U: Real, I_G: Real, time_step: float) -> Real | None:
         """Return the best shares of receiving (n,) at rates (n,), None in full duplex."""
-        return best_shares(I_U, I_G, self.buffer / time_step) if self.half else None
+        if not self.half:
+            return None
+        return best_shares(I_U, I_G, self.buffer / time_step, self.held / time_step)
 
     def relayed(
         self, I_U: Real, I_G: Real, time_step: float, shares: Real | None = None
     ) -> Relayed:
         """Return what is delivered at rates (n,): greedily, with given or else the best shares."""
-        room = self.buffer / time_step
+        limits = self.buffer / time_step, self.held / time_step
         if not self.half:
-            return forward_greedily(I_U, I_G, room)
+            return forward_greedily(I_U, I_G, *limits)
         if shares is None:
-            shares = best_shares(I_U, I_G, room)
-        return forward_by_shares(I_U, I_G, shares, room)
+            shares = best_shares(I_U, I_G, *limits)
+        return forward_by_shares(I_U, I_G, shares, *limits)
 
 
-def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:
+def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf, held: float = 0.0) -> Relayed:
     """Return what a full-duplex relay delivers that sends what it holds as fast as it can.
 
     f_n = min(q_n, I_G,n) and r_n = min(I_U,n, buffer - q_n + f_n) for rates `I_U`, `I_G` (n,),
-    bits, and a `buffer` of that many bits per hertz. No other forwarding along the same route
-    delivers more: a bit that can leave now and waits only takes room. Raises `InputError` for
-    rates of different shapes, negative or not finite ones, or a buffer not above 0.
+    bits, a `buffer` of that many bits per hertz, and q_0 = `held`. No other forwarding along the
+    same route delivers more: a bit that can leave now and waits only takes room. Raises
+    `InputError` for rates of different shapes, negative or not finite ones, a buffer not above 0,
+    or a queue that begins below 0 or above the buffer.
 
     >>> relayed = forward_greedily(np.array([2.0, 1.0, 0.0]), np.array([5.0, 1.0, 1.5]))
     >>> relayed.queue.tolist(), relayed.forwarded.tolist()
     ([0.0, 2.0, 2.0], [0.0, 1.0, 1.5])
     """
-    _check(I_U, I_G, buffer)
+    _check(I_U, I_G, buffer, held)
     received, forwarded, queue = np.empty((3, len(I_U)))
-    waiting = 0.0
+    waiting = held
     for n, (arriving, leaving) in enumerate(zip(I_U.tolist(), I_G.tolist(), strict=True)):
         queue[n] = waiting
         forwarded[n] = min(waiting, leaving)
@@ -93,7 +99,9 @@ def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:
     return Relayed(received, forwarded, queue)
 
 
-def forward_by_shares(I_U: Real, I_G: Real, shares: Real, buffer: float = math.inf) -> Relayed:
+def forward_by_shares(
+    I_U: Real, I_G: Real, shares: Real, buffer: float = math.inf, held: float = 0.0
+) -> Relayed:
     """Return what a half-duplex relay delivers that receives in the `shares` (n,) of each slot.
 
     The rates are `shares` I_U and (1 - `shares`) I_G; within them it forwards what it holds: see
@@ -101,10 +109,10 @@ def forward_by_shares(I_U: Real, I_G: Real, shares: Real, buffer: float = math.i
     """
     if shares.shape != I_U.shape or not ((shares >= 0) & (shares <= 1)).all():
         raise InputError(f"shares {shares.shape}: expected one of 0 to 1 for each of {len(I_U)}")
-    return forward_greedily(shares * I_U, (1 - shares) * I_G, buffer)
+    return forward_greedily(shares * I_U, (1 - shares) * I_G, buffer, held)
 
 
-def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
+def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf, held: float = 0.0) -> Real:
     """Return the shares (n,) of the slots to receive in with which a route delivers most.
 
     The linear program of the module's half duplex in the shares, f and q, by Clarabel, whose time
@@ -115,12 +123,12 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
     >>> round(forward_by_shares(rates, rates, best_shares(rates, rates)).rate, 6)
     1.0
     """
-    _check(I_U, I_G, buffer)
-    return _best_shares(I_U.tobytes(), I_G.tobytes(), buffer)
+    _check(I_U, I_G, buffer, held)
+    return _best_shares(I_U.tobytes(), I_G.tobytes(), buffer, held)
 
 
 @lru_cache(maxsize=32)  # an optimiser asks about its starts and its results more than once
-def _best_shares(rates_U: bytes, rates_G: bytes, buffer: float) -> Real:
+def _best_shares(rates_U: bytes, rates_G: bytes, buffer: float, held: float) -> Real:
     """Return the best shares, read-only, at the rates whose bytes are given."""
     import clarabel
     from scipy import sparse
@@ -131,11 +139,11 @@ def _best_shares(rates_U: bytes, rates_G: bytes, buffer: float) -> Real:
     arriving, leaving = (sparse.diags_array(rates, format="csr") for rates in (I_U, I_G))
     step = one - sparse.eye_array(n, k=-1, format="csr")
     before = one - step
-    ones, zeros = np.ones(n), np.zeros(n)
+    ones, zeros, begun = np.ones(n), np.zeros(n), held * (np.arange(n) == 0)
     limits = [
         ([leaving, one, none], I_G),  # f_n <= (1 - x_n) I_G
         ([none, one, -one], zeros),  # f_n <= q_n
-        ([-(before @ arriving), before, step], zeros),  # q_n <= q_{n-1} + x_{n-1} I_U - f_{n-1}
+        ([-(before @ arriving), before, step], begun),  # q_n <= q_{n-1} + x_{n-1} I_U - f_{n-1}
         ([-one, none, none], zeros),
         ([one, none, none], ones),
         ([none, -one, none], zeros),
@@ -158,10 +166,12 @@ def _best_shares(rates_U: bytes, rates_G: bytes, buffer: float) -> Real:
     return shares
 
 
-def _check(I_U: Real, I_G: Real, buffer: float) -> None:
+def _check(I_U: Real, I_G: Real, buffer: float, held: float) -> None:
     if I_U.ndim != 1 or I_U.shape != I_G.shape or not len(I_U):
         raise InputError(f"rates {I_U.shape} and {I_G.shape}; expected one per slot of each hop")
     if not (np.isfinite(I_U).all() and np.isfinite(I_G).all() and min(I_U.min(), I_G.min()) >= 0):
         raise InputError("rates of a relay: expected finite bits of at least 0")
     if not buffer > 0:
         raise InputError(f"buffer {buffer}; expected bits per hertz above 0")
+    if not (0 <= held <= buffer and math.isfinite(held)):
+        raise InputError(f"held {held}; expected bits per hertz of 0 to the buffer, {buffer}")

@@ -21,6 +21,7 @@ from faao_mav.mavlink.flying.course import Course
 from faao_mav.mavlink.flying.stream import Stream
 from faao_mav.mavlink.local_frame import frame_of
 from faao_mav.mavlink.messages import CommandLong, Envelope, SetMode, SetPositionTargetLocalNed
+from faao_mav.mavlink.modes import px4_mode
 from faao_mav.mavlink.protocol import GROUND_STATION, MavCommand
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
@@ -134,6 +135,23 @@ def test_it_stops_when_setpoints_cease(kind: str) -> None:
     else:
         assert ending == "taken over"
         assert scene.told("the pilot or a failsafe has the aircraft")
+
+
+def test_without_setpoints_or_sticks_px4_sinks_in_position() -> None:
+    scene = Scene("px4", solution=low())
+    receive = scene.mock.on
+
+    def hear(envelope: Any, now: float) -> Any:
+        ceased = isinstance(envelope.message, SetPositionTargetLocalNed) and now > 14.0
+        return () if ceased else receive(envelope, now)
+
+    scene.mock.on = hear  # type: ignore[method-assign]
+    modes = list[int]()
+    events = [(16.0, lambda _: modes.append(scene.mock.mode))]
+    assert scene.run(events=events, until=90.0) == "taken over"
+    assert scene.told("it changes to Position (and sinks, unless sticks fly it) after 1 s")
+    assert modes == [px4_mode(3, 0)]
+    assert scene.watch.seen.samples.height[-1] == pytest.approx(0.0, abs=0.1)
 
 
 @KINDS

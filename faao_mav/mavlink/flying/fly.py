@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.client import LinkOptions, Session
 from faao_mav.mavlink.discover import FoundVehicle
-from faao_mav.mavlink.flying.telemetry import Ending, Samples
+from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Samples
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Script
 from faao_mav.mavlink.protocol import MissionType
@@ -17,6 +17,7 @@ from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission.item import Mission
 
 if TYPE_CHECKING:
+    from faao_mav.mavlink.flying.replan import Solver
     from faao_mav.optimizer.solution import Solution
 
 
@@ -25,7 +26,8 @@ class FlightReport:
     """How a flight was watched: `ending` is None where the vehicle does not hold the mission.
 
     `differences` are what it holds instead; `samples` is where it was. `relay_start` is when the
-    clock of a streamed plan read 0, s on the vehicle's.
+    clock of a streamed plan read 0, s on the vehicle's, and `solution` what was streamed in the
+    end.
     """
 
     vehicle: FoundVehicle
@@ -33,6 +35,7 @@ class FlightReport:
     ending: Ending | None
     samples: Samples
     relay_start: float | None = None
+    solution: "Solution | None" = None
 
 
 def fly(
@@ -42,7 +45,8 @@ def fly(
     arm: bool = False,
     lands: bool = True,
     stream: "Solution | None" = None,
-    rate: float = 5.0,
+    rate: float = POSITION_RATE,
+    solver: "Solver | None" = None,
     watching: Callable[[Watch], object] = lambda _: None,
     **options: Unpack[LinkOptions],
 ) -> FlightReport:
@@ -50,10 +54,11 @@ def fly(
 
     It is armed and started only with `arm`; `lands` tells whether the flight ends on the ground:
     see `Watch`. With `stream` it is armed and flies that solution by setpoints, `rate` a second,
-    instead of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
-    that it is asked for. `watching` is called after every
-    step. `options` are those of `LinkOptions`. Raises `LinkError` if there is no such vehicle, none
-    that is known here, or its mission cannot be read.
+    instead of its mission: see `Stream`, and what that raises; with `solver` the rest is solved
+    again where the flight is off the plan. `rate` is also that of the positions
+    that it is asked for. `watching` is called after every step. `options` are those of
+    `LinkOptions`. Raises `LinkError` if there is no such vehicle, none that is known here, or its
+    mission cannot be read.
     """
     with Session(connection, options) as session:
         vehicle, peer = session.found, session.peer
@@ -75,12 +80,13 @@ def fly(
         if stream is not None:
             from faao_mav.mavlink.flying.stream import Stream
 
-            watch: Watch = Stream(peer, stream, rate=rate)
+            watch: Watch = Stream(peer, stream, rate=rate, solver=solver)
         else:
             rows = held.items[MissionType.MISSION]
-            watch = Watch(peer, rows, arm=arm, lands=lands, period=1 / rate)
+            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate)
         try:
             ending = session.link.watch(watch, lambda: watching(watch))
         except LinkError as error:
             ending = Ending("lost", str(error))
-    return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start)
+    samples = watch.seen.samples
+    return FlightReport(vehicle, (), ending, samples, watch.relay_start, watch.solution)

@@ -12,7 +12,8 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.flying.course import Setpoint
 from faao_mav.mavlink.flying.itinerary import Itinerary
-from faao_mav.mavlink.flying.watch import ACCEPTED, IN_PROGRESS, Watch
+from faao_mav.mavlink.flying.replan import Replan, Solver
+from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.local_frame import frame_of
 from faao_mav.mavlink.messages import (
     CommandLong,
@@ -27,8 +28,10 @@ from faao_mav.mavlink.messages import (
     Timesync,
 )
 from faao_mav.mavlink.protocol import LOCAL_ORIGIN, MavCommand
+from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
+from faao_mav.validate.flown import Line
 from faao_mav.vehicle.px4 import PX4
 
 LOCAL_NED = 1
@@ -40,18 +43,12 @@ _NO_YAW = 1 << 10 | 1 << 11
 _INT32 = 6
 """MAV_PARAM_TYPE of whole numbers, which PX4 sends as their bits."""
 
-_PX4_TIMEOUT, _TIMEOUT = ("COM_OF_LOSS_T", "COM_OBL_RC_ACT"), ("GUID_TIMEOUT",)
-"""The parameters that say what PX4 and ArduPilot do when setpoints cease."""
-
-_ACTIONS = ("Position", "Altitude", "Stabilized", "Return", "Land", "Hold", "Terminate", "Disarm")
-"""What the values of COM_OBL_RC_ACT mean, in PX4 1.14 to 1.16."""
-
 _ANSWER = 10.0
-"""Seconds in which these parameters are asked for; chosen."""
+"""Seconds in which the parameters of `SetpointRules` are asked for; chosen."""
 
 _STREAMED = 1.5
-"""Seconds, by the vehicle's clock, of setpoints before PX4 is asked for Offboard: it wants more
-than one."""
+"""By how many times as long as the vehicle wants setpoints come before it is asked to follow them.
+Chosen."""
 
 _AT_HOME = 20.0
 """The aircraft has to stand within so many metres of the plan's home; chosen."""
@@ -65,6 +62,10 @@ _ARM_AGAIN = 2.0
 
 _OFF_GROUND = 0.3
 """Metres above home from which on a take-off is under way, though its answer is lost; chosen."""
+
+_BACK = 1.5
+"""Seconds for which the mode has to be the one for setpoints again until an aircraft counts as
+handed back: two heartbeats, for one may be a late packet. Chosen."""
 
 _EARLY = 0.8
 """The share of a period after which the next setpoint may go: they come irregularly; chosen."""
@@ -83,40 +84,51 @@ class Stream(Watch):
     `rate` times a second of the vehicle's own clock, whenever it tells where it is, it is told
     where to be: see `Itinerary`, of which `flight` is one; in the end what `mission.on_finish`
     says. While nothing is heard of it nothing is sent, and it does what its parameters say. A mode
-    that was not asked for ends the setpoints for good.
+    that was not asked for ends the setpoints for good, but for a relay flight that has a `solver`:
+    whoever then sets the mode back hands it back, if no other ground station was heard. With
+    `solver` the rest is solved again where the flight is off its plan: see `Replan`.
 
     Raises `InputError` for a vehicle that is not flown by setpoints, and what `Itinerary` raises.
     """
 
+    _start_command = MavCommand.TAKEOFF
+
     def __init__(
-        self, peer: Peer, solution: Solution, *, rate: float = 10.0, patience: float = 60.0
+        self,
+        peer: Peer,
+        solution: Solution,
+        *,
+        rate: float = 10.0,
+        patience: float = 60.0,
+        solver: Solver | None = None,
     ) -> None:
         plan = solution.plan
         finish = plan.mission.on_finish
         lands = finish != "hover"
-        super().__init__(peer, (), arm=True, lands=lands, patience=patience, period=1 / rate)
+        super().__init__(peer, (), arm=True, lands=lands, patience=patience, rate=rate)
         if self._modes.guided is None or peer.vehicle is None:
             raise InputError("--stream: only copters fly by setpoints")
-        self._family = peer.vehicle.family
-        self._is_px4, self._guided = self._family == PX4, self._modes.guided
+        self._family, self._guided = peer.vehicle.family, self._modes.guided
+        self._rules = setpoint_rules(self._family)
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if lands else "hold"]
         self._height, self._period = plan.flight.altitude, 1 / rate
-        # PX4 goes where it is told until it is told another place; ArduPilot goes on from there.
-        self._held = self._period / 2 if self._is_px4 else 0.0
+        self._held = 0.0 if self._rules.carries_on else self._period / 2
         self._round_trips: deque[tuple[float, int, float]] = deque(maxlen=_ROUND_TRIPS)
-        self.flight = Itinerary(solution, takes_off=not self._is_px4)
+        self.flight = Itinerary(solution, takes_off=not self._rules.takes_off_by_setpoints)
+        self._replan = None if solver is None else Replan(self.flight, solver)
+        self._handed_back = False
+        self._back_since: float | None = float("inf")
         self._frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
         self._origin: GpsGlobalOrigin | None = None
         self._timeouts: dict[str, float] = {}
-        self._asked = _PX4_TIMEOUT if self._is_px4 else _TIMEOUT
         self._ground: Setpoint | None = None
         self._first_sent, self._last_sent = float("inf"), float("-inf")
 
     @property
-    def streams(self) -> bool:
-        """Whether it is not the mission that is flown, but a plan by setpoints."""
-        return True
+    def solution(self) -> Solution:
+        """What is flown by setpoints."""
+        return self.flight.solution
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         out = super()._receive(envelope, now)
@@ -125,8 +137,8 @@ class Stream(Watch):
         match envelope.message:
             case GpsGlobalOrigin() as origin:
                 self._origin = origin
-            case ParamValue(name, value, kind) if name in self._asked:
-                if self._is_px4 and kind == _INT32:
+            case ParamValue(name, value, kind) if name in self._rules.defaults:
+                if self._family == PX4 and kind == _INT32:
                     (value,) = struct.unpack("<i", struct.pack("<f", value))
                 self._timeouts[name] = value
             case Timesync(tc1, ts1) if tc1 and 0 < ts1 / 1e9 <= now:
@@ -148,11 +160,11 @@ class Stream(Watch):
         if self._origin is None:
             ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
             out.append(CommandLong(target, *ask))
-        unread = [name for name in self._asked if name not in self._timeouts]
+        unread = [name for name in self._rules.defaults if name not in self._timeouts]
         return [*out, *(ParamRequestRead(target, name, -1) for name in unread)]
 
     def _set_out(self, now: float) -> Sequence[Message]:
-        position, known = self.seen.position, len(self._timeouts) == len(self._asked)
+        position, known = self.seen.position, len(self._timeouts) == len(self._rules.defaults)
         if position is None or self._origin is None:
             return ()
         if not known and now < self._begun + _ANSWER:
@@ -162,28 +174,16 @@ class Stream(Watch):
             text = f"it stands {away:.0f} m from the plan's home (site.origin)"
             self._end("refused", f"nothing was started: {text}, not within {_AT_HOME:.0f} m")
             return ()
-        self.seen.told.append(f"without setpoints {self._without()}")
+        self.seen.told.append(f"without setpoints {self._rules.without(self._timeouts)}")
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
         self.phase = "engaging"
-        if self._is_px4:
+        if self._rules.takes_off_by_setpoints:
             return ()  # setpoints come first
         return self._say(lambda: self._mode(self._guided), now)
 
-    def _without(self) -> str:
-        """Return in words what the vehicle does when setpoints cease."""
-        told = [f"{name} {value:g}" for name, value in self._timeouts.items()]
-        if len(told) < len(self._asked):
-            return "it does what it does: it does not tell its parameters"
-        if not self._is_px4:
-            return f"it stops after {self._timeouts['GUID_TIMEOUT']:g} s (GUID_TIMEOUT)"
-        action = int(self._timeouts["COM_OBL_RC_ACT"])
-        name = _ACTIONS[action] if 0 <= action < len(_ACTIONS) else "another mode"
-        after = self._timeouts["COM_OF_LOSS_T"]
-        return f"it changes to {name} after {after:g} s ({', '.join(told)})"
-
     def _starting(self) -> Message:
         again = max(0, self._sent - 1)
-        return CommandLong(self._peer.address, MavCommand.TAKEOFF, again, param7=self._height)
+        return CommandLong(self._peer.address, self._start_command, again, param7=self._height)
 
     # ---- what the vehicle does
 
@@ -197,6 +197,13 @@ class Stream(Watch):
                 return self._say(lambda: self._arming(True), now)
             case "engaging" if mode != self._mode_before:
                 self._step_aside()
+            case "aside" if mode != self._guided:
+                self._back_since = None
+            case "aside" if self._back_since is None:
+                self._back_since = now
+            case "aside" if now - (self._back_since or 0.0) >= _BACK and self._may_go_on():
+                self.phase, self._handed_back = "flying", True
+                self.seen.told.append("handed back: it holds until there is a new course")
             case "arming" | "starting" | "flying" if mode != self._guided:
                 self._step_aside()
             case "ending" if mode == self._finish:
@@ -214,19 +221,16 @@ class Stream(Watch):
                 self._step_aside()
         return ()
 
-    def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
-        awaited = {"arming": MavCommand.ARM, "starting": MavCommand.TAKEOFF}.get(self.phase)
-        if command != awaited or result == IN_PROGRESS:
-            return ()
-        if result != ACCEPTED and self.phase == "arming" and now < self._begun + self._patience:
+    def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:
+        if self.phase == "arming" and now < self._begun + self._patience:
             # In this mode it may need what its checks did not ask for before, a position above all.
             self._sent, self._next_try = 0, now + _ARM_AGAIN
             return ()
-        if result != ACCEPTED:
-            return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
-        if self.phase == "arming" and not self._is_px4:
-            self.phase = "starting"
-            return self._say(self._starting, now)
+        return super()._denied(command, result, now)
+
+    def _accepted(self, now: float) -> Sequence[Message]:
+        if self.phase == "arming" and not self._rules.takes_off_by_setpoints:
+            return super()._accepted(now)
         self._fly()
         return ()
 
@@ -239,6 +243,11 @@ class Stream(Watch):
     def _fly(self) -> None:
         self.phase, self._command = "flying", None
         self.seen.told.append("taking off")
+
+    def _may_go_on(self) -> bool:
+        """Tell whether an aircraft that somebody else has flown may be flown on."""
+        relay = self.flight.part == "relay" and self._armed
+        return self._replan is not None and relay and not self.seen.stations
 
     # ---- where it is to be
 
@@ -259,8 +268,8 @@ class Stream(Watch):
         return out
 
     def _streamed(self, t: float) -> bool:
-        """Tell whether PX4 has had setpoints for long enough."""
-        return t >= self._first_sent + _STREAMED
+        """Tell whether the vehicle has had setpoints for long enough."""
+        return t >= self._first_sent + _STREAMED * self._rules.streamed
 
     def _setpoint(self, t: float, place: Real, position: GlobalPositionInt) -> Setpoint | None:
         """Return where the aircraft is to be at `t`; None while nothing is to be sent."""
@@ -268,17 +277,54 @@ class Stream(Watch):
         asked = self.phase == "ending" and self._command is not None
         if self.phase == "flying" or (asked and guided):
             part = self.flight.part
-            velocity = np.array([position.vy, position.vx, -position.vz]) / 100
-            setpoint = self.flight.setpoint(t + self._lead(), place, velocity)
+            now = Setpoint.of(place[:2], position)
+            if not self._on_course(t, now):
+                return None
+            setpoint = self.flight.setpoint(t + self._lead(), place, now.velocity)
             if self.flight.part != part:
                 self.seen.told.append(_PARTS[self.flight.part])
                 self.relay_start = self.flight.relay_start
             return setpoint
-        if self._is_px4 and self.phase in ("engaging", "arming"):
+        if self._rules.takes_off_by_setpoints and self.phase in ("engaging", "arming"):
             if self._ground is None:
                 self._ground = Setpoint(place, np.zeros(3), np.zeros(3))
             return self._ground
         return None
+
+    def _on_course(self, t: float, now: Setpoint) -> bool:
+        """See to it that the course leads on from `now` where it may; tell whether it does."""
+        replan, start = self._replan, self.relay_start
+        if replan is None or start is None or self.flight.part != "relay":
+            return True
+        begin = replan.begin if self._handed_back and not replan.asking else replan.step
+        begin(self._flown, t - start, now, self._clock_speed())
+        self.seen.told += replan.told
+        replan.told.clear()
+        if not self._handed_back or replan.asking:
+            return True
+        self._handed_back = False
+        if replan.failed:
+            self._step_aside()
+        return not replan.failed
+
+    def _step_aside(self) -> None:
+        super()._step_aside()
+        self._handed_back, self._back_since = False, float("inf")
+        if self._replan is not None:
+            self._replan.forget()
+
+    def _flown(self) -> Line:
+        """Return where it was, on the plan's clock."""
+        assert self.relay_start is not None
+        t, w = self.seen.samples.record().line(self.flight.solution)
+        return Line(t - self.relay_start, w)
+
+    def _clock_speed(self) -> float:
+        """Return how many seconds of the vehicle's clock a second of the world's has."""
+        if len(self._round_trips) < 2:
+            return 1.0
+        (first, there_first, _), (last, there_last, _) = self._round_trips[0], self._round_trips[-1]
+        return max((there_last - there_first) / 1e9 / max(last - first, 1e-9), 0.0)
 
     def _lead(self) -> float:
         """Return by how much later than a position was told the setpoint for it counts, s.
@@ -287,10 +333,8 @@ class Stream(Watch):
         """
         if len(self._round_trips) < 2:
             return self._held
-        (first, there_first, _), (last, there_last, _) = self._round_trips[0], self._round_trips[-1]
-        speed = (there_last - there_first) / 1e9 / max(last - first, 1e-9)
         trip = median(trip for _, _, trip in self._round_trips)
-        return self._held + min(max(speed, 0.0) * trip, _LONGEST_TRIP)
+        return self._held + min(self._clock_speed() * trip, _LONGEST_TRIP)
 
     def _place(self, position: GlobalPositionInt) -> Real:
         """Return where it is: (3,) m east, north, up of the plan's origin, which is its home."""

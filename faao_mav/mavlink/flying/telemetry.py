@@ -41,8 +41,8 @@ Kind: TypeAlias = Literal[
 _SILENT = 5.0
 """Seconds without any message after which the link counts as interrupted: five heartbeats."""
 
-_PERIOD = 0.2
-"""Seconds between two positions that are asked for. Chosen: at 8 m/s they are 1.6 m apart."""
+POSITION_RATE = 5.0
+"""Positions a second that are asked for. Chosen: at 8 m/s they are 1.6 m apart."""
 
 _PERIODS = {SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
 """Other messages that are needed, and the seconds between two of them that are asked for."""
@@ -100,7 +100,7 @@ class Samples:
 class Telemetry:
     """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
 
-    Without `rows` its mission is not looked at. It is asked for a position every `period` s.
+    Without `rows` its mission is not looked at. It is asked for `rate` positions a second.
 
     Attributes:
         told: what has happened, in words, one after the other.
@@ -112,7 +112,7 @@ class Telemetry:
     """
 
     def __init__(
-        self, peer: Peer, rows: Sequence[WireItem], patience: float, period: float = _PERIOD
+        self, peer: Peer, rows: Sequence[WireItem], patience: float, rate: float = POSITION_RATE
     ) -> None:
         self._peer, self._rows, self._patience = peer, tuple(rows), patience
         self._home = home_items(peer.vehicle, MissionType.MISSION)
@@ -123,7 +123,7 @@ class Telemetry:
         self.current: MissionCurrent | None = None
         self.status: SysStatus | None = None
         self.position: GlobalPositionInt | None = None
-        self._periods = {POSITION: period} | _PERIODS
+        self._periods = {POSITION: 1 / rate} | _PERIODS
         self.stations: set[str] = set()
         self.ending: Ending | None = None
         self._next_item = self._home

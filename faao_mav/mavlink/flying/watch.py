@@ -1,9 +1,9 @@
 """Watching a mission from the ground to its end, and starting it where that is asked for."""
 
 from collections.abc import Callable, Sequence
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from faao_mav.mavlink.flying.telemetry import Ending, Kind, Telemetry
+from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.mavlink.machine import Machine, Progress
 from faao_mav.mavlink.messages import (
     CommandAck,
@@ -19,6 +19,9 @@ from faao_mav.mavlink.modes import modes_of
 from faao_mav.mavlink.protocol import MISSION_COMPLETE, MavCommand, MissionType
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.wire_items import home_items
+
+if TYPE_CHECKING:
+    from faao_mav.optimizer.solution import Solution
 
 Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "waiting", "flying", "holding", "ending", "aside"
@@ -56,7 +59,7 @@ class Watch(Machine[Ending]):
     and starts the mission once the autopilot's own checks pass and no other ground station was
     heard; else somebody else does. `lands`: the flight ends on the ground. After `patience` seconds
     without a message, or of checks that do not pass, it ends. `seen` is what it has heard; it asks
-    for a position every `period` s. `relay_start` is when the plan's clock read 0, s on the
+    for `rate` positions a second. `relay_start` is when the plan's clock read 0, s on the
     vehicle's, where that is known: in a `Stream`.
 
     Nothing is sent but what asks for telemetry, until `arm` or `cancel` has a reason; and nothing
@@ -70,6 +73,8 @@ class Watch(Machine[Ending]):
     vehicle that is not known.
     """
 
+    _start_command = MavCommand.START
+
     def __init__(
         self,
         peer: Peer,
@@ -78,7 +83,7 @@ class Watch(Machine[Ending]):
         arm: bool = False,
         lands: bool = True,
         patience: float = 60.0,
-        period: float = 0.2,
+        rate: float = POSITION_RATE,
     ) -> None:
         super().__init__()
         if peer.vehicle is None:
@@ -88,7 +93,7 @@ class Watch(Machine[Ending]):
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
         self._arm, self._lands, self._patience = arm, lands, patience
-        self.seen = Telemetry(peer, rows, patience, period)
+        self.seen = Telemetry(peer, rows, patience, rate)
         self.phase: Phase = "checking" if arm else "waiting"
         self.relay_start: float | None = None
         self._begun = 0.0
@@ -101,9 +106,9 @@ class Watch(Machine[Ending]):
         self._sent, self._next_try = 0, 0.0
 
     @property
-    def streams(self) -> bool:
-        """Whether it is not the mission that is flown, but a plan by setpoints."""
-        return False
+    def solution(self) -> "Solution | None":
+        """What is flown by setpoints; None where it is the mission that is flown."""
+        return None
 
     @property
     def progress(self) -> Progress:
@@ -199,15 +204,21 @@ class Watch(Machine[Ending]):
         return ()
 
     def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
-        awaited = {"arming": MavCommand.ARM, "starting": MavCommand.START}.get(self.phase)
+        awaited = {"arming": MavCommand.ARM, "starting": self._start_command}.get(self.phase)
         if command != awaited or result == IN_PROGRESS:
             return ()
-        if result != ACCEPTED:
-            return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
-        if self.phase == "arming":
-            self.phase = "starting"
-            return self._say(self._starting, now)
-        return ()
+        return self._accepted(now) if result == ACCEPTED else self._denied(command, result, now)
+
+    def _accepted(self, now: float) -> Sequence[Message]:
+        """Go on, now that arming or starting has been accepted."""
+        if self.phase != "arming":
+            return ()
+        self.phase = "starting"
+        return self._say(self._starting, now)
+
+    def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:  # noqa: ARG002
+        """End, now that arming or starting has been denied."""
+        return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
 
     def _on_disarmed(self) -> Sequence[Message]:
         match self.phase:
@@ -272,7 +283,7 @@ class Watch(Machine[Ending]):
         )
 
     def _starting(self) -> Message:
-        return CommandLong(self._peer.address, MavCommand.START, max(0, self._sent - 1))
+        return CommandLong(self._peer.address, self._start_command, max(0, self._sent - 1))
 
     def _hold(self) -> Message:
         return self._mode(self._modes.hold)

@@ -52,8 +52,7 @@ class ArduPilotFirmware(MockFirmware):
     fence_texts = (Statustext(MavSeverity.NOTICE, "Polygon fence breached"),)
     armed_inside_only = True
     returns_by_mode = frozenset({"plane"})
-    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "GUID_TIMEOUT": 3.0})
-    setpoint_timeout = "GUID_TIMEOUT"
+    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
     misplaced = MavResult.UNSUPPORTED
     nonsense = MavResult.INVALID
 

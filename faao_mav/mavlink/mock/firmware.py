@@ -109,10 +109,6 @@ class MockFirmware(ABC):
         returns_by_mode: the types of vehicle that change their mode when a mission has them return.
         fence_texts: what it says when it leaves the fence.
         armed_inside_only: it does not arm where home lies outside the fence.
-        takes_off_by_setpoints: it follows setpoints only after a second of them, and takes off by
-            them; else by a command.
-        setpoint_timeout: the parameter that says after how many seconds without setpoints it stops.
-        setpoint_loss: the parameter that says what it then does, "" if it stays in its mode.
     """
 
     family: ClassVar[AutopilotFamily]
@@ -125,9 +121,6 @@ class MockFirmware(ABC):
     returns_by_mode: ClassVar[frozenset[str]] = frozenset()
     fence_texts: ClassVar[tuple[Statustext, ...]]
     armed_inside_only: ClassVar[bool] = False
-    takes_off_by_setpoints: ClassVar[bool] = False
-    setpoint_timeout: ClassVar[str]
-    setpoint_loss: ClassVar[str] = ""
 
     def __init__(
         self,

@@ -1,9 +1,9 @@
 """A mock autopilot that follows setpoints: when it does, for how long, and how it flies then.
 
 Measured in simulation: ArduCopter 4.7 arms and takes off in GUIDED by a command, and stops in its
-place GUID_TIMEOUT seconds after the last setpoint; PX4 1.16.1 takes Offboard after a second of
-setpoints, takes off by them, and COM_OF_LOSS_T seconds after the last one does COM_OBL_RC_ACT.
-ArduCopter goes on from a setpoint by its velocity and acceleration; PX4 goes to where it is.
+place when setpoints cease; PX4 1.16.1 takes Offboard after a second of setpoints, takes off by
+them, and changes its mode when they cease, by default to Position, where it sinks without sticks:
+see `SetpointRules`.
 """
 
 import math
@@ -15,12 +15,12 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.flying.course import Course, Setpoint
 from faao_mav.mavlink.local_frame import frame_of
 from faao_mav.mavlink.messages import SetPositionTargetLocalNed
-from faao_mav.mavlink.mock.firmware import MockFirmware
+from faao_mav.mavlink.mock.firmware import whole
 from faao_mav.mavlink.mock.flight import Posture
 from faao_mav.mavlink.modes import Modes
+from faao_mav.mavlink.setpoints import SetpointRules
 from faao_mav.mission.item import Home
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.vehicle_type import FenceAction
+from faao_mav.vehicle import AutopilotFamily, Vehicle
 
 _STEP, _STEPS, _LONGEST_STEP = 0.05, 1000, 0.5
 """Seconds between two steps of the flight; after a longer silence it is about so many steps, none
@@ -38,15 +38,9 @@ _PUSH = 5.0
 _GROUND = 0.5
 """Metres above home below which it counts as standing; chosen."""
 
-_STREAMED = 1.0
-"""Seconds of setpoints that PX4 wants before it follows them."""
-
-_LOSS: Mapping[float, FenceAction] = {3.0: "return", 4.0: "land"}
-"""What the values of COM_OBL_RC_ACT make it do; else it holds."""
-
 
 class Guided:
-    """The part of a mock autopilot that follows setpoints in the `modes` of its vehicle.
+    """The part of a mock autopilot that follows setpoints by `rules`, in its `modes`.
 
     Its clock runs `speedup` times as fast as the world's, in whose seconds `now` is. `wind` is in
     m/s east and north: it holds its place in it, but flies no faster than its airspeed allows.
@@ -55,14 +49,16 @@ class Guided:
 
     def __init__(
         self,
-        firmware: MockFirmware,
+        family: AutopilotFamily,
+        rules: SetpointRules,
         parameters: Mapping[str, float],
         home: Home,
         modes: Modes,
         wind: tuple[float, float],
         speedup: float,
     ) -> None:
-        self._firmware, self._parameters, self._home = firmware, parameters, home
+        self._family, self._rules = family, rules
+        self._parameters, self._home = parameters, home
         self._modes, self._wind, self._speedup = modes, np.array([*wind, 0.0]), speedup
         self._first_heard = self._last_heard = -math.inf
         self._vehicle: Vehicle | None = None
@@ -77,8 +73,8 @@ class Guided:
 
     def accepts(self, now: float) -> bool:
         """Tell whether it enters the mode: PX4 only while setpoints come."""
-        streamed = (now - self._first_heard) * self._speedup > _STREAMED
-        return not self._firmware.takes_off_by_setpoints or (streamed and not self._late(now))
+        streamed = (now - self._first_heard) * self._speedup > self._rules.streamed
+        return not self._rules.takes_off_by_setpoints or (streamed and not self._late(now))
 
     def begin(self, posture: Posture, vehicle: Vehicle, now: float) -> None:
         """Follow setpoints from `posture` on."""
@@ -93,7 +89,7 @@ class Guided:
         if self._late(now):
             self._first_heard = now
         self._last_heard = now
-        by_setpoints = self._firmware.takes_off_by_setpoints
+        by_setpoints = self._rules.takes_off_by_setpoints
         if self.flying and mode == self._modes.guided and (by_setpoints or self._p[2] > _GROUND):
             self._advance(now)
             self._aim, self._course, self._since = self._setpoint(message), None, now
@@ -101,22 +97,21 @@ class Guided:
     def take_off(self, height: float, mode: int, now: float) -> bool:
         """Climb to `height`, m, on the command; tell whether it does."""
         ready = self.flying and mode == self._modes.guided and self._p[2] < _GROUND
-        if not ready or self._firmware.takes_off_by_setpoints:
+        if not ready or self._rules.takes_off_by_setpoints:
             return False
         self._go(now, [*self._p[:2], height])
         return True
 
     def leave(self, mode: int, now: float) -> None:
         """Do what another `mode` asks for: return, land, or stay there."""
-        vertical, (east, north, up) = self._of.vertical, self._p
         self._advance(now)
+        vertical, (east, north, up) = self._of.vertical, self._p
         if mode == self._modes.at_fence.get("return"):
             high = vertical.returns_at(up)
             self._go(now, [east, north, high], [0.0, 0.0, high], [0.0, 0.0, 0.0])
             self._lands = vertical.lands_on_return
         elif mode == self._modes.at_fence.get("land"):
-            self._go(now, [east, north, 0.0])
-            self._lands = True
+            self._land(now)
         else:
             self._stop(now)
 
@@ -124,12 +119,14 @@ class Guided:
         """Return the mode that it is in, now that setpoints may have ceased."""
         if mode != self._modes.guided or self._aim is None or not self._late(now):
             return mode
-        if not self._firmware.setpoint_loss:
+        if not self._rules.loss:
             self._stop(now)
             return mode
-        action = _LOSS.get(self._parameters[self._firmware.setpoint_loss], "hold")
-        after = self._modes.at_fence[action]
+        action = self._rules.actions.get(whole(self._parameters[self._rules.loss]))
+        after = self._modes.hold if action is None else action.mode
         self.leave(after, now)
+        if action is not None and action.by_sticks:
+            self._land(now)
         return after
 
     def landed(self, now: float) -> bool:
@@ -144,7 +141,7 @@ class Guided:
 
     def _late(self, now: float) -> bool:
         """Tell whether there was no setpoint for as long as its parameter allows."""
-        allowed = self._parameters[self._firmware.setpoint_timeout]
+        allowed = max(self._parameters[self._rules.timeout], self._rules.least_timeout)
         return (now - self._last_heard) * self._speedup > allowed
 
     @property
@@ -162,6 +159,10 @@ class Guided:
                 Course.through(leg, speed=speed if level else climb, acceleration=1.0)
             )
         self._aim, self._course, self._since = None, course, now
+
+    def _land(self, now: float) -> None:
+        self._go(now, [*self._p[:2], 0.0])
+        self._lands = True
 
     def _stop(self, now: float) -> None:
         self._advance(now)
@@ -198,14 +199,14 @@ class Guided:
             return self._course.at(since)
         assert self._aim is not None
         p, v, a = self._aim
-        if self._firmware.takes_off_by_setpoints:
+        if not self._rules.carries_on:
             return self._aim
         return Setpoint(p + v * since + a * since**2 / 2, v + a * since, a)
 
     def _setpoint(self, message: SetPositionTargetLocalNed) -> Setpoint:
         """Return what `message` says in metres east, north and up of home."""
         home = self._home
-        frame = frame_of(self._firmware.family, home.latitude, home.longitude)
+        frame = frame_of(self._family, home.latitude, home.longitude)
         own = LocalFrame(home.latitude, home.longitude)
         level = own.to_local(*frame.to_geodetic([message.y, message.x]))
         moves = (

@@ -49,6 +49,7 @@ from faao_mav.mavlink.protocol import (
     MavState,
     MissionType,
 )
+from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
@@ -112,7 +113,9 @@ class MockAutopilot(Machine[None]):
         self._modes = modes_of(self.vehicle)
         self._mode = self._modes.rest
         self.lists = StoredLists(self.vehicle, home)
-        known = self.vehicle.defaults() | dict(behaviour.firmware.parameters)
+        rules = setpoint_rules(behaviour.family)
+        known = self.vehicle.defaults() | dict(rules.defaults)
+        known |= dict(behaviour.firmware.parameters)
         self.parameters = ParameterServer(known | dict(parameters or {}))
         self._firmware = behaviour.firmware(self.lists, behaviour, self._is_ready, self._is_flying)
         self._fly, self._speedup = fly, speedup
@@ -127,7 +130,7 @@ class MockAutopilot(Machine[None]):
         self._rest = _AT_HOME
         self._broken_off: tuple[MockFlight, float] | None = None
         told = self.parameters.values
-        self._guided = Guided(self._firmware, told, home, self._modes, wind, speedup)
+        self._guided = Guided(self.vehicle.family, rules, told, home, self._modes, wind, speedup)
 
     @property
     def deadline(self) -> float | None:

@@ -1,7 +1,6 @@
 """How PX4 takes and gives lists."""
 
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Literal
 
 from faao_mav.mavlink.messages import (
@@ -68,10 +67,6 @@ class Px4Firmware(MockFirmware):
     misplaced = MavResult.ERROR
     nonsense = MavResult.UNSUPPORTED
     silent_at_boot = True
-    parameters = MappingProxyType({"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0})
-    takes_off_by_setpoints = True
-    setpoint_timeout = "COM_OF_LOSS_T"
-    setpoint_loss = "COM_OBL_RC_ACT"
 
     def requested_mode(self, command: CommandLong) -> int:
         """Return the custom mode that DO_SET_MODE asks for: main and sub mode in one number."""

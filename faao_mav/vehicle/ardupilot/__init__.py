@@ -14,6 +14,9 @@ ARDUPILOT = AutopilotFamily(
     parameter_prefixes=("WPNAV_", "WP_", "ATC_", "PSC_", "ARMING_"),
 )
 
+DEGREE = 111_318.84502145034
+"""ArduPilot's degree of latitude, m; times the cosine of the latitude one of longitude."""
+
 HOME_OUTSIDE_FENCE = "with FENCE_ENABLE 1 ArduPilot does not arm there"
 """Measured on ArduCopter and ArduPlane 4.7."""
 

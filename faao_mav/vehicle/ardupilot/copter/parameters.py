@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import Self
 
-from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.ardupilot import DEGREE, SHARED, SOURCE, rally_limit, switch
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, ParameterValues, table
 from faao_mav.vehicle.vehicle_type import lean_acceleration
 
@@ -62,9 +62,6 @@ ArduPilot's simulator."""
 
 _LEAST_INPUT_TIME = 0.1
 """The autopilot's own lower bound of ATC_INPUT_TC, s."""
-
-_DEGREE = 111_318.845
-"""Metres to a degree, north, and times the cosine of the latitude east, to the autopilot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,4 +133,4 @@ def _metres(latitude: float) -> tuple[float, float]:
     a, e2 = 6_378_137.0, 6.69437999014e-3
     w = 1 - e2 * math.sin(math.radians(latitude)) ** 2
     degree = math.pi / 180 * a / math.sqrt(w)
-    return _DEGREE / degree, _DEGREE * w / (degree * (1 - e2))
+    return DEGREE / degree, DEGREE * w / (degree * (1 - e2))

@@ -1,0 +1,91 @@
+"""How autopilots follow setpoints, and what they do when no more come."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from faao_mav.mavlink.modes import px4_mode
+from faao_mav.vehicle import AutopilotFamily
+from faao_mav.vehicle.ardupilot import ARDUPILOT
+from faao_mav.vehicle.px4 import PX4
+
+
+class LossAction(NamedTuple):
+    """What is done without setpoints: the name of a mode, its custom mode, whether sticks fly it.
+
+    Where there are no sticks PX4 1.16.1 sank in Position by 0.7 m/s to the ground, in simulation.
+    """
+
+    name: str
+    mode: int
+    by_sticks: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SetpointRules:
+    """The rules of an autopilot for flights by setpoints.
+
+    Attributes:
+        timeout: the parameter that says for how many seconds it does without setpoints.
+        least_timeout: the least time, s, whatever that parameter says.
+        loss: the parameter that says which of `actions`, by their values, it then does; "": it
+            stops in its place, and stays in its mode.
+        streamed: for so many seconds setpoints have to come before it enters the mode; it then
+            takes off by them. 0: it enters the mode at any time, and takes off by a command.
+        carries_on: it goes on from a setpoint by the velocity and the acceleration in it; else it
+            goes to where the setpoint is, and waits there for the next.
+        defaults: the values of these parameters that it comes with.
+    """
+
+    timeout: str
+    least_timeout: float = 0.0
+    loss: str = ""
+    actions: Mapping[int, LossAction] = field(default_factory=dict)
+    streamed: float = 0.0
+    carries_on: bool = False
+    defaults: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def takes_off_by_setpoints(self) -> bool:
+        """Whether it takes off by setpoints, which have to come before it enters the mode."""
+        return self.streamed > 0
+
+    def without(self, values: Mapping[str, float]) -> str:
+        """Return in words what it does without setpoints, given its parameters' `values`."""
+        if not {*self.defaults} <= {*values}:
+            return "it does what it does: it does not tell its parameters"
+        after = max(values[self.timeout], self.least_timeout)
+        if not self.loss:
+            return f"it stops after {after:g} s ({self.timeout})"
+        action = self.actions.get(int(values[self.loss]))
+        told = ", ".join(f"{name} {values[name]:g}" for name in self.defaults)
+        name = "another mode" if action is None else action.name
+        if action is not None and action.by_sticks:
+            name += " (and sinks, unless sticks fly it)"
+        return f"it changes to {name} after {after:g} s ({told})"
+
+
+_RULES = {
+    ARDUPILOT: SetpointRules(
+        "GUID_TIMEOUT", least_timeout=0.1, carries_on=True, defaults={"GUID_TIMEOUT": 3.0}
+    ),
+    PX4: SetpointRules(
+        "COM_OF_LOSS_T",
+        loss="COM_OBL_RC_ACT",
+        actions={
+            0: LossAction("Position", px4_mode(3, 0), by_sticks=True),
+            1: LossAction("Altitude", px4_mode(2, 0), by_sticks=True),
+            2: LossAction("Stabilized", px4_mode(7, 0), by_sticks=True),
+            3: LossAction("Return", px4_mode(4, 5)),
+            4: LossAction("Land", px4_mode(4, 6)),
+            5: LossAction("Hold", px4_mode(4, 3)),
+        },
+        streamed=1.0,
+        defaults={"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0},
+    ),
+}
+
+
+def setpoint_rules(family: AutopilotFamily) -> SetpointRules:
+    """Return the rules of `family`."""
+    return _RULES[family]

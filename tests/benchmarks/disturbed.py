@@ -1,0 +1,191 @@
+"""Plans that real autopilots fly by setpoints in trouble, with and without --replan.
+
+    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/disturbed.py [ardupilot | px4] [CASE ...]
+
+The sample 30 m above the ground, in simulators twice as fast as the world. Cases: `wind`, of which
+the plan knows nothing; `silence`, a link that carries nothing for 8 s of the flight; `pause`,
+another mode for 15 s and back, as a pilot sets them; `loss 5 %` and `loss 20 %` of all packets each
+way; `outages` of 2 s of the world's time, one in ten. One row for each: how it ended, the delivered
+rate over the planned one without and with re-planning, and what was told of new courses.
+"""
+
+import math
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from conftest import MISSIONS, edited
+from simulators import simulated
+
+from faao_mav import Result, plan_mission
+from faao_mav.mavlink import link
+from faao_mav.mavlink.client import upload
+from faao_mav.mavlink.codec import Codec
+from faao_mav.mavlink.faults import Faults, FaultyTransport
+from faao_mav.mavlink.flying.fly import FlightReport, fly
+from faao_mav.mavlink.flying.solving import ProcessSolver
+from faao_mav.mavlink.flying.watch import Watch
+from faao_mav.mavlink.messages import SetMode
+from faao_mav.mavlink.modes import modes_of
+from faao_mav.mavlink.protocol import Address
+from faao_mav.mavlink.transport import Transport, open_transport
+from faao_mav.plan import parse_plan
+from faao_mav.schedule.prediction import price_flight
+
+SPEEDUP = 2
+BEGIN = 25.0
+"""Seconds of the plan's clock after which the link breaks, or a pilot sets a mode."""
+
+PILOT = Address(250, 1)
+WINDS = {"ardupilot": (7.0, 225.0), "px4": (7.0, 225.0)}
+"""Speed, m/s, and where it comes from, degrees: against the middle of the flight."""
+
+OUTAGES = tuple((begin, begin + 2.0) for begin in range(15, 600, 20))
+FAULTS = {
+    "loss 5 %": Faults(loss=0.05, seed=1),
+    "loss 20 %": Faults(loss=0.2, seed=1),
+    "outages": Faults(outages=OUTAGES, seed=1),
+}
+CASES = ("none", "wind", "silence", "pause", *FAULTS)
+
+
+@dataclass
+class Disturbance:
+    """What happens to the link of a flight, as its plan's clock goes on."""
+
+    case: str
+    transport: Transport | None = None
+    silent_until: float = 0.0
+    done: list[str] = field(default_factory=list)
+
+    def opened(self, text: str) -> "Disturbance | FaultyTransport":
+        """Open the link."""
+        self.transport = open_transport(text)
+        return FaultyTransport(self, FAULTS[self.case]) if self.case in FAULTS else self
+
+    def read(self, timeout: float) -> list[bytes]:
+        assert self.transport is not None
+        arrived = self.transport.read(timeout)
+        return [] if time.monotonic() < self.silent_until else arrived
+
+    def write(self, data: bytes) -> None:
+        assert self.transport is not None
+        if time.monotonic() >= self.silent_until:
+            self.transport.write(data)
+
+    def close(self) -> None:
+        assert self.transport is not None
+        self.transport.close()
+
+    def __call__(self, watch: Watch) -> None:
+        """Do what is due."""
+        samples, start = watch.seen.samples, watch.relay_start
+        if start is None or not samples.t:
+            return
+        t = samples.t[-1] - start
+        if self.case == "silence" and t > BEGIN and not self.done:
+            self.done.append("silent")
+            self.silent_until = time.monotonic() + 8 / SPEEDUP
+        modes = modes_of(watch._peer.vehicle)  # type: ignore[arg-type]
+        assert modes.guided is not None
+        for name, mode, when in (("out", modes.hold, 0.0), ("back", modes.guided, 15.0)):
+            if self.case == "pause" and t > BEGIN + when and name not in self.done:
+                self.done.append(name)
+                self.write(Codec(PILOT).pack(SetMode(watch._peer.address.system, 1, mode)))
+
+
+def flown(
+    autopilots: Path, autopilot: str, result: Result, case: str, *, replan: bool
+) -> FlightReport:
+    """Fly the plan of `result` by setpoints in a simulator."""
+    speed, origin = WINDS[autopilot] if case == "wind" else (0.0, 0.0)
+    assert result.conversion is not None
+    disturbance = Disturbance(case)
+    with tempfile.TemporaryDirectory() as where:
+        folder = Path(where)
+        if autopilot == "px4":
+            towards = math.radians(origin + 180)
+            east, north = speed * math.sin(towards), speed * math.cos(towards)
+            air = [f"--wind={east},{north}"] if speed else []
+            options = ["--speedup", str(SPEEDUP), "--params", "SIH_KDV=0.2", *air]
+        else:
+            timed = [f"{name} {value}" for name, value in result.conversion.parameters.items()]
+            air = [f"SIM_WIND_SPD {speed}", f"SIM_WIND_DIR {origin}"] if speed else []
+            (folder / "own.parm").write_text("\n".join([*timed, *air]))
+            defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
+            options = ["--speedup", str(SPEEDUP), "--defaults", defaults]
+        kind = "px4" if autopilot == "px4" else "arducopter"
+        with (
+            simulated(autopilots, kind, folder, *options) as connection,
+            ProcessSolver() if replan else nullcontext() as solver,
+        ):
+            upload(result.conversion.mission, connection, wait=60)
+            with patch.object(link, "open_transport", disturbance.opened):
+                told: list[str] = []
+                watching = telling(disturbance, told)
+                report = fly(
+                    result.conversion.mission,
+                    connection,
+                    stream=result.solution,
+                    solver=solver,
+                    rate=10,
+                    wait=60,
+                    watching=watching,
+                )
+    for text in told:
+        print("   ", text)
+    return report
+
+
+def telling(disturbance: Disturbance, told: list[str]) -> Callable[[Watch], None]:
+    """Return what is called after every step of a watch."""
+
+    def watching(watch: Watch) -> None:
+        disturbance(watch)
+        told[:] = [
+            text for text in watch.seen.told if "course" in text or "plan" in text or "mode" in text
+        ]
+
+    return watching
+
+
+def delivered(result: Result, report: FlightReport) -> str:
+    """Return how the flight ended, and what it delivered of the plan."""
+    ending: str = report.ending.kind if report.ending is not None else "different"
+    if report.ending is not None and ending != "finished":
+        ending += f" ({report.ending.text})"
+    if report.relay_start is None or report.solution is None:
+        return f"{ending}, -"
+    t, w = report.samples.record().line(report.solution)
+    real = price_flight(report.solution, t - report.relay_start, w)
+    share = 100 * real.delivered_rate / result.solution.delivered_rate
+    return f"{ending}, {share:.2f} %, {real.rms_position_error:.2f} m rms"
+
+
+def main() -> None:
+    """Print a row for each autopilot and case."""
+    chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
+    for autopilot in [each for each in WINDS if each in chosen] or WINDS:
+        changes: dict[str, Any] = {"vehicle.autopilot": autopilot, "flight.altitude": 30}
+        text = (MISSIONS / "copter_relay.yaml").read_text()
+        result = plan_mission(parse_plan(edited(text, changes)))
+        for case in [each for each in CASES if each in chosen] or CASES:
+            for replan in (False, True):
+                if case in FAULTS and replan:
+                    continue
+                report = flown(autopilots, autopilot, result, case, replan=replan)
+                name = "re-planned" if replan else "as planned"
+                print(f"{autopilot:<10}{case:<11}{name:<12}{delivered(result, report)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
