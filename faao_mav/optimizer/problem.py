@@ -11,7 +11,7 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
-from faao_mav.optimizer.kinematics import Kinematics, kinematics
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
     balanced_rayleigh,
@@ -31,6 +31,7 @@ from faao_mav.radio.relay import RelayQueue
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.interior.constraint import Constraint
+    from faao_mav.optimizer.interior.energy import EnergyLimit
 
 MAX_DIFFERENCE_VECTORS = 5_000_000
 MAX_CHANNELS = 5_000_000
@@ -154,12 +155,16 @@ class Link:
 
 @dataclass(frozen=True)
 class Problem:
-    """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue."""
+    """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue.
+
+    `energy` is what flight and relay may take, J.
+    """
 
     plan: Plan
     kinematics: Kinematics
     bs_uav: Link
     uav_user: Link
+    energy: float = math.inf
 
     @cached_property
     def free_area(self) -> FreeArea | None:
@@ -174,11 +179,36 @@ class Problem:
 
     def constraints(self, kin: Kinematics) -> "tuple[Constraint, ...]":
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""
+        limited = self.energy < math.inf
+        energy = (self._energy_limit(kin, self.energy),) if limited else ()
+        return (*self.fenced(kin), *energy)
+
+    def fenced(self, kin: Kinematics) -> "tuple[Constraint, ...]":
+        """Return what flights of `kin` have to keep of the fence."""
         if self.fence is None:
             return ()
         from faao_mav.optimizer.interior.fence import fence_constraints  # brings scipy along
 
         return fence_constraints(self.fence, kin)
+
+    def energy_of(self, flight: Trajectory) -> float | None:
+        """Return what `flight` and relay take, J, as sums over the slots; None without a model."""
+        if self.plan.power_model is None:
+            return None
+        kin = self.kinematics
+        return self._energy_limit(kin).used(flight) + self._radiated(kin)
+
+    def _energy_limit(self, kin: Kinematics, energy: float = math.inf) -> "EnergyLimit":
+        from faao_mav.optimizer.interior.energy import EnergyLimit
+
+        model = self.plan.power_model
+        assert model is not None  # plans that limit the energy have one
+        most = energy - self._radiated(kin)
+        return EnergyLimit(model, most, kin.time_step, kin.max_speed, kin.wind)
+
+    def _radiated(self, kin: Kinematics) -> float:
+        """Return what the relay's radio sends, J."""
+        return self.plan.radio.relay.power * kin.slots * kin.time_step
 
     @property
     def maximised_queue(self) -> RelayQueue | None:

@@ -3,7 +3,7 @@
 import io
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from faao_mav.optimizer.archive import read_archive
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.power import JOULES_PER_WH
 from faao_mav.radio.relay import Relayed
 
 
@@ -34,6 +35,16 @@ Observer = Callable[[Progress], None]
 """What an optimiser tells its progress to."""
 
 
+def staged(observe: Observer | None, told: str) -> Observer:
+    """Return an observer that tells `observe` the progress, of stages that begin with `told`."""
+
+    def tell(now: Progress) -> None:
+        if observe is not None:
+            observe(replace(now, stage=f"{told}: {now.stage}"))
+
+    return tell
+
+
 @dataclass(frozen=True, slots=True)
 class Rates:
     """R_U, R_G of (10) and R_avg of (9), bit/s/Hz."""
@@ -49,11 +60,11 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class Least:
-    """How the least duration or power was found, which the solution's plan has.
+    """How the duration, power or energy of a `goal` was found, which the solution has.
 
-    `limit` is what the plan allowed, s or the base station's dBm; `below` the best solution with
-    one step of the grid less, None where there is no flight, and `optimizations` how many flights
-    were optimised.
+    `limit` is what the plan allowed: s (for the most data too), the base station's dBm, or the Wh
+    of the whole duration. `below` is the best solution with one step of the grid less, None where
+    there is no flight, and `optimizations` how many flights were optimised.
     """
 
     limit: float
@@ -133,6 +144,12 @@ class Solution:
     def delivered_rate(self) -> float:
         """The delivered rate R_del, the mean of what is forwarded, bit/s/Hz; at most R_avg."""
         return self.relayed.rate
+
+    @property
+    def energy_wh(self) -> float | None:
+        """The energy of the planned flight and its relay, Wh; None without `vehicle.power`."""
+        energy = build_problem(self.plan).energy_of(self.trajectory)
+        return None if energy is None else energy / JOULES_PER_WH
 
     @property
     def iterations(self) -> int:
