@@ -39,10 +39,11 @@ _LEAST_AIRSPEED = 1.0
 """Airspeed below which a fixed wing is not flying, m/s: c_2 / v is held there. Chosen."""
 
 
-_KINK = 0.02
-"""Half the width, W/kg, in which the growth of kinetic energy turns smoothly into none.
+_KINK = 1.0
+"""Half the width, W/kg, in which `partials` lets the growth of kinetic energy set in smoothly.
 
-Chosen: level flight at an even speed takes 0.01 W/kg more by that, a thousandth of all.
+It is half of that too large at an even speed, and nowhere too small. Measured on a plane of 2.5 kg
+and 90 W that circles for 32 s: with 0.02 no search converges in 300 steps, with 1 nearly all do.
 """
 
 _STILL = 1e-9
@@ -70,7 +71,7 @@ class PowerModel(Protocol):
         """Return W (...) at velocities through the air and accelerations (..., 3), m/s, m/s^2."""
 
     def partials(self, v: Real, a: Real) -> PowerPartials:
-        """Return the power of level flight at v and a (2, ...), m/s, m/s^2, with derivatives."""
+        """Return what flight at v and a (2, ...), m/s, m/s^2, takes at most, with derivatives."""
 
     def least_power(self, speeds: Real) -> tuple[float, float]:
         """Return the one of the `speeds` of least power in straight and level flight, and that."""
@@ -189,7 +190,7 @@ class FixedWing:
         across = np.abs(v[..., 0] * a[..., 1] - v[..., 1] * a[..., 0])
         gained = (v * a).sum(axis=-1) + GRAVITY * velocity[..., 2]
         turning = across / np.maximum(speed, _LEAST_AIRSPEED)
-        return np.asarray(self.level(speed, turning) + self.mass * _growth(gained))
+        return np.asarray(self.level(speed, turning) + self.mass * np.maximum(0.0, gained))
 
     def partials(self, v: Real, a: Real) -> PowerPartials:
         """Return P and its derivatives: see `PowerModel`."""
@@ -212,17 +213,12 @@ class FixedWing:
         by_vv += self.mass * curved * _packed(a, a)
         by_vv[::2] += along
         by_aa = 2 * bank * _packed(turned, turned) + self.mass * curved * _packed(v, v)
-        value = self.level(speed, across / speed) + self.mass * _growth(gained)
+        value = self.level(speed, across / speed) + self.mass * (gained + root) / 2
         return PowerPartials(value, by_v, by_a, by_vv, by_aa)
 
     def least_power(self, speeds: Real) -> tuple[float, float]:
         """Return the speed of least power: see `PowerModel`."""
         return _least(speeds, self.level(speeds, np.zeros_like(speeds)))
-
-
-def _growth(gained: Real) -> Real:
-    """Return max(0, `gained`), smooth over `_KINK`."""
-    return np.asarray((gained + np.hypot(gained, _KINK)) / 2)
 
 
 def _packed(x: Real, y: Real) -> Real:

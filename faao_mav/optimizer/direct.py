@@ -42,7 +42,7 @@ from faao_mav.optimizer.search.starts import split_names, starts
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
-_LONG_SEARCH = 6
+LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded where a queue has a buffer, shares
 or a least speed. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300 steps."""
 
@@ -52,7 +52,7 @@ _EXACT_ITERATIONS = 12
 Chosen; what a change costs is not measured.
 """
 
-_ROUGH = 1e-3
+ROUGH = 1e-3
 """The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared.
 
 Chosen; what a change costs is not measured.
@@ -81,7 +81,7 @@ def direct(
     """Optimise trajectory and precoders of `problem` together.
 
     The starts of `optimizer.starts` are improved roughly where there are several, and the best of
-    them to the end; the flight `known` of a similar plan is one more, or `alone` improved roughly.
+    them to the end; the flight `known` of a similar plan is one more, or `alone` the only one.
     The result is never worse than any start. Raises `InfeasibleError` when there is no flight at
     all.
     """
@@ -96,7 +96,7 @@ def direct(
     long = relay is not None and (anew or shared or math.isfinite(relay.buffer))
     long = long or problem.fence is not None or problem.energy < math.inf
     warm = WARM_SHARES if shared else WARM_START
-    steps = options.max_iterations * (_LONG_SEARCH if long else 1)
+    steps = options.max_iterations * (LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
@@ -131,7 +131,7 @@ def direct(
             kin,
             field,
             routes,
-            tolerance=_ROUGH,
+            tolerance=ROUGH,
             max_iterations=steps,
             relay=relay,
             constraints=problem.constraints,
@@ -155,7 +155,7 @@ def direct(
             field,
             flights,
             constraints=kept,
-            tolerance=max(options.tolerance, _ROUGH) if alone else options.tolerance,
+            tolerance=options.tolerance,
             max_iterations=steps,
             strategy=COLD_START if cold else warm,
             relay=relay,

@@ -1,18 +1,19 @@
-"""The least duration or power that delivers what a plan's `goal` asks for.
+"""The least duration, power or energy that delivers what a plan's `goal` asks for.
 
-Both searches rest on what is delivered growing with either. A flight at the speeds v(t / c) / c
+The searches rest on what is delivered growing with each. A flight at the speeds v(t / c) / c
 takes c times as long along the same path: with c > 1 it keeps the limits, with ends that hover or
 are free, and its rates have the same means, so that R_del never falls as T grows and T R_del rises
-with it. A precoder that keeps a power limit keeps a larger one. Each step is a whole optimisation,
-which has the last flight among its starts. Where the growth is not certain (known draws, which
-change with T; wind; a least speed; a buffer that fills), the answer still meets the goal and one
-step less was found not to, but a smaller one may meet it.
+with it. A precoder that keeps a power limit keeps a larger one, and so does a flight
+with a limit on its energy. Each step is a whole optimisation, which has the last flight among its
+starts; for an energy it is a search for the best duration: see `most_data`. Where the growth is not
+certain (known draws, which change with T; wind; a least speed; a buffer that fills), the answer
+still meets the goal and one step less was found not to, but a smaller one may meet it.
 """
 
 import math
 from abc import ABC, abstractmethod
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from faao_mav.errors import InfeasibleError
@@ -30,14 +31,15 @@ POWER_STEP = 0.01
 """The step of the least power, dB. Chosen: radios are set to tenths."""
 
 ENERGY_SHARE = 1e-3
-"""The step of the least energy, in shares of what the whole duration takes. Chosen: models of power
-are less true than that."""
+"""The step of the least energy, in shares of what the whole duration takes.
+
+Chosen: models of power are less true than that."""
 
 
 def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
-    """Return the solution of `plan` with the least duration or powers that meet its `goal`.
+    """Return the solution of `plan` with the least duration, powers or energy that meet its `goal`.
 
-    The solution's plan has them; `Solution.least` tells how they were found. Raises
+    The solution has them; `Solution.least` tells how they were found. Raises
     `InfeasibleError` where the goal is out of reach, with what the limits let be delivered.
 
     >>> from faao_mav.plan import parse_plan
@@ -58,14 +60,14 @@ def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
     >>> found.least.below.plan.flight.duration, found.least.below.delivered_rate < 0.6
     (9.5, True)
     """
+    kinds: dict[str, Callable[[Plan, Observer | None], _Search]]
     kinds = {"duration": _Durations, "power": _Powers, "energy": _Energies}
     search: _Search = kinds[plan.goal.minimise or ""](plan, observe)
     if not search.meets(search.high):
         raise InfeasibleError(_out_of_reach(plan, search.solved[search.high]))
     while search.high - search.low > 1:
         search.meets(min(max(search.guess(), search.low + 1), search.high - 1))
-    best, below = search.solved[search.high], search.solved.get(search.low)
-    assert best is not None
+    best, below = search.answer(), search.solved.get(search.low)
     return replace(best, least=Least(search.limit, below, search.optimizations))
 
 
@@ -108,6 +110,12 @@ class _Search(ABC):
         else:
             self.low = number
         return met
+
+    def answer(self) -> Solution:
+        """Return the solution at `high`, optimised from all starts."""
+        found = self.solved[self.high]
+        assert found is not None
+        return found
 
     def changed(self, changes: Mapping[str, float], known: Solution | None) -> Solution:
         """Optimise the plan with `changes` by dotted keys."""
@@ -190,6 +198,13 @@ class _Energies(_Chords):
             return self.within.unlimited
         found = self.within.best(self.energy(number))
         self.optimizations = self.within.optimizations
+        return found
+
+    def answer(self) -> Solution:
+        found = super().answer()
+        if found is not self.within.unlimited:
+            found = self.within.ended(found, self.energy(self.high))
+            self.optimizations = self.within.optimizations
         return found
 
     def energy(self, number: int) -> float:

@@ -180,7 +180,7 @@ class Problem:
     def constraints(self, kin: Kinematics) -> "tuple[Constraint, ...]":
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""
         limited = self.energy < math.inf
-        energy = (self._energy_limit(kin, self.energy),) if limited else ()
+        energy = (self._energy_limit(kin),) if limited else ()
         return (*self.fenced(kin), *energy)
 
     def fenced(self, kin: Kinematics) -> "tuple[Constraint, ...]":
@@ -193,17 +193,19 @@ class Problem:
 
     def energy_of(self, flight: Trajectory) -> float | None:
         """Return what `flight` and relay take, J, as sums over the slots; None without a model."""
-        if self.plan.power_model is None:
+        model, kin = self.plan.power_model, self.kinematics
+        if model is None:
             return None
-        kin = self.kinematics
-        return self._energy_limit(kin).used(flight) + self._radiated(kin)
+        level = ((0, 0), (0, 1))
+        power = model(np.pad(flight.v - kin.wind, level), np.pad(flight.a, level))
+        return kin.time_step * float(power.sum()) + self._radiated(kin)
 
-    def _energy_limit(self, kin: Kinematics, energy: float = math.inf) -> "EnergyLimit":
+    def _energy_limit(self, kin: Kinematics) -> "EnergyLimit":
         from faao_mav.optimizer.interior.energy import EnergyLimit
 
         model = self.plan.power_model
         assert model is not None  # plans that limit the energy have one
-        most = energy - self._radiated(kin)
+        most = self.energy - self._radiated(kin)
         return EnergyLimit(model, most, kin.time_step, kin.max_speed, kin.wind)
 
     def _radiated(self, kin: Kinematics) -> float:
