@@ -40,7 +40,10 @@ _INSIDE = 1e-5
 Chosen: ten times the margin that a search to a tolerance of 1e-4 may leave."""
 
 _HEADROOM = 0.1
-"""The slack of a cold start that has less, in shares of the energy. Chosen."""
+"""The slack of a cold start that has less, in shares of the energy; less of a warm one. Chosen."""
+
+_LEAST_MARGIN = 0.01
+"""The least share of `_HEADROOM`, for searches that widen no other limit. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ class EnergyLimit(Constraint):
         on, none = np.ones((start.w.shape[1], 1)), np.zeros((1, 1))
         state = EnergyState(on, on, on, on, self, flight, start.own, none, none, none, none)
         state = state.at(start.v)
-        s = np.maximum(state.left, _HEADROOM * min(1.0, start.margin) * state.slots)
+        headroom = _HEADROOM * min(1.0, max(start.margin, _LEAST_MARGIN))
+        s = np.maximum(state.left, headroom * state.slots)
         return replace(state, s=s, margin=s - state.left).centred(start.mu)
 
     def partials(self, v: Real, a: Real) -> PowerPartials:
