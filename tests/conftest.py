@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
+from xdist.scheduler import LoadScopeScheduling
 
 from faao_mav.optimizer.search import bound
 from faao_mav.optimizer.search.map_bound import map_bound
@@ -96,6 +97,18 @@ def paper_plan(small_plan: MakePlan) -> MakePlan:
         return small_plan(paper | (changes or {}))
 
     return make
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
+    """Share tests out one by one; real autopilots fly one after the other, in one process."""
+
+    class OneFlightAtATime(LoadScopeScheduling):  # type: ignore[misc]
+        def _split_scope(self, nodeid: str) -> str:
+            folder = "tests/autopilots/"
+            return folder if nodeid.startswith(folder) else nodeid
+
+    return OneFlightAtATime(config, log)
 
 
 @pytest.fixture

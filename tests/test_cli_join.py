@@ -311,7 +311,8 @@ def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
 ) -> None:
     save, page = tmp_path / "r.npz", tmp_path / "r.html"
     paper = tmp_path / "paper.yaml"  # 100 m/s
-    paper.write_text(edited((MISSIONS / "paper_fig3.yaml").read_text(), {"flight.time_step": 1}))
+    brief = {"flight.duration": 20, "flight.time_step": 1}
+    paper.write_text(edited((MISSIONS / "paper_fig3.yaml").read_text(), brief))
     told = run(paper, "--save", save, "--report", page)
     assert (told.exit_code, told.stderr) == (0, "")
     assert re.search(r"^checked      1 error, ", told.stdout, re.M)
@@ -350,7 +351,7 @@ def test_a_plane_that_flies_at_no_such_speed_is_planned_but_gets_no_mission(
     plan: Path, out: Path
 ) -> None:
     text = (MISSIONS / "plane_relay.yaml").read_text()
-    changes = {"vehicle.max_speed": 60, "radio.fading": "none", "flight.duration": 90}
+    changes = {"vehicle.max_speed": 60, "radio.fading": "none", "flight.duration": 60}
     plan.write_text(edited(text, changes))
     refused = run(plan, "--out", out)
     assert refused.exit_code == 2

@@ -1,7 +1,6 @@
 """What a flight model is asked, what it answers, and the predicted flight of a whole mission."""
 
 from dataclasses import dataclass
-from math import inf
 from typing import Protocol
 
 import numpy as np
@@ -10,6 +9,10 @@ from numpy.typing import NDArray
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import Vector
+
+LONGEST = 21_600.0
+"""The longest flight that is followed, s. Chosen: fuzzing took one of almost a day beyond 500 MB of
+memory, which six hours stay below."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +38,7 @@ class FlightPath:
     splines: NDArray[np.bool_]
     radii: Real
     delays: Real | float = 0.0
-    longest: float = inf
+    longest: float = LONGEST
     elevation: float = 0.0
     entry: Real | None = None
     wind: Vector = (0.0, 0.0)

@@ -136,8 +136,7 @@ class VehicleType:
         ceilings: how far a plan may go for the vehicle to keep it, beside `fastest`; the least of
             those with one key counts.
         max_airspeed: the greatest airspeed, m/s, that it holds in wind with room to correct.
-        models_wind: its flight model knows what becomes of a flight beyond that, or of a plane in
-            any wind.
+        models_wind: its flight model flies in wind: what hovers in more than it can hold as well.
         true_over_commanded: true airspeed over the one that a mission commands, at a height in m
             above sea level; 1 where missions command ground speeds.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in

@@ -158,6 +158,7 @@ def test_the_published_flight_is_reached() -> None:
     along = np.array([30.0, -30.0]) / np.sqrt(2)
     kin = plane(
         400,
+        time_step=0.5,
         start=np.array([0.0, 1000.0]),
         end=np.array([1000.0, 0.0]),
         start_velocity=along,

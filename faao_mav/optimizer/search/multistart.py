@@ -26,9 +26,9 @@ _COARSE_ERROR = 5e-3  # share of the best value within which starts are equally 
 _SAME = 0.02  # distance of flights that count as one, in the longer of their extents in x and y
 
 
-_DECIMALS = 6
-"""Decimals of the values, bit/s/Hz, by which starts are ranked: which of two that differ by less is
-larger is up to rounding, and differs from machine to machine. Chosen."""
+_EQUAL = 1e-6
+"""The difference of values, bit/s/Hz, below which starts are equally good: which of two is larger
+is then up to rounding, and differs from machine to machine. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class BlockStage:
 class ImprovedStarts:
     """The flights near the local optima that the starts lead to, by the name of the start.
 
-    `promising` names those that may be improved to the best local optimum, the best first.
+    `promising` names those that may be improved to the best local optimum, in the order given.
     """
 
     flights: dict[str, Trajectory]
@@ -81,9 +81,9 @@ def improve_starts(
 ) -> ImprovedStarts:
     """Improve the feasible `flights` to `tolerance` and compare them.
 
-    Not promising are flights that end clearly below the best, and those that end where a better one
-    does. No coarse copy is used for short flights, for those with a least speed (the copy cannot
-    make their turns), and for a single start, which needs no comparison.
+    Not promising are flights that end clearly below the best, and those that end where an earlier
+    one does. No coarse copy is used for short flights, for those with a least speed (the copy
+    cannot make their turns), and for a single start, which needs no comparison.
 
     Args:
         kin: the feasible set.
@@ -111,10 +111,10 @@ def improve_starts(
         race=True,
     )
     optima = dict(zip(flights, solved, strict=True))
-    ranked = sorted(optima, key=lambda name: -round(optima[name].value, _DECIMALS))
-    least = optima[ranked[0]].value * (1 - (0.0 if copy is kin else _COARSE_ERROR))
+    best = max(optimum.value for optimum in solved)
+    least = best - max(_EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
     promising: list[str] = []
-    for name in ranked:
+    for name in optima:  # of flights that count as one the first: values hang on rounding
         w = optima[name].trajectory.w
         near = _SAME * float(np.ptp(w, axis=0).max())
         others = (optima[other].trajectory.w for other in promising)

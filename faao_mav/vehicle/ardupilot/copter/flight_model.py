@@ -8,7 +8,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
 from faao_mav.vehicle.ardupilot.copter.course import Course, grid_of, motion_of, rows_of
-from faao_mav.vehicle.ardupilot.copter.follow import LONGEST, pursue
+from faao_mav.vehicle.ardupilot.copter.follow import pursue
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.route import Router
 from faao_mav.vehicle.flight_path import FlightPath, Flown
@@ -60,7 +60,7 @@ class ArduCopter(ArduCopterLimits):
             rows_of(target),
             self,
             wind=path.wind,
-            longest=min(path.longest, LONGEST),
+            longest=path.longest,
         )
         arrivals = np.interp(course.passed, pursuit.clock, pursuit.t)
         departures = _stopped(course, arrivals, pursuit.arrivals)

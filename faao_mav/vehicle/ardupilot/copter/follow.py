@@ -22,10 +22,6 @@ _STANDING = 1e-5
 until a hold is over. Chosen: ten times more changed arrivals by up to 0.1 s after a leg at 0.13
 m/s."""
 
-LONGEST = 21_600.0
-"""The longest flight that is followed where nothing else is asked for, s. Chosen: six hours take a
-second or two of processor time."""
-
 _HEADED = 0.5
 """The speed of the target, m/s, above which the aircraft turns its nose along the target's way.
 Chosen; what a change costs is not measured."""
@@ -54,7 +50,7 @@ def pursue(
     limits: ArduCopterLimits,
     *,
     wind: Vector = (0.0, 0.0),
-    longest: float = LONGEST,
+    longest: float = math.inf,
 ) -> Pursuit:
     """Return the flight along `course`, given as rows, up to the end of its last hold.
 

@@ -43,9 +43,6 @@ _HEADED = math.radians(10)
 _NOTICED = 0.12
 """How long after it is passed a waypoint counts as reached, s. Fitted as `motion`'s constants."""
 
-_LONGEST = 21_600.0
-"""The longest flight that is followed, s. Chosen: it takes some seconds of processor time."""
-
 
 @dataclass(frozen=True, slots=True)
 class ArduPlane(ArduPlaneLimits):
@@ -69,8 +66,8 @@ class ArduPlane(ArduPlaneLimits):
         when the course is within 10 degrees of the next waypoint. Speeds of 0 or less mean
         `cruise_speed`.
 
-        Raises `InputError` for a flight that takes more than `path.longest`, or six hours, as in a
-        wind that carries it away.
+        Raises `InputError` for a flight that takes more than `path.longest`, as in a wind that
+        carries it away.
         """
         return _Flight(self, path).flown(step)
 
@@ -196,7 +193,7 @@ class _Flight:
 
     def _keep(self) -> None:
         """Keep where the aircraft is now."""
-        if self._motion.time > min(self._path.longest, _LONGEST):
+        if self._motion.time > self._path.longest:
             raise InputError(
                 f"the flight would take more than {self._motion.time:.0f} s, perhaps for the wind"
             )
