@@ -214,6 +214,7 @@ class Solution:
         slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
         found from the arrays by CVXPY, without the multipliers of the method that solved the plan.
         Raises `SolverError` where the trajectory breaks its limits.
+        A limit on the energy, which a `goal` sets, is not counted: the gain is then above 0.
         """
         from faao_mav.optimizer.design import design
         from faao_mav.optimizer.rates.field import rate_field
