@@ -206,17 +206,19 @@ class Result:
 
 
 def _goal_as_dict(solution: Solution) -> dict[str, Any] | None:
-    """Return the least duration, s, or powers, dBm, and what one step less delivers."""
+    """Return what a goal led to, s, dBm and Wh, and what one step less delivers."""
     plan, least = solution.plan, solution.least
     if least is None:
         return None
     below = least.below
     return {
         "minimise": plan.goal.minimise,
+        "maximise": plan.goal.maximise,
         "needed_rate": plan.needed_rate,
         "deliver_mbytes": plan.goal.deliver_mbytes,
         "duration": plan.flight.duration,
         "power_dbm": [round(dbm(power), 6) for power in plan.powers],
+        "energy_wh": solution.energy_wh,
         "limit": least.limit,
         "one_step_less": {
             "delivered_rate": below.delivered_rate,

@@ -135,7 +135,7 @@ def test_the_wind_blows_away_from_where_it_comes_from(
         ({"flight.time_step": 1e-7}, ["flight.duration", "100,000,000 steps", "100,000"]),
         ({"flight.altitude": 0}, ["flight.altitude", "above 0", "no bound"]),
         ({"flight.altitude": -40}, ["flight.altitude", "-40", "above 0"]),
-        ({"goal": {"minimise": "time"}}, ["goal.minimise", "'time'", "duration or power"]),
+        ({"goal": {"minimise": "time"}}, ["goal.minimise", "'time'", "duration, power or energy"]),
         (
             {"goal": {"minimise": "power"}},
             ["goal.minimise", "missing", "deliver_mbytes or goal.rate"],

@@ -1,5 +1,7 @@
 """Power of flight against the published curves, and the energy of a flight against its integral."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 from conftest import SMALL, edited
@@ -11,12 +13,14 @@ from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Mission
 from faao_mav.plan import parse_plan
-from faao_mav.power import GRAVITY, FixedWing, RotaryWing
+from faao_mav.plan.energy import PowerOptions
+from faao_mav.power import FixedWing, PowerModel, RotaryWing
 from faao_mav.validate import Finding, validate
 from faao_mav.validate.energy import EnergyUse, energy_use
 from faao_mav.vehicle import Track, Vehicle
 
-TABLE = RotaryWing.of(mass=20 / GRAVITY, rotor_area=0.503)
+TABLE = cast("RotaryWing", PowerOptions().model(hovers=True))
+PLANE = cast("FixedWing", PowerOptions().model(hovers=False))
 
 
 def published(v: float) -> float:
@@ -67,7 +71,36 @@ def test_the_fixed_wing_is_that_of_the_paper(
     across = a @ a - (a @ v) ** 2 / speed**2
     drag = 9.26e-4 * speed**3 + 2250 / speed * (1 + across / 9.8**2)
     gained = 10.0 * max(0.0, float(a @ v))
-    assert float(FixedWing()(v, a)) == pytest.approx(drag + gained, rel=1e-3, abs=1e-6)
+    assert float(PLANE(v, a)) == pytest.approx(drag + gained, rel=1e-3, abs=1e-6)
+
+
+@settings(max_examples=60)
+@given(
+    st.sampled_from([TABLE, TABLE.fitted(200.0, 180.0, 12.0), PLANE]),
+    st.floats(3, 30),
+    *[st.floats(-3.2, 3.2)] * 2,
+    st.floats(0, 5),
+)
+def test_derivatives_are_those_of_differences(
+    model: PowerModel, speed: float, heading: float, across: float, size: float
+) -> None:
+    v, a = (
+        r * np.array([np.cos(angle), np.sin(angle)])[:, None]
+        for r, angle in ((speed, heading), (size, across))
+    )
+    at, h = model.partials(v, a), 1e-6
+    level = np.vstack([v, [[0.0]]]).T, np.vstack([a, [[0.0]]]).T
+    more = float((at.value - model(*level))[0])  # the growth of kinetic energy sets in smoothly
+    assert -1e-9 <= more <= (model.mass / 2 if isinstance(model, FixedWing) else 0.0) + 1e-9
+    for k, step in enumerate(h * np.eye(2)[:, :, None]):
+        for high, low, gradient, hessian, of in (
+            (model.partials(v + step, a), model.partials(v - step, a), at.by_v, at.by_vv, "by_v"),
+            (model.partials(v, a + step), model.partials(v, a - step), at.by_a, at.by_aa, "by_a"),
+        ):
+            slope = (high.value - low.value) / (2 * h)
+            assert gradient[k] == pytest.approx(slope, rel=1e-5, abs=1e-4)
+            curved = (getattr(high, of) - getattr(low, of)) / (2 * h)
+            assert hessian[[k, k + 1]] == pytest.approx(curved, rel=1e-4, abs=1e-2)
 
 
 def test_a_plane_flies_farthest_at_the_speed_of_its_measured_power() -> None:

@@ -34,9 +34,7 @@ def study(
     ] = None,
     frontier: Annotated[
         str | None,
-        option(
-            "AXIS,data", "The most data for every duration or power: duration,data or power,data."
-        ),
+        option("AXIS,data", "The most data for every AXIS: duration, power or energy."),
     ] = None,
     points: Annotated[
         int | None, option("N", "Points of the frontier; without it 12.", min=2)

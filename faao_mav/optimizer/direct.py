@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
@@ -36,11 +37,12 @@ from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.routes import global_flights
+from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import split_names, starts
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
-_LONG_SEARCH = 6
+LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded where a queue has a buffer, shares
 or a least speed. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300 steps."""
 
@@ -50,7 +52,7 @@ _EXACT_ITERATIONS = 12
 Chosen; what a change costs is not measured.
 """
 
-_ROUGH = 1e-3
+ROUGH = 1e-3
 """The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared.
 
 Chosen; what a change costs is not measured.
@@ -70,13 +72,18 @@ KNOWN = "known"
 
 
 def direct(
-    problem: Problem, *, observe: Observer | None = None, known: Trajectory | None = None
+    problem: Problem,
+    *,
+    observe: Observer | None = None,
+    known: Trajectory | None = None,
+    alone: bool = False,
 ) -> Solution:
     """Optimise trajectory and precoders of `problem` together.
 
     The starts of `optimizer.starts` are improved roughly where there are several, and the best of
-    them to the end. The result is never worse than any start. Raises `InfeasibleError` when there
-    is no flight at all.
+    them to the end; the flight `known` of a similar plan is one more, or `alone` the only one.
+    The result is never worse than any start. Raises `InfeasibleError` when there is no flight at
+    all.
     """
     options, kin = problem.plan.optimizer, problem.kinematics
     scheme = design(problem.plan)
@@ -87,9 +94,9 @@ def direct(
     # queue they take more steps, and so do shares and a buffer
     anew, shared = kin.min_speed > 0, relay is not None and relay.half
     long = relay is not None and (anew or shared or math.isfinite(relay.buffer))
-    long = long or problem.fence is not None
+    long = long or problem.fence is not None or problem.energy < math.inf
     warm = WARM_SHARES if shared else WARM_START
-    steps = options.max_iterations * (_LONG_SEARCH if long else 1)
+    steps = options.max_iterations * (LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
@@ -98,31 +105,37 @@ def direct(
     tell(0, "rates over the map", 0.0)
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
-    kept = problem.constraints(kin)
-    names, over_the_map = split_names(kin, options.starts)
+    kept, fenced = problem.constraints(kin), problem.fenced(kin)
+    names, over_the_map = split_names(kin, ("straight",) if alone else options.starts)
     routes = (
-        starts_inside(kin, names, stations, problem.free_area, kept)
+        starts_inside(kin, names, stations, problem.free_area, fenced)
         if problem.free_area
         else starts(kin, names, stations)
     )
     if over_the_map:
         first = next(iter(routes.values()))
-        routes |= global_flights(kin, field, relay, first, free=problem.free_area, kept=kept)
+        routes |= global_flights(kin, field, relay, first, free=problem.free_area, kept=fenced)
     if before is not None:
         routes[CUTOFF] = before.trajectory
     if known is not None:
-        limits = (*constraints_of(kin), *kept)
-        routes[KNOWN] = feasible(kin, next(iter(routes.values())), stretched(kin, known), limits)
+        calm = (*constraints_of(kin), *fenced)
+        near = feasible(kin, next(iter(routes.values())), stretched(kin, known), calm)
+        routes = {KNOWN: near} if alone else routes | {KNOWN: near}
+    if problem.energy < math.inf:
+        routes = sparing_starts(kin, routes, (*constraints_of(kin), *kept))
+        if not routes:
+            raise InfeasibleError("no flight was found that takes so little energy")
     tell(1, "the starts", 0.0)
     if len(routes) > 1:
         rough = improve_starts(
             kin,
             field,
             routes,
-            tolerance=_ROUGH,
+            tolerance=ROUGH,
             max_iterations=steps,
             relay=relay,
             constraints=problem.constraints,
+            coarse=problem.energy == math.inf,  # the copy cannot make the circles that save energy
         )
     else:  # a single start needs no comparison
         rough = ImprovedStarts(routes, list(routes))

@@ -1,37 +1,45 @@
-"""The least duration or power that delivers what a plan's `goal` asks for.
+"""The least duration, power or energy that delivers what a plan's `goal` asks for.
 
-Both searches rest on what is delivered growing with either. A flight at the speeds v(t / c) / c
+The searches rest on what is delivered growing with each. A flight at the speeds v(t / c) / c
 takes c times as long along the same path: with c > 1 it keeps the limits, with ends that hover or
 are free, and its rates have the same means, so that R_del never falls as T grows and T R_del rises
-with it. A precoder that keeps a power limit keeps a larger one. Each step is a whole optimisation,
-which has the last flight among its starts. Where the growth is not certain (known draws, which
-change with T; wind; a least speed; a buffer that fills), the answer still meets the goal and one
-step less was found not to, but a smaller one may meet it.
+with it. A precoder that keeps a power limit keeps a larger one, and so does a flight
+with a limit on its energy. Each step is a whole optimisation, which has the last flight among its
+starts; for an energy it is a search for the best duration: see `most_data`. Where the growth is not
+certain (known draws, which change with T; wind; a least speed; a buffer that fills), the answer
+still meets the goal and one step less was found not to, but a smaller one may meet it.
 """
 
 import math
 from abc import ABC, abstractmethod
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.direct import direct
+from faao_mav.optimizer.most_data import WithinEnergy
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.solution import Least, Observer, Progress, Solution
+from faao_mav.optimizer.solution import Least, Observer, Solution, staged
 from faao_mav.plan import Plan, changed_plan
-from faao_mav.plan.checks import FEWEST_SLOTS, shortest_duration
+from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import MIN_DBM, dbm
 from faao_mav.plan.keys import ALIASES, POWER
+from faao_mav.power import JOULES_PER_WH
 
 POWER_STEP = 0.01
 """The step of the least power, dB. Chosen: radios are set to tenths."""
 
+ENERGY_SHARE = 1e-3
+"""The step of the least energy, in shares of what the whole duration takes.
+
+Chosen: models of power are less true than that."""
+
 
 def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
-    """Return the solution of `plan` with the least duration or powers that meet its `goal`.
+    """Return the solution of `plan` with the least duration, powers or energy that meet its `goal`.
 
-    The solution's plan has them; `Solution.least` tells how they were found. Raises
+    The solution has them; `Solution.least` tells how they were found. Raises
     `InfeasibleError` where the goal is out of reach, with what the limits let be delivered.
 
     >>> from faao_mav.plan import parse_plan
@@ -52,14 +60,15 @@ def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
     >>> found.least.below.plan.flight.duration, found.least.below.delivered_rate < 0.6
     (9.5, True)
     """
-    search = (_Durations if plan.goal.minimise == "duration" else _Powers)(plan, observe)
+    kinds: dict[str, Callable[[Plan, Observer | None], _Search]]
+    kinds = {"duration": _Durations, "power": _Powers, "energy": _Energies}
+    search: _Search = kinds[plan.goal.minimise or ""](plan, observe)
     if not search.meets(search.high):
         raise InfeasibleError(_out_of_reach(plan, search.solved[search.high]))
     while search.high - search.low > 1:
         search.meets(min(max(search.guess(), search.low + 1), search.high - 1))
-    best, below = search.solved[search.high], search.solved.get(search.low)
-    assert best is not None
-    return replace(best, least=Least(search.limit, below, len(search.solved)))
+    best, below = search.answer(), search.solved.get(search.low)
+    return replace(best, least=Least(search.limit, below, search.optimizations))
 
 
 class _Search(ABC):
@@ -73,11 +82,12 @@ class _Search(ABC):
     def __init__(self, plan: Plan, observe: Observer | None, low: int, high: int) -> None:
         self.plan, self.observe, self.low, self.high = plan, observe, low, high
         self.solved: dict[int, Solution | None] = {}
+        self.optimizations = 0
         self.last, self.repeats = high, 0  # the last number, and how often that end has moved alone
 
     @abstractmethod
-    def changes(self, number: int) -> Mapping[str, float]:
-        """Return what the plan of `number` has instead, by dotted keys."""
+    def optimised(self, number: int, known: Solution | None) -> Solution:
+        """Return the best flight of `number`; `known` is that of a near one."""
 
     @abstractmethod
     def guess(self) -> int:
@@ -85,22 +95,13 @@ class _Search(ABC):
 
     def meets(self, number: int) -> bool:
         """Optimise at `number`, and tell whether the goal is met; without a flight it is not."""
-        changes = self.changes(number)
-        plan, known = changed_plan(self.plan, changes), self.solved.get(self.last)
-        told = ", ".join(f"{key} {value:g}" for key, value in changes.items())
-
-        def tell(now: Progress) -> None:
-            if self.observe is not None:
-                self.observe(replace(now, stage=f"{told}: {now.stage}"))
-
         found: Solution | None = None
         try:
-            start = None if known is None else known.trajectory
-            found = direct(build_problem(plan), observe=tell, known=start)
+            found = self.optimised(number, self.solved.get(self.last))
         except InfeasibleError:
             if not self.solved:  # the plan as it was given
                 raise
-        met = found is not None and found.delivered_rate >= plan.needed_rate
+        met = found is not None and found.delivered_rate >= found.plan.needed_rate
         same = self.solved and self.last == (self.high if met else self.low)
         self.repeats = self.repeats + 1 if same else 0
         self.solved[number], self.last = found, number
@@ -110,22 +111,28 @@ class _Search(ABC):
             self.low = number
         return met
 
+    def answer(self) -> Solution:
+        """Return the solution at `high`, optimised from all starts."""
+        found = self.solved[self.high]
+        assert found is not None
+        return found
 
-class _Durations(_Search):
-    """Numbers of slots."""
+    def changed(self, changes: Mapping[str, float], known: Solution | None) -> Solution:
+        """Optimise the plan with `changes` by dotted keys."""
+        told = ", ".join(f"{key} {value:g}" for key, value in changes.items())
+        self.optimizations += 1
+        return direct(
+            build_problem(changed_plan(self.plan, changes)),
+            observe=staged(self.observe, told),
+            known=None if known is None else known.trajectory,
+        )
 
-    def __init__(self, plan: Plan, observe: Observer | None) -> None:
-        shortest = shortest_duration(plan)
-        assert shortest is not None  # the plan's own duration is no shorter
-        fewest = max(round(shortest / plan.flight.time_step), FEWEST_SLOTS)
-        super().__init__(plan, observe, fewest - 1, plan.flight.slots)
-        self.limit = plan.flight.duration
 
-    def changes(self, number: int) -> Mapping[str, float]:
-        return {"flight.duration": round(number * self.plan.flight.time_step, 9)}
+class _Chords(_Search):
+    """Numbers in which T (R_del - needed) is nearly linear: of slots, or of shares of an energy."""
 
     def guess(self) -> int:
-        """Return the root of the chord of T (R_del - needed), which is nearly linear in T.
+        """Return the root of the chord of T (R_del - needed).
 
         Long flights stay where the rate is best. Where the same end moves again and again, half of
         the other's value is taken (the Illinois rule). R_del is at most that of the longer flight:
@@ -135,7 +142,7 @@ class _Durations(_Search):
         assert high is not None
         if low is None:
             return self._without_flight(high)
-        less, more = _surplus(self.low, low), _surplus(self.high, high)
+        less, more = _surplus(low), _surplus(high)
         if self.last == self.low:
             more *= 0.5**self.repeats
         else:
@@ -143,7 +150,7 @@ class _Durations(_Search):
         return math.ceil(self.low - less / (more - less) * (self.high - self.low))
 
     def _without_flight(self, high: Solution) -> int:
-        """Return the guess where nothing is known of shorter times, or there is no flight."""
+        """Return the guess where nothing is known of less, or there is no flight."""
         first = self.low not in self.solved
         if first and self.plan.goal.deliver_mbytes is not None:
             return int(self.high * high.plan.needed_rate / high.delivered_rate)
@@ -154,13 +161,55 @@ class _Durations(_Search):
         beyond = self.solved.get(longer)
         if beyond is None:
             return halfway
-        here, there = _surplus(self.high, high), _surplus(longer, beyond)
+        here, there = _surplus(high), _surplus(beyond)
         root = self.high - here / max(there - here, 1e-9) * (longer - self.high)
         return max(math.ceil(root), (self.low + halfway) // 2)
 
 
-def _surplus(slots: int, found: Solution) -> float:
-    return slots * (found.delivered_rate - found.plan.needed_rate)
+def _surplus(found: Solution) -> float:
+    return found.plan.flight.slots * (found.delivered_rate - found.plan.needed_rate)
+
+
+class _Durations(_Chords):
+    """Numbers of slots."""
+
+    def __init__(self, plan: Plan, observe: Observer | None) -> None:
+        super().__init__(plan, observe, fewest_slots(plan) - 1, plan.flight.slots)
+        self.limit = plan.flight.duration
+
+    def optimised(self, number: int, known: Solution | None) -> Solution:
+        duration = round(number * self.plan.flight.time_step, 9)
+        return self.changed({"flight.duration": duration}, known)
+
+
+class _Energies(_Chords):
+    """Numbers of `ENERGY_SHARE` of what the flight of the plan's whole duration takes."""
+
+    def __init__(self, plan: Plan, observe: Observer | None) -> None:
+        most = round(1 / ENERGY_SHARE)
+        super().__init__(plan, observe, 0, most)
+        self.within = WithinEnergy(plan, observe)
+        self.limit = self.within.unlimited_energy / JOULES_PER_WH
+        self.low = int(most * self.within.least_energy / self.within.unlimited_energy) - 1
+        self.optimizations = 1
+
+    def optimised(self, number: int, known: Solution | None) -> Solution:
+        if known is None:
+            return self.within.unlimited
+        found = self.within.best(self.energy(number))
+        self.optimizations = self.within.optimizations
+        return found
+
+    def answer(self) -> Solution:
+        found = super().answer()
+        if found is not self.within.unlimited:
+            found = self.within.ended(found, self.energy(self.high))
+            self.optimizations = self.within.optimizations
+        return found
+
+    def energy(self, number: int) -> float:
+        """Return the energy of `number`, J."""
+        return number * ENERGY_SHARE * self.within.unlimited_energy
 
 
 class _Powers(_Search):
@@ -174,8 +223,9 @@ class _Powers(_Search):
         room = min(self.given.values()) - MIN_DBM
         super().__init__(plan, observe, -int(room / POWER_STEP) - 1, 0)
 
-    def changes(self, number: int) -> Mapping[str, float]:
-        return {key: round(p + number * POWER_STEP, 6) for key, p in self.given.items()}
+    def optimised(self, number: int, known: Solution | None) -> Solution:
+        changes = {key: round(p + number * POWER_STEP, 6) for key, p in self.given.items()}
+        return self.changed(changes, known)
 
     def guess(self) -> int:
         """Return the number at which the last flight, with its precoders scaled, meets the goal.

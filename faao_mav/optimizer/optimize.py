@@ -15,6 +15,10 @@ def optimize(plan: Plan, *, observe: Observer | None = None) -> Solution:
         from faao_mav.optimizer.goal import least
 
         return least(plan, observe=observe)
+    if plan.goal.maximise == "data":
+        from faao_mav.optimizer.most_data import most_data
+
+        return most_data(plan, observe=observe)
     problem = build_problem(plan)
     if plan.optimizer.method == "algorithm1":
         from faao_mav.optimizer.algorithm1 import algorithm1  # CVXPY takes half a second

@@ -11,7 +11,7 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
-from faao_mav.optimizer.kinematics import Kinematics, kinematics
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
     balanced_rayleigh,
@@ -31,6 +31,7 @@ from faao_mav.radio.relay import RelayQueue
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.interior.constraint import Constraint
+    from faao_mav.optimizer.interior.energy import EnergyLimit
 
 MAX_DIFFERENCE_VECTORS = 5_000_000
 MAX_CHANNELS = 5_000_000
@@ -156,7 +157,8 @@ class Link:
 class Problem:
     """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue.
 
-    The relay holds `held`, bit/Hz, when the flight begins.
+    The relay holds `held`, bit/Hz, when the flight begins. `energy` is what flight and relay may
+    take, J.
     """
 
     plan: Plan
@@ -164,6 +166,7 @@ class Problem:
     bs_uav: Link
     uav_user: Link
     held: float = 0.0
+    energy: float = math.inf
 
     @cached_property
     def free_area(self) -> FreeArea | None:
@@ -178,11 +181,38 @@ class Problem:
 
     def constraints(self, kin: Kinematics) -> "tuple[Constraint, ...]":
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""
+        limited = self.energy < math.inf
+        energy = (self._energy_limit(kin),) if limited else ()
+        return (*self.fenced(kin), *energy)
+
+    def fenced(self, kin: Kinematics) -> "tuple[Constraint, ...]":
+        """Return what flights of `kin` have to keep of the fence."""
         if self.fence is None:
             return ()
         from faao_mav.optimizer.interior.fence import fence_constraints  # brings scipy along
 
         return fence_constraints(self.fence, kin)
+
+    def energy_of(self, flight: Trajectory) -> float | None:
+        """Return what `flight` and relay take, J, as sums over the slots; None without a model."""
+        model, kin = self.plan.power_model, self.kinematics
+        if model is None:
+            return None
+        level = ((0, 0), (0, 1))
+        power = model(np.pad(flight.v - kin.wind, level), np.pad(flight.a, level))
+        return kin.time_step * float(power.sum()) + self._radiated(kin)
+
+    def _energy_limit(self, kin: Kinematics) -> "EnergyLimit":
+        from faao_mav.optimizer.interior.energy import EnergyLimit
+
+        model = self.plan.power_model
+        assert model is not None  # plans that limit the energy have one
+        most = self.energy - self._radiated(kin)
+        return EnergyLimit(model, most, kin.time_step, kin.max_speed, kin.wind)
+
+    def _radiated(self, kin: Kinematics) -> float:
+        """Return what the relay's radio sends, J."""
+        return self.plan.radio.relay.power * kin.slots * kin.time_step
 
     @property
     def maximised_queue(self) -> RelayQueue | None:

@@ -17,6 +17,7 @@ from faao_mav.optimizer.archive import read_archive
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.power import JOULES_PER_WH
 from faao_mav.radio.relay import Relayed
 
 
@@ -34,6 +35,16 @@ Observer = Callable[[Progress], None]
 """What an optimiser tells its progress to."""
 
 
+def staged(observe: Observer | None, told: str) -> Observer:
+    """Return an observer that tells `observe` the progress, of stages that begin with `told`."""
+
+    def tell(now: Progress) -> None:
+        if observe is not None:
+            observe(replace(now, stage=f"{told}: {now.stage}"))
+
+    return tell
+
+
 @dataclass(frozen=True, slots=True)
 class Rates:
     """R_U, R_G of (10) and R_avg of (9), bit/s/Hz."""
@@ -49,11 +60,11 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class Least:
-    """How the least duration or power was found, which the solution's plan has.
+    """How the duration, power or energy of a `goal` was found, which the solution has.
 
-    `limit` is what the plan allowed, s or the base station's dBm; `below` the best solution with
-    one step of the grid less, None where there is no flight, and `optimizations` how many flights
-    were optimised.
+    `limit` is what the plan allowed: s (for the most data too), the base station's dBm, or the Wh
+    of the whole duration. `below` is the best solution with one step of the grid less, None where
+    there is no flight, and `optimizations` how many flights were optimised.
     """
 
     limit: float
@@ -137,6 +148,12 @@ class Solution:
         return self.relayed.rate
 
     @property
+    def energy_wh(self) -> float | None:
+        """The energy of the planned flight and its relay, Wh; None without `vehicle.power`."""
+        energy = build_problem(self.plan).energy_of(self.trajectory)
+        return None if energy is None else energy / JOULES_PER_WH
+
+    @property
     def iterations(self) -> int:
         """Iterations that were completed."""
         return len(self.history) - 1
@@ -199,6 +216,7 @@ class Solution:
         slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
         found from the arrays by CVXPY, without the multipliers of the method that solved the plan.
         Raises `SolverError` where the trajectory breaks its limits.
+        A limit on the energy, which a `goal` sets, is not counted: the gain is then above 0.
         """
         from faao_mav.optimizer.design import design
         from faao_mav.optimizer.rates.field import rate_field

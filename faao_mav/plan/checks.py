@@ -144,13 +144,15 @@ def _distance(plan: Plan) -> Iterator[str]:
 def _goal(plan: Plan) -> Iterator[str]:
     goal = plan.goal
     amounts = [name for name in ("deliver_mbytes", "rate") if getattr(goal, name) is not None]
-    if goal.minimise is None:
-        if amounts:
-            yield f"goal.{amounts[0]}: is for a goal that minimises; give goal.minimise too"
-        return
-    if goal.maximise is not None:
+    if goal.minimise is None and amounts:
+        yield f"goal.{amounts[0]}: is for a goal that minimises; give goal.minimise too"
+    if goal.maximise != "data" and goal.energy_wh is not None:
+        yield f"goal.energy_wh: {goal.energy_wh:g}: is for the most data; give maximise: data too"
+    if goal.maximise == "data" and goal.energy_wh is None:
+        yield "goal.maximise: data: give goal.energy_wh too, or maximise: rate"
+    if goal.minimise is not None and goal.maximise is not None:
         yield f"goal.maximise: {goal.maximise}: goal.minimise is given too; leave one out"
-    if len(amounts) != 1:
+    if goal.minimise is not None and len(amounts) != 1:
         given = "both are given" if amounts else "what has to be delivered is missing"
         yield f"goal.minimise: {goal.minimise}: {given}; give goal.deliver_mbytes or goal.rate"
     if goal.deliver_mbytes is not None and plan.radio.bandwidth_mhz is None:
@@ -158,10 +160,15 @@ def _goal(plan: Plan) -> Iterator[str]:
             f"goal.deliver_mbytes: {goal.deliver_mbytes:g}: what a rate carries depends on the "
             "bandwidth; give radio.bandwidth_mhz too, or goal.rate"
         )
-    if not plan.radio.causal:
+    if goal.searches and not plan.radio.causal:
         yield (
-            f"goal.minimise: {goal.minimise}: counts what is delivered, which radio.causal: false "
+            f"goal.{goal.searches}: counts what is delivered, which radio.causal: false "
             "does not plan for; give radio.causal: true"
+        )
+    if goal.counts_energy and plan.vehicle.power is None:
+        yield (
+            f"goal.{goal.searches}: what the flight takes is missing; give vehicle.power, as "
+            "{hover_w: 170, cruise_w: 130, at: 10}"
         )
 
 
@@ -228,6 +235,13 @@ def reach(steps: int, plan: Plan) -> float:
         np.minimum(speed, last + n[::-1] * gain, out=speed)
     farthest = float(dt * (speed[:-1] + speed[1:]).sum() / 2)
     return min(farthest, dt * steps * chord(plan.wind, plan.max_airspeed, direction)[1])
+
+
+def fewest_slots(plan: Plan) -> int:
+    """Return the least number of slots in which `plan`, whose own are enough, can be flown."""
+    shortest = shortest_duration(plan)
+    assert shortest is not None  # the plan's own duration is no shorter
+    return max(round(shortest / plan.flight.time_step), FEWEST_SLOTS)
 
 
 def shortest_duration(plan: Plan) -> float | None:

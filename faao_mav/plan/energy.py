@@ -8,8 +8,8 @@ from pydantic import BeforeValidator
 from faao_mav.plan.fields import Number, Section, key
 from faao_mav.power import GRAVITY, FixedWing, PowerModel, RotaryWing
 
-_COPTER_MASS = 20 / GRAVITY
-"""The mass of the copter of the paper of 2019, kg: it weighs 20 N."""
+_COPTER_MASS, _PLANE_MASS = 20 / GRAVITY, 10.0
+"""The masses of the aircraft of the papers, kg: the copter of 2019 weighs 20 N."""
 
 
 def _percent(value: object) -> object:
@@ -50,7 +50,7 @@ class PowerOptions(Section):
     def model(self, *, hovers: bool) -> PowerModel:
         """Return the power of an aircraft that `hovers`, or of a plane."""
         if not hovers:
-            mass = self.mass or FixedWing().mass
+            mass = self.mass or _PLANE_MASS
             if self.cruise_w is not None and self.at is not None:
                 return FixedWing.fitted(self.cruise_w, self.at, mass)
             return FixedWing(self.c1, self.c2, mass)

@@ -34,8 +34,8 @@ StudyScheme: TypeAlias = Literal[
     "faao", "algorithm1", "mmse", "mrt", "zf", "waterfilling", "gaussian"
 ]
 StudyFigure: TypeAlias = Literal["delivered", "rate", "trajectories"]
-Maximised: TypeAlias = Literal["rate"]
-Minimised: TypeAlias = Literal["duration", "power"]
+Maximised: TypeAlias = Literal["rate", "data"]
+Minimised: TypeAlias = Literal["duration", "power", "energy"]
 
 _HOVER = (0.0, 0.0)
 
@@ -230,12 +230,22 @@ class Optimizer(Section):
 class Goal(Section):
     """What the plan is for; by default the highest rate. Duration and powers are upper limits."""
 
-    maximise: Annotated[Maximised | None, key("What is maximised.", accepted="rate")] = None
+    maximise: Annotated[
+        Maximised | None,
+        key("What is maximised: the rate, or the data within energy_wh.", accepted="rate or data"),
+    ] = None
+    energy_wh: Annotated[
+        Number | None,
+        key(
+            "Energy of the planned flight and its relay (needs vehicle.power).", "Wh", gt=0, le=1e6
+        ),
+    ] = None
     minimise: Annotated[
         Minimised | None,
         key(
-            "What is minimised: the duration in whole time steps, or both powers by the same dB.",
-            accepted="duration or power",
+            "What is minimised: the duration in whole time steps, both powers by the same dB, or "
+            "the energy of the planned flight and its relay (needs vehicle.power).",
+            accepted="duration, power or energy",
         ),
     ] = None
     deliver_mbytes: Annotated[
@@ -246,6 +256,18 @@ class Goal(Section):
         Number | None,
         key("Instead: the delivered rate R_del that is needed.", "bit/s/Hz", gt=0, le=1e4),
     ] = None
+
+    @property
+    def searches(self) -> str:
+        """The key and its value where a duration or powers are looked for; else empty."""
+        if self.minimise is not None:
+            return f"minimise: {self.minimise}"
+        return "maximise: data" if self.maximise == "data" else ""
+
+    @property
+    def counts_energy(self) -> bool:
+        """Whether the energy of the flight has a part in the goal."""
+        return self.minimise == "energy" or self.maximise == "data"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -158,7 +158,7 @@ def energy(use: EnergyUse) -> "Figure":
     with drawing(WIDTH, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(use.t, use.power, color=SERIES[1], linewidth=1.1)
-        upper.set_ylim(bottom=0)
+        upper.set_ylim(0, 1.05 * float(use.power.max()))
         label(upper, "", "", "power, W")
         _share_time(upper)
         battery = use.battery

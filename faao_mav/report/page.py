@@ -97,7 +97,8 @@ def _sections(
     if check is not None and check.energy is not None:
         from faao_mav.report.figures import energy
 
-        title = "Power of the whole predicted flight over time, and the energy"
+        what = "energy that is used" if check.energy.battery is None else "energy that is left"
+        title = f"Power of the whole predicted flight over time, and the {what}"
         yield _figure("energy", "Energy", energy(check.energy), title)
     if result is not None:
         yield from _plan_figures(result, debriefing)

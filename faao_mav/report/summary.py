@@ -94,31 +94,46 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
 
 
 def _least(solution: Solution) -> Iterator[Line]:
-    """Yield the least duration or power, and what one step less would deliver."""
-    found = solution.least
+    """Yield what a goal led to, and for a least quantity what one step less would deliver."""
+    found, plan = solution.least, solution.plan
     if found is None:
         return
+    flights = f"{found.optimizations} flights optimised"
+    if plan.goal.energy_wh is not None:
+        yield (
+            "goal",
+            f"most data within {plan.goal.energy_wh:g} Wh: {plan.flight.duration:g} s "
+            f"({found.limit:g} s given), {solution.energy_wh:.4g} Wh; {flights}",
+        )
+        return
     below = found.below
-    of, answer = _minimised(solution.plan)
-    limit = f"{found.limit:g} {'s' if of == 'duration' else 'dBm'}"
+    of = plan.goal.minimise or ""
+    limit = {
+        "duration": f"{found.limit:g} s given",
+        "power": f"{found.limit:g} dBm given",
+        "energy": f"{found.limit:.4g} Wh without",
+    }[of]
     yield (
         "goal",
-        f"least {of} for {_amount(solution.plan, solution.plan.needed_rate)}: {answer} "
-        f"({limit} given); {found.optimizations} flights optimised",
+        f"least {of} for {_amount(plan, plan.needed_rate)}: {_minimised(solution)} "
+        f"({limit}); {flights}",
     )
     if below is None:
-        yield "", "no flight takes less time"
+        yield "", f"no flight takes less {'energy' if of == 'energy' else 'time'}"
     else:
-        less = _minimised(below.plan)[1]
-        yield "", f"{less} would deliver {_amount(below.plan, below.delivered_rate)}"
+        delivered = _amount(below.plan, below.delivered_rate)
+        yield "", f"{_minimised(below)} would deliver {delivered}"
 
 
-def _minimised(plan: Plan) -> tuple[str, str]:
-    """Return what the goal of `plan` minimises, and how much of it the plan has."""
+def _minimised(solution: Solution) -> str:
+    """Return how much of what its plan's goal minimises a solution has."""
+    plan = solution.plan
     if plan.goal.minimise == "duration":
-        return "duration", f"{plan.flight.duration:g} s"
+        return f"{plan.flight.duration:g} s"
+    if plan.goal.minimise == "energy":
+        return f"{solution.energy_wh:.4g} Wh in {plan.flight.duration:g} s"
     powers = dict.fromkeys(f"{dbm(power):.2f}" for power in plan.powers)
-    return "power", f"{' and '.join(powers)} dBm"
+    return f"{' and '.join(powers)} dBm"
 
 
 def _amount(plan: Plan, rate: float) -> str:

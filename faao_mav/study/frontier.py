@@ -1,4 +1,4 @@
-"""The trade-off of one plan: the most data for every duration or power, with its route."""
+"""The trade-off of one plan: the most data for every duration, power or energy, with its route."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -8,11 +8,12 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError, quote
 from faao_mav.plan import Plan
-from faao_mav.plan.checks import shortest_duration
+from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import dbm
 from faao_mav.plan.keys import ALIASES, POWER
 from faao_mav.plan.reader import changed
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+from faao_mav.power import JOULES_PER_WH
 from faao_mav.report.style import drawing, label
 from faao_mav.study.figure import as_map
 from faao_mav.study.rows import StudyRow
@@ -27,10 +28,15 @@ POINTS = 12
 _DECIBELS = 20.0
 """How far below the plan's powers a frontier begins, dB. Chosen: from there on little arrives."""
 
-_AXES = {"duration": "flight.duration", "power": POWER}
+ENERGY = "goal.energy_wh"
+
+_DECIMALS = 4
+"""Decimals of the energies of a frontier, Wh, which are rounded up. Chosen."""
+
+_AXES = {"duration": "flight.duration", "power": POWER, "energy": ENERGY}
 """The key of the plan that each trade-off varies."""
 
-_TOLD = {"flight.duration": "duration, s", POWER: "power, dBm"}
+_TOLD = {"flight.duration": "duration, s", POWER: "power, dBm", ENERGY: "energy, Wh"}
 
 
 def parse_frontier(text: str) -> str:
@@ -50,25 +56,42 @@ def frontier_cases(plan: Plan, key: str, points: int = POINTS) -> tuple[StudyCas
     """Return the cases of the most data at `points` values of `key`, the plan's own the last.
 
     Durations are whole time steps from the shortest on. Powers rise by the same dB at both
-    stations, and the value is that of the base station, dBm.
+    stations, and the value is that of the base station, dBm. Energies, of flights of any duration
+    up to the plan's, rise from the straight flight's to that of the plan without a limit, which is
+    optimised for it. Raises `InputError` where the plan cannot be asked for energies.
     """
     data = load_yaml(plan.text, plan.source)
     for section in ("goal", "study"):
         data.pop(section, None)
     cases = []
-    for changes in _durations(plan, points) if key != POWER else _powers(plan, points):
+    along = {"flight.duration": _durations, POWER: _powers, ENERGY: _energies}[key]
+    for changes in along(plan, points):
         value = next(iter(changes.values()))
-        text = dump_yaml(changed(data, changes))
+        more = {"goal.maximise": "data"} if key == ENERGY else {}
+        text = dump_yaml(changed(data, changes | more))
         scheme = plan.optimizer.precoder
         cases.append(StudyCase(((key, value),), scheme, plan.radio.seed, text, plan.source))
     return tuple(cases)
 
 
 def _durations(plan: Plan, points: int) -> list[dict[str, float]]:
-    step, shortest = plan.flight.time_step, shortest_duration(plan)
-    assert shortest is not None  # the plan's own duration is no shorter
-    slots = np.linspace(max(3, round(shortest / step)), plan.flight.slots, points)
-    return [{"flight.duration": round(n * step, 9)} for n in np.unique(np.rint(slots)).tolist()]
+    slots = np.unique(np.rint(np.linspace(fewest_slots(plan), plan.flight.slots, points)))
+    return [{"flight.duration": round(n * plan.flight.time_step, 9)} for n in slots.tolist()]
+
+
+def _energies(plan: Plan, points: int) -> list[dict[str, float]]:
+    from faao_mav.optimizer.direct import direct
+    from faao_mav.optimizer.most_data import thriftiest_straight
+    from faao_mav.optimizer.problem import build_problem
+
+    if plan.vehicle.power is None or not plan.radio.causal:
+        missing = "vehicle.power" if plan.vehicle.power is None else "radio.causal: true"
+        raise InputError(f"{plan.source}: --frontier energy,data: give {missing} in the plan")
+    most = direct(build_problem(plan)).energy_wh
+    least = thriftiest_straight(plan)[1] / JOULES_PER_WH
+    assert most is not None
+    values = np.linspace(min(least, most), most, points).round(_DECIMALS) + 10.0**-_DECIMALS
+    return [{ENERGY: value} for value in values.round(_DECIMALS).tolist()]
 
 
 def _powers(plan: Plan, points: int) -> list[dict[str, float]]:

@@ -8,9 +8,8 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.plan import Plan, Vector
 from faao_mav.plan.energy import Battery
+from faao_mav.power import JOULES_PER_WH
 from faao_mav.vehicle import Track
-
-_JOULES_PER_WH = 3600.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +44,7 @@ class EnergyUse:
         """Return the object `energy` of `--json`: Wh, W, a share."""
         return {
             "used_wh": self.total,
-            "mean_power_w": float(self.total * _JOULES_PER_WH / self.t[-1]),
+            "mean_power_w": float(self.total * JOULES_PER_WH / self.t[-1]),
             "capacity_wh": self.battery.capacity_wh if self.battery else None,
             "reserve": self.battery.reserve / 100 if self.battery else None,
             "left": self.left,
@@ -66,5 +65,5 @@ def energy_use(plan: Plan, track: Track, wind: Vector) -> EnergyUse | None:
     acceleration = np.gradient(air, track.t, axis=0)
     power = model(air, acceleration) + plan.radio.relay.power
     steps = np.diff(track.t) * (power[1:] + power[:-1]) / 2
-    used = np.concatenate([[0.0], np.cumsum(steps)]) / _JOULES_PER_WH
+    used = np.concatenate([[0.0], np.cumsum(steps)]) / JOULES_PER_WH
     return EnergyUse(track.t, power, used, plan.vehicle.battery, track.lands)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from faao_mav.mission.command import Command
+from faao_mav.power import GRAVITY
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME, Straight
@@ -21,9 +22,6 @@ _SLOW = 3.0
 _CLIMB_SHARE = 0.8
 """The share of the climbing time that the way over ground may fall short to: less, and the leg is
 steep. Chosen."""
-
-_GRAVITY = 9.81
-"""Standard gravity, m/s²."""
 
 _SHORTEST = 1.0
 """The length, m, below which a leg has no direction to turn from. Chosen."""
@@ -77,7 +75,7 @@ def _tight(context: ValidationContext) -> Iterator[Issue]:
     bank = context.vehicle.value("roll_limit")
     shown = f"{math.degrees(bank):g} degrees of bank"
     for before, after, turn in _corners(context):
-        radius = before.speed * before.speed / (_GRAVITY * math.tan(bank))
+        radius = before.speed * before.speed / (GRAVITY * math.tan(bank))
         needed = radius * math.tan(math.radians(min(turn, 179.0)) / 2)
         room = min(before.length, after.length)
         if needed > room:

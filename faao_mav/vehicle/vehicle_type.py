@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.power import GRAVITY
 from faao_mav.vehicle.dialect import Dialect
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
@@ -18,13 +19,10 @@ HELD = 0.9
 """The greatest airspeed that a plan asks of a copter, in that at which drag takes all of its lean
 limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
 
-_G = 9.80665
-"""Standard gravity, m/s²."""
-
 
 def lean_acceleration(angle: float) -> float:
     """Return the level acceleration at the lean or bank `angle`, rad, at constant height, m/s²."""
-    return _G * math.tan(angle)
+    return GRAVITY * math.tan(angle)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,11 +16,9 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.item import Home
+from faao_mav.power import GRAVITY
 from faao_mav.vehicle import Track, Vehicle
 from faao_mav.vehicle.vehicle_type import FenceAction
-
-_G = 9.80665
-"""Standard gravity, m/s²."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +76,7 @@ def _instead(track: Track, last: int, breach: Breach, vehicle: Vehicle) -> Track
     if breach.action == "land" or (breach.action == "return" and vertical.lands_on_return):
         go(down, vertical.descend(points[-1][2]))
     elif breach.action == "terminate":
-        go(down, math.sqrt(2 * max(points[-1][2], 0.0) / _G))
+        go(down, math.sqrt(2 * max(points[-1][2], 0.0) / GRAVITY))
     t = track.t[last] + np.cumsum(lasting[1:])
     after = np.diff(points, axis=0) / np.array(lasting[1:])[:, None]
     reached = np.where(track.reached <= breach.time, track.reached, np.nan)

@@ -25,6 +25,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.banded import SIZE, Entry, FlightMatrix
+from faao_mav.optimizer.interior.cones import TINY
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 
@@ -259,6 +260,16 @@ def quadratic(packed: Real, x: Real) -> Real:
     east, north = x
     each = xx * east * east + 2 * xy * east * north + yy * north * north
     return np.asarray(each.sum(axis=-1, keepdims=True))
+
+
+def positive_part(packed: Real) -> Real:
+    """Return the nearest positive semidefinite matrices, (3, flights, n)."""
+    xx, xy, yy = packed
+    middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    low = np.minimum(middle - radius, 0)
+    # with eigenvalues low < 0 <= high: high (M - low I) / (high - low); with both < 0: zero
+    share = np.where(low < 0, np.maximum(middle + radius, 0) / np.maximum(2 * radius, TINY), 1)
+    return np.stack([share * (xx - low), share * xy, share * (yy - low)])
 
 
 def summed(values: Real) -> Real:

@@ -21,13 +21,13 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.optimizer.interior.banded import Entry, Factors, Q, V, W, Y
-from faao_mav.optimizer.interior.cones import TINY
 from faao_mav.optimizer.interior.constraint import (
     Forces,
     Move,
     ScaledFlight,
     Stiffness,
     added,
+    positive_part,
     quadratic,
     summed,
 )
@@ -84,7 +84,7 @@ class Newton:
         curvature = -np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.hessian)
         curvature += added(each.curvature for each in stiffness)
         if cut.any():
-            curvature = np.where(cut, _positive_part(curvature), curvature)
+            curvature = np.where(cut, positive_part(curvature), curvature)
         curvature[::2] += proximal
         compliance = np.empty((3, flights, n))  # the last slot has none
         compliance[..., :-1] = _compliance(stiffness)
@@ -249,13 +249,3 @@ def _compliance(stiffness: list[Stiffness]) -> Real:
         return acting[0].compliance
     xx, xy, yy = np.asarray(added(each.a for each in acting))
     return np.asarray(np.stack([yy, -xy, xx]) / (xx * yy - xy * xy))
-
-
-def _positive_part(packed: Real) -> Real:
-    """Return the nearest positive semidefinite matrices, (3, flights, n)."""
-    xx, xy, yy = packed
-    middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-    low = np.minimum(middle - radius, 0)
-    # with eigenvalues low < 0 <= high: high (M - low I) / (high - low); with both < 0: zero
-    share = np.where(low < 0, np.maximum(middle + radius, 0) / np.maximum(2 * radius, TINY), 1)
-    return np.stack([share * (xx - low), share * xy, share * (yy - low)])

@@ -77,6 +77,7 @@ def improve_starts(
     max_iterations: int,
     relay: RelayQueue | None = None,
     constraints: Callable[[Kinematics], Sequence[Constraint]] = lambda _: (),
+    coarse: bool = True,
 ) -> ImprovedStarts:
     """Improve the feasible `flights` to `tolerance` and compare them.
 
@@ -92,9 +93,10 @@ def improve_starts(
         max_iterations: steps of each search at most.
         relay: the queue whose delivered rate is maximised instead of the smaller mean.
         constraints: what flights of given kinematics keep beside their limits.
+        coarse: whether a copy may be used.
     """
     copy, reward, on_copy = kin, stage, list(flights.values())
-    if len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
+    if coarse and len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
         copy, reward = coarse_copy(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
         tolerance = max(tolerance, _COARSE_TOLERANCE)
         on_copy = [copy.follow(resampled(kin, flight, copy)) for flight in on_copy]

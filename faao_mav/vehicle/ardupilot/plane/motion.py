@@ -7,6 +7,7 @@ Constants that say no other are fitted to eleven flights of ArduPilot's simulato
 import cmath
 import math
 
+from faao_mav.power import GRAVITY
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.atmosphere import density_ratio
 
@@ -16,9 +17,6 @@ STEP = 0.1
 SIDESLIP = 0.284
 """The share of a coordinated turn's acceleration that sideslip takes, at sea level's density: the
 simulator's aircraft turns without enough rudder."""
-
-_GRAVITY = 9.80665
-"""Standard gravity, m/s²."""
 
 _ROLL_TURN = 0.019
 """How far the course turns while the aircraft banks, over the change of bank."""
@@ -178,12 +176,12 @@ class Motion:
         before = self._climb
         self._hold(height, speed, step)
         limits = self._limits
-        bank = math.atan2(lateral, _GRAVITY)
+        bank = math.atan2(lateral, GRAVITY)
         bank = min(max(bank, -limits.roll_limit), limits.roll_limit)
         change = (bank - self._bank) * -math.expm1(-step / limits.roll_time)
         self._bank += change
         airspeed = self._airspeed()
-        lift = _GRAVITY + (self._climb - before) / step
+        lift = GRAVITY + (self._climb - before) / step
         turn = self._turning * lift * math.tan(self._bank) / airspeed * step + _ROLL_TURN * change
         self.place += (cmath.rect(airspeed, self.heading + turn / 2) + self._wind) * step
         self.heading += turn
@@ -194,11 +192,11 @@ class Motion:
         limits, flown = self._limits, self._speed
         climb, sink = limits.climb_speed * step, limits.descent_speed * step
         self._level += min(max(height - self._level, -sink), climb)
-        rise = _RISE * limits.climb_speed * _GRAVITY / flown * step
+        rise = _RISE * limits.climb_speed * GRAVITY / flown * step
         change = min(max(speed - self._demand, -_FALL / flown * step), rise)
         self._demand += change
-        growth = change / step * flown / _GRAVITY
-        kinetic = (self._demand**2 - flown**2) / (2 * _GRAVITY)
+        growth = change / step * flown / GRAVITY
+        kinetic = (self._demand**2 - flown**2) / (2 * GRAVITY)
         potential = self._level - self._height
 
         total, held, ahead = _POWER
@@ -217,5 +215,5 @@ class Motion:
             wanted = min(wanted, self._power - 2 * (limits.min_speed - flown))
         self._held_climb += held * (potential - kinetic) * step
         self._climb += (wanted - self._climb) * -math.expm1(-step / _PITCH_LAG)
-        self._speed = max(flown + _GRAVITY * (self._power - self._climb) / flown * step, 1.0)
+        self._speed = max(flown + GRAVITY * (self._power - self._climb) / flown * step, 1.0)
         self._height += self._climb * step

@@ -1,0 +1,229 @@
+"""The most data that an energy lets be delivered, in any duration up to the plan's.
+
+The data D(T, E) of the best flight of duration T within the energy E rises with E. Along T it rises
+while there is energy to spare and falls where it is short, to nothing at E = T min P. One search
+over T finds its maximum: each step improves the last step's flight, roughly. The flight of the best
+T is then optimised from all starts. Energies are those of flight and relay, J.
+"""
+
+import math
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.direct import LONG_SEARCH, ROUGH, direct
+from faao_mav.optimizer.interior.maximize import (
+    LocalOptimum,
+    constraints_of,
+    feasible,
+    maximize,
+)
+from faao_mav.optimizer.kinematics import Trajectory
+from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search.multistart import stretched
+from faao_mav.optimizer.search.sparing import sparing_starts
+from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.solution import Least, Observer, Progress, Solution, staged
+from faao_mav.plan import Plan, changed_plan
+from faao_mav.plan.checks import fewest_slots
+from faao_mav.power import JOULES_PER_WH
+
+_PRECISION = 0.004
+"""The share of the longest duration to which the best one is looked for. Chosen."""
+
+_NEAR = 0.15
+"""The share by which durations are tried on both sides of that of a near energy. Chosen."""
+
+_BETTER = 1e-3
+"""The share of data by which a flight from other starts has to be better to look for its duration
+anew. Chosen: the precision of a rough search is some ten times that."""
+
+_STRAIGHT = 50
+"""Durations of straight flights that are compared. Chosen."""
+
+_SPEEDS = 500
+"""Airspeeds among which that of least power is looked for. Chosen."""
+
+_TRIES = 8
+"""Durations that are tried from all starts where the last flight leads to none. Chosen."""
+
+
+def most_data(plan: Plan, *, observe: Observer | None = None) -> Solution:
+    """Return the solution of `plan` with the duration of most data within `goal.energy_wh`.
+
+    Raises `InfeasibleError` where no flight was found that takes so little.
+    """
+    within = WithinEnergy(plan, observe)
+    assert plan.goal.energy_wh is not None
+    energy = JOULES_PER_WH * plan.goal.energy_wh
+    best = within.unlimited
+    if within.unlimited_energy > energy:
+        best = within.ended(within.best(energy), energy)
+    return replace(best, least=Least(plan.flight.duration, None, within.optimizations))
+
+
+class WithinEnergy:
+    """Flights of most data within an energy, from that of `plan` without such a limit on.
+
+    `last` is the last one that was found, `optimizations` how many were optimised.
+    """
+
+    def __init__(self, plan: Plan, observe: Observer | None) -> None:
+        self.plan, self.observe, self.optimizations = plan, observe, 0
+        model, power = plan.power_model, plan.radio.relay.power
+        assert model is not None  # goals that count the energy have one
+        fastest = plan.max_ground_speed + math.hypot(*plan.wind)
+        speeds = np.linspace(plan.vehicle.min_speed, fastest, _SPEEDS)
+        self.fewest = fewest_slots(plan)
+        self.per_slot = plan.flight.time_step * (model.least_power(speeds)[1] + power)
+        self.unlimited = self._solved(plan.flight.slots, math.inf)
+        self.unlimited_energy = self._energy(self.unlimited)
+        self.last, self.near = self.unlimited.trajectory, 0.0
+        problem = build_problem(plan)
+        self.field = rate_field(problem, design(plan))  # which covers the shorter flights too
+
+    @property
+    def least_energy(self) -> float:
+        """An energy that no flight is below."""
+        return self.fewest * self.per_slot
+
+    def best(self, energy: float) -> Solution:
+        """Return the flight of most data, or where a rate is asked for of the highest rate.
+
+        Raises `InfeasibleError` where none was found.
+        """
+        from scipy.optimize import minimize_scalar
+
+        low, high = self.fewest, min(self.plan.flight.slots, int(energy / self.per_slot))
+        if self.near:
+            centre = len(self.last.w) * energy / self.near
+            low, high = max(low, int((1 - _NEAR) * centre)), min(high, int((1 + _NEAR) * centre))
+        found: dict[int, LocalOptimum | None] = {}
+
+        def missed(slots: float) -> float:
+            n = round(slots)
+            if n not in found:
+                found[n] = self._rough(n, energy)
+            return -self._worth(n, found[n])
+
+        if high > low:
+            step = max(0.5, _PRECISION * high)
+            minimize_scalar(missed, bounds=(low, high), method="bounded", options={"xatol": step})
+        elif high == low:
+            missed(low)
+        slots = max(found, key=lambda n: self._worth(n, found[n]), default=0)
+        optimum = found.get(slots)
+        best = (
+            self._from_all_starts(energy, high)
+            if optimum is None
+            else self._solved(slots, energy, optimum.trajectory, alone=True)
+        )
+        self.last, self.near = best.trajectory, energy
+        return best
+
+    def ended(self, best: Solution, energy: float) -> Solution:
+        """Return the flight of the duration of `best` from all starts."""
+        whole = self._solved(len(best.w), energy, best.trajectory)
+        if whole.delivered_rate > (1 + _BETTER) * best.delivered_rate:
+            self.last = whole.trajectory
+            return max(whole, self.best(energy), key=self._data)
+        return max(whole, best, key=self._data)
+
+    def _rough(self, slots: int, energy: float) -> LocalOptimum | None:
+        """Return the flight of so many `slots` near the last one; None where there is none."""
+        problem, told = self._problem(slots, energy)
+        kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
+        options = problem.plan.optimizer
+        if self.observe is not None:
+            self.observe(Progress(1, 2, told, 0.0))
+        self.optimizations += 1
+        field = self.field
+        if problem.plan.radio.fading == "realization":  # its draws are the slots'
+            field = rate_field(problem, design(problem.plan))
+        try:
+            straight = straight_flight(kin)
+        except InfeasibleError:
+            return None
+        limits = (*constraints_of(kin), *fenced)
+        start = feasible(kin, straight, stretched(kin, self.last), limits)
+        starts = sparing_starts(
+            kin, {"last": start}, (*constraints_of(kin), *problem.constraints(kin))
+        )
+        if not starts:
+            return None
+        optimum = maximize(
+            kin,
+            field,
+            starts["last"],
+            constraints=problem.constraints(kin),
+            tolerance=max(ROUGH, options.tolerance),
+            max_iterations=LONG_SEARCH * options.max_iterations,
+            relay=problem.maximised_queue,
+        )
+        self.last = optimum.trajectory
+        return optimum
+
+    def _worth(self, slots: int, optimum: LocalOptimum | None) -> float:
+        if optimum is None:
+            return 0.0
+        return optimum.value if self.plan.goal.rate is not None else slots * optimum.value
+
+    def _data(self, found: Solution) -> float:
+        slots = 1 if self.plan.goal.rate is not None else len(found.w)
+        return slots * found.delivered_rate
+
+    def _energy(self, found: Solution) -> float:
+        energy = build_problem(found.plan).energy_of(found.trajectory)
+        assert energy is not None
+        return energy
+
+    def _problem(self, slots: int, energy: float) -> tuple[Problem, str]:
+        """Return the problem of so many `slots` within `energy`, and its name."""
+        duration = round(slots * self.plan.flight.time_step, 9)
+        problem = build_problem(changed_plan(self.plan, {"flight.duration": duration}))
+        limit = "" if energy == math.inf else f" within {energy / JOULES_PER_WH:.4g} Wh"
+        return replace(problem, energy=energy), f"{duration:g} s{limit}"
+
+    def _solved(
+        self, slots: int, energy: float, known: Trajectory | None = None, *, alone: bool = False
+    ) -> Solution:
+        problem, told = self._problem(slots, energy)
+        self.optimizations += 1
+        return direct(problem, observe=staged(self.observe, told), known=known, alone=alone)
+
+    def _from_all_starts(self, energy: float, most: int) -> Solution:
+        """Return the longest flight that is found from all starts."""
+        tried = np.linspace(self.fewest, most, _TRIES if most >= self.fewest else 0).astype(int)
+        for slots in np.unique(tried)[::-1].tolist():
+            with suppress(InfeasibleError):
+                return self._solved(slots, energy)
+        raise InfeasibleError(self._too_little(energy))
+
+    def _too_little(self, energy: float) -> str:
+        duration, least = thriftiest_straight(self.plan)
+        return (
+            f"{self.plan.source}: goal.energy_wh: no flight was found that takes at most "
+            f"{energy / JOULES_PER_WH:.4g} Wh with its relay; straight from start to end it takes "
+            f"{least / JOULES_PER_WH:.4g} Wh, in {duration:g} s"
+        )
+
+
+def thriftiest_straight(plan: Plan) -> tuple[float, float]:
+    """Return the duration, s, and energy, J, of the straight flight that takes the least.
+
+    Infinite where there is none.
+    """
+    taken = [(math.inf, math.inf)]
+    slots = np.linspace(fewest_slots(plan), plan.flight.slots, _STRAIGHT).astype(int)
+    for n in np.unique(slots).tolist():
+        duration = round(n * plan.flight.time_step, 9)
+        problem = build_problem(changed_plan(plan, {"flight.duration": duration}))
+        with suppress(InfeasibleError):
+            energy = problem.energy_of(straight_flight(problem.kinematics))
+            taken.append((energy if energy is not None else math.inf, duration))
+    least, duration = min(taken)
+    return duration, least

@@ -1,0 +1,247 @@
+"""Energy in the optimiser: against sums of its own, against SLSQP, and as goals."""
+
+import math
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from random_flights import random_flight
+from scipy.optimize import minimize
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.direct import direct
+from faao_mav.optimizer.interior.energy import EnergyLimit
+from faao_mav.optimizer.interior.maximize import constraints_of, maximize
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search.sparing import sparing_starts
+from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan, changed_plan, parse_plan
+from faao_mav.report.summary import result_lines
+from faao_mav.workflow import Result
+
+COPTER = parse_plan("""
+site: {origin: {latitude: 47, longitude: 8}}
+vehicle: {max_speed: 14, max_acceleration: 4, power: {}}
+flight: {start: [0, 60], end: [60, 0], altitude: 40, duration: 32, time_step: 1}
+radio:
+  fading: none
+  bandwidth_mhz: 10
+  base_station: {position: [0, 0], power_dbm: 1}
+  relay: {power_dbm: 20, noise_dbm: -80}
+  ground_user: {position: [80, 60], noise_dbm: -80}
+optimizer: {starts: [bs-user], max_iterations: 25}
+""")
+PLANE = changed_plan(
+    COPTER,
+    {
+        "vehicle": {
+            "type": "plane",
+            "min_speed": 9,
+            "max_speed": 16,
+            "max_acceleration": 5,
+            "power": {"cruise_w": 90, "at": 12, "mass": 2.5},
+        },
+        "flight.start_velocity": "free",
+        "flight.end_velocity": "free",
+    },
+)
+
+
+def integrated(plan: Plan, flight: Trajectory) -> float:
+    """What a flight takes, J, by the formulas of the papers, slot by slot."""
+    total, dt, g = 0.0, plan.flight.time_step, 9.80665
+    wind = np.array(plan.wind)
+    for v, a in zip(flight.v - wind, flight.a, strict=True):
+        s = math.hypot(*v)
+        if plan.vehicle.type == "copter":
+            blade = 0.012 / 8 * 1.225 * 0.05 * 0.503 * 120**3
+            induced = 1.1 * 20**1.5 / math.sqrt(2 * 1.225 * 0.503)
+            r = s**2 / (2 * 20 / (2 * 1.225 * 0.503))
+            power = blade * (1 + 3 * s**2 / 120**2)
+            power += induced * math.sqrt(math.sqrt(1 + r**2) - r)
+            power += 0.6 * 1.225 * 0.05 * 0.503 * s**3 / 2
+        else:
+            c1, c2 = 90 / (2 * 12**3), 90 * 12 / 2
+            across = a @ a - (a @ v) ** 2 / s**2
+            power = c1 * s**3 + c2 / s * (1 + across / g**2) + 2.5 * max(0.0, float(a @ v))
+        total += dt * (power + plan.radio.relay.power)
+    return total
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("plan", "wind"), [(COPTER, 0), (COPTER, 5), (PLANE, 0)])
+def test_the_energy_is_that_of_direct_integration(plan: Plan, wind: float, seed: int) -> None:
+    plan = changed_plan(plan, {"site.wind": {"speed": wind, "from": 250}})
+    problem = build_problem(plan)
+    flight = random_flight(problem.kinematics, seed)
+    assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
+
+
+def limited(plan: Plan, share: float) -> tuple[Kinematics, Any, EnergyLimit, Trajectory]:
+    """The kinematics, rates and energy limit of `plan`: a share of what the best flight takes."""
+    problem = build_problem(plan)
+    kin, field = problem.kinematics, rate_field(problem, design(plan))
+    free = maximize(kin, field, straight_flight(kin), tolerance=1e-6, max_iterations=400)
+    energy = problem.energy_of(free.trajectory)
+    assert energy is not None
+    (limit,) = replace(problem, energy=share * energy).constraints(kin)
+    assert isinstance(limit, EnergyLimit)
+    return kin, field, limit, free.trajectory
+
+
+def slsqp(kin: Kinematics, field: Any, limit: EnergyLimit, start: Trajectory) -> float:
+    """The best min_j F_j that SLSQP finds from `start`, with gradients by the accelerations x."""
+    n, dt = kin.slots, kin.time_step
+    to_v = dt * np.tril(np.ones((n, n - 1)), -1)
+    to_w = np.zeros((n, n - 1))
+    to_w[1:] = dt * np.cumsum((to_v[:-1] + to_v[1:]) / 2, axis=0)
+
+    def flight(x: Real) -> tuple[Real, Real, Real]:
+        a = x[:-1].reshape(-1, 2)
+        return kin.start + to_w @ a, to_v @ a, a
+
+    def by_x(by_w: Real, by_v: Real) -> Real:
+        """Gradients (m, 2 (n - 1) + 1) by x of those by w and v, (m, n, 2)."""
+        by_a = np.einsum("mnc,nk->mkc", by_w, to_w) + np.einsum("mnc,nk->mkc", by_v, to_v)
+        return np.hstack([by_a.reshape(len(by_a), -1), np.zeros((len(by_a), 1))])
+
+    def kept(x: Real) -> Real:
+        w, v, a = flight(x)
+        energy = dt * limit.partials(v.T, 0 * v.T).value.sum()
+        return np.concatenate([
+            1 - (v**2).sum(axis=1) / kin.max_speed**2,
+            1 - (a**2).sum(axis=1) / kin.max_acceleration**2,
+            field.value(w.T[:, None]).mean(axis=-1)[:, 0] - x[-1],
+            [1 - energy / limit.most],
+        ])  # fmt: skip
+
+    def kept_gradients(x: Real) -> Real:
+        w, v, a = flight(x)
+        each = np.eye(n)[:, :, None]
+        speed = by_x(0 * each * v, -2 * each * v / kin.max_speed**2)
+        acceleration = np.zeros((n - 1, len(x)))
+        for k, part in enumerate(a):
+            acceleration[k, 2 * k : 2 * k + 2] = -2 * part / kin.max_acceleration**2
+        slopes = np.moveaxis(field(w.T[:, None]).gradient[:, :, 0], 0, -1) / n
+        rates = by_x(slopes, 0 * slopes)
+        rates[:, -1] = -1
+        power = limit.partials(v.T, 0 * v.T).by_v.T[None]
+        energy = by_x(0 * power, -dt / limit.most * power)
+        return np.vstack([speed, acceleration, rates, energy])
+
+    def ends(x: Real) -> Real:
+        w, v, _ = flight(x)
+        return np.concatenate([(w[-1] - kin.end) / 100, v[-1] / 10])
+
+    last = [*(to_w[-1] / 100, to_v[-1] / 10)]
+    end_gradients = np.vstack([np.hstack([np.kron(row, np.eye(2)), [[0], [0]]]) for row in last])
+    t = field.value(start.w.T[:, None]).mean(axis=-1).min()
+    constraints = [
+        {"type": "ineq", "fun": kept, "jac": kept_gradients},
+        {"type": "eq", "fun": ends, "jac": lambda _: end_gradients},
+    ]
+    told = {"maxiter": 300, "ftol": 1e-9}
+    found = minimize(  # type: ignore[call-overload]
+        lambda x: -float(x[-1]),
+        np.append(start.a[:-1].ravel(), t),
+        jac=lambda x: np.append(np.zeros(len(x) - 1), -1.0),
+        constraints=constraints,
+        method="SLSQP",
+        options=told,
+    )
+    sound = kept(found.x).min() > -1e-6 and abs(ends(found.x)).max() < 1e-6
+    return float(found.x[-1]) if sound else -math.inf
+
+
+@pytest.mark.parametrize("share", [0.97, 0.94])
+def test_no_worse_than_slsqp(share: float) -> None:
+    plan = changed_plan(COPTER, {"flight.duration": 20, "radio.causal": False})
+    kin, field, limit, free = limited(plan, share)
+    every = (*constraints_of(kin), limit)
+    starts = sparing_starts(kin, {"straight": straight_flight(kin), "free": free}, every)
+    ours = [
+        maximize(kin, field, each, constraints=[limit], tolerance=1e-6, max_iterations=400)
+        for each in starts.values()
+    ]
+    assert ours
+    best = max(ours, key=lambda each: each.value)
+    assert best.converged
+    assert max(kin.residuals(best.trajectory).values()) < 1e-6
+    assert limit.used(best.trajectory) <= limit.most * (1 + 1e-9)
+    assert limit.used(best.trajectory) >= limit.most * (1 - 1e-3)  # nothing is left lying
+    peers = [slsqp(kin, field, limit, each) for each in (*starts.values(), best.trajectory)]
+    assert best.value >= max(peers) - 1e-4
+
+
+def within(energy_wh: float) -> Solution:
+    return optimize(changed_plan(COPTER, {"goal": {"maximise": "data", "energy_wh": energy_wh}}))
+
+
+def used(found: Solution) -> float:
+    assert found.energy_wh is not None
+    return found.energy_wh
+
+
+def test_less_energy_never_delivers_more() -> None:
+    most = used(direct(build_problem(COPTER)))
+    data = []
+    for share in (0.6, 0.8, 1.01):
+        found = within(share * most)
+        assert used(found) <= share * most * (1 + 1e-9)
+        assert used(found) * 3600 == pytest.approx(integrated(COPTER, found.trajectory), rel=1e-9)
+        assert found.is_feasible(1e-5)
+        assert found.plan.flight.duration <= COPTER.flight.duration
+        data.append(len(found.w) * found.delivered_rate)
+    assert np.all(np.diff(data) > 0)
+    assert found.plan.flight.duration == COPTER.flight.duration
+    assert found.least is not None
+    assert found.least.optimizations == 1
+
+
+def test_the_best_duration_is_that_of_trying_all() -> None:
+    found = within(0.9)
+    tried = []
+    for slots in range(len(found.w) - 2, len(found.w) + 3):
+        problem = build_problem(changed_plan(COPTER, {"flight.duration": slots}))
+        with suppress(InfeasibleError):
+            each = direct(replace(problem, energy=0.9 * 3600))
+            tried.append(slots * each.delivered_rate)
+    assert len(tried) > 2
+    assert len(found.w) * found.delivered_rate >= max(tried) * (1 - 1e-3)
+
+
+def test_the_least_energy_is_below_that_of_other_ways() -> None:
+    most = direct(build_problem(COPTER))
+    asked = 0.6 * (COPTER.megabytes(most.delivered_rate) or 0.0)
+    found, quickest = (
+        optimize(changed_plan(COPTER, {"goal": {"deliver_mbytes": asked, "minimise": quantity}}))
+        for quantity in ("energy", "duration")
+    )
+    assert found.delivered_rate >= found.plan.needed_rate
+    assert used(found) < 0.99 * used(quickest)
+    assert used(found) < 0.99 * used(most)
+    assert found.least is not None
+    below = found.least.below
+    assert below is not None
+    assert below.delivered_rate < below.plan.needed_rate
+    assert used(below) >= used(found) - 2e-3 * used(most)
+    (label, told), *_ = result_lines(Result(found))
+    assert label == "goal"
+    assert told.startswith(f"least energy for {asked:.5g} megabytes: {used(found):.4g} Wh in ")
+    goal = Result(found).as_dict()["goal"]
+    assert goal["energy_wh"] == used(found)
+
+
+def test_too_little_energy_says_what_the_straight_flight_takes() -> None:
+    with pytest.raises(
+        InfeasibleError, match=r"at most 0\.2 Wh .*straight from start to end .* Wh"
+    ):
+        within(0.2)
