@@ -25,7 +25,7 @@ setattr(providers, "is_local_module_file", lambda _: False)  # noqa: B010
 
 settings.register_profile(
     "deterministic",
-    max_examples=40,
+    max_examples=30,
     deadline=None,
     derandomize=True,
     database=None,

@@ -43,9 +43,11 @@ def complaints(found: Check) -> list[str]:
     return [f"{f.rule}: {f.message}" for f in found.findings if f.level != "note"]
 
 
-@pytest.mark.parametrize("parameters", ["recommend", "keep"])
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-@pytest.mark.parametrize("name", ["copter_relay", "paper", "paper_active"])
+@pytest.mark.parametrize(
+    ("autopilot", "parameters"),
+    [("ardupilot", "recommend"), ("ardupilot", "keep"), ("px4", "recommend")],
+)
+@pytest.mark.parametrize("name", ["copter_relay", "paper_active"])
 def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
     text = (MISSIONS / f"{name}.yaml").read_text()
     changes: dict[str, Any] = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}

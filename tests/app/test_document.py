@@ -192,7 +192,7 @@ def test_only_the_file_that_was_opened_is_saved_and_no_newer_one(tmp_path: Path)
 
 def test_keys_of_one_word_have_choices() -> None:
     known = reference()
-    assert known["goal.minimise"].choices == ("duration", "power")
+    assert known["goal.minimise"].choices == ("duration", "power", "energy")
     assert known["radio.causal"].choices == ("true", "false")
     assert known["optimizer.starts"].choices == ()  # a list of words
     assert known["flight.start_velocity"].choices == ()  # a word or a velocity

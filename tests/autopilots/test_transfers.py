@@ -83,8 +83,7 @@ def test_signed(autopilots: Path, tmp_path: Path) -> None:
             upload(MISSION, connection, wait=3, signing_key=wrong)
 
 
-@pytest.mark.parametrize("moment", ["uploading", "reading"])
-@pytest.mark.parametrize("kind", ["arducopter", "px4"])
+@pytest.mark.parametrize(("kind", "moment"), [("arducopter", "reading"), ("px4", "uploading")])
 def test_a_reboot_in_the_middle(kind: str, moment: str, autopilots: Path, tmp_path: Path) -> None:
     """The power goes while a mission replaces another: what is said of it afterwards is true."""
     old, new = a_mission(60, shift=0.01), a_mission(80)

@@ -110,11 +110,9 @@ def test_schemes_keep_their_precoder_fly_for_it_and_are_beaten_by_faao(
         {"radio.rician_factor": 0},
         {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
         {"flight.start_velocity": [0, 6], "flight.end_velocity": [5, -3]},
-        {"flight.end": [0, 50]},
         {"flight.start": [0, 0], "flight.end": [0, 0], "radio.fading": "none"},
         {"radio.base_station.power_dbm": -60, "radio.relay.power_dbm": -60},
         {"radio.base_station.power_dbm": 60, "radio.relay.power_dbm": -20},
-        {"radio.base_station.power_dbm": 30, "radio.relay.power_dbm": 30},
         {"flight.duration": 1.5, "flight.end": [0.5, 49.5], "flight.time_step": 0.5},
     ],
 )

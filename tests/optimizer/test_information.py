@@ -22,7 +22,7 @@ BPSK = {"radio.modulation": "bpsk", "power": 0}
 
 @pytest.fixture(scope="module")
 def planned(small_plan: MakePlan) -> Solution:
-    return optimize(plan_of(small_plan, {"radio.fading_samples": 8, "radio.causal": True}))
+    return optimize(plan_of(small_plan, BPSK | {"radio.fading_samples": 8, "radio.causal": True}))
 
 
 def plan_of(small_plan: MakePlan, changes: dict[str, Any]) -> Plan:
@@ -88,7 +88,7 @@ def test_its_rates_are_those_that_sampling_finds(planned: Solution) -> None:
     assert planned.delivered_rate == pytest.approx(information.delivered, abs=0.02)
     assert information.delivered <= information.average + 1e-9
     assert planned.gain is not None
-    assert planned.gain > 0.05
+    assert planned.gain > 0.005
     assert planned.converged
     assert planned.kkt_residual() < 2e-4
 
