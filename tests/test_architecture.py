@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -58,13 +59,16 @@ def imports(path: Path) -> set[str]:
     return {name for name in found if name.startswith("faao_mav.")}
 
 
-IMPORTS = {name: imports(path) for name, path in MODULES.items()}
+@cache
+def all_imports() -> dict[str, set[str]]:
+    """Return what each module of the package imports."""
+    return {name: imports(path) for name, path in MODULES.items()}
 
 
 def test_no_import_runs_upward() -> None:
     upward = [
         (name, other)
-        for name, others in IMPORTS.items()
+        for name, others in all_imports().items()
         for other in others
         if name != "faao_mav"
         and other.split(".")[1] != name.split(".")[1]
@@ -76,7 +80,7 @@ def test_no_import_runs_upward() -> None:
 def test_no_module_imports_itself_by_way_of_others() -> None:
     """Not even for types, where Python itself would not mind."""
     try:
-        TopologicalSorter(IMPORTS).prepare()
+        TopologicalSorter(all_imports()).prepare()
     except CycleError as error:
         pytest.fail(" -> ".join(error.args[1]))
 
