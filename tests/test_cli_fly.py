@@ -12,6 +12,7 @@ from served import running
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.main import app
+from faao_mav.errors import InfeasibleError
 from faao_mav.mavlink.flying import solving
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mission import Home, Mission, MissionItem
@@ -111,9 +112,13 @@ class Immediate:
         """There is nothing to close."""
 
     def ask(self, rest: Rest) -> None:
-        self._answer = solve_rest(rest)
+        self._answer: Solution | str
+        try:
+            self._answer = solve_rest(rest)
+        except InfeasibleError as error:
+            self._answer = str(error)
 
-    def answer(self) -> Solution:
+    def answer(self) -> Solution | str:
         return self._answer
 
 
