@@ -1,8 +1,7 @@
 """The questions of one window and the answers to them: the last question wins."""
 
 import asyncio
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Awaitable, Callable
 
 from faao_mav.app import answers
 from faao_mav.app.answers import Answer
@@ -94,10 +93,10 @@ class Planner:
             self._show(answer)
 
 
-async def _told(job: Any) -> Answer:
+async def _told(job: Awaitable[Answer]) -> Answer:
     """Return the answer of `job`, or the error in its stead."""
     try:
-        return await job  # type: ignore[no-any-return]
+        return await job
     except FaaoError as error:
         return Answer(failed=str(error))
     except Exception as error:  # a page that waits for ever says nothing
