@@ -119,7 +119,9 @@ class FaultyTransport:
         self._flush()
 
     def close(self) -> None:
-        """Close the transport beneath; what is under way is lost."""
+        """Close the transport beneath; what was sent is under way, and arrives early."""
+        while queue := self._queues["out"]:
+            self._inner.write(heapq.heappop(queue)[2])
         self._inner.close()
 
     def _now(self) -> float:

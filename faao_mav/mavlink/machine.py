@@ -65,11 +65,12 @@ class AskingMachine(Machine[T]):
     """A machine that begins with a question, and repeats it until there is an answer.
 
     The question is put again every `wait` seconds, `retries` times; then `_give_up` is called.
+    With `soon` it is put once more before that, after so many seconds.
     """
 
-    def __init__(self, wait: float, retries: int) -> None:
+    def __init__(self, wait: float, retries: int, soon: float | None = None) -> None:
         super().__init__()
-        self._wait, self._retries = wait, retries
+        self._wait, self._retries, self._soon = wait, retries, soon
         self._retries_done = 0
 
     @abstractmethod
@@ -82,7 +83,7 @@ class AskingMachine(Machine[T]):
 
     def start(self, now: float) -> Sequence[Message]:
         """Ask."""
-        self._retries_done = 0
+        self._retries_done = 0 if self._soon is None else -1
         return self._ask(now)
 
     def _time_out(self, now: float) -> Sequence[Message]:
@@ -92,7 +93,8 @@ class AskingMachine(Machine[T]):
         return self._ask(now)
 
     def _ask(self, now: float) -> Sequence[Message]:
-        self._due = now + self._wait
+        early = self._soon if self._retries_done < 0 else None
+        self._due = now + (self._wait if early is None else early)
         return [self._question()]
 
 

@@ -16,7 +16,7 @@ from faao_mav.mavlink.messages import (
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.transfer.download import Download
 from faao_mav.mavlink.transfer.exchange import Clear
-from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.mavlink.transfer.pace import Pace, Timeouts
 
 ME = GROUND_STATION
 ROWS = rows_for("px4", 3)
@@ -66,6 +66,18 @@ def test_the_list_is_asked_for_again_and_given_up() -> None:
     attempts = Timeouts().attempts
     assert desk.sent.count(MissionRequestList(VEHICLE, 0)) == 6 * attempts
     assert desk.machine.outcome.status == "silent"
+
+
+def test_on_a_quick_link_the_list_is_asked_for_again_soon() -> None:
+    """A pace that an upload has measured: the first repetition need not wait for the guide's."""
+    before = Pace(Timeouts())
+    before.answer(before.ask(0.0), 0.01)
+    desk = Desk(Download(peer_of("px4"), before=before))
+    desk.start()
+    assert desk.wait(0.39) == []
+    assert desk.wait(0.01) == [MissionRequestList(VEHICLE, 0)]
+    assert desk.wait(1.49) == []
+    assert desk.wait(60.0)[0] == MissionRequestList(VEHICLE, 0)
 
 
 @pytest.mark.parametrize("seq", [0, 1])

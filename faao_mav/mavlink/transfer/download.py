@@ -63,7 +63,14 @@ class Download(Exchange):
         budget: Budget | None = None,
         before: Pace | None = None,
     ) -> None:
-        super().__init__(peer, mission_type, timeouts, budget)
+        self._pace = Pace(timeouts or Timeouts(), before=before)
+        super().__init__(
+            peer,
+            mission_type,
+            timeouts,
+            budget,
+            math.inf if self._pace.is_doubtful else max(_SPREAD, self._pace.wait),
+        )
         self._attempts_done = 0
         self._phase: Literal["list", "items", "resting"] = "list"
         self._legacy = False
@@ -73,7 +80,6 @@ class Download(Exchange):
         self._next_sequence = 0
         self._presumed_lost: set[int] = set()
         self._in_order = True
-        self._pace = Pace(self._timeouts, before=before)
         self._last_progress = 0.0
         # Transfers that late packets ended, requests in vain since the last sign of that, the
         # answers to the last item's request that may still come, and when it was sent last.

@@ -1,5 +1,6 @@
 """What the transfers of one list have in common, and the simplest of them: clearing it."""
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -93,9 +94,11 @@ class Exchange(AskingMachine[Outcome]):
         mission_type: MissionType = MissionType.MISSION,
         timeouts: Timeouts | None = None,
         budget: Budget | None = None,
+        soon: float = math.inf,
     ) -> None:
         self._timeouts = timeouts or Timeouts()
-        super().__init__(self._timeouts.response, self._timeouts.retries)
+        wait = self._timeouts.response
+        super().__init__(wait, self._timeouts.retries, soon if soon < wait else None)
         self._peer, self._type = peer, mission_type
         self._budget = budget or Budget(self._timeouts)
         self._armed = False

@@ -74,7 +74,9 @@ class Upload(Exchange):
     ) -> None:
         if not items:
             raise InputError(f"upload: no {mission_type.title} items; clear the list instead")
-        super().__init__(peer, mission_type, timeouts, budget)
+        # A vehicle that has heard the announcement has asked for an item, and asked again, by then.
+        soon = 2 * peer.manners.request_period
+        super().__init__(peer, mission_type, timeouts, budget, soon)
         self._items, self._manners = tuple(items), peer.manners
         self._phase: Literal["count", "items", "booting", "refused"] = "count"
         self._booting = False
