@@ -60,12 +60,13 @@ def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> N
         assert mission == "mission      6 items stored"
         assert verified.startswith("verified     read back and compared, ")
         assert result.stderr == ""
-        out = tmp_path / "back.waypoints"
+        out = tmp_path / "back.plan"
         result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out, "--system", 1)
         assert result.exit_code == 0, result.output
     assert "mission      6 items, 0 fence areas, 0 rally points" in result.stdout
     found, sent = read_mission(out), read_mission(mission_file)
     assert found.home == sent.home
+    assert json.loads(out.read_text())["mission"]["firmwareType"] == 3  # MAV_AUTOPILOT of ArduPilot
     rows, sent_rows = (
         wire_items(each, MissionType.MISSION, vehicle_of("ardupilot")) for each in (found, sent)
     )
