@@ -76,6 +76,27 @@ def test_measured_lengths_that_reach_8_metres_per_second() -> None:
     assert 21 < 2 * planned(500, quick).up.length < 23
 
 
+@pytest.mark.parametrize(
+    ("length", "before", "told", "reached"),
+    [(11.3, 1.992, 3.764, 2.32), (24.6, 3.764, 8.202, 4.79), (44.8, 7.71, 8.81, 7.71)],
+)
+def test_measured_speeds_after_a_change_on_a_short_leg(
+    length: float, before: float, told: float, reached: float
+) -> None:
+    """As ArduCopter's log has them: legs of a mission with WPNAV_ACCEL 400 and WPNAV_JERK 20."""
+    own = ArduCopterLimits(acceleration=4.0, jerk=20.0)
+    leg = at_speed(planned(length, LegBounds(before, 4.0, 20.0, own.rise)), told, elapsed=0.3)
+    assert max(v for _, v, _ in leg.states) == pytest.approx(reached, abs=0.03)
+
+
+def test_the_jerk_rises_no_faster_than_the_aircraft_leans() -> None:
+    """Half of what leaning at 1100 degrees/s² gives is slower than ATC_INPUT_TC from 18 m/s³ on."""
+    assert ArduCopterLimits(jerk=17).rise == pytest.approx(0.3)
+    half = 9.80665 * math.radians(1100) / 2
+    assert ArduCopterLimits(jerk=20).rise == pytest.approx(math.pi * 20 / (2 * half))
+    assert ArduCopterLimits(jerk=20, roll_acceleration=0, pitch_acceleration=0).rise == 0.3
+
+
 @given(limits, st.floats(20, 300), st.floats(0.3, 15), st.floats(0, 1))
 def test_a_speed_change_keeps_what_was_flown_and_the_end(
     bounds: LegBounds, length: float, speed: float, share: float

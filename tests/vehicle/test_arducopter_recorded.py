@@ -30,14 +30,19 @@ def test_splines_are_predicted_more_roughly() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wind", "arrival", "position"),
-    [("wind3", 0.15, 0.6), ("wind6", 0.2, 0.8), ("wind9", 0.8, 3.2)],
+    ("wind", "number", "arrival", "position"),
+    [
+        ("wind3", 4, 0.15, 0.6),
+        ("wind6", 4, 0.2, 0.8),
+        ("wind8", 1, 0.2, 0.6),
+        ("wind9", 4, 0.8, 3.2),
+    ],
 )
 def test_flights_in_wind_beyond_the_lean_limit_too(
-    wind: str, arrival: float, position: float
+    wind: str, number: int, arrival: float, position: float
 ) -> None:
     flights = [row(name) for name in IN_WIND if wind in name]
-    assert len(flights) == 4
+    assert len(flights) == number
     for flight in flights:
         assert flight.arrival_rms <= arrival, flight
         assert flight.position_rms <= position, flight

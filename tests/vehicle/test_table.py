@@ -27,7 +27,7 @@ from faao_mav.vehicle.parameter import Parameter
 
 TYPES = (ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE)
 PARAMETERS = [(each, parameter) for each in TYPES for parameter in each.parameters.values()]
-UNITS = {"", "m", "s", "rad", "m/s", "m/s^2", "m/s^3", "1/s", "1/s^2"}
+UNITS = {"", "m", "s", "rad", "m/s", "m/s^2", "m/s^3", "1/s", "1/s^2", "rad/s", "rad/s^2"}
 
 
 def label(value: object) -> str:

@@ -48,12 +48,14 @@ class Course:
     """The way of the target, whose clock stands still while the aircraft is told to wait.
 
     `legs` lead on from `origin` (3,), m; where they overlap their motions add up. `passed` (m,) is
-    when the autopilot takes the points as reached, s on that clock. It begins at 0 after `wait` s.
+    when the autopilot takes the points as reached, s on that clock: up to each but the first it has
+    been told `speeds` (m - 1,), m/s. It begins at 0 after `wait` s.
     """
 
     origin: Real
     legs: Sequence[PlacedLeg]
     passed: Real
+    speeds: Sequence[float]
     wait: float
     stops: Sequence[Stop]
 

@@ -26,6 +26,9 @@ _HEADED = 0.5
 """The speed of the target, m/s, above which the aircraft turns its nose along the target's way.
 Chosen; what a change costs is not measured."""
 
+_NONE = (math.inf, 0.0)
+"""After the last commanded speed: when there is another one."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pursuit:
@@ -70,6 +73,10 @@ def pursue(
     patience = limits.acceleration / limits.jerk
     leaning, adapting = 1 - math.exp(-GRID / limits.lag), 1 - math.exp(-GRID / patience)
     hypot, sqrt, most = math.hypot, math.sqrt, lean * lean
+    turning = limits.turn_rate * GRID or math.pi
+    least_cosine, most_sine = math.cos(turning), math.sin(turning)
+    commands = iter([*zip(course.passed[:-1].tolist(), course.speeds, strict=True), _NONE])
+    farthest, (told, speed) = math.inf, next(commands)
     last = math.ceil(course.end / GRID)
     stops = iter(course.stops)
     stop: Stop | None = next(stops, None)
@@ -98,7 +105,12 @@ def pursue(
         while at < k:
             x, dx, y, dy, u, du, v, dv, c, dc, b, db, d, dd = next(table)
             at += 1
+        while clock >= told:
+            farthest, (told, speed) = limits.farthest(speed) ** 2, next(commands)
         ex, ey = x + w * dx - px, y + w * dy - py
+        if (apart := ex * ex + ey * ey) > farthest:
+            share = sqrt(farthest / apart)
+            ex, ey = share * ex, share * ey
         if now < resume:  # at rest, though samples on both sides are not
             ux = uy = fx = fy = 0.0
             aim = 1.0
@@ -125,8 +137,13 @@ def pursue(
         ax += (fx - ax) * leaning
         ay += (fy - ay) * leaning
         headed = sqrt(ux * ux + uy * uy)
-        if headed > _HEADED:  # the nose follows the target
-            nx, ny = ux / headed, uy / headed
+        if headed > _HEADED:  # the nose turns to where the target goes
+            towards, sine = nx * ux + ny * uy, nx * uy - ny * ux
+            if towards > least_cosine * headed:
+                nx, ny = ux / headed, uy / headed
+            else:
+                turn = most_sine if sine > 0 else -most_sine
+                nx, ny = least_cosine * nx - turn * ny, least_cosine * ny + turn * nx
         rx, ry = vx - east, vy - north
         along, across = nx * rx + ny * ry, nx * ry - ny * rx
         along *= linear + quadratic * abs(along)

@@ -28,8 +28,8 @@ hovers at 9 m/s: with 0.4 6.0, with 0.75 1.6, with 1.5 1.3; with 1.5 other plans
 twice the time to convert."""
 
 _JERK_TIMES = 12
-"""The least length of the cruise that has room for a second ramp, in jerk times at the speed: the
-autopilot's own rule."""
+"""The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
+which none is longer than a second: the autopilot's own rule."""
 
 
 @dataclass(frozen=True)
@@ -128,14 +128,13 @@ def at_speed(leg: StraightLeg, speed: float, elapsed: float) -> StraightLeg:
 
 def _second(speed: float, limits: LegBounds, cruise: float) -> Ramp | None:
     """The ramp between `speed` and the limit that the `cruise` metres have room for."""
-    change = abs(limits.speed - speed)
-    jerk_time = min((change * math.pi / (4 * limits.snap)) ** (1 / 3), limits.rise)
-    if change == 0.0 or speed * _JERK_TIMES * jerk_time >= cruise:
+    room = _JERK_TIMES * min(limits.rise, 1.0)
+    if limits.speed == speed or speed * room >= cruise:
         return None
     if limits.speed < speed:
         second = ramp_between(limits.speed, speed, limits, cruise / 2)
         return replace(second, low=speed - (second.high - second.low), high=speed)
-    fastest = min(limits.speed, cruise / (_JERK_TIMES * jerk_time))
+    fastest = min(limits.speed, cruise / room)
     return ramp_between(speed, fastest, limits, cruise / 2)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import Self
 
+from faao_mav.power import GRAVITY
 from faao_mav.vehicle.ardupilot import DEGREE, SHARED, SOURCE, rally_limit, switch
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, ParameterValues, table
 from faao_mav.vehicle.vehicle_type import lean_acceleration
@@ -22,6 +23,11 @@ def _parameter(
 ) -> Parameter:
     names = {new: 1.0, old: factor}
     return Parameter(key, unit, default, names, least, documented=documented, source=SOURCE)
+
+
+def _attitude(key: str, unit: str, degrees: float, new: str, old: str) -> Parameter:
+    names = {new: radians(1), old: radians(0.01)}
+    return Parameter(key, unit, radians(degrees), names, 0.0, source=SOURCE)
 
 
 TABLE = table(
@@ -43,6 +49,9 @@ TABLE = table(
         source=SOURCE,
     ),
     Parameter("input_time", "s", 0.15, {"ATC_INPUT_TC": 1.0}, 0.0, source=SOURCE),
+    _attitude("roll_acceleration", "rad/s^2", 1100, "ATC_ACC_R_MAX", "ATC_ACCEL_R_MAX"),
+    _attitude("pitch_acceleration", "rad/s^2", 1100, "ATC_ACC_P_MAX", "ATC_ACCEL_P_MAX"),
+    _attitude("turn_rate", "rad/s", 60, "ATC_RATE_WPY_MAX", "ATC_SLEW_YAW"),
     _parameter("position_gain", "1/s", 1.0, "PSC_NE_POS_P", "PSC_POSXY_P", 1.0),
     _parameter("velocity_gain", "1/s", 2.0, "PSC_NE_VEL_P", "PSC_VELXY_P", 1.0),
     _parameter("velocity_integral", "1/s^2", 1.0, "PSC_NE_VEL_I", "PSC_VELXY_I", 1.0, 0.0),
@@ -84,6 +93,9 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
     radius: float = TABLE["radius"].default
     lean_angle: float = TABLE["lean_angle"].default
     input_time: float = TABLE["input_time"].default
+    roll_acceleration: float = TABLE["roll_acceleration"].default
+    pitch_acceleration: float = TABLE["pitch_acceleration"].default
+    turn_rate: float = TABLE["turn_rate"].default
     position_gain: float = TABLE["position_gain"].default
     velocity_gain: float = TABLE["velocity_gain"].default
     velocity_integral: float = TABLE["velocity_integral"].default
@@ -107,8 +119,22 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
 
     @property
     def rise(self) -> float:
-        """t_j: how long the jerk takes to rise, s: twice ATC_INPUT_TC."""
-        return 2 * max(self.input_time, _LEAST_INPUT_TIME)
+        """t_j: how long the jerk takes to rise, s: twice ATC_INPUT_TC, or what leaning allows."""
+        agility = min(self.roll_acceleration or math.inf, self.pitch_acceleration or math.inf)
+        return max(
+            2 * max(self.input_time, _LEAST_INPUT_TIME), math.pi * self.jerk / (GRAVITY * agility)
+        )
+
+    def farthest(self, speed: float) -> float:
+        """Return the error, m, at which the position controller asks for a correction at `speed`.
+
+        With the gain k and the acceleration A that is v / k, from v = A / k on v²/2A + A/2k²: of an
+        error farther than that of the commanded speed no more is made.
+        """
+        gain, most = self.position_gain, self.acceleration
+        if speed <= most / gain:
+            return speed / gain
+        return speed**2 / (2 * most) + most / (2 * gain**2)
 
     @property
     def corner(self) -> float:

@@ -134,7 +134,7 @@ class Router:
             early, entry, planned_at = step.early, step.entry, speed if step.overlaps else None
             passed.append(end - early)
             start = end - 2 * early
-        return Course(self._points[0], legs, np.array(passed), waits[0], stops)
+        return Course(self._points[0], legs, np.array(passed), speeds, waits[0], stops)
 
     def _step(
         self, k: int, speed: float, planned_at: float | None, elapsed: float, entry: float
