@@ -1,16 +1,28 @@
 """Predicted against recorded PX4 flights (tests/data/flights/px4).
 
-    python tests/benchmarks/flights_px4.py
+    python tests/benchmarks/flights_px4.py [OTHER]
 
 The constants that the model calls fitted make the rms over the "fitted" flights of the arrival
 error (s) and a third of the position error (m) small, as round figures near a flat minimum. The
 flights "held out" were not looked at for that. Those that are "slow" have legs below 1 m/s, on
 which half a metre of error in the aircraft's own position is up to a second: repeats differ by as
 much, and missions are made without such legs.
+
+With OTHER, a folder of tracks NAME.NUMBER.csv (`record_px4.py --again OTHER`), it is told how well
+flights of one mission predict each other: arrivals (s rms) and positions (m rms) of the prediction
+beside each flight, of each flight beside the mean of the others, of the prediction beside the mean.
 """
 
+import math
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
 from recorded import FLIGHTS, Row, compared, mission_of, read, show
 
+from faao_mav.arrays import Real
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.px4 import Px4
@@ -58,5 +70,49 @@ def row(name: str) -> Row:
     return compared(name, use, recorded, model.fly(recorded.path))
 
 
+def repeated(name: str, others: Path) -> list[float]:
+    """Return the six errors of the prediction and of the flights of one mission."""
+    tracks = [FOLDER / f"{name}.csv", *sorted(others.glob(f"{name}.*.csv"))]
+    parameters = read_parameters(FOLDER / f"{name}.params")
+    with tempfile.TemporaryDirectory() as where:
+        shutil.copy(FOLDER / f"{name}.waypoints", where)
+        flights = []
+        for track in tracks:
+            shutil.copy(track, Path(where) / f"{name}.csv")
+            flights.append(read(Path(where), name, home_row=False))
+    flown = Px4.from_vehicle(Vehicle("px4", "copter", parameters, name)).fly(flights[0].path)
+    known = np.flatnonzero(np.isfinite(flights[0].left))[1:]
+    foreseen = (flown.departures - flown.departures[0])[known]
+    left = np.array([flight.left[known] for flight in flights])
+    t = np.arange(0.5, min(foreseen[-1], left[:, -1].min()), 0.5)
+    places = np.array([[np.interp(t, each.t, x) for x in each.position.T] for each in flights])
+    there = np.array([np.interp(t + flown.departures[0], flown.t, x) for x in flown.position.T[:2]])
+
+    def apart(arrivals: Real, positions: Real) -> list[float]:
+        return [
+            math.sqrt(np.mean(arrivals**2)),
+            math.sqrt(np.mean(np.sum(positions**2, axis=-2))),
+        ]
+
+    count = len(flights)
+    from_others = count / (count - 1)  # times the distance from the mean of all
+    return [
+        *apart(foreseen - left, there - places),
+        *apart(from_others * (left - left.mean(0)), from_others * (places - places.mean(0))),
+        *apart(foreseen - left.mean(0), there - places.mean(0)),
+    ]
+
+
+def main() -> None:
+    """Show how far predictions are from flights, or flights from each other."""
+    if len(sys.argv) == 1:
+        show(rows())
+        return
+    table = {name: repeated(name, Path(sys.argv[1])) for name in HELD_OUT}
+    table["all, rms"] = np.sqrt(np.mean(np.square(list(table.values())), axis=0)).tolist()
+    for name, errors in table.items():
+        print(f"{name:<24}" + "".join(f"{error:7.2f}" for error in errors))
+
+
 if __name__ == "__main__":
-    show(rows())
+    main()

@@ -1,11 +1,13 @@
 """Fly missions in a real PX4's simulator and keep the thinned tracks (tests/data/flights/px4).
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/record_px4.py [NAME ...]
+    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/record_px4.py [NAME ...] [--again OTHER]
 
 Each mission is written with its parameters, flown without wind and with little drag, and its track
-is kept every half second and at each change of the current item.
+is kept every half second and at each change of the current item. With --again those of the flights
+held out are flown as they stand, and their tracks kept in OTHER, beside those of earlier times.
 """
 
+import argparse
 import csv
 import os
 import subprocess
@@ -14,8 +16,11 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
 import numpy as np
-from recorded import FLIGHTS
+from flights_px4 import FOLDER, HELD_OUT
+from simulators import usable
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
@@ -27,7 +32,6 @@ from faao_mav.schedule.conversion import convert
 from faao_mav.vehicle import PX4_COPTER
 from missions import PLANS, plan_of
 
-FOLDER = FLIGHTS / "px4"
 HOME = Home(-35.363262, 149.165237, 584.0)
 HEIGHT = 30.0  # of the plain shapes, m above home
 
@@ -184,8 +188,14 @@ def record(name: str, runner: Path) -> None:
     target.write_text(write_wpl(mission))
     values = target.with_suffix(".params")
     values.write_text(render_parameters(settings, PX4_COPTER.family.parameter_style))
-    options = ["--param-file", str(values), "--params", "SIH_KDV=0.2", "--speedup", "10"]
-    keep(flown_by(runner, target, options), target, ("t_s", "lat", "lon", "alt_rel_m", "seq"))
+    fly_as_it_stands(target, runner, target)
+
+
+def fly_as_it_stands(mission: Path, runner: Path, target: Path) -> None:
+    """Fly the file `mission` with the parameters beside it, and keep the track beside `target`."""
+    values = str(mission.with_suffix(".params"))
+    options = ["--param-file", values, "--params", "SIH_KDV=0.2", "--speedup", "10"]
+    keep(flown_by(runner, mission, options), target, ("t_s", "lat", "lon", "alt_rel_m", "seq"))
 
 
 def flown_by(runner: Path, mission: Path, options: list[str]) -> list[dict[str, str]]:
@@ -219,11 +229,21 @@ def keep(rows: list[dict[str, str]], target: Path, keys: Sequence[str]) -> None:
 
 
 def main() -> None:
-    """Record the flights that are named, or all."""
-    runner = Path(os.environ["FAAO_AUTOPILOTS"]) / "fly_px4.py"
-    for name in sys.argv[1:] or [*SHAPES, *CONVERTED]:
-        record(name, runner)
-        print(name, flush=True)
+    """Record the flights that are named, or all; or fly again those that are held out."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--again", type=Path, metavar="OTHER")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as where:
+        runner = usable(Path(os.environ["FAAO_AUTOPILOTS"]), Path(where)) / "fly_px4.py"
+        for name in options.names or (HELD_OUT if options.again else [*SHAPES, *CONVERTED]):
+            if options.again:
+                number = len(list(options.again.glob(f"{name}.*.csv")))
+                target = options.again / f"{name}.{number}.waypoints"
+                fly_as_it_stands(FOLDER / f"{name}.waypoints", runner, target)
+            else:
+                record(name, runner)
+            print(name, flush=True)
 
 
 if __name__ == "__main__":

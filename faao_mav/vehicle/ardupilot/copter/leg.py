@@ -110,13 +110,14 @@ def at_speed(leg: StraightLeg, speed: float, elapsed: float) -> StraightLeg:
     limits = leg.limits.at(speed)
     if elapsed <= 0:
         return planned(leg.length, limits, end=leg.final)
-    up = leg.up
+    up, down = leg.up, leg.down
     early = 2 * up.rise + up.kept
     late = early + up.steady
     if speed < up.high and up.steady > 0 and elapsed <= late:
         slowest = up.high - up.peak * (late - max(elapsed, early))
         up = ramp_from_rest(limits.at(max(speed, slowest)), leg.length / 2)
-    cruise = leg.length - up.length - leg.down.length  # the ramp down is the one that was planned
+        down = down if down.low > 0 else up
+    cruise = leg.length - up.length - down.length  # before another speed changes the ramp down
     phases, covered, reached = up.phases(), up.length, up.high
     if (second := _second(up.high, limits, cruise)) is not None:
         slower = second.low < up.high
