@@ -11,9 +11,9 @@ The constants below were chosen; unless one says so, what a change costs is not 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.radio.class_sum import ClassSum
 from faao_mav.radio.constellation import DifferenceClasses
 from faao_mav.radio.precoder_objective import (
-    ClassSum,
     Objective,
     evaluate,
     to_complex,
