@@ -58,7 +58,8 @@ def cutoff_rate(
     rate = classes.bits - np.log1p(classes.symbols * remaining) / np.log(2.0)
     low = remaining + 1.0 / classes.symbols > 0.5
     rate[low] = -np.log1p(_mean(np.expm1, flat[low], classes)) / np.log(2.0)
-    return np.clip(rate, 0.0, classes.bits).reshape(z.shape[:-1])[()]
+    bounded: Real = np.clip(rate, 0.0, classes.bits).reshape(z.shape[:-1])[()]
+    return bounded
 
 
 def _mean(function: np.ufunc, z: Real, classes: DifferenceClasses) -> Real:

@@ -106,6 +106,6 @@ def nearest_slots(solution: Solution, w: Real) -> Integers:
     import shapely  # as in transit: only predictions need it
 
     places, first = np.unique(solution.w, axis=0, return_index=True)
-    tree = shapely.STRtree(shapely.points(places))
+    tree = shapely.STRtree(np.asarray(shapely.points(places)))
     _, nearest = tree.query_nearest(shapely.points(w), all_matches=False)
     return np.asarray(first[nearest])
