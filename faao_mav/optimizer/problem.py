@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.errors import PlanError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
+from faao_mav.optimizer.size import check_size
 from faao_mav.plan import Plan, Vector
 from faao_mav.radio.channel import (
     balanced_rayleigh,
@@ -24,7 +24,6 @@ from faao_mav.radio.channel import (
 from faao_mav.radio.constellation import (
     DifferenceClasses,
     difference_classes,
-    difference_vector_count,
 )
 from faao_mav.radio.measure import Measure, best_precoders_for, draw_rates
 from faao_mav.radio.relay import RelayQueue
@@ -32,10 +31,6 @@ from faao_mav.radio.relay import RelayQueue
 if TYPE_CHECKING:
     from faao_mav.optimizer.interior.constraint import Constraint
     from faao_mav.optimizer.interior.energy import EnergyLimit
-
-MAX_DIFFERENCE_VECTORS = 5_000_000
-MAX_CHANNELS = 5_000_000
-"""Channels that are held for each link: draws times slots."""
 
 
 @dataclass(frozen=True)
@@ -247,18 +242,11 @@ def counted_as_cutoff(problem: Problem) -> Problem:
 def build_problem(plan: Plan) -> Problem:
     """Turn `plan` into arrays; the fading is drawn from its seed.
 
-    Raises `PlanError` when alphabet and antennas make more differences than can be handled.
+    Raises `PlanError` when the plan is larger than ``size.check_size`` accepts.
     """
+    check_size(plan)
     radio, slots = plan.radio, plan.flight.slots
     base, relay, user = radio.base_station, radio.relay, radio.ground_user
-    for key, antennas in (("base_station", base.antennas), ("relay", relay.antennas)):
-        _check_size(plan, f"radio.{key}.antennas", antennas)
-    if radio.fading == "ergodic" and radio.fading_samples * slots > MAX_CHANNELS:
-        raise PlanError(
-            f"{plan.source}: radio.fading_samples: {radio.fading_samples:,} draws in {slots:,} "
-            f"slots are {radio.fading_samples * slots:,} channels, at most {MAX_CHANNELS:,} are "
-            "accepted; use fewer draws or a longer flight.time_step"
-        )
     rng = np.random.default_rng(radio.seed)
 
     def link(
@@ -316,13 +304,3 @@ def build_problem(plan: Plan) -> Problem:
             user.noise,
         ),
     )
-
-
-def _check_size(plan: Plan, key: str, antennas: int) -> None:
-    count = difference_vector_count(plan.radio.modulation, antennas)
-    if count > MAX_DIFFERENCE_VECTORS:
-        raise PlanError(
-            f"{plan.source}: {key}: {antennas} antennas with {plan.radio.modulation} make "
-            f"{count:,} difference vectors; at most {MAX_DIFFERENCE_VECTORS:,} are accepted: "
-            "use fewer antennas or a smaller alphabet"
-        )

@@ -12,7 +12,7 @@ from faao_mav.arrays import Integers, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import constellation, symbol_vectors
 
-_MAX_INPUTS = 1 << 16
+MAX_INPUTS = 1 << 16
 """Input vectors accepted at most. Chosen: the time of a slot is proportional to their number."""
 
 
@@ -44,10 +44,10 @@ def real_inputs(modulation: str, antennas: int) -> RealInputs:
     """
     symbols = constellation(modulation)
     size = len(symbols) ** antennas
-    if size > _MAX_INPUTS:
+    if size > MAX_INPUTS:
         raise InputError(
             f"{modulation} on {antennas} antennas has {size} input vectors; "
-            f"the mutual information is computed for up to {_MAX_INPUTS}"
+            f"the mutual information is computed for up to {MAX_INPUTS}"
         )
     x = symbol_vectors(modulation, antennas)
     # A rotation that maps the alphabet onto itself maps the noise onto equally likely noise:

@@ -11,7 +11,6 @@ from faao_mav.optimizer.solution import Rates, Solution
 from faao_mav.radio.relay import Relayed
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.schedule import deviation, positions_at
-from faao_mav.vector import lengths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,5 +99,13 @@ def rates_along(solution: Solution, w: Real, slots: Integers | None = None) -> t
 
 
 def nearest_slots(solution: Solution, w: Real) -> Integers:
-    """Return for each of `w` (n, 2), m, the slot (n,) that is planned nearest to it."""
-    return np.array([int(np.argmin(lengths(solution.w - place))) for place in w], dtype=int)
+    """Return for each of `w` (n, 2), m, the slot (n,) that is planned nearest to it.
+
+    Of slots at one place, where the aircraft hovers, it is the first.
+    """
+    import shapely  # as in transit: only predictions need it
+
+    places, first = np.unique(solution.w, axis=0, return_index=True)
+    tree = shapely.STRtree(np.asarray(shapely.points(places)))
+    _, nearest = tree.query_nearest(shapely.points(w), all_matches=False)
+    return np.asarray(first[nearest])

@@ -247,12 +247,6 @@ def test_progress_is_told(faint_plan: MakePlan) -> None:
     assert 0 < told[-1].best_rate <= solution.rates.R_avg
 
 
-def test_more_draws_than_can_be_held_are_refused(small_plan: MakePlan) -> None:
-    changes = {"radio.fading_samples": 10_000, "flight.duration": 500}
-    with pytest.raises(PlanError, match=r"radio\.fading_samples: 10,000 draws in 1,000 slots"):
-        optimize(small_plan(changes))
-
-
 def test_algorithm_1_refuses_what_it_cannot_do(faint_plan: MakePlan) -> None:
     with pytest.raises(PlanError, match=r"radio\.fading: ergodic is not for algorithm1"):
         optimize(faint_plan({"optimizer.method": "algorithm1"}))

@@ -15,10 +15,10 @@ from faao_mav.radio.best_precoder import (
     best_mean_precoders,
     best_precoders,
 )
+from faao_mav.radio.class_sum import ClassSum
 from faao_mav.radio.constellation import difference_classes
 from faao_mav.radio.precoder import SCHEMES
 from faao_mav.radio.precoder_objective import (
-    ClassSum,
     Objective,
     evaluate,
     to_complex,

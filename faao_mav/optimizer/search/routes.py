@@ -16,6 +16,7 @@ from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.interior.maximize import feasible, maximize, objectives
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.rates import link_coordinates
 from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.search.multistart import COARSE_SLOTS, coarse_copy, resampled
 from faao_mav.optimizer.search.sweep import Sweep, sweep_over
@@ -152,16 +153,20 @@ def _usual_speed(kin: Kinematics, stations: Real) -> float:
 def _mean_rates(field: RateField, sweep: Sweep, slots: int) -> Real:
     """Return the mean rates of both links over all slots (2, i, j) in the cells.
 
-    They are those in the direction of the other station.
+    They are those in the direction of the other station. From the farthest distance to the nearest:
+    rates that are searched for start each search from the precoders of the last.
     """
     known = any(link.nlos is not None and not link.averaged for link in field.links)
     a, b = (link.station for link in field.links)
     apart = b - a if (a != b).any() else np.array([1.0, 0.0])
     toward, rates = apart / np.hypot(*apart), []
-    for j, (link, sign) in enumerate(zip(field.links, (1, -1), strict=True)):
+    for link, rate, sign in zip(field.links, field.rates, (1, -1), strict=True):
         away = np.hypot(*(sweep.x - link.station[:, None, None]))
         r = np.linspace(0.0, float(away.max()), _DISTANCES)
         w = link.station[:, None] + sign * toward[:, None] * r
-        wide = np.repeat(w[..., None], slots if known else 1, axis=-1)
-        rates.append(np.interp(away, r, field.value(wide)[j].mean(axis=-1)))
+        means = []
+        for place in w.T[::-1]:
+            at = link_coordinates(link, np.repeat(place[:, None], slots if known else 1, axis=-1))
+            means.append(float(rate.value(at.gain_log, at.cosine).mean()))
+        rates.append(np.interp(away, r, means[::-1]))
     return np.stack(rates)

@@ -1,0 +1,82 @@
+"""Print what plans of many sizes cost, beside what `optimizer.size` reckons: whole plans.
+
+    python tests/benchmarks/sizes.py [--longest SECONDS]
+
+Plans reckoned to take longer than `--longest`, 30 s unless told, are left out. Each plan is the
+copter's sample with its alphabet, antennas, fading and time step changed, in a process of its own.
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from faao_mav import parse_plan, plan_mission
+from faao_mav.optimizer.size import cost
+
+_SAMPLE = Path(__file__).resolve().parents[2] / "missions" / "copter_relay.yaml"
+
+_SIZES = (
+    "qpsk 2 ergodic 0.5",
+    "16qam 2 ergodic 0.5",
+    "64qam 2 ergodic 0.5",
+    "8psk 3 ergodic 0.5",
+    "16qam 3 ergodic 0.5",
+    "qpsk 4 ergodic 0.5",
+    "bpsk 6 ergodic 0.5",
+    "64qam 2 none 0.5",
+    "64qam 2 realization 0.5",
+    "qpsk 3 realization 0.5",
+    "bpsk 4 realization 0.5",
+    "bpsk 2 ergodic 0.12",
+    "bpsk 2 ergodic 0.012",
+    "bpsk 2 ergodic 0.0012",
+)
+
+
+def text_of(size: str) -> str:
+    """Return the plan of a row: alphabet, antennas, fading and time step, s."""
+    modulation, antennas, fading, step = size.split()
+    text = _SAMPLE.read_text(encoding="utf-8")
+    for old, new in (
+        ("modulation: qpsk", f"modulation: {modulation}"),
+        ("antennas: 2", f"antennas: {antennas}"),
+        ("fading: ergodic", f"fading: {fading}"),
+        ("time_step: 0.5", f"time_step: {step}"),
+    ):
+        text = text.replace(old, new)
+    return text
+
+
+def measure(size: str) -> None:
+    """Print one row: what the plan takes, what was reckoned, and R_del."""
+    plan = parse_plan(text_of(size))
+    seconds, gigabytes = cost(plan)
+    result = plan_mission(plan)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    print(
+        f"{size:24} {plan.flight.slots:7,} slots  {time.process_time():6.1f} s "
+        f"(reckoned {seconds:6.1f})  {peak:5.2f} GB ({gigabytes:5.2f})  "
+        f"{result.solution.delivered_rate:.4f} bit/s/Hz",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Measure each size that is reckoned to end soon enough."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--longest", type=float, default=30.0)
+    parser.add_argument("--size", help=argparse.SUPPRESS)
+    chosen = parser.parse_args()
+    if chosen.size:
+        measure(chosen.size)
+        return
+    for size in _SIZES:
+        if cost(parse_plan(text_of(size)))[0] <= chosen.longest:
+            subprocess.run([sys.executable, __file__, "--size", size], check=True)
+
+
+if __name__ == "__main__":
+    main()
