@@ -61,8 +61,8 @@ class Stiffness:
     `entries` are those of the constraint's own unknowns, of which the proximal term holds the
     places `held` as it does w. `curvature` (3, flights, n) is that of its functions of w, weighted
     by their multipliers, which is cut where it has the wrong sign. `turning` (flights, n), at most
-    0, times the identity is the part of K on v that only as large a share of counts as leaves the
-    model concave; the first constraint is then no `FlightLimits`.
+    0, times the identity is a part of K on v: of it, and of what is cut elsewhere, as large a share
+    counts as leaves the model concave. The first constraint is then no `FlightLimits`.
     """
 
     w: Real | float = 0.0
@@ -179,6 +179,11 @@ class Constraint(ABC):
     @property
     def turns(self) -> bool:
         """Whether its half-planes turn so fast that mu has to wait for the iterates."""
+        return False
+
+    @property
+    def curved(self) -> bool:
+        """Whether the curvature of its functions of v or a counts."""
         return False
 
     @property

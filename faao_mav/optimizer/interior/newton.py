@@ -48,8 +48,8 @@ class Newton:
     """The factored system at an iterate; `curvature` (3, flights, n) is H with its proximal term.
 
     `proximal` (flights, 1) is that term, which holds the places `held` of a slot's unknowns too.
-    `turning` (flights, n), 0 or less, times the identity is what constraints on the speeds curve
-    away from a maximum, or the share of it that leaves the model concave.
+    `turning` (flights, n) times the identity is what constraints on the speeds curve away from a
+    maximum, the share of it that leaves the model concave, with a proximal term of its own.
 
     `columns` are the solutions for the gradients of the F_j, and for mu = 0 without correction;
     `border` (flights, J, J) is what the first ones leave for the weights.
@@ -83,8 +83,10 @@ class Newton:
         stiffness = [state.stiffness() for state in at.states]
         curvature = -np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.hessian)
         curvature += added(each.curvature for each in stiffness)
+        whole = curvature
         if cut.any():
             curvature = np.where(cut, positive_part(curvature), curvature)
+        wrong = whole - curvature
         curvature[::2] += proximal
         compliance = np.empty((3, flights, n))  # the last slot has none
         compliance[..., :-1] = _compliance(stiffness)
@@ -98,7 +100,9 @@ class Newton:
         on_v = np.asarray(added(each.v for each in stiffness))
         turning = added(each.turning for each in stiffness)
         if isinstance(turning, np.ndarray):
-            turning = turning * _concave_share(flight, on_w, on_v, compliance, turning)
+            share = _concave_share(flight, (on_w, on_v), (wrong, turning), compliance)
+            on_w, curvature = on_w + share * wrong, curvature + share * wrong
+            turning = share * turning + proximal
             on_v[::2] += turning
         factors = matrix.factor(
             on_w,
@@ -209,19 +213,24 @@ class Newton:
 
 
 _SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0)
-"""Shares of the constraints' curvature that are tried. Chosen."""
+"""Shares of the curvature of the wrong sign that are tried. Chosen."""
 
 
 def _concave_share(
-    flight: ScaledFlight, on_w: Real, on_v: Real, compliance: Real, turning: Real
+    flight: ScaledFlight, stiff: tuple[Real, Real], wrong: tuple[Real, Real], compliance: Real
 ) -> Real:
-    """Return the largest share (flights, 1) of `turning` with which the model is concave."""
+    """Return the largest share (flights, 1) of what is `wrong` with which the model is concave.
+
+    `stiff` are the blocks on w and v, `wrong` what more there is: a block on w, and on v a multiple
+    of the identity.
+    """
     xx, xy, yy = compliance
     on_a = np.stack([yy, -xy, xx]) / (xx * yy - xy * xy)
+    on_w, on_v = stiff
     share, curved = np.full((on_w.shape[1], 1), _SHARES[0]), on_v.copy()
     for lower in _SHARES[1:]:
-        curved[::2] = on_v[::2] + share * turning
-        sound = flight.matrix.positive(on_w, curved, on_a)
+        curved[::2] = on_v[::2] + share * wrong[1]
+        sound = flight.matrix.positive(on_w + share * wrong[0], curved, on_a)
         if sound.all():
             break
         share = np.where(sound, share, lower)
