@@ -173,6 +173,10 @@ def direct(
         optima += optimized([flights[int(values.argmax())]])
     best = _best(problem, field, optima)
     final = _at_exact_rates(problem, scheme, field, best)
+    for other in optima:  # where rates come from a table another may be the best in truth
+        if other is not best and other.value > final.value:
+            exact = _at_exact_rates(problem, scheme, field, other)
+            final = exact if exact.value > final.value else final
     solution = _solution(problem, scheme, field, final, history, by_start)
     if before is None:
         return solution
@@ -269,12 +273,15 @@ def _solution(
         ending=residual
         if final.converged
         else f"stopped after {final.iterations} steps, {residual}",
-        starts=by_start,
     )
     # Rates read off a table on the way are a little off; the last is not.
     reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
-    exact = history if scheme.gaussian else np.minimum(history, reached).tolist()
-    return replace(solution, history=np.array([*exact, reached]))
+    most = np.inf if scheme.gaussian else reached
+    return replace(
+        solution,
+        history=np.array([*np.minimum(history, most).tolist(), reached]),
+        starts={name: min(value, most) for name, value in by_start.items()},
+    )
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex) -> Complex:
