@@ -118,7 +118,8 @@ class HalfPlanesState(Slacks):
         packed: Any = _per_slot(self.z / self.s * np.stack([x * x, x * y, y * y]))
         curved = -self.constraint.bend * self.z.reshape(-1, *self.z.shape[-2:]).sum(axis=0)
         if self.constraint.bend > 0:
-            return Stiffness(**{self.constraint.quantity: packed}, turning=curved)
+            turning = np.stack([curved, 0 * curved, curved])
+            return Stiffness(**{self.constraint.quantity: packed}, turning=turning)
         packed[::2] += curved
         return Stiffness(**{self.constraint.quantity: packed})
 

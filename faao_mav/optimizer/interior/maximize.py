@@ -113,7 +113,8 @@ def maximize_all(
     again = slow and max_iterations >= _REPEATED and len(left) > (len(optima) - 1) * race
     if left and again:
         near = [optima[k].trajectory for k in left]
-        ends = _optima(kin, stage, near, kept, tolerance, max_iterations, COLD_START, relay)
+        other = SLOW_START if strategy == COLD_START else COLD_START
+        ends = _optima(kin, stage, near, kept, tolerance, max_iterations, other, relay)
         for k, end in zip(left, ends, strict=True):
             taken = optima[k].iterations + end.iterations
             further = end.converged or end.value > optima[k].value
@@ -157,10 +158,11 @@ def _optima(
             optima.append(LocalOptimum(start, least, lowest / lowest.sum(), 0, 0.0, True))
             continue
         end = results[k]
-        better = value >= least
-        flight, value = (flights[k], value) if better else (start, least)
-        # inside a search that keeps its limits a start is as good an end as any; else it is none
-        converged = end.converged and (better or isinstance(kept[0], FlightLimits))
+        # inside a search that keeps its limits a start is as good an end as any, else only where
+        # what was found is as good to the tolerance
+        equal = value > least - tolerance * abs(least) or isinstance(kept[0], FlightLimits)
+        converged = end.converged and equal
+        flight, value = (flights[k], value) if value >= least else (start, least)
         optima.append(
             LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
         )
