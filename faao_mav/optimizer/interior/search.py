@@ -115,12 +115,10 @@ _MU_PER_TOLERANCE = 1 / 20
 """The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
 
 
-_HOPELESS, _HOPELESS_CURVED = 0.97, 0.9
+_HOPELESS = 0.97
 """In a race, the share of the best converged value that a flight's value and gap together have to
 reach. Half-duplex flights that creep along a ridge end where others are already, or lower: without
-it the last of seven takes 96 iterations with T = 200 s, where the first takes 11. Chosen.
-
-The second is for limits with curvature, which iterates may break: their values tell less."""
+it the last of seven takes 96 iterations with T = 200 s, where the first takes 11. Chosen."""
 
 _MOST_PER_SLOT = 10.0
 """The inequalities per slot from which the least mu is smaller: the gap is their sum. Chosen."""
@@ -264,8 +262,7 @@ class Search:
         value, mean = self.at.value(), self.rewards.mean
         self.best = max(self.best, float(mean(value)[converged].max(initial=-np.inf)))
         gap = reduce(np.add, [state.gap() for state in self.at.states])
-        least = _HOPELESS_CURVED if self.curved else _HOPELESS
-        return np.asarray(mean(value + gap) < least * self.best)
+        return np.asarray(mean(value + gap) < _HOPELESS * self.best)
 
     def _result(self, k: int, residual: float, converged: bool) -> SearchResult:
         """Return the best flight within the limits so far, else the last one."""
