@@ -54,7 +54,7 @@ _STILL = 1e-9
 class PowerPartials:
     """P, W (...), its gradients by v and a (2, ...) and its Hessians by each (3, ...): xx, xy, yy.
 
-    Second derivatives by v and a together are left out.
+    `by_va` (2, 2, ...) are the second derivatives by v (first) and a.
     """
 
     value: Real
@@ -62,6 +62,7 @@ class PowerPartials:
     by_a: Real
     by_vv: Real
     by_aa: Real
+    by_va: Real
 
 
 class PowerModel(Protocol):
@@ -154,7 +155,8 @@ class RotaryWing:
         second += self.induced * per_square**2 * inflow * (1 / root**2 + 2 * r / root**3) / 4
         by_vv = 4 * second * _packed(v, v)
         by_vv[::2] += 2 * first
-        return PowerPartials(self.level(speed), 2 * first * v, 0 * v, by_vv, 0 * by_vv)
+        none = np.zeros((2, *v.shape))
+        return PowerPartials(self.level(speed), 2 * first * v, 0 * v, by_vv, 0 * by_vv, none)
 
     def least_power(self, speeds: Real) -> tuple[float, float]:
         """Return the speed of least power: see `PowerModel`."""
@@ -213,8 +215,14 @@ class FixedWing:
         by_vv += self.mass * curved * _packed(a, a)
         by_vv[::2] += along
         by_aa = 2 * bank * _packed(turned, turned) + self.mass * curved * _packed(v, v)
+        outer = by_turn - 3 * across / speed**2 * v
+        by_va = 2 * bank * outer[:, None] * turned + self.mass * curved * a[:, None] * v
+        by_va[0, 0] += self.mass * share
+        by_va[1, 1] += self.mass * share
+        by_va[0, 1] += 2 * bank * across
+        by_va[1, 0] -= 2 * bank * across
         value = self.level(speed, across / speed) + self.mass * (gained + root) / 2
-        return PowerPartials(value, by_v, by_a, by_vv, by_aa)
+        return PowerPartials(value, by_v, by_a, by_vv, by_aa, by_va)
 
     def least_power(self, speeds: Real) -> tuple[float, float]:
         """Return the speed of least power: see `PowerModel`."""

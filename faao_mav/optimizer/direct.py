@@ -27,7 +27,11 @@ from faao_mav.optimizer.interior.maximize import (
     maximize_all,
     objectives,
 )
-from faao_mav.optimizer.interior.search import COLD_START, WARM_SHARES, WARM_START
+from faao_mav.optimizer.interior.search import (
+    NEAR_START,
+    WARM_SHARES,
+    WARM_START,
+)
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
@@ -43,8 +47,9 @@ from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
 LONG_SEARCH = 6
-"""By how many times `optimizer.max_iterations` may be exceeded where a queue has a buffer, shares
-or a least speed. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300 steps."""
+"""By how many times `optimizer.max_iterations` may be exceeded where there is a least speed, or a
+queue has a buffer or shares. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300
+steps."""
 
 _EXACT_ITERATIONS = 12
 """The largest number of iterations at exact rates, after those in a table.
@@ -90,12 +95,11 @@ def direct(
     counts_cutoff = options.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
     relay = problem.maximised_queue
-    # the half-planes of a least speed turn too fast for the short steps of a warm start; with a
-    # queue they take more steps, and so do shares and a buffer
-    anew, shared = kin.min_speed > 0, relay is not None and relay.half
-    long = relay is not None and (anew or shared or math.isfinite(relay.buffer))
-    long = long or problem.fence is not None or problem.energy < math.inf
-    warm = WARM_SHARES if shared else WARM_START
+    # these take more steps, as shares and a buffer do
+    slow, shared = kin.min_speed > 0, relay is not None and relay.half
+    long = shared or (relay is not None and math.isfinite(relay.buffer))
+    long = long or slow or problem.fence is not None or problem.energy < math.inf
+    warm = NEAR_START if slow else WARM_SHARES if shared else WARM_START
     steps = options.max_iterations * (LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
@@ -149,7 +153,7 @@ def direct(
     tell(2, "the best start", history[-1])
 
     def optimized(flights: list[Trajectory]) -> list[LocalOptimum]:
-        cold = anew or any(flight in routes.values() for flight in flights)
+        cold = any(flight in routes.values() for flight in flights)
         return maximize_all(
             kin,
             field,
@@ -157,7 +161,7 @@ def direct(
             constraints=kept,
             tolerance=options.tolerance,
             max_iterations=steps,
-            strategy=COLD_START if cold else warm,
+            strategy=None if cold else warm,
             relay=relay,
         )
 
@@ -169,6 +173,10 @@ def direct(
         optima += optimized([flights[int(values.argmax())]])
     best = _best(problem, field, optima)
     final = _at_exact_rates(problem, scheme, field, best)
+    for other in optima:  # where rates come from a table another may be the best in truth
+        if other is not best and other.value > final.value:
+            exact = _at_exact_rates(problem, scheme, field, other)
+            final = exact if exact.value > final.value else final
     solution = _solution(problem, scheme, field, final, history, by_start)
     if before is None:
         return solution
@@ -224,6 +232,7 @@ def _at_exact_rates(
         constraints=problem.constraints(problem.kinematics),
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=_EXACT_ITERATIONS,
+        strategy=NEAR_START if problem.kinematics.min_speed > 0 else None,
         relay=problem.maximised_queue,
     )
     return replace(optimum, trajectory=further.trajectory, value=further.value)
@@ -264,12 +273,15 @@ def _solution(
         ending=residual
         if final.converged
         else f"stopped after {final.iterations} steps, {residual}",
-        starts=by_start,
     )
     # Rates read off a table on the way are a little off; the last is not.
     reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
-    exact = history if scheme.gaussian else np.minimum(history, reached).tolist()
-    return replace(solution, history=np.array([*exact, reached]))
+    most = np.inf if scheme.gaussian else reached
+    return replace(
+        solution,
+        history=np.array([*np.minimum(history, most).tolist(), reached]),
+        starts={name: min(value, most) for name, value in by_start.items()},
+    )
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex) -> Complex:

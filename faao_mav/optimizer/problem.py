@@ -176,9 +176,8 @@ class Problem:
 
     def constraints(self, kin: Kinematics) -> "tuple[Constraint, ...]":
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""
-        limited = self.energy < math.inf
-        energy = (self._energy_limit(kin),) if limited else ()
-        return (*self.fenced(kin), *energy)
+        energy = self.energy_limit(kin)
+        return (*self.fenced(kin), *([] if energy is None else [energy]))
 
     def fenced(self, kin: Kinematics) -> "tuple[Constraint, ...]":
         """Return what flights of `kin` have to keep of the fence."""
@@ -197,13 +196,17 @@ class Problem:
         power = model(np.pad(flight.v - kin.wind, level), np.pad(flight.a, level))
         return kin.time_step * float(power.sum()) + self._radiated(kin)
 
-    def _energy_limit(self, kin: Kinematics) -> "EnergyLimit":
+    def energy_limit(self, kin: Kinematics) -> "EnergyLimit | None":
+        """Return the limit on the energy of flights of `kin`; None where there is none."""
         from faao_mav.optimizer.interior.energy import EnergyLimit
 
+        if self.energy == math.inf:
+            return None
         model = self.plan.power_model
         assert model is not None  # plans that limit the energy have one
         most = self.energy - self._radiated(kin)
-        return EnergyLimit(model, most, kin.time_step, kin.max_speed, kin.wind)
+        curved = kin.min_speed > 0
+        return EnergyLimit(model, most, kin.time_step, kin.max_speed, kin.wind, curved)
 
     def _radiated(self, kin: Kinematics) -> float:
         """Return what the relay's radio sends, J."""

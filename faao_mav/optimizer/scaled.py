@@ -14,6 +14,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
 from faao_mav.optimizer.fence_geometry import FenceGeometry
+from faao_mav.optimizer.interior.energy import EnergyLimit
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -152,6 +153,16 @@ def _forwarded(
     return forwarded, limits
 
 
+def _within(limit: EnergyLimit, now: Trajectory, flight: FlightVariables) -> Any:
+    """Return that `flight` keeps the energy `limit`, to first order about `now`."""
+    kin, power = flight.kinematics, limit.partials(now.v.T, now.a.T)
+    left = limit.most / limit.time_step - float(power.value.sum())
+    by_v = cp.sum(cp.multiply(power.by_v.T, flight.v * kin.max_speed - now.v))
+    by_a = cp.sum(cp.multiply(power.by_a.T, flight.a * kin.max_acceleration - now.a))
+    unit = limit.most / limit.time_step
+    return (by_v + by_a) / unit <= max(0.0, left) / unit
+
+
 _NEAR = 3.0
 """The distance beyond the margin, in moves, from which a part of the fence is not in the way."""
 
@@ -203,6 +214,7 @@ def kkt_residual(
     reach: float = 1.0,
     relay: RelayQueue | None = None,
     fence: FenceGeometry | None = None,
+    energy: EnergyLimit | None = None,
 ) -> float:
     """Return the best first-order gain of min_j F_j per metre, in rewards per metre.
 
@@ -215,6 +227,8 @@ def kkt_residual(
 
     With `fence` the distances of the path from what it has to keep out of are linear in the move,
     and in the turn of the half-planes that part it from them.
+
+    With `energy` what the flight takes is linear in the move, with the power's own derivatives.
 
     Linearised so, the feasible set is convex, and this is zero exactly where the conditions of
     Karush, Kuhn and Tucker hold. It is a convex problem: its optimum is that of Clarabel, to about
@@ -242,6 +256,8 @@ def kkt_residual(
         limits += [*queue, gain == cp.sum(forwarded) / slots]
     if fence is not None:
         limits += _apart(fence, kin, trajectory.w, shift, reach)
+    if energy is not None:
+        limits.append(_within(energy, trajectory, flight))
     problem = cp.Problem(cp.Maximize(gain), limits)
     if solve(problem) == cp.INFEASIBLE:
         raise SolverError("the flight given breaks its limits")

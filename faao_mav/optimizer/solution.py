@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -88,7 +89,8 @@ class Solution:
     flight begins: not 0 for the rest of a flight only, and not saved. All rates are those that the
     plan counts, `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6),
     and `gain` is by how much the rate that it maximises is above that of the plan for the cutoff
-    rate. `least` tells of a plan whose `goal` minimises; it is not saved.
+    rate. `least` tells of a plan whose `goal` minimises, `energy_limit` is what flight and relay
+    may take for a `goal`, J; they are not saved.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -126,6 +128,7 @@ class Solution:
     gain: float | None = None
     least: Least | None = None
     held: float = 0.0
+    energy_limit: float = math.inf
 
     @property
     def rates(self) -> Rates:
@@ -185,12 +188,15 @@ class Solution:
         """Return by how much each constraint of (13) is missed, computed from the arrays alone.
 
         Metres, m/s, m/s²; `fence` is by how much the continuous path misses the margin; the power
-        limits (13b), (13c) relative to W; the fading relative to what the plan's seed draws at w;
-        the rates in bit/s/Hz. 0 where a constraint holds.
+        limits (13b), (13c) relative to W, and `energy` to its limit; the fading relative to what
+        the plan's seed draws at w; the rates in bit/s/Hz. 0 where a constraint holds.
         """
-        problem = build_problem(self.plan)
+        problem = replace(build_problem(self.plan), energy=self.energy_limit)
         again = self.recomputed()
         found = problem.kinematics.residuals(self.trajectory)
+        limit = problem.energy_limit(problem.kinematics)
+        if limit is not None:
+            found["energy"] = limit.excess(problem.kinematics, self.trajectory)
         if problem.fence is not None:
             clearance = problem.fence.clearance(self.trajectory, self.plan.flight.time_step)
             found["fence"] = max(0.0, problem.fence.margin - clearance)
@@ -216,13 +222,13 @@ class Solution:
         slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
         found from the arrays by CVXPY, without the multipliers of the method that solved the plan.
         Raises `SolverError` where the trajectory breaks its limits.
-        A limit on the energy, which a `goal` sets, is not counted: the gain is then above 0.
+        The `energy_limit` counts where the solution has one.
         """
         from faao_mav.optimizer.design import design
         from faao_mav.optimizer.rates.field import rate_field
         from faao_mav.optimizer.scaled import kkt_residual
 
-        problem = build_problem(self.plan)
+        problem = replace(build_problem(self.plan), energy=self.energy_limit)
         rates = rate_field(problem, design(self.plan))
         relay = problem.maximised_queue
         return kkt_residual(
@@ -232,6 +238,7 @@ class Solution:
             reach=reach,
             relay=relay,
             fence=problem.fence,
+            energy=problem.energy_limit(problem.kinematics),
         )
 
 
@@ -274,6 +281,7 @@ def make_solution(
         starts=starts or {},
         shares=problem.relay.best_shares(I_U, I_G, problem.kinematics.time_step),
         held=problem.held,
+        energy_limit=problem.energy,
     )
 
 

@@ -245,3 +245,11 @@ def test_too_little_energy_says_what_the_straight_flight_takes() -> None:
         InfeasibleError, match=r"at most 0\.2 Wh .*straight from start to end .* Wh"
     ):
         within(0.2)
+
+
+def test_the_kkt_residual_knows_the_energy() -> None:
+    found = within(0.9 * used(direct(build_problem(COPTER))))
+    assert found.residuals()["energy"] == 0
+    free = replace(found, energy_limit=math.inf)
+    assert found.kkt_residual() < 0.1 * free.kkt_residual()
+    assert not replace(found, energy_limit=0.9 * found.energy_limit).is_feasible(1e-5)

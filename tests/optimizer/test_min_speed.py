@@ -96,13 +96,12 @@ def test_back_to_the_start_is_no_refusal_where_a_circle_does(
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -2.0)])
-def test_smooth_limits_end_a_search_that_half_planes_leave(wind: Vector) -> None:
+def test_circles_turn_as_a_whole_until_the_search_has_converged(wind: Vector) -> None:
     over_ground, through_air = (15.0 + math.hypot(*wind), 15.0) if any(wind) else (15.0, math.inf)
     kin = cruiser(120, 12.0, time_step=1.0, max_speed=over_ground)
     kin, stage = replace(kin, max_airspeed=through_air, wind=wind), links(bpsk, 4e4, 4e4)
     start = starts(kin, ["bs-user"], PLACES)["bs-user"]
-    best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=20)
-    assert best.iterations > 20  # the half-planes alone have not converged
+    best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=80)
     assert best.converged
     assert worst(kin, best.trajectory) < 1e-8
     assert best.value >= reward(stage, start)
@@ -133,7 +132,7 @@ def test_the_optimum_keeps_the_least_speed(
     for flight in starts(kin, ["straight", "bs-user", "user-bs"], PLACES).values():
         free = maximize(replace(kin, min_speed=0.0), stage, flight)
         hovering = max(hovering, free.value)
-        found = maximize(kin, stage, flight, tolerance=1e-4, max_iterations=30)
+        found = maximize(kin, stage, flight, tolerance=1e-4, max_iterations=150)
         assert worst(kin, found.trajectory) < 1e-6
         assert found.value >= reward(stage, flight) - 1e-12
         best = max(best, found.value)
@@ -167,7 +166,7 @@ def test_the_published_flight_is_reached() -> None:
     )
     start = straight_flight(kin)
     stage = links(gaussian, 1e7)
-    best = maximize(kin, stage, start, max_iterations=150)
+    best = maximize(kin, stage, start, max_iterations=300)
     assert worst(kin, best.trajectory) < 1e-6
     assert reward(stage, start) == pytest.approx(4.01, abs=0.06)
     assert best.value == pytest.approx(9.53, rel=5e-3)

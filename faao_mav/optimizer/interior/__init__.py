@@ -18,8 +18,8 @@ Lifecycle. `maximize.maximize` (or `maximize_all`, from many starts side by side
 `search.Search`: it scales the rewards (`rewards`), lays out the Newton matrix (`banded`) and lets
 every constraint begin its state. Per iteration: measure the residual, factor (`newton`), predict,
 choose the barrier parameter mu, correct, move. At the end the speeds are integrated to a flight
-that is exact in (11), (12) and (13d). Searches with a least speed that have not converged by then
-go on with the limits of `smooth`, whose curvature counts.
+that is exact in (11), (12) and (13d). With a least speed the limits have curvature (`min_speed`):
+iterates may break them until the end, mu waits for them, and no multipliers are centred anew.
 
 Units inside: lengths in 100 m, speeds in v_max, accelerations in a_max, rewards summed over the
 slots and divided by the largest gradient at the start.
@@ -27,8 +27,8 @@ slots and divided by the largest gradient at the start.
 To add a constraint, write one file here and hand its objects to `maximize(constraints=...)`:
 
 - on every slot's position, speed or acceleration: a subclass of `half_planes.HalfPlanes` that says
-  which (`quantity`) and what g(x) >= 0 is (`slack`); see `min_speed`, 40 lines, and `fence`, which
-  has several inequalities in every slot.
+  which (`quantity`) and what g(x) >= 0 is (`slack`); see `fence`, which has several inequalities in
+  every slot, and `min_speed`, where g has curvature.
 - anything else, with unknowns of its own too: a `constraint.Constraint` and its `State`. `unknowns`
   says how many a slot has, `entries` what never changes of their rows in the banded matrix,
   `State.stiffness` what does, `State.push` their right-hand sides. tests/optimizer/

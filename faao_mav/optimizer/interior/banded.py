@@ -134,10 +134,11 @@ class FlightMatrix:
                 return Factors(lu, pivots, band, sound)
             sound[(info - 1) // (self.size * self.slots)] = False
 
-    def positive(self, at_w: Real, at_v: Real, at_a: Real) -> Flags:
+    def positive(self, at_w: Real, at_v: Real, at_a: Real, across: Real | float = 0.0) -> Flags:
         """Tell whether M + Dᵀ C⁻¹ D is positive definite where A (w, v) = 0, (flights, 1).
 
-        M is as in `factor`; `at_a` (3, flights, n) is C⁻¹, its last slot unused. With a large
+        M is as in `factor`; `at_a` (3, flights, n) is C⁻¹, its last slot unused; `across`
+        (2, 2, flights, n - 1) is what more there is between v_n and v_{n+1}. With a large
         multiple of AᵀA added it is so for every (w, v), which Cholesky's factors tell.
         """
         flights, n = at_w.shape[1:]
@@ -162,6 +163,10 @@ class FlightMatrix:
                 add(first + row, first + column, block[k])
         for k, (row, column) in ((0, (0, 0)), (1, (1, 0)), (1, (0, 1)), (2, (1, 1))):
             add(V.start + row, V.start + column, -stiff[k], 1)
+        if np.ndim(across) == 4:
+            for i, each in enumerate(np.asarray(across)):
+                for j, values in enumerate(each):
+                    add(V.start + j, V.start + i, values, 1)
         for w, v in ((0, 2), (1, 3)):
             add(w, w, rho * inner)
             add(v, v, rho * h * h * inner)

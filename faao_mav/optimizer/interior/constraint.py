@@ -60,9 +60,10 @@ class Stiffness:
     `compliance` is the inverse of `a`, for a constraint that knows it better than by inversion.
     `entries` are those of the constraint's own unknowns, of which the proximal term holds the
     places `held` as it does w. `curvature` (3, flights, n) is that of its functions of w, weighted
-    by their multipliers, which is cut where it has the wrong sign. `turning` (flights, n), at most
-    0, times the identity is the part of K on v that only as large a share of counts as leaves the
-    model concave; the first constraint is then no `FlightLimits`.
+    by their multipliers, which is cut where it has the wrong sign. `turning` (3, flights, n) is
+    more of K on v, `across` (2, 2, flights, n - 1) between v_n and v_{n+1}: of both, and of what is
+    cut elsewhere, as large a share counts as leaves the model concave. The first constraint is then
+    no `FlightLimits`.
     """
 
     w: Real | float = 0.0
@@ -73,6 +74,7 @@ class Stiffness:
     curvature: Real | float = 0.0
     held: Sequence[int] = ()
     turning: Real | float = 0.0
+    across: Real | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +181,11 @@ class Constraint(ABC):
     @property
     def turns(self) -> bool:
         """Whether its half-planes turn so fast that mu has to wait for the iterates."""
+        return False
+
+    @property
+    def curved(self) -> bool:
+        """Whether the curvature of its functions of v or a counts."""
         return False
 
     @property

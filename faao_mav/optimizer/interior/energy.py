@@ -1,10 +1,10 @@
 """The energy that a flight may take: sum_n P(v_n, a_n) delta_t <= E, one inequality for it all.
 
 P is smooth but not convex: a copter that hovers takes more than one that flies slowly. The Newton
-matrix has the positive part of P's Hessians by v and by a, and none of what couples both. The
-gradient of the sum couples all slots. So that the matrix stays banded the sum runs along: with g_n
-the gradient by v_n and two unknowns per slot, the change e_n of the sum before slot n and a copy
-lambda_n of the multiplier,
+matrix has the positive part of P's Hessians by v and by a, and where limits are `curved` the rest
+too, with what couples both. The gradient of the sum couples all slots. So that the matrix stays
+banded the sum runs along: with g_n the gradient by v_n and two unknowns per slot, the change e_n of
+the sum before slot n and a copy lambda_n of the multiplier,
 
     e_0 = 0,  e_n - e_{n+1} + g_n dv_n = 0,  lambda_n = lambda_{n-1}
 
@@ -55,6 +55,7 @@ class EnergyLimit(Constraint):
     time_step: float
     max_speed: float
     wind: Vector = (0.0, 0.0)
+    curved: bool = False
 
     @property
     def unknowns(self) -> int:
@@ -63,8 +64,9 @@ class EnergyLimit(Constraint):
 
     def entries(self, slots: int, first: int) -> Sequence[Entry]:
         """Return what the running sum has of its neighbours."""
-        begins = np.eye(slots)[0]
+        begins, room = np.eye(slots)[0], Entry(V.stop - 1, V.start, np.zeros(slots - 1), ahead=1)
         return (
+            *([room] if self.curved else []),  # for what couples neighbouring speeds
             Entry(first + 1, first, 1 - begins),
             Entry(first, first + 1, -np.ones(slots - 1), ahead=1),
             Entry(first, first, begins),
@@ -73,7 +75,9 @@ class EnergyLimit(Constraint):
     def begin(self, flight: ScaledFlight, start: Start) -> "EnergyState":
         """Return the centred state at `start`, widened where little of the energy is left."""
         on, none = np.ones((start.w.shape[1], 1)), np.zeros((1, 1))
-        state = EnergyState(on, on, on, on, self, flight, start.own, none, none, none, none)
+        state = EnergyState(
+            on, on, on, on, self, flight, start.own, none, none, none, none, none, none
+        )
         state = state.at(start.v)
         headroom = _HEADROOM * min(1.0, max(start.margin, _LEAST_MARGIN))
         s = np.maximum(state.left, headroom * state.slots)
@@ -98,7 +102,8 @@ class EnergyState(Slacks):
 
     on, s, z and margin are (flights, 1), and so is `left`, what is left of the energy, of which s
     is larger by the margin. What is used has the gradient `by_v` (2, flights, n) by the scaled
-    speeds, and the curvatures `on_v` (3, flights, n) and `on_a` (3, flights, n - 1).
+    speeds, and the curvatures `on_v` (3, flights, n) and `on_a` (3, flights, n - 1). Where limits
+    are curved `turning` (3, flights, n) and `across` (2, 2, flights, n - 1) are the rest.
     """
 
     constraint: EnergyLimit
@@ -108,6 +113,8 @@ class EnergyState(Slacks):
     by_v: Real
     on_v: Real
     on_a: Real
+    turning: Real
+    across: Real
 
     @property
     def slots(self) -> int:
@@ -125,11 +132,18 @@ class EnergyState(Slacks):
         by_v, by_a = power.by_v * limit.max_speed, power.by_a[..., :-1] * per_dv
         by_v[..., :-1] -= by_a
         by_v[..., 1:] += by_a
+        kept, across = positive_part(power.by_vv), power.by_va[..., :-1] * limit.max_speed * per_dv
+        turning = (power.by_vv - kept) * limit.max_speed**2
+        turning[0, :, :-1] -= 2 * across[0, 0]
+        turning[1, :, :-1] -= across[0, 1] + across[1, 0]
+        turning[2, :, :-1] -= 2 * across[1, 1]
         return replace(
             self,
             left=(1 - _INSIDE) * self.slots - power.value.sum(axis=-1, keepdims=True) * dt / unit,
             by_v=by_v * (dt / unit * flight.matrix.moves_v),
-            on_v=positive_part(power.by_vv) * (dt / unit * limit.max_speed**2),
+            turning=turning * dt / unit,
+            across=across * dt / unit,
+            on_v=kept * (dt / unit * limit.max_speed**2),
             on_a=power.by_aa[..., :-1] * (dt / unit * (per_dv / flight.gain) ** 2),
         )
 
@@ -151,6 +165,8 @@ class EnergyState(Slacks):
             v=z * self.on_v,
             a=z * self.on_a if self.on_a.any() else 0.0,
             entries=[*entries, Entry(multiplier, multiplier, closes)],
+            turning=z * self.turning if self.constraint.curved else 0.0,
+            across=z * self.across if self.constraint.curved else 0.0,
         )
 
     def push(self, target: Real | None) -> Forces:
@@ -169,7 +185,11 @@ class EnergyState(Slacks):
             v=-z * self.by_v - self.z * _times(self.on_v, move.v),
             a=-self.z * _times(self.on_a, da),
         )
-        return (ds, z - self.z, bent), supplied
+        rest_bent = np.zeros_like(bent)
+        if self.constraint.curved:
+            both = np.einsum("ijbn,ibn,jbn->b", self.across, move.v[..., :-1], move.v[..., 1:])
+            rest_bent = self.z * (quadratic(self.turning, move.v) + 2 * both[:, None])
+        return (ds, z - self.z, bent, rest_bent), supplied
 
     def curvature(self, step: Any) -> Real:
         """Return z / s ds^2, the margin left out, and the curvature along the step."""
@@ -183,7 +203,7 @@ class EnergyState(Slacks):
     def missing(self, share: Real, step: Any, then: "EnergyState") -> Real:
         """Return by how much more is used than the model says, weighted."""
         return np.asarray(
-            then.z * (then.margin - (1 - share) * self.margin) - share**2 / 2 * step[2]
+            then.z * (then.margin - (1 - share) * self.margin) - share**2 / 2 * (step[2] + step[3])
         )
 
     def centred(self, mu: Real) -> "EnergyState":

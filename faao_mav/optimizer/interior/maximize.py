@@ -9,11 +9,15 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.interior.limits import AirspeedLimit, FlightLimits
-from faao_mav.optimizer.interior.min_speed import MinSpeedConstraint
+from faao_mav.optimizer.interior.min_speed import limits_with_least_speed
 from faao_mav.optimizer.interior.queue import Queue, QueueRewards
 from faao_mav.optimizer.interior.rewards import ScaledRewards, Stage
-from faao_mav.optimizer.interior.search import COLD_START, FINISHES, Search, StartStrategy
-from faao_mav.optimizer.interior.smooth import smooth_limits
+from faao_mav.optimizer.interior.search import (
+    COLD_START,
+    SLOW_START,
+    Search,
+    StartStrategy,
+)
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
 
@@ -21,9 +25,9 @@ _ALLOWED = 1e-9
 """The violation of a limit, relative to it, that a flight may have: rounding of 1,000s of slots."""
 
 
-_LAST_STEPS, _LAST_SHARE = 150, 3
-"""Steps at most of each search with curvature that ends one with a least speed, and in multiples of
-those that the search before it may take. Chosen."""
+_REPEATED = 50
+"""The steps allowed from which a search with a least speed that has not converged is repeated, in
+another way. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +54,15 @@ def maximize(
     constraints: Sequence[Constraint] = (),
     tolerance: float = 1e-6,
     max_iterations: int = 100,
-    strategy: StartStrategy = COLD_START,
+    strategy: StartStrategy | None = None,
     relay: RelayQueue | None = None,
 ) -> LocalOptimum:
     """Return a local optimum that is never worse than the feasible `start`.
 
     `constraints` are kept beside those of `kin`, by `start` too; with `relay`, what it delivers is
-    maximised instead. Where no gain is to be had, as in
-    saturation, or none was found, the optimum is the start itself. `stage` is called once for the
-    start, once per trial step and once for the result.
+    maximised instead. Without a `strategy` it is that for any start. Where no gain is to be had, as
+    in saturation, or none was found, the optimum is the start itself. `stage` is called once for
+    the start, once per trial step and once for the result.
 
     >>> from faao_mav.optimizer.interior.rewards import StageValues
     >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
@@ -93,7 +97,7 @@ def maximize_all(
     constraints: Sequence[Constraint] = (),
     tolerance: float = 1e-6,
     max_iterations: int = 100,
-    strategy: StartStrategy = COLD_START,
+    strategy: StartStrategy | None = None,
     relay: RelayQueue | None = None,
     race: bool = False,
 ) -> list[LocalOptimum]:
@@ -102,14 +106,15 @@ def maximize_all(
     In a `race` those are given up that fall behind the best.
     """
     kept = (*constraints_of(kin), *constraints)
+    slow = kin.min_speed > 0
+    strategy = strategy or (SLOW_START if slow else COLD_START)
     optima = _optima(kin, stage, starts, kept, tolerance, max_iterations, strategy, relay, race)
-    for finish in FINISHES if kin.min_speed > 0 else ():
-        left = [k for k, optimum in enumerate(optima) if not optimum.converged]
-        if not left:
-            break
-        near, kept = [optima[k].trajectory for k in left], (*smooth_limits(kin), *constraints)
-        steps = min(_LAST_STEPS, _LAST_SHARE * max_iterations)
-        ends = _optima(kin, stage, near, kept, tolerance, steps, finish, relay)
+    left = [k for k, optimum in enumerate(optima) if not optimum.converged]
+    again = slow and max_iterations >= _REPEATED and len(left) > (len(optima) - 1) * race
+    if left and again:
+        near = [optima[k].trajectory for k in left]
+        other = SLOW_START if strategy == COLD_START else COLD_START
+        ends = _optima(kin, stage, near, kept, tolerance, max_iterations, other, relay)
         for k, end in zip(left, ends, strict=True):
             taken = optima[k].iterations + end.iterations
             further = end.converged or end.value > optima[k].value
@@ -153,10 +158,11 @@ def _optima(
             optima.append(LocalOptimum(start, least, lowest / lowest.sum(), 0, 0.0, True))
             continue
         end = results[k]
-        better = value >= least
-        flight, value = (flights[k], value) if better else (start, least)
-        # inside a search that keeps its limits a start is as good an end as any; else it is none
-        converged = end.converged and (better or isinstance(kept[0], FlightLimits))
+        # inside a search that keeps its limits a start is as good an end as any, else only where
+        # what was found is as good to the tolerance
+        equal = value > least - tolerance * abs(least) or isinstance(kept[0], FlightLimits)
+        converged = end.converged and equal
+        flight, value = (flights[k], value) if value >= least else (start, least)
         optima.append(
             LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
         )
@@ -177,13 +183,12 @@ def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
 
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
     """Return the constraints of `kin` itself, the limits on speed and acceleration first."""
-    east, north = (part / kin.max_speed for part in kin.wind)
-    kept: list[Constraint] = [FlightLimits()]
-    if math.isfinite(kin.max_airspeed):
-        kept.append(AirspeedLimit(kin.max_airspeed / kin.max_speed, (east, north)))
     if kin.min_speed > 0:
-        kept.append(MinSpeedConstraint(kin.min_speed / kin.max_speed, (east, north)))
-    return tuple(kept)
+        return limits_with_least_speed(kin)
+    if math.isinf(kin.max_airspeed):
+        return (FlightLimits(),)
+    east, north = (part / kin.max_speed for part in kin.wind)
+    return FlightLimits(), AirspeedLimit(kin.max_airspeed / kin.max_speed, (east, north))
 
 
 def feasible(

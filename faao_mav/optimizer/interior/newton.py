@@ -48,8 +48,8 @@ class Newton:
     """The factored system at an iterate; `curvature` (3, flights, n) is H with its proximal term.
 
     `proximal` (flights, 1) is that term, which holds the places `held` of a slot's unknowns too.
-    `turning` (flights, n), 0 or less, times the identity is what constraints on the speeds curve
-    away from a maximum, or the share of it that leaves the model concave.
+    `turning` (3, flights, n) and `across` (2, 2, flights, n - 1) are what constraints curve on v_n,
+    and between v_n and v_{n+1}: the share that leaves the model concave, with a proximal term.
 
     `columns` are the solutions for the gradients of the F_j, and for mu = 0 without correction;
     `border` (flights, J, J) is what the first ones leave for the weights.
@@ -62,6 +62,7 @@ class Newton:
     held: Sequence[int]
     curvature: Real
     turning: Real | float
+    across: Real | float
     compliance: Real
     factors: Factors
     columns: Real
@@ -83,8 +84,10 @@ class Newton:
         stiffness = [state.stiffness() for state in at.states]
         curvature = -np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.hessian)
         curvature += added(each.curvature for each in stiffness)
+        whole = curvature
         if cut.any():
             curvature = np.where(cut, positive_part(curvature), curvature)
+        wrong = whole - curvature
         curvature[::2] += proximal
         compliance = np.empty((3, flights, n))  # the last slot has none
         compliance[..., :-1] = _compliance(stiffness)
@@ -96,10 +99,16 @@ class Newton:
         entries += [Entry(place, place, np.repeat(proximal, n, axis=1)) for place in held]
         on_w = np.asarray(added([curvature, *(each.w for each in stiffness)]))
         on_v = np.asarray(added(each.v for each in stiffness))
-        turning = added(each.turning for each in stiffness)
+        turning, across = (added(getattr(e, part) for e in stiffness) for part in _SHARED)
         if isinstance(turning, np.ndarray):
-            turning = turning * _concave_share(flight, on_w, on_v, compliance, turning)
-            on_v[::2] += turning
+            share = _concave_share(flight, (on_w, on_v), (wrong, turning, across), compliance)
+            on_w, curvature = on_w + share * wrong, curvature + share * wrong
+            turning = share * turning
+            turning[::2] += proximal
+            on_v += turning
+            across = share * across if isinstance(across, np.ndarray) else across
+        if isinstance(across, np.ndarray):
+            entries += [Entry(V.start + j, V.start + i, across[i, j], 1) for i, j in _PAIRS]
         factors = matrix.factor(
             on_w,
             on_v,
@@ -125,6 +134,7 @@ class Newton:
             held,
             curvature,
             turning,
+            across,
             compliance,
             factors,
             columns,
@@ -201,27 +211,42 @@ class Newton:
         """Return the curvature of the whole model along a `direction` of `bend`, (flights, 1)."""
         at = self.at
         kink = at.weights / (at.total - at.floor) * (direction.total - direction.floor) ** 2
-        bend = bend + summed(self.turning * (direction.move.v**2).sum(axis=0))
+        dv = direction.move.v
+        if isinstance(self.turning, np.ndarray):
+            bend = bend + quadratic(self.turning, dv)
+        if isinstance(self.across, np.ndarray):
+            both = [self.across[i, j] * dv[i, :, :-1] * dv[j, :, 1:] for i, j in _PAIRS]
+            bend = bend + 2 * summed(np.stack(both))
         of_constraints = [
             state.curvature(step) for state, step in zip(at.states, direction.steps, strict=True)
         ]
         return np.asarray(reduce(np.add, of_constraints, bend) + kink.sum(axis=0))
 
 
+_SHARED = "turning", "across"
+_PAIRS = (0, 0), (0, 1), (1, 0), (1, 1)
+
 _SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0)
-"""Shares of the constraints' curvature that are tried. Chosen."""
+"""Shares of the curvature of the wrong sign that are tried. Chosen."""
 
 
 def _concave_share(
-    flight: ScaledFlight, on_w: Real, on_v: Real, compliance: Real, turning: Real
+    flight: ScaledFlight,
+    stiff: tuple[Real, Real],
+    wrong: tuple[Real, Real, Real | float],
+    compliance: Real,
 ) -> Real:
-    """Return the largest share (flights, 1) of `turning` with which the model is concave."""
+    """Return the largest share (flights, 1) of what is `wrong` with which the model is concave.
+
+    `stiff` are the blocks on w and v, `wrong` what more there is, the last between v_n and v_{n+1}.
+    """
     xx, xy, yy = compliance
     on_a = np.stack([yy, -xy, xx]) / (xx * yy - xy * xy)
-    share, curved = np.full((on_w.shape[1], 1), _SHARES[0]), on_v.copy()
+    on_w, on_v = stiff
+    share = np.full((on_w.shape[1], 1), _SHARES[0])
     for lower in _SHARES[1:]:
-        curved[::2] = on_v[::2] + share * turning
-        sound = flight.matrix.positive(on_w, curved, on_a)
+        more_w, more_v, across = (share * each for each in wrong)
+        sound = flight.matrix.positive(on_w + more_w, on_v + more_v, on_a, across)
         if sound.all():
             break
         share = np.where(sound, share, lower)
