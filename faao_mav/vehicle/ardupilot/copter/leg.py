@@ -28,9 +28,9 @@ hovers at 9 m/s: with 0.4 6.0, with 0.75 1.6, with 1.5 1.3; with 1.5 other plans
 twice the time to convert."""
 
 _SHORTEST = 4.0
-"""The least length of a leg, m, where the path does not need a shorter one: on it centimetres decide
-how long the target waits for an aircraft that has passed it. Flown: a mission with 1.1 m before a
-hover left there 4.1 s late, one with 2.3 m 0.4 s."""
+"""The least length of a leg, m, where the path needs no shorter one: on such centimetres decide how
+long the target waits for an aircraft that has passed it. Flown: a mission with 1.1 m before a hover
+left there 4.1 s late, one with 2.3 m 0.4 s."""
 
 _JERK_TIMES = 12
 """The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
