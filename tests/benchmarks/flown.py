@@ -1,10 +1,12 @@
 """Missions that real autopilots flew in their simulators, beside their plans.
 
     FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/flown.py [ardupilot | px4 | plane] [PLAN ...]
-        [--wind SPEED,FROM] [--stream]
+        [--wind SPEED,FROM] [--stream] [--limits] [--random FIRST,COUNT]
 
 With a wind, m/s and degrees, plans are made for it, and flown in it; else in calm air. With
---stream copters fly the plans by setpoints, and what is predicted is of the mission still.
+--stream copters fly the plans by setpoints, and what is predicted is of the mission still. With
+--limits missions for calm air are flown in the strongest wind that the summary says they keep, and
+in `BEYOND` more. With --random plans for copters, each with its wind, are drawn from these seeds.
 
 One row for each plan: rms position error at equal times (m), how much later than planned the flight
 is over (s), the delivered rate over the planned one; each as predicted and as flown.
@@ -16,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -30,8 +33,9 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.client import upload
 from faao_mav.mavlink.flying.fly import fly
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Wind
 from faao_mav.schedule.prediction import Prediction, price_flight
-from missions import PLANS, plan_of
+from missions import PLANS, plan_of, random_changes
 
 RUNNERS = {
     "ardupilot": ("fly_arducopter.py", ["--speedup", "20"]),
@@ -39,6 +43,9 @@ RUNNERS = {
     "plane": ("fly_arducopter.py", ["--speedup", "20", "--vehicle", "plane", "--tail", "5"]),
 }
 """The runner of each autopilot, with its options: little air drag for PX4's aircraft."""
+
+BEYOND = 2.0
+"""m/s more than the wind that a mission is said to keep."""
 
 FLOWN: dict[str, dict[str, Any]] = {
     name: PLANS[name]
@@ -100,16 +107,19 @@ PLANES: dict[str, tuple[dict[str, Any], float]] = {
 """Plans for planes, as changes of `missions/plane_relay.yaml`, and the elevation of home, m."""
 
 
-def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Prediction:
+def flown(
+    autopilots: Path, autopilot: str, result: Result, folder: Path, wind: Wind | None = None
+) -> Prediction:
     """Fly the mission of `result` and return what it delivers; again if the simulator fails.
 
-    `autopilots` is the folder with the runners; mission and track are written to `folder`.
+    `autopilots` is the folder with the runners; mission and track are written to `folder`. It is
+    flown in `wind`, else in the plan's.
     """
     script, options = RUNNERS[autopilot]
     files = result.write(folder / "mission.waypoints")
     command = [sys.executable, str(autopilots / script), str(files[0])]
     command += ["--param-file", str(files[1])] if len(files) > 1 else []
-    command += in_wind(autopilots / script, result.solution.plan.site.wind)
+    command += in_wind(autopilots / script, wind or result.solution.plan.site.wind)
     track = folder / "track.csv"
     for _ in range(4):
         run = subprocess.run(
@@ -187,6 +197,30 @@ def row(
     return "   ".join(cells)
 
 
+def at_limits(name: str, autopilots: Path, autopilot: str) -> str:
+    """Fly a mission made for calm air in the wind that it is said to keep, and in more."""
+    result = plan_mission(plan_of(FLOWN[name], autopilot, "recommend"))
+    assert result.check is not None
+    assert result.check.wind_limit is not None
+    limit = result.check.wind_limit
+    cells = [f"{autopilot:<10}{name:<28}{limit.speed:5.2f} m/s from {limit.from_degrees:3.0f}"]
+    for speed in (limit.speed, limit.speed + BEYOND):
+        with tempfile.TemporaryDirectory() as folder:
+            wind = Wind(speed, limit.from_degrees)
+            found = flown(autopilots, autopilot, result, Path(folder), wind)
+        late = found.duration - result.solution.plan.flight.duration
+        share = 100 * found.delivered_rate / result.solution.delivered_rate
+        cells.append(f"{late:+6.2f} s {share:7.2f} %")
+    return "   ".join(cells)
+
+
+def drawn(seed: int) -> dict[str, Any]:
+    """Return the plan that `seed` draws, as changes of the sample, with 3 to 8 m/s of wind."""
+    random = Random(seed + 1000)
+    wind = {"speed": round(random.uniform(3, 8), 1), "from": random.randrange(360)}
+    return random_changes(seed) | {"site.wind": wind}
+
+
 def main() -> None:
     """Print the table."""
     chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
@@ -194,11 +228,19 @@ def main() -> None:
     if "--wind" in chosen:
         speed, start = chosen[chosen.index("--wind") + 1].split(",")
         wind = {"site.wind": {"speed": float(speed), "from": float(start)}}
+    names: list[str] = []
+    if "--random" in chosen:
+        first, count = map(int, chosen[chosen.index("--random") + 1].split(","))
+        names = [f"random {seed}" for seed in range(first, first + count)]
+        FLOWN.update({name: drawn(int(name.split()[1])) for name in names})
     print(f"{'':<41}{'predicted: m, s late, rate':<27}flown")
     for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
         plans = PLANES if autopilot == "plane" else FLOWN
-        for name in [each for each in plans if each in chosen] or plans:
+        for name in [each for each in plans if each in chosen] or names or plans:
             stream = "--stream" in chosen
+            if "--limits" in chosen:
+                print(at_limits(name, autopilots, autopilot), flush=True)
+                continue
             print(row(name, autopilots, autopilot, wind, stream=stream), flush=True)
 
 
