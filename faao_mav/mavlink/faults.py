@@ -120,9 +120,11 @@ class FaultyTransport:
 
     def close(self) -> None:
         """Close the transport beneath; what was sent is under way, and arrives early."""
-        while queue := self._queues["out"]:
-            self._inner.write(heapq.heappop(queue)[2])
-        self._inner.close()
+        try:
+            for _, _, data in sorted(self._queues["out"]):
+                self._inner.write(data)
+        finally:
+            self._inner.close()
 
     def _now(self) -> float:
         return time.monotonic() - self._started

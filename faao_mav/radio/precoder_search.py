@@ -47,9 +47,10 @@ _MARGIN = 0.03
 of ln δ by which such an optimum may be worse before it is improved."""
 
 _DRAWS, _KEPT = 8, 3
-"""Draws of a channel for which all starts are improved first, and how many results, those of the
-highest mean rate over all draws, are improved for all of them.
-"""
+"""About how many draws of a channel all starts are improved for first, and how many results, those
+of the highest mean rate over all draws, are then improved for all of them. Measured on the sample,
+beside all draws at once: 16-QAM on three antennas in a quarter of the time; the delivered rate of
+QPSK on four 1.5e-4 bit/s/Hz lower, of 8-PSK on three 5e-5 higher, on two the same to 1e-6."""
 
 _COARSE = 1e-4  # tolerance, as a relative power, that tells starts apart, and in saturation
 _STEPS = 60  # Newton steps at most
