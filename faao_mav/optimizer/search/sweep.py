@@ -80,7 +80,7 @@ class Sweep:
         """Return the largest of `values` (..., i, j) in reach of one stage."""
         best = np.full_like(values, -np.inf)
         for rows, columns in self.rows:
-            near = _largest_within(values, columns)
+            near = largest_within(values, columns)
             if rows == 0:
                 np.maximum(best, near, out=best)
             elif rows < values.shape[-2]:
@@ -112,7 +112,7 @@ class Sweep:
         return cells
 
 
-def _largest_within(values: Real, reach: int) -> Real:
+def largest_within(values: Real, reach: int) -> Real:
     """Return the largest of `values` (..., n) up to `reach` places away, by windows that double.
 
     scipy.ndimage has a filter for it, and takes 0.15 s to import.
