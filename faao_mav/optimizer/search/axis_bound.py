@@ -24,6 +24,10 @@ _BEYOND = 40.0
 _INTERVAL, _MOST_INSTANTS = 2.4, 50
 """Time between instants, s, at least, and instants of a flight at most. Chosen."""
 
+_MOST_CELLS = 100_000
+"""Cells at an instant at most, about: where a_max is small the instants lie farther apart. With ten
+parts and four prices an array of them takes 30 MB. Chosen."""
+
 _PARTS = 4
 """Places to the side of a cell at which rates are tabulated. Chosen."""
 
@@ -70,9 +74,12 @@ class AxisBound:
         kin = self.problem.kinematics
         inner = np.arange(1, kin.slots - 1)
         lasting = kin.time_step * len(inner)
-        count = max(1, min(int(lasting / _INTERVAL), _MOST_INSTANTS, len(inner)))
+        extent = float(np.ptp(self.places[0])) + 2 * _BEYOND
+        crossed = 4 * self.speeds**2 * kin.max_speed * extent / kin.max_acceleration**2
+        least = max(_INTERVAL, (crossed / _MOST_CELLS) ** (1 / 3))
+        count = max(1, min(int(lasting / least), _MOST_INSTANTS, len(inner)))
         h = lasting / count
-        instants = kin.time_step / 2 + h * (np.arange(count) + 0.5)
+        instants: Real = kin.time_step / 2 + h * (np.arange(count, dtype=np.float64) + 0.5)
         nearest = np.abs(instants[:, None] - kin.time_step * inner).argmin(axis=0)
         return instants, h, [inner[nearest == k] for k in range(count)]
 
@@ -122,7 +129,7 @@ class AxisBound:
         ways = np.array(self.problem.kinematics.longest_ways())
         ends = self.places[1][:2, None]
         low, high = (ends - ways).max(axis=0), (ends + ways).min(axis=0)
-        return np.maximum(0.0, np.maximum(low, -high))
+        return np.asarray(np.maximum(0.0, np.maximum(low, -high)))
 
     @cached_property
     def passed(self) -> tuple[float, list[Real]]:
@@ -260,33 +267,31 @@ class AxisBound:
         p = np.clip(np.array(prices), 0.0, 1.0)
         count = len(self.times[0])
         before = self._since(range(count // 2 + 1), 0, p)
-        after = self._since(range(count - 1, count // 2, -1), 1, p)
-        if after is not None:
-            before += self.reached(after, 1)
+        if count > 1:
+            before += self.reached(self._since(range(count - 1, count // 2, -1), 1, p), 1)
         ends = np.array([at_ends(self.problem, self.rates, one, one) for one in p])
         through = before + ends[:, None, None]
         return float(through.min(axis=0).max()) / self.problem.kinematics.slots
 
-    def _since(self, order: range, end: int, prices: Real) -> Real | None:
+    def _since(self, order: range, end: int, prices: Real) -> Real:
         """Return the best sums (B, columns, rows) from one end on, at the last instant of `order`.
 
         Of all parts of the flights the best counts, from some time after they are parted on.
         """
         kin, when, parts = self.problem.kinematics, *self.passed
-        values = None
+        values = np.empty((0, 0, 0, 0))
         for k in order:
             t = float(self.times[0][k])
             since = kin.time_step * (kin.slots - 1) - t if end else t
             across = parts[end] if since < _MERGED * when else self.across[None]
             worth = self.rewards(k, prices, across)
-            if values is not None:
+            if values.size:
                 if len(values) > len(across):
                     values = values.max(axis=0, keepdims=True)
-                shape = values.shape
-                flat = values.reshape(-1, *shape[2:])
-                worth += self.reached(flat, 1 if end else -1).reshape(shape)
+                flat = values.reshape(-1, *values.shape[2:])
+                worth += self.reached(flat, 1 if end else -1).reshape(values.shape)
             values = worth
-        return None if values is None else values.max(axis=0)
+        return np.asarray(values.max(axis=0))
 
 
 def axis_bound(
