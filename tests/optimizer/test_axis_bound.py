@@ -121,6 +121,17 @@ def test_the_paper_s_plan_at_10_dbm_is_within_an_eighth_of_it() -> None:
     assert reached < cells.bound([0.45, 0.55]) < 1.125 * reached
 
 
+@pytest.mark.parametrize("instants", [1, 2, 3])
+def test_flights_may_have_few_instants(
+    bounded: dict[str, AxisBound], monkeypatch: pytest.MonkeyPatch, instants: int
+) -> None:
+    monkeypatch.setattr("faao_mav.optimizer.search.axis_bound._MOST_INSTANTS", instants)
+    one = bounded["free ends"]
+    cells = AxisBound(one.problem, one.rates, one.speeds, one.parts)
+    assert len(cells.times[0]) == instants
+    assert optimize(one.problem.plan).rates.R_avg <= cells.bound([0.5])
+
+
 def test_the_price_sought_is_better_than_others(bounded: dict[str, AxisBound]) -> None:
     cells = bounded["fast"]
     found = axis_bound(cells.problem, cells.rates, coarse=3, fine=6)

@@ -267,7 +267,7 @@ class AxisBound:
         p = np.clip(np.array(prices), 0.0, 1.0)
         count = len(self.times[0])
         before = self._since(range(count // 2 + 1), 0, p)
-        if count > 1:
+        if count > count // 2 + 1:
             before += self.reached(self._since(range(count - 1, count // 2, -1), 1, p), 1)
         ends = np.array([at_ends(self.problem, self.rates, one, one) for one in p])
         through = before + ends[:, None, None]
