@@ -8,6 +8,7 @@ from typing import Any
 
 from nicegui import events, ui
 
+from faao_mav.app.planner import mistake
 from faao_mav.app.vehicle import debriefed, uploaded, watched
 from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError
@@ -93,8 +94,8 @@ class Fly:
     async def _until_done(self, work: Coroutine[Any, Any, str]) -> None:
         try:
             self._tell(await work)
-        except FaaoError as error:
-            self._tell(f"failed       {error}")
+        except Exception as error:
+            self._tell(_failure(error))
         finally:
             self._task = self._watched = None
             self._arms, self._phase = False, ""
@@ -105,12 +106,12 @@ class Fly:
         self._told.text = "\n".join(lines[-_MOST_LINES:])
 
     def _upload(self) -> None:
-        if self._result is not None:
+        if self._result is not None and self._task is None:
             asked = (self._result, str(self._connection.value))
             self._begin(asyncio.to_thread(uploaded, *asked))
 
     def _begin_to_watch(self) -> None:
-        if self._result is not None:
+        if self._result is not None and self._task is None:
             self._watch(self._result, arm=False)
 
     def _watch(self, result: Result, *, arm: bool) -> None:
@@ -159,11 +160,16 @@ class Fly:
             await event.file.save(log)
             try:
                 told = await self._workers.long(debriefed, result, log, event.file.name)
-            except FaaoError as error:
-                self._debriefing.text = f"failed       {error}"
+            except Exception as error:
+                self._debriefing.text = _failure(error)
                 return
         self._debriefing.text, places = told
         self._draw("flown", places)
+
+
+def _failure(error: Exception) -> str:
+    said = str(error) if isinstance(error, FaaoError) else mistake(error)
+    return f"failed       {said}"
 
 
 def _button(text: str, act: Callable[[], object]) -> ui.button:
