@@ -106,7 +106,7 @@ def test_every_public_name_can_be_had() -> None:
         ("import faao_mav.cli.autopilot", {"numpy", "pymavlink"}),
         ("import faao_mav.cli.app", {"numpy", "nicegui", "ruamel", "pydantic"}),
         ("import faao_mav.app.guard, faao_mav.app.document", {"nicegui", "scipy", "pyproj"}),
-        ("import faao_mav.app.planner", {"nicegui", "cvxpy", "matplotlib"}),
+        ("import faao_mav.app.planner, faao_mav.app.vehicle", {"nicegui", "cvxpy", "pymavlink"}),
         ("import faao_mav.cli.study", {"numpy", "joblib", "matplotlib"}),
         ("import faao_mav.study", {"scipy", "cvxpy", "joblib", "matplotlib", "pyproj"}),
         ("import faao_mav.report", {"scipy", "cvxpy", "matplotlib"}),

@@ -1,5 +1,6 @@
 """The planner page: drag stations, draw zones, see the flight; served on loopback by NiceGUI.
 
 `document` and `scene` hold the plan that is edited, `planner` asks worker processes for `answers`,
-`page` shows them. Only `page`, `form`, `charts`, `map` and `serve` know NiceGUI.
+`vehicle` uploads, watches and debriefs there, `page` shows it all. Only `page`, its parts `form`,
+`results`, `fly` and `map`, and `serve` know NiceGUI.
 """

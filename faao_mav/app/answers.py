@@ -115,7 +115,7 @@ def _series(flight: RoughFlight | Solution) -> dict[str, list[float]]:
     track = Track(flight.t, position, velocity, items, np.empty(0), frame)
     if (use := energy_use(plan, track, plan.wind)) is not None:
         values |= {"power": use.power, "energy": use.used}
-    return {name: _thinned(np.asarray(each)).round(4).tolist() for name, each in values.items()}
+    return {name: thinned(np.asarray(each)).round(4).tolist() for name, each in values.items()}
 
 
 def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str, Any]:
@@ -127,8 +127,8 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
 
     speeds = lengths(flight.v)
     drawn = {
-        "places": degrees(_thinned(flight.w)),
-        "speeds": _thinned(speeds).round(3).tolist(),
+        "places": degrees(thinned(flight.w)),
+        "speeds": thinned(speeds).round(3).tolist(),
         "top": max(float(speeds.max()), 0.01),
         "track": [],
         "waypoints": [],
@@ -140,7 +140,7 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
         if plan.fence.file is not None:
             drawn["fixed"] = [degrees(edge) for edge in area.edges()]
     if result is not None and result.conversion is not None:
-        drawn["track"] = degrees(_thinned(result.conversion.schedule.track()["predicted_w"]))
+        drawn["track"] = degrees(thinned(result.conversion.schedule.track()["predicted_w"]))
         drawn["waypoints"] = [
             [number, [item.x, item.y]]
             for number, item in enumerate(result.conversion.mission.items, 1)
@@ -149,7 +149,7 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
     return drawn
 
 
-def _thinned(values: Real) -> Real:
+def thinned(values: Real) -> Real:
     """Return at most `_MOST_DRAWN` of `values` (n, ...), the first and the last among them."""
     kept = np.linspace(0, len(values) - 1, min(len(values), _MOST_DRAWN)).round().astype(int)
     return np.asarray(values[kept])
@@ -173,25 +173,3 @@ def made(result: Result, wanted: str) -> tuple[str, bytes]:
                 raise PlanError(f"the mission has no {wanted.removeprefix('.')} file")
             mission = found[0]
         return mission.name, mission.read_bytes()
-
-
-def uploaded(result: Result, connection: str) -> str:
-    """Upload the mission of `result` to `connection`, read it back, compare; return what to tell.
-
-    What the command line would not upload is not uploaded: a mission with errors, or that of a plan
-    beyond its vehicle. Nothing is armed or started.
-    """
-    from faao_mav.mavlink.client import upload
-    from faao_mav.mavlink.upload_text import upload_text
-    from faao_mav.schedule.conversion import beyond_vehicle
-
-    try:
-        if result.conversion is None or not result.flyable:
-            raise PlanError("the mission does not pass validation; do not fly it")
-        if beyond := beyond_vehicle(result.solution.plan):
-            raise PlanError("\n".join(beyond))
-        report = upload(result.conversion.mission, connection, note=lambda _: None)
-    except FaaoError as error:
-        return f"failed       {error}"
-    told = upload_text(report)
-    return told if report.verified else f"{told}\nthe mission is not verified; do not fly it"

@@ -22,8 +22,8 @@ _GREY, _COLOURS = "#888", ("#3b7ddd", "#d9731a", "#2a9d5c", "#8a5cd0", "#c23b6a"
 def options(series: dict[str, list[float]], unit: str) -> dict[str, Any]:
     """Return the charts of `series` over its `t`, s; amounts of data are in `unit`."""
     plots = [plot for plot in _PLOTS if plot[0][0] in series]
-    axis = {"type": "value", "splitNumber": 3, "splitLine": {"lineStyle": {"opacity": 0.25}},
-            "axisLabel": {"color": _GREY}}  # fmt: skip
+    axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
+            "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
     xs, ys, curves = [], [], []
     for k, (names, of) in enumerate(plots):
         title = f"{', '.join(names)}, {of.format(unit=unit)}"

@@ -51,13 +51,13 @@ class Guard:
         answer: Response
         if not self._from_here(asked):
             answer = PlainTextResponse("this address is not used from other pages\n", 403)
-        elif self._equal(asked.cookies.get(self._cookie, "")):
-            await self._inner(scope, receive, _with_headers(send))
-            return
         elif scope["type"] == "http" and scope["method"] == "GET" and self._equal(given):
             path = "/" + scope["path"].lstrip("/")
             answer = RedirectResponse(f"{path}?{urlencode(query)}" if query else path, 303)
             answer.set_cookie(self._cookie, self._token, httponly=True, samesite="lax")
+        elif self._equal(asked.cookies.get(self._cookie, "")):
+            await self._inner(scope, receive, _with_headers(send))
+            return
         else:
             answer = PlainTextResponse("open the address that faao-mission app printed\n", 403)
         refusal = answer if scope["type"] == "http" else WebSocketClose(1008)

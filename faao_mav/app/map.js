@@ -37,6 +37,8 @@ export default {
     const group = () => L.layerGroup().addTo(this.map);
     Object.assign(this, { zones: group(), route: group(), marks: group(), handles: group() });
     this.aircraft = L.marker([0, 0], { icon: icon("aircraft", "✈"), interactive: false, zIndexOffset: 900 });
+    this.vehicle = L.marker([0, 0], { icon: icon("vehicle", "Vehicle"), interactive: false, zIndexOffset: 950 });
+    this.track = L.polyline([], { className: "flown", interactive: false });
     this.map.on("mousemove", (e) => this.tell("cursor", { at: pair(e.latlng) }));
     this.map.on("click", (e) => (this.drawing ? this.corner(e.latlng) : this.select(null)));
     this.map.on("dblclick", () => this.finish());
@@ -202,14 +204,26 @@ export default {
       if (at) this.aircraft.setLatLng(at).addTo(this.map);
       else this.aircraft.remove();
     },
+    // Where a vehicle was: the line of a flight, and a point more of it with the vehicle there.
+    flown(places) {
+      this.vehicle.remove();
+      this.track.setLatLngs(places).addTo(this.map);
+    },
+    flies(at) {
+      this.track.addLatLng(at);
+      this.vehicle.setLatLng(at).addTo(this.map);
+    },
     focus(at) {
       this.map.setView(at, Math.max(this.map.getZoom(), 17));
       const ring = L.circleMarker(at, { radius: 16, className: "found", interactive: false }).addTo(this.map);
       setTimeout(() => ring.remove(), 2500);
     },
-    background(url, attribution) {
+    background(map) {
       this.tiles?.remove();
-      this.tiles = url ? L.tileLayer(url, { attribution, maxZoom: 22, maxNativeZoom: 19 }).addTo(this.map) : null;
+      this.tiles = null;
+      if (!map) return;
+      const { url, attribution, deepest } = map;
+      this.tiles = L.tileLayer(url, { attribution, maxZoom: 22, maxNativeZoom: deepest }).addTo(this.map);
     },
   },
 };

@@ -1,6 +1,7 @@
 """The page of one window: the map, the plan beside it, what the flight delivers, and its files."""
 
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -12,17 +13,17 @@ from nicegui import events, ui
 from faao_mav.app import charts
 from faao_mav.app.answers import FILES, Answer, made
 from faao_mav.app.document import Document, problems_of
+from faao_mav.app.fly import Fly
 from faao_mav.app.form import Form, fields
 from faao_mav.app.guard import TILES
 from faao_mav.app.map import PlannerMap
 from faao_mav.app.planner import Planner
 from faao_mav.app.results import Results
 from faao_mav.app.scene import STATIONS, Scene
+from faao_mav.app.tiles import OPEN_STREET_MAP, Background
 from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.plan.yaml_text import MAX_CHARACTERS
-
-_ATTRIBUTION = '&copy; <a href="https://openstreetmap.org/copyright">OpenStreetMap</a> contributors'
 
 _HINTS = {
     "circle": "Click the center, then the edge; Esc ends.",
@@ -46,8 +47,8 @@ class Page:
     for answers; `_show` takes them.
     """
 
-    def __init__(self, document: Document, workers: Workers) -> None:
-        self._document, self._workers = document, workers
+    def __init__(self, document: Document, workers: Workers, background: Background) -> None:
+        self._document, self._workers, self._background = document, workers, background
         self._planner = Planner(workers, self._show)
         self._answer, self._gestures = Answer(), 0
         self._form = Form(document, self._changed)
@@ -65,6 +66,7 @@ class Page:
         ui.keyboard(self._key)
         # not on_disconnect: a connection that was lost for a moment comes back
         ui.context.client.on_delete(self._planner.close)
+        ui.context.client.on_delete(self._fly.close)
 
     def _bar(self) -> None:
         with ui.element("header").classes("bar"):
@@ -101,10 +103,10 @@ class Page:
                                 partial(self._hint, _HINTS[shape]))  # fmt: skip
             _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
             _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
-            ui.switch("Background", on_change=self._background).tooltip(
-                "OpenStreetMap: the parts of the map that you look at are asked for from "
-                f"{TILES.removeprefix('https://')}"
-            )
+            shown = ui.switch("Background", on_change=self._show_background)
+            if self._background is OPEN_STREET_MAP:
+                shown.tooltip("OpenStreetMap: the parts of the map that you look at are asked for "
+                              f"from {TILES.removeprefix('https://')}")  # fmt: skip
         self._map.move(target_index=-1)
         self._map.on("ready", self._ready)
         self._map.on("moved", self._moved)
@@ -121,12 +123,13 @@ class Page:
     def _side_part(self) -> None:
         self._failed = ui.label().classes("failed").props('role="alert"')
         with ui.tabs().props("dense no-caps align=justify") as tabs:
-            for tab in ("Plan", "Result", "Findings", "Upload"):
+            for tab in ("Plan", "Result", "Findings", "Fly"):
                 ui.tab(tab)
         with ui.tab_panels(tabs, value="Plan", keep_alive=True).classes("w-full"):
             with ui.tab_panel("Plan"):
                 self._form.build()
             self._results = Results(partial(self._map.run_method, "focus"))
+            self._fly = Fly(self._workers, self._map.run_method)
 
     def _ready(self) -> None:
         self._draw_scene(fit=True)
@@ -142,7 +145,7 @@ class Page:
         self._undo.set_enabled(document.can_undo)
         self._redo.set_enabled(document.can_redo)
         self._save_button.set_enabled(document.path is not None and not document.saved)
-        self._results.stale()
+        self._fly.stale()
         self._say("computing")
         self._planner.ask(document.text, document.source, soon=soon)
 
@@ -186,6 +189,7 @@ class Page:
         self._at_time()
         if answer.result is not None:
             self._results.show(answer.result)
+            self._fly.show(answer.result)
 
     def _draw_scene(self, *, fit: bool = False) -> None:
         scene = Scene(self._document)
@@ -230,9 +234,8 @@ class Page:
         self._chart.run_chart_method("dispatchAction", tip)
         self._now.text = f"{series['t'][k]:.1f} s, {series['speed'][k]:.2f} m/s"
 
-    def _background(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        url = f"{TILES}/{{z}}/{{x}}/{{y}}.png" if event.value else None
-        self._map.run_method("background", url, _ATTRIBUTION)
+    def _show_background(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        self._map.run_method("background", asdict(self._background) if event.value else None)
 
     def _key(self, event: events.KeyEventArguments) -> None:
         if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):

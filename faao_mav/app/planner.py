@@ -100,4 +100,9 @@ async def _told(job: Awaitable[Answer]) -> Answer:
     except FaaoError as error:
         return Answer(failed=str(error))
     except Exception as error:  # a page that waits for ever says nothing
-        return Answer(failed=f"a mistake of faao-mav, please report it: {error!r}")
+        return Answer(failed=mistake(error))
+
+
+def mistake(error: Exception) -> str:
+    """Return what is said of an `error` that should not be."""
+    return f"a mistake of faao-mav, please report it: {error!r}"

@@ -1,48 +1,27 @@
-"""What comes of a finished flight: its figures, what validation found, and its upload."""
+"""What comes of a finished flight: its figures, and what validation found."""
 
 from collections.abc import Callable
 from functools import partial
 
-from nicegui import run, ui
+from nicegui import ui
 
-from faao_mav.app.answers import uploaded
 from faao_mav.report.summary import by_rule, message_of, result_lines
 from faao_mav.validate import Finding
 from faao_mav.workflow import Result
 
 
 class Results:
-    """The panels "Result", "Findings" and "Upload".
-
-    `focus` shows a [latitude, longitude] on the map. `show` is for a finished flight, `stale` for
-    when the plan has changed since: what is shown stays, what it led to is not uploaded.
-    """
+    """The panels "Result" and "Findings"; `focus` shows a [latitude, longitude] on the map."""
 
     def __init__(self, focus: Callable[[list[float]], object]) -> None:
         self._focus = focus
-        self._result: Result | None = None
         with ui.tab_panel("Result"):
             self._facts = ui.element("dl").classes("facts")
         with ui.tab_panel("Findings"):
             self._findings = ui.column().classes("findings")
-        with ui.tab_panel("Upload"):
-            ui.label("The mission is put on the vehicle, read back and compared. It is not armed "
-                     "or started.")  # fmt: skip
-            self._connection = ui.input("Connection", value="udpout:127.0.0.1:14550")
-            self._connection.classes("w-full")
-            self._button = ui.button("Upload and verify", on_click=self._upload)
-            self._button.props("no-caps unelevated").classes("mt-2")
-            self._uploaded = ui.label().classes("uploaded").props('aria-live="polite"')
-
-    def stale(self) -> None:
-        """Take what is shown for that of another plan."""
-        self._result = None
-        self._button.set_enabled(False)
 
     def show(self, result: Result) -> None:
         """Show what is to be said of `result` in the place of what was."""
-        self._result = result
-        self._button.set_enabled(result.flyable)
         self._facts.clear()
         with self._facts:
             for line in result_lines(result):
@@ -69,11 +48,3 @@ class Results:
             if item.x or item.y:
                 show = partial(self._focus, [item.x, item.y])
                 ui.button(f"item {number}", on_click=show).props("flat dense no-caps icon=place")
-
-    async def _upload(self) -> None:
-        if (result := self._result) is None:
-            return
-        self._button.disable()
-        self._uploaded.text = "Uploading"
-        self._uploaded.text = await run.io_bound(uploaded, result, str(self._connection.value))
-        self._button.set_enabled(self._result is not None and self._result.flyable)

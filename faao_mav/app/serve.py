@@ -11,6 +11,7 @@ from html import escape
 from pathlib import Path
 
 from faao_mav.app.document import Document
+from faao_mav.app.tiles import OPEN_STREET_MAP, TileFile
 from faao_mav.errors import FaaoError, InputError
 
 LOOPBACK = ("127.0.0.1", "localhost")
@@ -25,11 +26,13 @@ def serve(
     host: str,
     port: int,
     browser: bool,
+    tiles: TileFile | None,
     note: Callable[[str], None],
 ) -> None:
     """Serve the page until interrupted; each window `begin`s with a document of its own.
 
-    `port` 0 stands for any that is free. `note` is told the address, with the token in it; with
+    `port` 0 stands for any that is free. `tiles` are served as the background map in the stead of
+    OpenStreetMap's. `note` is told the address, with the token in it; with
     `browser` that is opened. Raises `InputError` where the port cannot be had, or NiceGUI, which
     the extra `app` brings, is not installed.
     """
@@ -40,7 +43,7 @@ def serve(
         raise InputError(
             "faao-mission app: the page is served by nicegui: pip install 'faao-mav[app]'"
         ) from None
-    from fastapi import FastAPI
+    from fastapi import FastAPI, Response
     from nicegui import ui
 
     from faao_mav.app.guard import Guard
@@ -54,11 +57,20 @@ def serve(
     @ui.page("/", title="faao-mission")
     def page() -> None:
         try:
-            Page(begin(), workers).build()
+            Page(begin(), workers, tiles.background if tiles else OPEN_STREET_MAP).build()
         except FaaoError as error:  # the file is another one by now
             ui.label(str(error))
 
     inner = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    if tiles is not None:
+
+        @inner.get("/tiles/{zoom}/{x}/{y}")
+        def tile(zoom: int, x: int, y: int) -> Response:
+            found = tiles.tile(zoom, x, y)
+            if found is None:
+                return Response(status_code=204)
+            return Response(found, media_type=tiles.media_type)
+
     ui.run_with(inner, dark=None, show_welcome_message=False)
     names = LOOPBACK if host in LOOPBACK else (host, *LOOPBACK)
     guarded = Guard(inner, token, names, port)

@@ -3,6 +3,7 @@
 import asyncio
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -23,10 +24,11 @@ _ENDED = "the process that computes has ended; change the plan again"
 
 
 class Workers:
-    """One process that stays, for short jobs that share tables, and one for each long job.
+    """One process that stays, for short jobs that share tables, and one for each other job.
 
-    Setup, once: `Workers()`, which begins to load what jobs need; per job: `short` or `long`;
-    at the end: `stop`. A long job whose wait is cancelled ends at once: its process is killed.
+    Setup, once: `Workers()`, which begins to load what jobs need; per job: `short`, `long` or
+    `talk`; at the end: `stop`. A job of a process of its own ends with its wait: cancelled, the
+    process is killed.
     """
 
     def __init__(self) -> None:
@@ -54,19 +56,44 @@ class Workers:
     async def long(self, work: Callable[..., T], *arguments: Any) -> T:
         """Return what `work` returns, or raise what it raises, of a process of its own."""
         async with self._free:
-            receiver, sender = self._context.Pipe(duplex=False)
-            process = self._context.Process(target=_job, args=(sender, work, arguments))
-            process.daemon = True
-            process.start()
-            sender.close()
-            try:
-                # a process that is killed closes its end: the thread that waits ends too
-                done, value = await asyncio.to_thread(receiver.recv)
-            except EOFError:
-                raise FaaoError(_ENDED) from None
-            finally:
-                process.kill()
-        if not done:
+            return await self._run(work, arguments, None)
+
+    async def talk(
+        self, work: Callable[..., T], hear: Callable[[Any], object], *arguments: Any
+    ) -> T:
+        """Do the same, but at once and giving way to nothing: what cannot wait for its turn.
+
+        The first argument of `work` is a function; what that is given is given to `hear`.
+        """
+        return await self._run(work, arguments, hear)
+
+    def event(self) -> Any:
+        """Return an `Event` that can be an argument of a job."""
+        return self._context.Event()
+
+    async def _run(
+        self,
+        work: Callable[..., T],
+        arguments: tuple[object, ...],
+        hear: Callable[[Any], object] | None,
+    ) -> T:
+        receiver, sender = self._context.Pipe(duplex=False)
+        told = (sender, work, arguments, hear is not None)
+        process = self._context.Process(target=_job, args=told)
+        process.daemon = True
+        process.start()
+        sender.close()
+        try:
+            # a process that is killed closes its end: the thread that waits ends too
+            while (message := await asyncio.to_thread(receiver.recv))[0] == "tells":
+                if hear is not None:
+                    hear(message[1])
+        except EOFError:
+            raise FaaoError(_ENDED) from None
+        finally:
+            process.kill()
+        ending, value = message
+        if ending == "fails":
             raise value
         return value  # type: ignore[no-any-return]
 
@@ -76,11 +103,16 @@ class Workers:
             self._pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _job(sender: Connection, work: Callable[..., object], arguments: tuple[object, ...]) -> None:
-    if hasattr(os, "nice"):
+def _job(
+    sender: Connection, work: Callable[..., object], arguments: tuple[object, ...], talks: bool
+) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the page, which ends its jobs
+    if talks:
+        arguments = (lambda told: sender.send(("tells", told)), *arguments)
+    elif hasattr(os, "nice"):
         os.nice(_NICE)
     try:
-        outcome: tuple[bool, object] = True, work(*arguments)
+        outcome: tuple[str, object] = "returns", work(*arguments)
     except Exception as error:  # told to whom has asked
-        outcome = False, error
+        outcome = "fails", error
     sender.send(outcome)

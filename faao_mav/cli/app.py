@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from faao_mav.cli.shared import exit_status, flag, note, option
+from faao_mav.cli.shared import File, exit_status, flag, note, option
 
 _EMPTY = """\
 name: new relay
@@ -33,19 +33,24 @@ def app(
     host: Annotated[
         str, option("ADDRESS", "The address to serve at; not loopback: others can reach it.")
     ] = "127.0.0.1",
+    mbtiles: Annotated[
+        File, option("FILE", "A background map for the field: an MBTiles file of pictures.")
+    ] = None,
     no_browser: Annotated[bool, flag("--no-browser", "Only print the address.")] = False,
 ) -> None:
     """Serve the planner page: drag stations, draw zones, see the flight.
 
     The address that is printed has a token in it: who does not have the token gets nothing. The
-    file is written by Save alone. Nothing is fetched from elsewhere unless a background map is
-    switched on.
+    file is written by Save alone. Nothing is fetched from elsewhere unless the background map is
+    switched on; that of --mbtiles is served by this command too.
     """
     from faao_mav.app.document import Document
     from faao_mav.app.serve import serve
+    from faao_mav.app.tiles import TileFile
 
     def begin() -> Document:
         return Document(_EMPTY) if plan_file is None else Document.open(plan_file)
 
     begin()  # what is no plan is refused at once
-    serve(begin, host=host, port=port, browser=not no_browser, note=note)
+    tiles = None if mbtiles is None else TileFile(mbtiles)
+    serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=note)

@@ -1,7 +1,6 @@
 """`faao-mission debrief`: what became of a plan in a real flight, from its log."""
 
 import json
-import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
     from faao_mav.validate.calibrate import Calibrated
     from faao_mav.validate.flown import Debriefing
     from faao_mav.workflow import Result
-
-_SAME = 1e-5
-"""Relative difference of two parameters that single precision does not tell apart."""
 
 
 @exit_status()
@@ -56,28 +52,20 @@ def debrief(
         check_writable(report)
     read = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     check_apart({"--report": report}, read)
-    from faao_mav.errors import FaaoError
     from faao_mav.mavlink.flying.logs import read_log
     from faao_mav.mavlink.flying.radio import UdpRadio, replay, replayed
+    from faao_mav.report.debrief import debriefed, other_parameters, remarks_on
     from faao_mav.report.summary import debriefing_lines, joined
-    from faao_mav.validate.flown import Line, planned_line
+    from faao_mav.validate.flown import Line
     from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 
     to = None if radio is None else UdpRadio(radio)
     record = read_log(log)
     solution = planned(plan_file, solution_file)
     assert solution is not None
-    result, line = with_mission(Result(solution)), planned_line(solution)
-    if result.conversion is not None:
-        track = result.conversion.schedule.track()
-        line = Line(track["predicted_t"], track["predicted_w"])
-    found = record.debriefing(solution, line)
-    if found is None:
-        raise FaaoError(
-            f"{log}: the plan's flight is not in it: no departure from flight.start like the "
-            f"predicted one in {record.t[-1] - record.t[0]:.0f} s of flight"
-        )
-    remarks = list(_remarks(record, found, result))
+    result = with_mission(Result(solution))
+    found = debriefed(record, result, str(log))
+    remarks = list(remarks_on(record, found, result))
     calibrated = _calibrated(record, found, result) if calibrate else []
     if calibrate:
         remarks += _calibration_lines(calibrated)
@@ -89,7 +77,7 @@ def debrief(
     if as_json:
         told = debriefing_as_dict(found) | {
             "wind": None,
-            "parameters": dict(_differing(record, result)),
+            "parameters": other_parameters(record, result),
         }
         if calibrate:
             told["calibrated"] = [asdict(each) for each in calibrated]
@@ -128,35 +116,3 @@ def _calibration_lines(calibrated: "list[Calibrated]") -> "Iterator[Line]":
         change = f"{each.name} {each.better:g} instead of {each.value:g}"
         text = f"{each.rms_better:.2f} m rms from the flight instead of {each.rms:.2f}"
         yield "calibrated", f"{change}: the prediction is {text}"
-
-
-def _remarks(record: "FlightRecord", found: "Debriefing", result: "Result") -> "Iterator[Line]":
-    """Yield what the log says of wind and parameters."""
-    wind = record.mean_wind(found.start, found.solution.plan.flight.duration)
-    if wind is None:
-        yield "wind", "not estimated by the autopilot"
-    else:
-        east, north = map(float, wind)
-        source = math.degrees(math.atan2(-east, -north)) % 360
-        yield "wind", f"{math.hypot(east, north):.1f} m/s from {source:.0f} degrees, as estimated"
-    timed = result.conversion.parameters if result.conversion is not None else {}
-    differing = _differing(record, result)
-    known = sum(name in record.parameters for name in timed)
-    if differing:
-        text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in differing.items())
-        yield "parameters", f"other than the mission is timed for: {text}"
-    elif timed and known:
-        yield "parameters", f"{known} in the log, as the mission is timed for"
-    elif timed:
-        yield "parameters", "not in the log"
-
-
-def _differing(record: "FlightRecord", result: "Result") -> dict[str, tuple[float, float]]:
-    """Return by name the value in the log and the one that the mission is timed for, if another."""
-    timed = result.conversion.parameters if result.conversion is not None else {}
-    return {
-        name: (record.parameters[name], value)
-        for name, value in timed.items()
-        if name in record.parameters
-        and not math.isclose(record.parameters[name], value, rel_tol=_SAME)
-    }

@@ -1,5 +1,6 @@
 """The planner page in a real Chromium: what is dragged and drawn, told, downloaded and uploaded."""
 
+import base64
 import json
 import math
 import os
@@ -19,13 +20,18 @@ import numpy as np
 import pytest
 from conftest import FLYABLE, free_port
 from served import running
+from test_tiles import mbtiles
 from typer.testing import CliRunner
 
+from faao_mav.arrays import Real
 from faao_mav.cli.main import app
 from faao_mav.errors import PlanError
+from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
+from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
+from faao_mav.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page
@@ -38,7 +44,12 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium to show th
 PLAN = "# a comment that stays" + FLYABLE.replace("  causal: false\n", "").replace(
     "duration: 10", "duration: 14"
 )
+LOGS = Path(__file__).parents[1] / "data" / "logs"
 HOME = Home(-35.363262, 149.165237, 584.0)
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
+"""A picture of one pixel."""
 RUN = "from faao_mav.cli.main import run\nif __name__ == '__main__':\n    run()\n"
 WAIT = 40_000
 """Milliseconds until something on the page has happened: the machine may be busy."""
@@ -81,8 +92,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     plan, script = folder / "plan.yaml", folder / "run.py"
     plan.write_text(PLAN)
     script.write_text(RUN)
+    tiles = mbtiles(folder / "field.mbtiles", ((0, 0, 0, PIXEL),))
     server = subprocess.Popen(
-        [sys.executable, str(script), "app", str(plan), "--no-browser"],
+        [sys.executable, str(script), "app", str(plan), "--no-browser", "--mbtiles", str(tiles)],
         stderr=subprocess.PIPE, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"},
     )  # fmt: skip
     try:
@@ -113,11 +125,19 @@ def finished(page: "Page") -> float:
     return float(page.locator(".rate").get_attribute("data-delivered") or "nan")
 
 
-def route_of(page: "Page") -> list[str]:
-    """Return the lines of the route as they are drawn."""
-    lines = page.locator("path.route").evaluate_all("all => all.map(x => x.getAttribute('d'))")
-    assert lines
-    return [str(line) for line in lines]
+def route_of(page: "Page") -> Real:
+    """Return latitude and longitude (n, 2) of the route as it is drawn."""
+    drawn = page.evaluate(
+        """() => {
+          const element = document.querySelector('.planner-map');
+          const page = document.querySelector('#app')._vnode.component.proxy;
+          const map = page.$refs['r' + element.id.slice(1)];
+          const lines = map.route.getLayers().filter((line) => line.options.className === 'route');
+          return lines.map((line) => line.getLatLngs().map((p) => [p.lat, p.lng]));
+        }"""
+    )
+    first, *rest = drawn
+    return np.array([*first, *(place for line in rest for place in line[1:])])
 
 
 def drag(page: "Page", title: str, east: float, north: float) -> None:
@@ -161,17 +181,26 @@ def test_a_dragged_user_changes_flight_and_rate_as_the_command_line_says(
     window: "Page", served: Served, tmp_path: Path
 ) -> None:
     first, route = finished(window), route_of(window)
-    drag(window, "User", 200, 60)
+    for _ in range(2):
+        window.locator(".leaflet-control-zoom-out").click()
+        window.wait_for_timeout(400)  # the map has zoomed
+    drag(window, "User", 150, 60)
     text = saved(window, served)
     rate = finished(window)
-    assert abs(rate - first) > 0.01
-    assert route_of(window) != route
     assert text.startswith("# a comment that stays")
-    moved = parse_plan(text).radio.ground_user.position
-    assert math.dist(moved, (60, 60)) > 30
-    out = tmp_path / "mission.waypoints"
-    told = command_line(served.plan, "--out", out, "--precoders", tmp_path / "precoders.csv")
+    moved = parse_plan(text)
+    assert math.dist(moved.radio.ground_user.position, (60, 60)) > 100
+    out, result = tmp_path / "mission.waypoints", tmp_path / "result.npz"
+    told = command_line(
+        served.plan, "--out", out, "--precoders", tmp_path / "precoders.csv", "--save", result
+    )
+    assert abs(rate - first) > 0.01
     assert rate == pytest.approx(told["delivered_rate"], abs=1e-6)
+    frame = LocalFrame(moved.origin.latitude, moved.origin.longitude)
+    with np.load(result) as archive:
+        flown = np.stack(frame.to_geodetic(archive["w"]), axis=1)
+    assert np.abs(route_of(window) - flown).max() < 1e-8
+    assert np.abs(route - flown).max() > 1e-4
 
     # what is downloaded is what the command line writes
     assert downloaded(window, "Mission, QGC WPL 110 (.waypoints)") == out.read_bytes()
@@ -232,18 +261,53 @@ def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
     assert window.locator(".q-field--error").count() == 0
 
 
-def test_an_upload_to_the_mock_is_verified(window: "Page") -> None:
+def test_a_mission_is_uploaded_watched_and_started_once_that_is_confirmed(window: "Page") -> None:
     port = free_port()
-    with running(
-        MockAutopilot(behaviour_of("ardupilot"), home=HOME), f"udpin:127.0.0.1:{port}"
-    ) as mock:
-        window.get_by_role("tab", name="Upload").click()
+    mock = MockAutopilot(
+        behaviour_of("ardupilot"), home=HOME, fly=predicted(Vehicle()), beat=0.1, speedup=20.0
+    )
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        window.get_by_role("tab", name="Fly").click()
         window.get_by_label("Connection").fill(f"udpout:127.0.0.1:{port}")
         window.get_by_role("button", name="Upload and verify").click()
         told = window.locator(".uploaded", has_text="verified")
         told.wait_for()
         assert "read back and compared" in told.inner_text()
-    assert mock is not None
+
+        arm = window.get_by_role("button", name="Arm and start")
+        assert arm.is_disabled()
+        window.get_by_role("button", name="Watch").click()
+        window.locator(".stands", has_text="waiting").wait_for()
+        arm.click()
+        window.get_by_role("button", name="Cancel").click()
+        window.locator(".q-dialog").wait_for(state="detached")
+        arm.click()
+        assert not mock.armed
+        window.get_by_role("button", name="Yes, arm it").click()
+        window.locator(".stands", has_text="flying").wait_for()
+        assert mock.armed
+        told = window.locator(".uploaded", has_text="landed and disarmed")
+        told.wait_for()
+    assert re.search(r"^flown +delivers .* % of the plan", told.inner_text(), re.MULTILINE)
+    assert window.locator(".mark-vehicle").count() == 1
+    window.locator("path.flown[d*=L]").wait_for()
+
+
+def test_a_log_that_is_dropped_is_told_as_the_command_line_tells_it(window: "Page") -> None:
+    log, plan = LOGS / "arducopter.tlog", LOGS / "plan.yaml"
+    window.get_by_role("tab", name="Fly").click()
+    told = window.locator(".debriefing")
+    window.locator(".log input").set_input_files(log)
+    window.get_by_text("the plan's flight is not in it").wait_for()  # that of another plan
+    window.locator('[aria-label="Open a plan"]').click()
+    window.locator(".q-dialog input").set_input_files(plan)
+    window.locator(".state[data-state=computing]").wait_for()
+    finished(window)
+    window.locator(".log input").set_input_files(log)
+    window.locator(".debriefing", has_text="delivers").wait_for()
+    said = CliRunner().invoke(app, ["debrief", str(log), "--plan", str(plan)])
+    assert told.inner_text().splitlines() == said.output.splitlines()
+    window.locator("path.flown[d*=L]").wait_for()
 
 
 def test_two_windows_do_not_disturb_each_other(window: "Page", served: Served) -> None:
@@ -255,6 +319,10 @@ def test_two_windows_do_not_disturb_each_other(window: "Page", served: Served) -
     assert finished(other) == rate
     # a phone shows it without scrolling sideways
     assert other.evaluate("document.documentElement.scrollWidth") <= 390
+    # the background map of the field
+    assert window.locator("img.leaflet-tile").count() == 0
+    window.get_by_role("switch", name="Background").click()
+    window.locator("img.leaflet-tile-loaded").wait_for()
     # what another window has saved is not overwritten
     text = served.plan.read_text()
     other.locator(".bar .name").click()
@@ -275,11 +343,14 @@ def test_without_the_token_there_is_nothing_and_no_other_page_gets_in(served: Se
             return error.code
 
     assert answer(here) == answer(f"{here}_nicegui/static/nicegui.js") == 403
+    assert answer(f"{here}tiles/0/0/0") == 403
     socket_io = "_nicegui_ws/socket.io/?EIO=4&transport=polling"
     assert answer(here + socket_io) == 403
     port = here.rpartition(":")[2].strip("/")
     cookie = f"faao-app-{port}={query.removeprefix('token=')}"
     assert answer(here + socket_io, Cookie=cookie) == 200
+    assert answer(f"{here}tiles/0/0/0", Cookie=cookie) == 200
+    assert answer(f"{here}tiles/1/0/0", Cookie=cookie) == 204
     assert answer(here + socket_io, Cookie=cookie, Origin="http://evil.org") == 403
     with socket.socket() as elsewhere:  # it listens on loopback alone
         elsewhere.settimeout(2)

@@ -49,6 +49,7 @@ def status(*answer: Any, **asked: Any) -> int:
 
 def test_the_token_in_the_address_becomes_a_cookie_and_leaves_the_address() -> None:
     start, _ = ask("//elsewhere.org", query=f"token={TOKEN}&a=b")
+    assert status(query=f"token={TOKEN}", cookie=COOKIE) == 303  # a second window
     headers = dict(start["headers"])
     assert start["status"] == 303
     assert headers[b"location"] == b"/elsewhere.org?a=b"

@@ -1,0 +1,74 @@
+"""What became of a plan in a flight, watched or from a log, in lines for people."""
+
+import math
+from collections.abc import Iterator
+
+from faao_mav.errors import FaaoError
+from faao_mav.mavlink.flying.fly import FlightReport
+from faao_mav.mavlink.flying.record import FlightRecord
+from faao_mav.report.summary import Line, debriefing_lines
+from faao_mav.validate import flown
+from faao_mav.validate.flown import Debriefing
+from faao_mav.workflow import Result
+
+_SAME = 1e-5
+"""Relative difference of two parameters that single precision does not tell apart."""
+
+
+def flight_lines(report: FlightReport, found: Debriefing | None) -> Iterator[Line]:
+    """Yield the lines of a flight that was watched: differences, what was `found`, its ending."""
+    yield from (("different", str(each)) for each in report.differences)
+    if found is not None:
+        yield from debriefing_lines(found)
+    if report.ending is not None:
+        yield report.ending.kind, report.ending.text
+
+
+def debriefed(record: FlightRecord, result: Result, source: str) -> Debriefing:
+    """Return what became of the plan of `result` in the flight `record` of the log `source`.
+
+    Raises `FaaoError` where the plan's flight is not in it.
+    """
+    line = flown.planned_line(result.solution)
+    if result.conversion is not None:
+        track = result.conversion.schedule.track()
+        line = flown.Line(track["predicted_t"], track["predicted_w"])
+    found = record.debriefing(result.solution, line)
+    if found is None:
+        raise FaaoError(
+            f"{source}: the plan's flight is not in it: no departure from flight.start like the "
+            f"predicted one in {record.t[-1] - record.t[0]:.0f} s of flight"
+        )
+    return found
+
+
+def remarks_on(record: FlightRecord, found: Debriefing, result: Result) -> Iterator[Line]:
+    """Yield what the log says of wind and parameters."""
+    wind = record.mean_wind(found.start, found.solution.plan.flight.duration)
+    if wind is None:
+        yield "wind", "not estimated by the autopilot"
+    else:
+        east, north = map(float, wind)
+        source = math.degrees(math.atan2(-east, -north)) % 360
+        yield "wind", f"{math.hypot(east, north):.1f} m/s from {source:.0f} degrees, as estimated"
+    timed = result.conversion.parameters if result.conversion is not None else {}
+    differing = other_parameters(record, result)
+    known = sum(name in record.parameters for name in timed)
+    if differing:
+        text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in differing.items())
+        yield "parameters", f"other than the mission is timed for: {text}"
+    elif timed and known:
+        yield "parameters", f"{known} in the log, as the mission is timed for"
+    elif timed:
+        yield "parameters", "not in the log"
+
+
+def other_parameters(record: FlightRecord, result: Result) -> dict[str, tuple[float, float]]:
+    """Return by name the value in the log and the one that the mission is timed for, if another."""
+    timed = result.conversion.parameters if result.conversion is not None else {}
+    return {
+        name: (record.parameters[name], value)
+        for name, value in timed.items()
+        if name in record.parameters
+        and not math.isclose(record.parameters[name], value, rel_tol=_SAME)
+    }
