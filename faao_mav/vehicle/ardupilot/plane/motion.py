@@ -1,6 +1,6 @@
 """An aeroplane with the guidance that banks it and the energy that carries it.
 
-Constants that say no other are fitted to eleven flights of ArduPilot's simulator from sea level
+Constants that say no other are fitted to flights of ArduPilot's simulator from sea level
 (`tests/benchmarks/flights_arduplane.py`): they are its aircraft's.
 """
 
@@ -38,9 +38,7 @@ class Motion:
     acceleration 4 ζ² V² / L sin η, η the angle from its course to that point. It banks for that
     as in a coordinated turn.
 
-    Speed and height are held by total energy control (Lambregts, AIAA 83-2239): thrust by the sum
-    of the errors of kinetic and potential energy, pitch by their difference, both for a demanded
-    speed that changes no faster than the aircraft may gain and lose energy.
+    Speed and height are held by total energy control: see `energy`.
 
     Banks and energy turn and speed up the flight through the air, which moves steadily at `wind`;
     guidance sees the flight over ground, the sum of both.
