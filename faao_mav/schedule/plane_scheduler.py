@@ -2,14 +2,17 @@
 
 An aeroplane aims at a point far ahead on its track: it cuts into bends and swings out of them. So
 its waypoints are moved against its predicted offsets from the plan, again and again, with more of
-them where that is not enough; then the speeds are fitted. It cannot wait, and it is slow to change
-its speed: time that it loses it cannot always make up for.
+them where that is not enough; then the speeds are fitted. Waypoints are judged by the path alone:
+the speeds mend the time. The aircraft cannot wait, and it is slow to change its speed: a change
+begins legs before the plan's, and time that is lost it cannot always make up for.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from faao_mav.schedule.ramped import RampedRetimed
+from faao_mav.schedule.retimed import LegTimes, Retimed
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import Scheduler
@@ -23,6 +26,9 @@ _MOVE_SHARE = 0.5
 
 _SPLITS = 2  # times that legs are split off which the flight strays too far; chosen
 _STRAY = 0.5  # the share of the path tolerance beyond which a leg is split; chosen
+_ROUNDS = 3  # times that waypoints are moved and speeds fitted, in turn; chosen
+# Where the plan's speed changes by more than this share, its legs are split so often, s; chosen.
+_CHANGE, _CHANGE_SPACING = 0.05, 3.0
 _SHORTEST_TIME = 1.5  # the least time from a new waypoint to the next one, s; chosen
 
 
@@ -36,6 +42,7 @@ class PlaneScheduler(Scheduler):
         Its speeds are the airspeeds to command for the plan's.
         """
         ratio = self.vehicle.type.true_over_commanded(self.vehicle, self.altitude)
+        route = self._with(route, self._changes(route))
         ways = np.diff(route.positions, axis=0)
         ground = ways * (route.speeds / lengths(ways))[:, None]
         speeds = np.clip(lengths(ground - self.wind) / ratio, self.min_speed, self.max_speed)
@@ -44,7 +51,7 @@ class PlaneScheduler(Scheduler):
             if best.deviation.path <= self.tolerance:
                 break
             split = self._kept(self._split(best))
-            if split.cost >= best.cost:
+            if split.deviation.path >= best.deviation.path:
                 break
             best = split
         return best
@@ -55,7 +62,7 @@ class PlaneScheduler(Scheduler):
         schedule = best = self.flight(route)
         for _ in range(_MOVES):
             schedule = self.flight(self.moved(schedule, points, _MOVE_SHARE))
-            if schedule.cost < best.cost:
+            if schedule.deviation.path < best.deviation.path:
                 best = schedule
         return best
 
@@ -63,18 +70,52 @@ class PlaneScheduler(Scheduler):
         """Return the route with a waypoint more on each leg where the flight strays too far."""
         route = schedule.route
         stray = distances_to_path(self.w, schedule.flown.position[:, :2])
-        times = []
+        times: list[float] = []
         for k in range(route.first, route.last):
             begin, end = route.arrivals[k] + _SHORTEST_TIME, route.arrivals[k + 1] - _SHORTEST_TIME
             inside = np.flatnonzero((self.t > begin) & (self.t < end))
             if len(inside) and stray[inside].max() > _STRAY * self.tolerance:
                 times.append(float(self.t[inside[np.argmax(stray[inside])]]))
+        return self._with(route, times)
+
+    def _changes(self, route: Route) -> list[float]:
+        """Return times, s, at which legs are split so that changes of speed can begin there.
+
+        The vehicle takes as long for the plan's whole range of speeds as `speed_rates` says. So
+        near are the times to where the plan's speed changes: half before it, half behind.
+        """
+        rates = self.vehicle.type.speed_rates
+        if rates is None:
+            return []
+        middle = (self.t[1:] + self.t[:-1]) / 2
+        speed = lengths(np.diff(self.w, axis=0)) / np.diff(self.t)
+        reach = np.ptp(speed) / rates(self.vehicle)(speed)[0] / 2 + _CHANGE_SPACING
+        times: list[float] = []
+        for time in np.arange(self.t[0], self.t[-1], _CHANGE_SPACING).tolist():
+            near = speed[np.abs(middle - time) <= reach]
+            apart = np.abs(np.append(route.arrivals, times[-1:]) - time).min()
+            if len(near) and np.ptp(near) > _CHANGE * near.max() and apart > _SHORTEST_TIME:
+                times.append(time)
+        return times
+
+    def _with(self, route: Route, times: list[float]) -> Route:
+        """Return the route with a waypoint more where the plan is at each of the `times`, s."""
         at = np.searchsorted(route.arrivals, times)
         positions = positions_at(np.array(times), self.t, self.w)
         return route.insert(at, positions, np.array(times), route.speeds[at - 1])
 
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with the speeds that fit best, few and as they are sent."""
-        fitted = self.fitted(first.route, self.max_speed)
-        best = min(first, fitted, key=lambda each: each.cost)
+        tried = [first]
+        for _ in range(_ROUNDS):
+            tried.append(self.fitted(self._kept(tried[-1].route).route, self.max_speed))
+        best = min(tried, key=lambda each: each.cost)
         return self.rounded(self.shared(best, self.max_speed), self.max_speed)
+
+    def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:
+        """Return what `schedule` becomes at other commands, which are slow to take effect."""
+        kind = self.vehicle.type
+        if kind.speed_rates is None:
+            return super().retimed(schedule, times)
+        ratio = kind.true_over_commanded(self.vehicle, self.altitude)
+        return RampedRetimed(schedule, kind.speed_rates(self.vehicle), ratio)

@@ -8,6 +8,7 @@ further flight has to be predicted for a slope.
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,42 +99,26 @@ class Retiming:
     late: float
 
 
-class Retimed:
+class Retimed(ABC):
     """The flight of `schedule` as it would be at other commands.
 
     At the speeds v'_k and the waits h'_k it is at the same places later by
 
-        sum_k d_k(t) T_k(v') + sum_k (h'_k - h_k) [t > departure k],
+        D(t, v') + sum_k (h'_k - h_k) [t > departure k],
 
-    T_k being by how much longer leg k takes, which `times` knows, and d_k(t), from 0 to 1, the
-    share of it that has come up by t: it grows while the leg is flown at its command. A command
-    that is not reached, as on a short leg, counts as the greatest speed of the leg: `limits`
-    (m - 1,), m/s, infinite where it is reached.
+    D (k,) being what a subclass says. A command that is not reached, as on a short leg, counts as
+    the greatest speed of the leg: `limits` (m - 1,), m/s, infinite where it is reached.
     """
 
-    def __init__(self, schedule: Schedule, times: LegTimes) -> None:
+    limits: Real
+
+    def __init__(self, schedule: Schedule) -> None:
         route, flown, clock = schedule.route, schedule.flown, schedule.clock
-        self._times, self._waits, self._lead = times, route.waits, route.lead
+        self._waits, self._lead = route.waits, route.lead
         self._leads = float(clock.leaving)
         self._t, self._places = flown.t[::_STRIDE], flown.position[::_STRIDE, :2]
         self._steps = np.diff(self._places, axis=0)
-        self._durations = flown.leg_durations
-        speed = lengths(flown.velocity[::_STRIDE])
-        leg = np.searchsorted(flown.departures[1:-1], self._t, side="right")
-        under_way = (self._t >= flown.departures[leg]) & (self._t < flown.arrivals[leg + 1])
-        peaks = np.full(len(route.speeds), _LEAST_PEAK)
-        np.maximum.at(peaks, leg, speed * under_way)
-        self.limits = np.where(route.speeds > _REACHED * peaks, peaks, np.inf)
-        self._speeds = np.minimum(route.speeds, self.limits)
-        share = (speed / self._speeds[leg] - _HEEDING) / (_COMMANDED - _HEEDING)
-        lasting = np.diff(self._t) * under_way[:-1]
-        steps = np.zeros((len(self._t), len(peaks)))
-        at = np.arange(1, len(leg)), leg[:-1]
-        steps[at] = np.clip(share[:-1], 0.0, 1.0) * lasting
-        self._cruise = steps.sum(axis=0)
-        steps[at] += _RESTLESS * lasting
-        done = np.cumsum(steps, axis=0)
-        self._done = done / np.maximum(done[-1], 1e-9)
+        self._leg = np.searchsorted(flown.departures[1:-1], self._t, side="right")
         self._left = (self._t[:, None] > flown.departures).astype(float)
         # the samples at which the clocks of plan and flight meet, and with which the flight is over
         self._start, self._late = clock.start(flown), clock.late(flown)
@@ -142,15 +127,21 @@ class Retimed:
         found = np.searchsorted(self._t, [meeting, over])
         self._met, self._over = np.minimum(found, len(self._t) - 1).tolist()
 
+    @abstractmethod
     def learn(self, after: Schedule) -> None:
-        """Tell `times` how long the legs really take on the flight `after`."""
-        longer = after.flown.leg_durations - self._durations
-        self._times.learn(self._cruise, self._slower(after.route.speeds), longer)
+        """Take in how the flight `after` really is."""
+
+    @abstractmethod
+    def _later(self, speeds: Real) -> Real:
+        """Return D, by how much later each sample is at other `speeds` (m - 1,), (k,), s."""
+
+    @abstractmethod
+    def _later_slopes(self, speeds: Real) -> Real:
+        """Return what each of the `speeds` (m - 1,) does to D, (k, m - 1), s for 1 m/s."""
 
     def at(self, t: Real, route: Route) -> Retiming:
         """Return the flight with the commands of `route` at the plan's times `t` (n,), s."""
-        longer = self._times.delays(self._cruise, self._slower(route.speeds))
-        delays = self._done @ longer + self._left @ (route.waits - self._waits)
+        delays = self._later(route.speeds) + self._left @ (route.waits - self._waits)
         ahead = (route.lead - self._lead) * self._leads
         clock = np.maximum.accumulate(self._t + delays) - (
             self._start + float(delays[self._met]) + ahead
@@ -175,16 +166,57 @@ class Retimed:
         The rows are the `samples` (n,), and the end; the columns the speeds of the legs, the waits
         at the points, and the lead: by how many seconds later for each m/s or s.
         """
-        slower = -self._speeds / route.speeds**2 * (route.speeds <= self.limits)
-        rows = np.append(samples, self._over)
+        rows, later = np.append(samples, self._over), self._later_slopes(route.speeds)
         return np.hstack(
             [
-                (self._done[rows] - self._done[self._met])
-                @ (self._times.slopes(self._cruise) * slower),
+                later[rows] - later[self._met],
                 self._left[rows] - self._left[self._met],
                 np.full((len(rows), 1), -self._leads),
             ]
         )
+
+
+class LegRetimed(Retimed):
+    """The flight of an aircraft that heeds a command at once, leg by leg.
+
+    D = sum_k d_k(t) T_k(v'), T_k being by how much longer leg k takes, which `times` knows, and
+    d_k(t), from 0 to 1, the share of it that has come up by t: it grows while the leg is flown at
+    its command.
+    """
+
+    def __init__(self, schedule: Schedule, times: LegTimes) -> None:
+        super().__init__(schedule)
+        route, flown, leg = schedule.route, schedule.flown, self._leg
+        self._times, self._durations = times, flown.leg_durations
+        speed = lengths(flown.velocity[::_STRIDE])
+        under_way = (self._t >= flown.departures[leg]) & (self._t < flown.arrivals[leg + 1])
+        peaks = np.full(len(route.speeds), _LEAST_PEAK)
+        np.maximum.at(peaks, leg, speed * under_way)
+        self.limits = np.where(route.speeds > _REACHED * peaks, peaks, np.inf)
+        self._speeds = np.minimum(route.speeds, self.limits)
+        share = (speed / self._speeds[leg] - _HEEDING) / (_COMMANDED - _HEEDING)
+        lasting = np.diff(self._t) * under_way[:-1]
+        steps = np.zeros((len(self._t), len(peaks)))
+        at = np.arange(1, len(leg)), leg[:-1]
+        steps[at] = np.clip(share[:-1], 0.0, 1.0) * lasting
+        self._cruise = steps.sum(axis=0)
+        steps[at] += _RESTLESS * lasting
+        done = np.cumsum(steps, axis=0)
+        self._done = done / np.maximum(done[-1], 1e-9)
+
+    def learn(self, after: Schedule) -> None:
+        """Tell `times` how long the legs really take on the flight `after`."""
+        longer = after.flown.leg_durations - self._durations
+        self._times.learn(self._cruise, self._slower(after.route.speeds), longer)
+
+    def _later(self, speeds: Real) -> Real:
+        later: Real = self._done @ self._times.delays(self._cruise, self._slower(speeds))
+        return later
+
+    def _later_slopes(self, speeds: Real) -> Real:
+        slower = -self._speeds / speeds**2 * (speeds <= self.limits)
+        slopes: Real = self._done @ (self._times.slopes(self._cruise) * slower)
+        return slopes
 
     def _slower(self, speeds: Real) -> Real:
         """Return q_k = v_k / v'_k - 1, (m - 1,), at other `speeds`."""

@@ -130,7 +130,7 @@ def deviation(
     at = positions_at(planned_t, t, w)
     apart = lengths(at - planned_w)
     late = lateness(planned_t, planned_w, t, w, tolerance)
-    begin, end = planned_t[0], planned_t[-1] + max(0.0, late)  # a path flown late is the same path
+    begin, end = planned_t[0], planned_t[-1] + late  # a path flown late or early is the same path
     inside = t[(t > begin) & (t < end)][::stride]
     path = positions_at(np.concatenate([[begin], inside, [end]]), t, w)
     return Deviation(

@@ -11,6 +11,7 @@ import numpy as np
 from faao_mav.arrays import Integers, Real
 from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
+from faao_mav.schedule.retimed import LegRetimed, LegTimes, Retimed
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Clock, Schedule, positions_at
 from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
@@ -93,7 +94,12 @@ class Scheduler(ABC):
             min_speed=self.min_speed,
             max_speed=top_speed,
             flights=flights,
+            retime=self.retimed,
         )
+
+    def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:
+        """Return what `schedule` becomes at other commands."""
+        return LegRetimed(schedule, times)
 
     def moved(self, schedule: Schedule, points: Integers, share: float) -> Route:
         """Return the route with the waypoints `points` (k,) moved against the flight's offset.

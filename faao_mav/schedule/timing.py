@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.schedule.retimed import LegTimes, Retimed, Retiming
+from faao_mav.schedule.retimed import LegRetimed, LegTimes, Retimed, Retiming
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import LATE_WEIGHT, Clock, Schedule
 
@@ -55,6 +55,7 @@ def fit(
     min_speed: float,
     max_speed: float,
     flights: int = MOST_FLIGHTS,
+    retime: Callable[[Schedule, LegTimes], Retimed] = LegRetimed,
 ) -> Schedule:
     """Return the `flight` of `route` with the speeds, the waits and the lead that fit best.
 
@@ -73,7 +74,7 @@ def fit(
     cost = goal.cost(best, unknowns.pull(x))
     times, leash = LegTimes(len(groups)), 0.0
     for _ in range(flights - 1):
-        retimed = Retimed(best, times)
+        retimed = retime(best, times)
         tried, foreseen = _stepped(goal, unknowns, retimed, x, leash)
         if foreseen > (1 - _LEAST_GAIN) * cost:
             break

@@ -34,6 +34,7 @@ FITTED = (
     "sea-steps-300m",
     "sea-speedsteps",
     "sea-wandering-4",
+    "sea-plan-240-12",
 )
 HELD_OUT = tuple(sorted(path.stem for path in FOLDER.glob("*.csv") if path.stem not in FITTED))
 TAKE_OFF = 1  # the row of the take-off

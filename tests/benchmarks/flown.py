@@ -6,7 +6,7 @@
 With a wind, m/s and degrees, plans are made for it, and flown in it; else in calm air. With
 --stream copters fly the plans by setpoints, and what is predicted is of the mission still. With
 --limits missions for calm air are flown in the strongest wind that the summary says they keep, and
-in `BEYOND` more. With --random plans for copters, each with its wind, are drawn from these seeds.
+in `BEYOND` more. With --random plans, for copters each with its wind, are drawn from these seeds.
 
 One row for each plan: rms position error at equal times (m), how much later than planned the flight
 is over (s), the delivered rate over the planned one; each as predicted and as flown.
@@ -221,6 +221,34 @@ def drawn(seed: int) -> dict[str, Any]:
     return random_changes(seed) | {"site.wind": wind}
 
 
+def drawn_plane(seed: int) -> tuple[dict[str, Any], float]:
+    """Return the plan for a plane that `seed` draws, and the elevation of home, m.
+
+    It takes 100 to 240 s, at 12 to 16 m/s and 1.1 to 1.5 times as much, half of them in up to 5 m/s
+    of wind.
+    """
+    random = Random(seed)
+    least = random.randrange(12, 17)
+
+    def place(reach: int) -> list[int]:
+        return [random.randrange(-reach, reach) for _ in range(2)]
+
+    changes: dict[str, Any] = {
+        "vehicle.min_speed": least,
+        "vehicle.max_speed": round(least * random.uniform(1.1, 1.5), 1),
+        "vehicle.max_acceleration": round(random.uniform(2.0, 4.0), 1),
+        "flight.start": place(600),
+        "flight.end": place(600),
+        "flight.duration": random.randrange(100, 241, 10),
+        "radio.ground_user.position": place(600),
+        "radio.modulation": random.choice(("bpsk", "qpsk")),
+    }
+    if random.random() < 0.5:
+        speed = round(random.uniform(1, 5), 1)
+        changes["site.wind"] = {"speed": speed, "from": random.randrange(360)}
+    return changes, random.choice((0.0, 584.0))
+
+
 def main() -> None:
     """Print the table."""
     chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
@@ -233,6 +261,7 @@ def main() -> None:
         first, count = map(int, chosen[chosen.index("--random") + 1].split(","))
         names = [f"random {seed}" for seed in range(first, first + count)]
         FLOWN.update({name: drawn(int(name.split()[1])) for name in names})
+        PLANES.update({name: drawn_plane(int(name.split()[1])) for name in names})
     print(f"{'':<41}{'predicted: m, s late, rate':<27}flown")
     for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
         plans = PLANES if autopilot == "plane" else FLOWN

@@ -49,6 +49,14 @@ def circle() -> Trajectory:
     return t, np.stack([np.interp(14 * t, way, axis) for axis in path.T], axis=-1)
 
 
+def steps() -> Trajectory:
+    """A straight way at 16, 12 and 16 m/s, with changes of 3 m/s² that no plane makes."""
+    t = np.arange(0.0, 100.0, STEP)
+    speed = 12 + np.clip(3 * (np.abs(t - 50) - 16), 0, 4)
+    east = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * STEP)])
+    return t, np.stack([east, 0 * east], axis=-1)
+
+
 def followed_unmoved(t: np.ndarray, w: np.ndarray, plan: Plan) -> float:
     """How far the flight strays whose waypoints lie on the path, m."""
     vehicle = vehicle_of(plan)
@@ -74,12 +82,26 @@ def test_the_path_is_kept_where_plain_waypoints_would_lose_it(
     assert abs(conversion.schedule.clock.late(conversion.schedule.flown)) < 0.5
 
 
+def test_a_change_of_speed_begins_before_the_plans() -> None:
+    """The aircraft loses 0.8 m/s in a second at most: with one speed for all it is 25 m rms off."""
+    t, w = steps()
+    plan = plane_plan(AIRSPEED_CRUISE=22.0)
+    schedule = converted(t, w, plan).schedule
+    found, flown = schedule.deviation, schedule.track()
+    slower = np.flatnonzero(np.hypot(*flown["predicted_v"].T) < 15)
+    assert flown["predicted_t"][slower[0]] < 50 - 16 - 1 / 3
+    assert found.rms < 5
+    assert found.max < 12
+    assert abs(found.late) < 0.2
+
+
 def test_the_whole_mission_flies_like_its_schedule(
     flight: tuple[Conversion, Trajectory],
 ) -> None:
     """Take-off and the way to the run-in are over before w_I: the run-in is long enough.
 
-    What the turn into the run-in changes is made up for there but for 0.4 m, or 0.03 s.
+    What the turn into the run-in changes is made up for there but for 0.1 m, and in the integrals
+    of total energy control: 2.3 m, or 0.16 s, at the end.
     """
     conversion, (t, _) = flight
     plan = plane_plan()
@@ -93,7 +115,7 @@ def test_the_whole_mission_flies_like_its_schedule(
     clock = schedule.clock
     start = passed + clock.start(schedule.flown) - schedule.flown.arrivals[schedule.route.first]
     at = np.stack([np.interp(t + start, track.t, x) for x in track.position.T[:2]], axis=-1)
-    assert np.hypot(*(at - schedule.positions(t)).T).max() < 1
+    assert np.hypot(*(at - schedule.positions(t)).T).max() < 3
 
 
 def test_items_are_an_aeroplanes(flight: tuple[Conversion, Trajectory]) -> None:

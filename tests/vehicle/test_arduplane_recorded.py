@@ -14,19 +14,19 @@ def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
     assert len(rows) >= 24
     assert len(HELD_OUT) >= len(rows) / 3
     for flight in rows:
-        assert flight.arrival_rms <= (0.7 if "wind" not in flight.name else 1.2), flight
-        assert flight.position_rms <= 10.5, flight
+        assert flight.arrival_rms <= 0.6, flight
+        assert flight.position_rms <= 6, flight
         assert flight.path_error <= 6, flight
 
 
 @pytest.mark.parametrize(
     ("use", "seconds", "metres"),
     [
-        ("fitted", 0.35, 4.5),
-        ("held out, sea", 0.25, 4.0),
-        ("held out, high", 0.4, 5.5),
-        ("in 3 m/s", 0.4, 5.5),
-        ("in 6 m/s", 0.55, 4.5),
+        ("fitted", 0.3, 3.1),
+        ("held out, sea", 0.22, 3.4),
+        ("held out, high", 0.27, 3.7),
+        ("in 3 m/s", 0.27, 3.4),
+        ("in 6 m/s", 0.22, 2.6),
     ],
 )
 def test_flights_together(rows: list[Row], use: str, seconds: float, metres: float) -> None:

@@ -5,10 +5,10 @@ from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane as ArduPlane
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlaneLegs
 from faao_mav.vehicle.ardupilot.plane.motion import SIDESLIP
-from faao_mav.vehicle.ardupilot.plane.parameters import TABLE, true_over_commanded
+from faao_mav.vehicle.ardupilot.plane.parameters import TABLE, ArduPlaneLimits, true_over_commanded
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.parameter import ParameterValues
-from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType, lean_acceleration
+from faao_mav.vehicle.vehicle_type import Ceiling, SpeedRates, VehicleType, lean_acceleration
 
 
 def _vertical(vehicle: ParameterValues) -> VerticalProfile:
@@ -42,6 +42,10 @@ def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
     return (Ceiling("max_acceleration", bank, "roll_limit"),)
 
 
+def _speed_rates(vehicle: ParameterValues) -> SpeedRates:
+    return ArduPlaneLimits.from_vehicle(vehicle).speed_rates
+
+
 ARDUPLANE = VehicleType(
     family=ARDUPILOT,
     kind="plane",
@@ -60,6 +64,7 @@ ARDUPLANE = VehicleType(
     calibrated=True,
     models_wind=True,
     true_over_commanded=_true_over_commanded,
+    speed_rates=_speed_rates,
 )
 """ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are
 recommended."""

@@ -1,6 +1,6 @@
 """An aeroplane with the guidance that banks it and the energy that carries it.
 
-Constants that say no other are fitted to eleven flights of ArduPilot's simulator from sea level
+Constants that say no other are fitted to flights of ArduPilot's simulator from sea level
 (`tests/benchmarks/flights_arduplane.py`): they are its aircraft's.
 """
 
@@ -8,49 +8,26 @@ import cmath
 import math
 
 from faao_mav.power import GRAVITY
+from faao_mav.vehicle.ardupilot.plane.energy import Energy
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.atmosphere import density_ratio
 
 STEP = 0.1
 """The longest step of the simulation, s. Chosen; what a change costs is not measured."""
 
-SIDESLIP = 0.284
+SIDESLIP = 0.286
 """The share of a coordinated turn's acceleration that sideslip takes, at sea level's density: the
 simulator's aircraft turns without enough rudder."""
 
-_ROLL_TURN = 0.019
+_SLOW = 14.0
+"""The airspeed, m/s, below which that share falls in proportion to the speed. A flight of 12 m/s
+showed it: in its log, sideslip times the airspeed's square is less there, and turns are tighter."""
+
+_ROLL_TURN = 0.01
 """How far the course turns while the aircraft banks, over the change of bank."""
 
 _INTERCEPT = math.radians(45)
 """The steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
-
-_RISE = 0.5
-"""The greatest growth of kinetic energy demanded, over that of height's at `climb_speed`."""
-
-_FALL = 12.5
-"""The greatest loss of kinetic energy demanded, m²/s³ for one kilogram."""
-
-_POWER = (2.03, 0.464, 2.35)
-"""The power, m/s, that thrust is given: for each metre of total energy that is missing, 1/s, for
-the integral of that, 1/s², and for each m/s at which kinetic energy is to grow. All for one newton
-of weight."""
-
-_POWER_LAG = 0.85
-"""The time constant of that power, s."""
-
-_POWER_RANGE = (-6.4, 12.0)
-"""The least and greatest power that thrust is given, m/s: for one newton of weight."""
-
-_TURN_POWER = 4.73
-"""The power that a turn is given beyond its drag, m/s, over the load factor's square less 1."""
-
-_PITCH = (0.358, 0.03, 0.88)
-"""The climb, m/s, that pitch is given: for each metre by which more potential than kinetic energy
-is missing, 1/s, for the integral of that, 1/s², and for each m/s at which kinetic energy is to
-grow."""
-
-_PITCH_LAG = 0.668
-"""The time constant of the climb, s."""
 
 
 class Motion:
@@ -61,9 +38,7 @@ class Motion:
     acceleration 4 ζ² V² / L sin η, η the angle from its course to that point. It banks for that
     as in a coordinated turn.
 
-    Speed and height are held by total energy control (Lambregts, AIAA 83-2239): thrust by the sum
-    of the errors of kinetic and potential energy, pitch by their difference, both for a demanded
-    speed that changes no faster than the aircraft may gain and lose energy.
+    Speed and height are held by total energy control: see `energy`.
 
     Banks and energy turn and speed up the flight through the air, which moves steadily at `wind`;
     guidance sees the flight over ground, the sum of both.
@@ -90,24 +65,21 @@ class Motion:
         """
         self.time = 0.0
         self.place, self.heading = place, cmath.phase(airspeed)
-        self._limits, self._height, self._wind = limits, height, wind
-        self._level = height  # the demanded height
-        self._speed = math.hypot(abs(airspeed), climb)
-        self._demand = self._speed if speed is None else speed
-        self._bank, self._climb = 0.0, climb
-        # A climb is flown at full power: twice what it takes (fitted).
-        self._power, self._held_power, self._held_climb = 2 * climb, climb, 0.0
-        self._turning = 1 - SIDESLIP * density_ratio(altitude)
+        self._limits, self._wind = limits, wind
+        self._bank, density, flown = 0.0, density_ratio(altitude), math.hypot(abs(airspeed), climb)
+        demand = flown if speed is None else speed
+        self._energy = Energy(limits, density, height, flown, climb, demand)
+        self._sideslip = SIDESLIP * density
 
     def sample(self) -> tuple[float, ...]:
         """Return time, place (east, north, up) and velocity, SI."""
         velocity = self._velocity()
-        place = (self.place.real, self.place.imag, self._height)
-        return (self.time, *place, velocity.real, velocity.imag, self._climb)
+        place = (self.place.real, self.place.imag, self._energy.height)
+        return (self.time, *place, velocity.real, velocity.imag, self._energy.climb)
 
     def _airspeed(self) -> float:
         """Return the horizontal part of the airspeed, m/s."""
-        return math.sqrt(max(self._speed**2 - self._climb**2, 1.0))
+        return math.sqrt(max(self._energy.speed**2 - self._energy.climb**2, 1.0))
 
     def _velocity(self) -> complex:
         """Return the velocity over ground."""
@@ -173,47 +145,17 @@ class Motion:
 
     def _go(self, lateral: float, height: float, speed: float, step: float) -> None:
         """Move on with `lateral` acceleration to the left, m/s², as far as it goes."""
-        before = self._climb
-        self._hold(height, speed, step)
+        before = self._energy.climb
+        self._energy.hold(height, speed, 1 / math.cos(self._bank), step)
         limits = self._limits
         bank = math.atan2(lateral, GRAVITY)
         bank = min(max(bank, -limits.roll_limit), limits.roll_limit)
         change = (bank - self._bank) * -math.expm1(-step / limits.roll_time)
         self._bank += change
         airspeed = self._airspeed()
-        lift = GRAVITY + (self._climb - before) / step
-        turn = self._turning * lift * math.tan(self._bank) / airspeed * step + _ROLL_TURN * change
+        lift = GRAVITY + (self._energy.climb - before) / step
+        turning = 1 - self._sideslip * min(1.0, airspeed / _SLOW)
+        turn = turning * lift * math.tan(self._bank) / airspeed * step + _ROLL_TURN * change
         self.place += (cmath.rect(airspeed, self.heading + turn / 2) + self._wind) * step
         self.heading += turn
         self.time += step
-
-    def _hold(self, height: float, speed: float, step: float) -> None:
-        """Hold `height`, m, and the true airspeed `speed`, m/s, for `step` seconds."""
-        limits, flown = self._limits, self._speed
-        climb, sink = limits.climb_speed * step, limits.descent_speed * step
-        self._level += min(max(height - self._level, -sink), climb)
-        rise = _RISE * limits.climb_speed * GRAVITY / flown * step
-        change = min(max(speed - self._demand, -_FALL / flown * step), rise)
-        self._demand += change
-        growth = change / step * flown / GRAVITY
-        kinetic = (self._demand**2 - flown**2) / (2 * GRAVITY)
-        potential = self._level - self._height
-
-        total, held, ahead = _POWER
-        load = 1 / math.cos(self._bank) ** 2 - 1
-        power = total * (potential + kinetic) + self._held_power
-        power += ahead * growth + _TURN_POWER * load
-        least, greatest = _POWER_RANGE
-        if least < power < greatest:
-            self._held_power += held * (potential + kinetic) * step
-        power = min(max(power, least), greatest)
-        self._power += (power - self._power) * -math.expm1(-step / _POWER_LAG)
-
-        difference, held, ahead = _PITCH
-        wanted = difference * (potential - kinetic) + self._held_climb + ahead * growth
-        if flown < limits.min_speed:  # speed before height
-            wanted = min(wanted, self._power - 2 * (limits.min_speed - flown))
-        self._held_climb += held * (potential - kinetic) * step
-        self._climb += (wanted - self._climb) * -math.expm1(-step / _PITCH_LAG)
-        self._speed = max(flown + GRAVITY * (self._power - self._climb) / flown * step, 1.0)
-        self._height += self._climb * step

@@ -1,0 +1,155 @@
+"""How ArduPlane holds height and airspeed: total energy control, and the aircraft that it flies.
+
+Total energy control (Lambregts, AIAA 83-2239; ArduPilot's documentation, TECS tuning): throttle by
+the error of the sum of kinetic and potential energy, pitch by that of their difference. Each rule
+here was told by the autopilot's logs of its simulator's flights (TECS, TEC2, TEC3 and TEC4), which
+list its terms. The aircraft's constants are fitted, as `motion` says of its own.
+"""
+
+import math
+
+from faao_mav.power import GRAVITY
+from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
+
+_TIME = 5.0  # TECS_TIME_CONST, s; as all of these ArduPlane's default
+_THROTTLE_DAMPING = 0.5  # TECS_THR_DAMP
+_PITCH_DAMPING = 0.3  # TECS_PTCH_DAMP
+_INTEGRAL_GAIN = 0.3  # TECS_INTEG_GAIN, 1/s
+_TURN = 10.0  # TECS_RLL2THR: power per unit of load factor squared beyond 1, m²/s³
+_TRIM = 0.5  # TRIM_THROTTLE of the simulator's plane; what is wrong about it goes with time
+_PITCH_LIMITS = (math.radians(-20), math.radians(15))  # PTCH_LIM_MIN_DEG of that, TECS_PITCH_MAX
+_EASE = 0.2  # TECS_THR_ERATE, 1/s: how fast the full throttle of a take-off goes at most
+_CLIMBING = 1.0  # a flight that begins with so much of a climb, m/s, comes from a take-off; chosen
+_KINETIC_SHARE = 0.25  # of the range of pitch, the most that the integral of kinetic energy takes
+
+_THRUST = 6.28
+"""The acceleration that full throttle gives, m/s²."""
+
+_DRAG = (0.00532, 67.1)
+"""The drag at sea level: over the airspeed's square, 1/m, and over the load factor's square over
+the airspeed's, m³/s⁴."""
+
+_ANGLE_OF_ATTACK = (25.3, 0.0573)
+"""The angle of attack at sea level: over the load factor over the airspeed's square, rad m²/s², and
+below that, rad."""
+
+_PITCH_LAG = 1.05
+"""The time constant with which the path's angle follows the pitch demanded, s."""
+
+
+class Energy:
+    """Height, m, true airspeed and climb, m/s, of an aircraft under total energy control.
+
+    `density` is that of the air over sea level's. Demands begin at `demand`, m/s, and at `height`.
+    """
+
+    def __init__(
+        self,
+        limits: ArduPlaneLimits,
+        density: float,
+        height: float,
+        speed: float,
+        climb: float,
+        demand: float,
+    ) -> None:
+        self.height, self.speed, self.climb = height, speed, climb
+        self._limits, self._density = limits, density
+        self._level, self._demand = height, demand
+        self._throttle_integral = self._pitch_integral = self._kinetic_integral = 0.0
+        self._demanded_rate = self._flown_rate = self._rate = 0.0
+        self._least_throttle = float(climb > _CLIMBING)
+        if climb <= _CLIMBING:  # in trim, with what logs show that a take-off leaves behind
+            self._throttle_integral = self._drag(1.0) / _THRUST - _TRIM
+            self._kinetic_integral = self._most_kinetic()
+            trim = self._attack(1.0) * GRAVITY * speed
+            self._pitch_integral = trim - self._kinetic_integral
+
+    def hold(self, height: float, speed: float, load: float, step: float) -> None:
+        """Fly on towards `height` and the true airspeed `speed` for `step` seconds.
+
+        `load` is the load factor.
+        """
+        limits, flown = self._limits, self.speed
+        up, down = limits.climb_speed * step, limits.descent_speed * step
+        self._level += min(max(height - self._level, -down), up)
+        loss, gain = limits.speed_rates(flown)
+        rate = min(max((speed - self._demand) / step, -loss), gain)
+        self._demand += rate * step
+        # of both rates only what is new counts: a high-pass filter
+        wash = -math.expm1(-step / _TIME)
+        self._demanded_rate += (rate - self._demanded_rate) * wash
+        self._flown_rate += (self._rate - self._flown_rate) * wash
+        kinetic_demanded = flown * (rate - self._demanded_rate)
+        kinetic_rate = flown * (self._rate - self._flown_rate)
+
+        kinetic = (self._demand**2 - flown**2) / 2
+        potential = GRAVITY * (self._level - self.height)
+        potential_rate = GRAVITY * self.climb
+        throttle = self._throttle(
+            kinetic + potential,
+            kinetic_demanded + potential / _TIME,
+            kinetic_rate + potential_rate,
+            load,
+            step,
+        )
+        pitch = self._pitch(potential - kinetic, potential_rate - kinetic_rate, kinetic, step)
+        self._move(throttle, pitch, load, step)
+
+    def _throttle(
+        self, missing: float, demanded: float, flown: float, load: float, step: float
+    ) -> float:
+        """Return the throttle, 0 to 1, for an energy that is `missing`, m²/s², and its rates."""
+        most, least = (
+            GRAVITY * self._limits.climb_speed,
+            -GRAVITY * self._limits.descent_speed,
+        )
+        demanded = min(max(demanded, least), most)
+        ahead = _TRIM + (demanded + _TURN * (load**2 - 1)) / (most - least)
+        gain = 1 / (_TIME * (most - least))
+        throttle = ahead + gain * (missing + _THROTTLE_DAMPING * (demanded - flown))
+        self._least_throttle -= _EASE * step
+        held = min(max(throttle + self._throttle_integral, self._least_throttle, 0.0), 1.0)
+        integral = self._throttle_integral + gain * _INTEGRAL_GAIN * missing * step
+        self._throttle_integral = min(max(integral, -throttle), 1 - throttle)
+        return held
+
+    def _pitch(self, missing: float, flown: float, kinetic: float, step: float) -> float:
+        """Return the pitch, rad, for a difference of energies that is `missing`, m²/s²."""
+        least, most = _PITCH_LIMITS
+        weight = GRAVITY * self.speed
+        demanded = missing / _TIME
+        error = demanded - flown
+        limit = self._most_kinetic()
+        self._kinetic_integral = min(
+            max(self._kinetic_integral - kinetic * step / _TIME, -limit), limit
+        )
+        pitch = demanded + _PITCH_DAMPING * error
+        pitch += self._pitch_integral + self._kinetic_integral
+        if least * weight < pitch < most * weight or error * pitch < 0:
+            self._pitch_integral += _INTEGRAL_GAIN * error * step
+        return min(max(pitch / weight, least), most)
+
+    def _most_kinetic(self) -> float:
+        """Return the greatest integral of kinetic energy's error, m²/s³."""
+        least, most = _PITCH_LIMITS
+        return _KINETIC_SHARE * (most - least) * GRAVITY * self.speed
+
+    def _move(self, throttle: float, pitch: float, load: float, step: float) -> None:
+        """Let the aircraft fly for `step` seconds."""
+        angle = math.asin(min(max(self.climb / self.speed, -1.0), 1.0))
+        angle += (pitch - self._attack(load) - angle) * -math.expm1(-step / _PITCH_LAG)
+        self._rate = _THRUST * throttle - self._drag(load) - GRAVITY * math.sin(angle)
+        self.speed = max(self.speed + self._rate * step, 1.0)
+        self.climb = self.speed * math.sin(angle)
+        self.height += self.climb * step
+
+    def _attack(self, load: float) -> float:
+        """Return the angle of attack, rad."""
+        by_lift, least = _ANGLE_OF_ATTACK
+        return by_lift * load / (self._density * self.speed**2) - least
+
+    def _drag(self, load: float) -> float:
+        """Return the deceleration by drag, m/s²."""
+        parasitic, induced = _DRAG
+        dynamic = self._density * self.speed**2
+        return parasitic * dynamic + induced * load**2 / dynamic
