@@ -31,7 +31,7 @@ _SWING = 1.5
 _SHIFTS = 10  # shifts of a hover towards its farthest swing, until that is at its radius,
 _NEARLY = 1e-3  # or beyond it by this share
 
-_SPEED_WINDOW = 1.0  # s, over which a speed is averaged: it hides a trajectory's chatter
+_SPEED_WINDOW = 1.0  # s, over which a speed is averaged first: it hides a trajectory's chatter
 _SAME_POINT = 1e-3  # the distance, m, within which both ends of a trajectory are one waypoint
 _BISECTIONS = 8  # halvings of the tolerance that evens out legs: it is found to 1/256
 _BEND_SAMPLING = 1.0  # the distance of the points, m, at which a path's bends are measured
@@ -54,15 +54,25 @@ def find_hovers(t: Real, w: Real, radius: float, slowest: float = SLOWEST) -> li
     A hover lasts 3 s at least, in which the aircraft is slower than `slowest` m/s throughout and
     stays in a box with a half diagonal of at most `radius` (m). Its position is the median, or the
     box's middle if a sample is farther than `radius` from the median. A creep through several boxes
-    makes several hovers, with 3 s between them to get on.
+    makes several hovers, with 3 s between them to get on. A plan may dither about a place: where
+    there is no other hover, it is slow if its mean velocity over 3 s is.
 
     >>> t = np.arange(0.0, 20.0)
     >>> w = np.column_stack([np.clip(t - 10, 0, None), 0 * t])
     >>> [(hover.first, hover.last) for hover in find_hovers(t, w, 0.5)]
     [(0, 9)]
     """
+    hovers: list[Waypoint] = []
+    for window in (_SPEED_WINDOW, _SHORTEST_HOVER):
+        slow = _speeds(t, w, window) < slowest
+        hovers += [new for new in _boxed(t, w, slow, radius) if _is_apart(t, new, hovers)]
+    return sorted(hovers, key=lambda hover: hover.first)
+
+
+def _boxed(t: Real, w: Real, slow: Flags, radius: float) -> list[Waypoint]:
+    """Return the hovers in each run of `slow` samples (n,)."""
     hovers = []
-    for begin, end in _runs(_speeds(t, w) < slowest):
+    for begin, end in _runs(slow):
         first = begin
         while first < end:
             last = _last_within(w[first : end + 1], radius) + first
@@ -72,6 +82,12 @@ def find_hovers(t: Real, w: Real, radius: float, slowest: float = SLOWEST) -> li
             else:
                 first += 1
     return hovers
+
+
+def _is_apart(t: Real, new: Waypoint, hovers: list[Waypoint]) -> bool:
+    """Tell whether there are 3 s between the hover `new` and each of `hovers`."""
+    begin, end = t[new.first] - _SHORTEST_HOVER, t[new.last] + _SHORTEST_HOVER
+    return all(t[known.last] < begin or t[known.first] > end for known in hovers)
 
 
 def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[Waypoint]:
@@ -165,10 +181,10 @@ def along_spline(path: Real, spacing: float, end_spacing: float) -> list[int]:
     return [int(k) for k in np.unique(np.searchsorted(way, places)) if 0 < k < len(path) - 1]
 
 
-def _speeds(t: Real, w: Real) -> Real:
-    """Return the magnitude of the mean velocity over a window about each sample, (n,), m/s."""
-    before = np.maximum(t - _SPEED_WINDOW / 2, t[0])
-    after = np.minimum(t + _SPEED_WINDOW / 2, t[-1])
+def _speeds(t: Real, w: Real, window: float) -> Real:
+    """Return the magnitude of the mean velocity over `window` s about each sample, (n,), m/s."""
+    before = np.maximum(t - window / 2, t[0])
+    after = np.minimum(t + window / 2, t[-1])
     moved = [np.interp(after, t, x) - np.interp(before, t, x) for x in w.T]
     means: Real = np.stack(moved, axis=-1) / (after - before)[:, None]
     return lengths(means)

@@ -254,6 +254,19 @@ def test_hovers_stay_in_their_radius() -> None:
         assert t[hover.last] - t[hover.first] >= 3
 
 
+def test_a_plan_that_dithers_about_a_place_waits_there() -> None:
+    """8 s on a circle of 0.8 m at 1.3 m/s between legs at 5 m/s, as spare time may be filled."""
+    t = STEP * np.arange(0.0, 40.0 / STEP)
+    angle = 1.6 * np.clip(t - 16, 0, 8)
+    along = np.clip(5 * (t - 16), None, 0) + np.clip(5 * (t - 24), 0, None)
+    w = np.stack([along + 0.8 * np.sin(angle), 0.8 * np.cos(angle)], axis=-1)
+    (hover,) = find_hovers(t, w, 1.5, slowest=0.75)
+    assert t[hover.first] == pytest.approx(17.5, abs=1.5)
+    assert t[hover.last] == pytest.approx(22.5, abs=1.5)
+    creep = np.stack([np.clip(5 * (t - 16), None, 0) + np.clip(1.3 * (t - 16), 0, 10), 0 * t], -1)
+    assert not find_hovers(t[t < 23], creep[t < 23], 1.5, slowest=0.75)
+
+
 def bent_at_45_degrees() -> Trajectory:
     """300 m east, a bend of 50 m radius, 300 m north-east; at 6 m/s throughout."""
     s = np.arange(0.0, 640.0, 1.0)
