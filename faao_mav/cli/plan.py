@@ -143,7 +143,7 @@ def _checked_plan(
 
 def _sound(result: "Result") -> bool:
     """Say the errors that validation found, and whether there are none."""
-    from faao_mav.report.summary import by_rule, line_of
+    from faao_mav.report.findings import by_rule, line_of
     from faao_mav.validate import Level
 
     errors = [finding for finding in result.findings if finding.level is Level.ERROR]

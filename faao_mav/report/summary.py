@@ -1,17 +1,17 @@
-"""A result, a validation and its findings in words: the lines of the terminal and of the page."""
+"""A result and a validation in words: the lines of the terminal and of the page."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
-from itertools import groupby
 from pathlib import Path
 from typing import TypeAlias
 
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
+from faao_mav.report.findings import by_rule, count_of, counted, line_of
 from faao_mav.schedule.precoder_table import taken_by
-from faao_mav.validate import Finding, Level
+from faao_mav.validate import Level
 from faao_mav.validate.check import Check
 from faao_mav.validate.demands import LinkCheck
 from faao_mav.validate.flown import Debriefing
@@ -26,9 +26,6 @@ _LABEL_WIDTH = 13
 
 _LOSS_TOLD = 0.01
 """Share of R_avg that may be lost on the way before a plan for R_avg is warned about. Chosen."""
-
-_MAX_RUNS_SHOWN = 8
-"""Runs of item numbers that are named in one line; chosen: about a line of a terminal."""
 
 
 def summary(
@@ -85,7 +82,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
         yield "starts", f"{len(ranked)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
     state = "converged" if solution.converged else "NOT CONVERGED"
     seconds = f", {result.seconds_optimize:.1f} s" if timed else ""
-    steps = _count(solution.iterations, "iteration")
+    steps = counted(solution.iterations, "iteration")
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
     yield from _flown(result)
     yield from _wind(plan, result.check)
@@ -224,7 +221,7 @@ def _flown(result: Result) -> Iterator[Line]:
     if conversion is None or flown is None:
         return
     distance = conversion.schedule.route.distance
-    items = _count(len(conversion.mission.items), "item")
+    items = counted(len(conversion.mission.items), "item")
     yield "mission", f"{items}; relay route of {distance:.0f} m"
     plan = solution.plan
     lasting = f", in {flown.duration:.1f} s (planned: {plan.flight.duration:g} s)"
@@ -293,7 +290,7 @@ def _fenced(fence: FenceSummary | None) -> Iterator[Line]:
     kept = f"the plan keeps {fence.planned_clearance:.1f} m (margin {fence.margin:g} m)"
     if fence.predicted_clearance is not None:
         kept += f", the predicted flight {fence.predicted_clearance:.1f} m"
-    yield "fence", f"{_count(fence.areas, 'area')}; {kept} from the edge"
+    yield "fence", f"{counted(fence.areas, 'area')}; {kept} from the edge"
 
 
 def _of_plan(rate: float, planned: float, bandwidth_mhz: float | None) -> str:
@@ -372,53 +369,3 @@ def _checked(result: Result) -> Iterator[Line]:
     if parameters := result.conversion.parameters:
         wanted = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
         yield "parameters", f"the mission is timed for {wanted}: load them first"
-
-
-def count_of(findings: Sequence[Finding], level: Level) -> str:
-    """Return how many of `findings` are of `level`, as in "2 errors"."""
-    return _count(sum(finding.level is level for finding in findings), level)
-
-
-def by_rule(findings: Sequence[Finding]) -> Iterator[list[Finding]]:
-    """Yield the findings with those of one rule together, in the order of the first of each."""
-    order = {finding.rule: n for n, finding in reversed(list(enumerate(findings)))}
-    for _, group in groupby(sorted(findings, key=lambda f: order[f.rule]), lambda f: f.rule):
-        yield list(group)
-
-
-def line_of(group: Sequence[Finding]) -> str:
-    """Return the findings of one rule in a line: level, items, what is the case, the rule."""
-    return f"{group[0].level}: {said_of(group)}"
-
-
-def said_of(group: Sequence[Finding]) -> str:
-    """Return the line of `line_of` without the level."""
-    numbers = items_of(group)
-    plural = "" if numbers.isdigit() else "s"
-    where = f"item{plural} {numbers}: " if numbers else ""
-    return f"{where}{message_of(group)} [{group[0].rule}]"
-
-
-def message_of(group: Sequence[Finding]) -> str:
-    """Return the message of the first of `group`, and how many more there are."""
-    more = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
-    return group[0].message + more
-
-
-def items_of(group: Sequence[Finding]) -> str:
-    """Return the items' numbers, runs as `4-9`; nothing where it is about no item."""
-    numbers = sorted({finding.item for finding in group if finding.item is not None})
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    shown = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
-    if len(shown) > _MAX_RUNS_SHOWN:
-        shown = [*shown[:_MAX_RUNS_SHOWN], "..."]
-    return ", ".join(shown)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
