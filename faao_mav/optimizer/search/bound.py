@@ -59,16 +59,18 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
     half = relay is not None and relay.half
     value = ceiling
     if known > _SATURATED * ceiling and not half:
+        tell(1, "the bound by accelerations", value)
         value = relaxed_bound(problem, known)
     if value > (1 + _TIGHT) * known:
-        tell(1, "the bound over the map", value)
         corners = np.vstack([kin.start, kin.end, *(link.station for link in problem.links)])
-        accelerating = kin.max_speed**2 / kin.max_acceleration > float(
-            np.ptp(corners, axis=0).max()
-        )
-        if accelerating and not half:  # there is no way from rest to v_max and back to rest
+        extent = float(np.ptp(corners, axis=0).max())
+        # there is no way from rest to v_max and back to rest
+        accelerating = kin.max_speed**2 / kin.max_acceleration > extent
+        if accelerating and not half:
+            tell(1, "the bound by the axis", value)
             value = min(value, axis_bound(problem, rates))
         if not accelerating or half or problem.free_area is not None:
+            tell(1, "the bound over the map", value)
             value = min(value, map_bound(problem, rates))
         value = max(known, value)
     tell(2, "the bound", value)
