@@ -123,7 +123,8 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
 
     def degrees(places: Real) -> list[list[float]]:
-        return np.stack(frame.to_geodetic(places), axis=1).round(8).tolist()  # type: ignore[no-any-return]
+        pairs: list[list[float]] = np.stack(frame.to_geodetic(places), axis=1).round(8).tolist()
+        return pairs
 
     speeds = lengths(flight.v)
     drawn = {

@@ -92,10 +92,10 @@ class Workers:
             raise FaaoError(_ENDED) from None
         finally:
             process.kill()
-        ending, value = message
-        if ending == "fails":
-            raise value
-        return value  # type: ignore[no-any-return]
+        if message[0] == "fails":
+            raise message[1]
+        value: T = message[1]
+        return value
 
     def stop(self) -> None:
         """End the process that stays; those of long jobs end with their waits."""
