@@ -71,6 +71,7 @@ def _mean(function: np.ufunc, z: Real, classes: DifferenceClasses) -> Real:
         weight = classes.weight[first : first + _CLASSES]
         for start in range(0, len(z), step):
             part = slice(start, start + step)
-            D = np.minimum(0.0, z[part] @ phi)
+            D = z[part] @ phi
+            np.minimum(D, 0.0, out=D)
             total[part] += function(D, out=D) @ weight
     return total
