@@ -6,7 +6,7 @@ therefore enter only through products of matrices with the features φ, which ar
 channels.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
@@ -16,6 +16,9 @@ from faao_mav.radio.constellation import DifferenceClasses
 
 _BLOCK, _CLASSES = 1 << 17, 2048
 """Exponents held at once, 1 MB, and classes taken together: they stay in the cache. Chosen."""
+
+_KEPT = 1 << 24
+"""Numbers of features and their products that are kept, 128 MB; more are computed anew. Chosen."""
 
 _TINY = 1e-200
 """The least sum that is taken without a common factor. Chosen: far above the smallest number."""
@@ -71,8 +74,17 @@ class ClassSum:
         self._phi = features(classes.vectors)
         self._weights = classes.multiplicity / classes.symbols
         self._rows, self._columns = np.triu_indices(self.antennas**2)
+        self._kept: dict[bool, list[tuple[Real, Real]]] = {}
 
-    def _blocks(self, derivatives: bool) -> Iterator[tuple[Real, Real]]:
+    def _blocks(self, derivatives: bool) -> Iterable[tuple[Real, Real]]:
+        """Return φᵀ and weight [1, φ, φ φ] of the classes, `_CLASSES` at once."""
+        if self._phi.size * (1 + derivatives * self._phi.shape[1]) > _KEPT:
+            return self._computed(derivatives)
+        if derivatives not in self._kept:
+            self._kept[derivatives] = list(self._computed(derivatives))
+        return self._kept[derivatives]
+
+    def _computed(self, derivatives: bool) -> Iterator[tuple[Real, Real]]:
         for start in range(0, len(self._phi), _CLASSES):
             phi = self._phi[start : start + _CLASSES]
             terms = [np.ones((len(phi), 1))]
