@@ -136,8 +136,9 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
     Every slot has draws of its own, or where that takes long (large alphabets, and precoders that
-    know the draw, which are searched for each of them) every so many slots. What is delivered is the mean over flights that
-    have one of the draws in each slot, forwarded with the planned shares.
+    know the draw, which are searched for each of them) every so many slots. What is delivered is
+    the mean over flights that have one of the draws in each slot, forwarded with the planned
+    shares.
     """
     problem, how = build_problem(solution.plan), design(solution.plan)
     if not how.averaged:
