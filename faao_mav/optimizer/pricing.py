@@ -30,7 +30,8 @@ _SAMPLED_PAIRS = 200  # pairs of the sample beyond
 _COARSER = 3.0  # tolerance of the noise average of a sample, in that of the result
 _DEGREE = 5  # of the polynomial from cutoff rates to mutual information
 _FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
-_FRESH_SLOTS = 128  # slots with new draws where their rates take long: a search, noises, ...
+_FRESH_SLOTS = 2000  # slots with new draws, at most
+_FEW_FRESH_SLOTS = 128  # the same where their rates take long: a search, noises, ...
 _FEW_CLASSES = 1000  # ... or more classes of differences than this; chosen
 
 _MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
@@ -135,8 +136,8 @@ class FreshRates:
 def fresh_rates(solution: Solution) -> FreshRates | None:
     """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
-    Every slot has draws of its own, or where that takes long (large alphabets, and precoders that
-    know the draw, which are searched for each of them) every so many slots. What is delivered is
+    Every slot has draws of its own, or where that takes long (large alphabets, many slots, searches
+    for precoders that know the draw) every so many slots. What is delivered is
     the mean over flights that have one of the draws in each slot, forwarded with the planned
     shares.
     """
@@ -147,7 +148,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     slots = len(solution.w)
     quick = how.blind and solution.plan.optimizer.rate == "cutoff"
     quick &= all(len(link.classes.vectors) <= _FEW_CLASSES for link in problem.links)
-    step = 1 if quick else -(-slots // _FRESH_SLOTS)
+    step = -(-slots // (_FRESH_SLOTS if quick else _FEW_FRESH_SLOTS))
     chosen = np.arange(step // 2, slots, step)
     w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
     found, rates = [], []
