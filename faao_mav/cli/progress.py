@@ -86,6 +86,7 @@ def _line(
         return
     from rich import progress
     from rich.console import Console
+    from rich.progress_bar import ProgressBar
 
     class TimeBar(progress.BarColumn):
         """A bar that fills with the time, of a task whose total is in seconds."""
@@ -93,7 +94,7 @@ def _line(
         def __init__(self) -> None:
             super().__init__(bar_width=_WIDTH)
 
-        def render(self, task: progress.Task) -> progress.ProgressBar:
+        def render(self, task: progress.Task) -> ProgressBar:
             if task.total is not None:
                 task.completed = min(task.elapsed or 0.0, _FULL * task.total)
             return super().render(task)

@@ -55,7 +55,7 @@ def cutoff_rate(
     >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))
     0.548059
     """
-    H, P = np.asarray(H), np.asarray(P)
+    H, P = np.asarray(H, dtype=np.complex128), np.asarray(P, dtype=np.complex128)
     shape = np.broadcast_shapes(H.shape[:-2], P.shape[:-2])
     if math.prod(shape) > _PAIRS:
         axis = int(np.argmax(shape)) - len(shape) - 2
@@ -78,11 +78,11 @@ def cutoff_rate(
     return bounded
 
 
-def _split(M: RealOrComplex, axis: int, parts: int) -> Sequence[RealOrComplex]:
+def _split(M: Complex, axis: int, parts: int) -> Sequence[Complex]:
     """Return M (..., N, N) in parts along an axis, or M itself for each if it has none there."""
     if M.ndim < -axis or M.shape[axis] == 1:
         return [M] * parts
-    return np.array_split(M, parts, axis)
+    return [*np.array_split(M, parts, axis)]
 
 
 def _mean(function: np.ufunc, z: Real, classes: DifferenceClasses) -> Real:
