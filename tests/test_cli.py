@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import FLYABLE, edited
+from conftest import FLYABLE, MakePlan, edited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
+from faao_mav.cli.progress import optimizer_progress
 from faao_mav.mission.formats import read_mission, read_mission_file
 from faao_mav.mission.formats.parameter_file import read_parameters
+from faao_mav.optimizer.solution import Progress
 from faao_mav.plan.yaml_text import load_yaml
 
 
@@ -317,3 +319,31 @@ def test_a_plan_is_piped_in(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["-", "--out", str(out), "--quiet"], input=FLYABLE)
     assert (result.exit_code, result.stderr) == (0, "")
     assert read_mission(out).items
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, "of about 2 s: the best start, 2.5000 bit/s/Hz"),
+        ({"optimizer.method": "algorithm1"}, "iteration 1 of at most 2: the best start, 2.5000"),
+        (
+            {"radio.causal": True, "goal": {"rate": 1.0, "minimise": "power"}},
+            "iteration 1 of at most 2: the best start",
+        ),
+    ],
+)
+def test_progress_says_how_long_the_work_takes_where_it_is_known(
+    small_plan: MakePlan,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    changes: dict[str, Any],
+    told: str,
+) -> None:
+    for name, value in (("FORCE_COLOR", "1"), ("COLUMNS", "100")):
+        monkeypatch.setenv(name, value)
+    with optimizer_progress(small_plan(changes), shown=True) as observe:
+        assert observe is not None
+        observe(Progress(1, 2, "the best start", 2.5))
+    drawn = capsys.readouterr()
+    assert drawn.out == ""
+    assert told in drawn.err

@@ -61,11 +61,16 @@ class Machine(ABC, Generic[T]):
         """Do what is due now."""
 
 
+_EARLY = 3
+"""How often a question is put again early, where that is asked for. Chosen: 200 uploads of 200
+items to a mock PX4, with 20 % loss each way, took at most 11.6 s with one, 10.2 s with three."""
+
+
 class AskingMachine(Machine[T]):
     """A machine that begins with a question, and repeats it until there is an answer.
 
     The question is put again every `wait` seconds, `retries` times; then `_give_up` is called.
-    With `soon` it is put once more before that, after so many seconds.
+    With `soon` it is put `_EARLY` times more before that, each time after so many seconds.
     """
 
     def __init__(self, wait: float, retries: int, soon: float | None = None) -> None:
@@ -83,7 +88,7 @@ class AskingMachine(Machine[T]):
 
     def start(self, now: float) -> Sequence[Message]:
         """Ask."""
-        self._retries_done = 0 if self._soon is None else -1
+        self._retries_done = 0 if self._soon is None else -_EARLY
         return self._ask(now)
 
     def _time_out(self, now: float) -> Sequence[Message]:

@@ -30,7 +30,9 @@ _SAMPLED_PAIRS = 200  # pairs of the sample beyond
 _COARSER = 3.0  # tolerance of the noise average of a sample, in that of the result
 _DEGREE = 5  # of the polynomial from cutoff rates to mutual information
 _FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
-_FRESH_SEARCHES = 128  # slots with new draws where their rates take long: a search, or noises
+_FRESH_SLOTS = 2000  # slots with new draws, at most
+_FEW_FRESH_SLOTS = 128  # the same where their rates take long: a search, noises, ...
+_FEW_CLASSES = 1000  # ... or more classes of differences than this; chosen
 
 _MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
 _SPARE_ERROR = 0.001  # error of the spare power, dB: it is printed to 0.1. Chosen
@@ -134,9 +136,10 @@ class FreshRates:
 def fresh_rates(solution: Solution) -> FreshRates | None:
     """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
-    Every slot has draws of its own, or where that takes long (precoders that know the draw are
-    searched for each of them) every so many slots. What is delivered is the mean over flights that
-    have one of the draws in each slot, forwarded with the planned shares.
+    Every slot has draws of its own, or where that takes long (large alphabets, many slots, searches
+    for precoders that know the draw) every so many slots. What is delivered is
+    the mean over flights that have one of the draws in each slot, forwarded with the planned
+    shares.
     """
     problem, how = build_problem(solution.plan), design(solution.plan)
     if not how.averaged:
@@ -144,7 +147,8 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
     slots = len(solution.w)
     quick = how.blind and solution.plan.optimizer.rate == "cutoff"
-    step = 1 if quick else -(-slots // _FRESH_SEARCHES)
+    quick &= all(len(link.classes.vectors) <= _FEW_CLASSES for link in problem.links)
+    step = -(-slots // (_FRESH_SLOTS if quick else _FEW_FRESH_SLOTS))
     chosen = np.arange(step // 2, slots, step)
     w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
     found, rates = [], []
@@ -208,7 +212,7 @@ def saturation(solution: Solution) -> Saturation:
         rates = solution.recomputed_slots(10 ** (-db / 10))
         return maximised(*rates, solution.shares) >= SATURATED * ceiling
 
-    if not enough(0.0):
+    if maximised(solution.I_U, solution.I_G, solution.shares) < SATURATED * ceiling:
         return Saturation(ceiling, 0.0)
     low, high = 0.0, _FIRST_SPARE_DB
     while high < _MAX_SPARE_DB and enough(high):

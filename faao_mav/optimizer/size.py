@@ -25,15 +25,15 @@ MAX_SECONDS, MAX_GIGABYTES = 600.0, 8.0
 
 # Fitted to the plans of tests/benchmarks/sizes.py, whose times they give within a factor of two.
 # Not those of algorithm1, which has a limit of its own.
-_EXPONENTIAL = 1.6e-9  # s for one exponential of a class
-_PRODUCT = 4e-11  # s for one product of a class with a pair of coordinates
+_EXPONENTIAL = 1.3e-9  # s for one exponential of a class
+_PRODUCT = 3e-11  # s for one product of a class with a pair of coordinates
 _DENSE = 6e-10  # s for one product of the dense algebra after the sums over the classes
 _ALWAYS = 1.5  # s of any plan
 _PROGRAM = 0.1  # GB of any plan
-_FLIGHT_SLOT = 1e-3  # s for each slot, of the flight and of the mission that flies it
-_SUMS = 46  # sums for each slot and draw: of the flight found, of its prediction, in wind
-_CURVE = 2500  # sums with derivatives for each draw in the table of a link's rate
-_SLOT = 4  # the same for each draw of a slot of the flight found
+_FLIGHT_SLOT = 7e-4  # s for each slot, of the flight and of the mission that flies it
+_SUMS = 16  # sums for each slot and draw: of the flight found, of its prediction, in wind
+_CURVE = 1700  # sums with derivatives for each draw in the table of a link's rate
+_SLOT = 3  # the same for each draw of a slot of the flight found
 _TABLE = 300_000  # sums with derivatives for the table of known draws, of two modes at most
 _KNOWN_SLOT = 200  # the same for each slot of the flight found, with known draws
 _SEARCHED_SLOT = 15_000  # the same for each slot where the search is repeated at every place
@@ -41,7 +41,7 @@ _SAMPLED = 4e-4  # s for each vector of symbols, for the mutual information of a
 _EXACT = 1.2e-3  # the same where the slots are not a sample of those of many draws
 _CLASS_BYTES = 40  # for each difference vector and each number by which they are merged
 _HELD_BYTES = 250  # for each class in each slot, where rates of known draws are differentiated
-_CHANNEL_COPIES = 7  # copies of the channels of all slots and draws held at once
+_CHANNEL_COPIES = 4  # copies of the channels of all slots and draws held at once
 
 _NODES = 4096  # points of the noise in each mutual information that is optimised
 _NODE = 60  # exponentials that one such point costs beside one for each vector of symbols

@@ -139,7 +139,7 @@ def best_mean_precoders(
     if exact and N == 2:
         P = bpsk_two_antennas(flat[:, 0], power)
     elif not exact:
-        A = flat * (np.sqrt(power) / (2.0 * np.sqrt(noise)))
+        scale = np.sqrt(power) / (2.0 * np.sqrt(noise))
         given = None if start is None else np.reshape(start, (-1, N, N)).astype(np.complex128)
         mean = np.mean(flat, axis=1)
         step = max(1, _CHUNK // (S * 2 * N**4 * (_STARTS if start is None else 1)))
@@ -147,6 +147,6 @@ def best_mean_precoders(
             part = slice(first, first + step)
             known = None if given is not None else _known(mean[part], power, noise)
             begin = None if given is None else given[part]
-            P[part] = search(A[part], classes, tolerance, begin, known)
+            P[part] = search(flat[part] * scale, classes, tolerance, begin, known)
     P = with_power(P, power)
     return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)

@@ -6,7 +6,7 @@ therefore enter only through products of matrices with the features φ, which ar
 channels.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
@@ -16,6 +16,12 @@ from faao_mav.radio.constellation import DifferenceClasses
 
 _BLOCK, _CLASSES = 1 << 17, 2048
 """Exponents held at once, 1 MB, and classes taken together: they stay in the cache. Chosen."""
+
+_KEPT = 1 << 24
+"""Numbers of features and their products that are kept, 128 MB; more are computed anew. Chosen."""
+
+_TINY = 1e-200
+"""The least sum that is taken without a common factor. Chosen: far above the smallest number."""
 
 
 def _basis(antennas: int) -> Complex:
@@ -68,8 +74,17 @@ class ClassSum:
         self._phi = features(classes.vectors)
         self._weights = classes.multiplicity / classes.symbols
         self._rows, self._columns = np.triu_indices(self.antennas**2)
+        self._kept: dict[bool, list[tuple[Real, Real]]] = {}
 
-    def _blocks(self, derivatives: bool) -> Iterator[tuple[Real, Real]]:
+    def _blocks(self, derivatives: bool) -> Iterable[tuple[Real, Real]]:
+        """Return φᵀ and weight [1, φ, φ φ] of the classes, `_CLASSES` at once."""
+        if self._phi.size * (1 + derivatives * self._phi.shape[1]) > _KEPT:
+            return self._computed(derivatives)
+        if derivatives not in self._kept:
+            self._kept[derivatives] = list(self._computed(derivatives))
+        return self._kept[derivatives]
+
+    def _computed(self, derivatives: bool) -> Iterator[tuple[Real, Real]]:
         for start in range(0, len(self._phi), _CLASSES):
             phi = self._phi[start : start + _CLASSES]
             terms = [np.ones((len(phi), 1))]
@@ -79,21 +94,40 @@ class ClassSum:
             yield np.ascontiguousarray(phi.T), np.concatenate(terms, axis=1) * weights
 
     def _sums(self, z: Real, derivatives: bool) -> tuple[Real, Real]:
-        """Return Σ_k weight_k e^(least - D_k) [1, φ, φ φ] and least, the smallest D_k."""
-        step = max(1, _BLOCK // min(_CLASSES, len(self._phi)))
-        least = np.full(len(z), np.inf)
-        width = 1 + derivatives * (z.shape[1] + len(self._rows))
-        sums = np.zeros((len(z), width))
-        for phi, terms in self._blocks(derivatives):
-            for start in range(0, len(z), step):
-                part = slice(start, start + step)
-                D = z[part] @ phi
-                lower = np.minimum(least[part], np.min(D, axis=1))
-                sums[part] *= np.exp(lower - least[part])[:, None]
-                np.subtract(lower[:, None], D, out=D)
-                sums[part] += np.exp(D, out=D) @ terms
-                least[part] = lower
+        """Return Σ_k weight_k e^(least - D_k) [1, φ, φ φ] and least, 0 or the smallest D_k."""
+        least = np.zeros(len(z))
+        with np.errstate(over="ignore", invalid="ignore"):
+            sums = self._shifted(z, least, derivatives)
+        far = np.flatnonzero(~((sums[:, 0] > _TINY) & (sums[:, 0] < 1 / _TINY)))
+        if far.size:
+            least[far] = self._least(z[far])
+            sums[far] = self._shifted(z[far], least[far], derivatives)
         return sums, least
+
+    def _shifted(self, z: Real, least: Real, derivatives: bool) -> Real:
+        """Return Σ_k weight_k e^(least - D_k) [1, φ, φ φ]."""
+        sums = np.zeros((len(z), 1 + derivatives * (z.shape[1] + len(self._rows))))
+        shift = bool(least.any())
+        for phi, terms in self._blocks(derivatives):
+            for part in self._parts(z):
+                D = z[part] @ -phi
+                if shift:
+                    D += least[part, None]
+                sums[part] += np.exp(D, out=D) @ terms
+        return sums
+
+    def _least(self, z: Real) -> Real:
+        """Return the smallest exponent at z (b, N²), (b,)."""
+        least = np.full(len(z), np.inf)
+        for phi, _ in self._blocks(False):
+            for part in self._parts(z):
+                least[part] = np.minimum(least[part], (z[part] @ phi).min(axis=1))
+        return least
+
+    def _parts(self, z: Real) -> Iterator[slice]:
+        """Yield the parts of z that are taken at once."""
+        step = max(1, _BLOCK // min(_CLASSES, len(self._phi)))
+        return (slice(start, start + step) for start in range(0, len(z), step))
 
     def value(self, z: Real) -> Real:
         """Return s, (b,), at z (b, N²)."""

@@ -1,5 +1,8 @@
 """The cutoff rate, (7) and (8): a lower bound on the mutual information, in closed form."""
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
@@ -8,6 +11,7 @@ from faao_mav.radio.class_sum import coordinates, features
 from faao_mav.radio.constellation import DifferenceClasses
 
 _CHUNK = 1 << 16  # exponents held at once: 512 kB stay in the cache, 15 % quicker than 16 MB
+_PAIRS = 1 << 17  # channels with their precoders taken together: bounds the memory; chosen
 _CLASSES = 2048  # classes taken together: those of the largest alphabets would not stay there
 
 
@@ -51,6 +55,18 @@ def cutoff_rate(
     >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))
     0.548059
     """
+    H, P = np.asarray(H, dtype=np.complex128), np.asarray(P, dtype=np.complex128)
+    shape = np.broadcast_shapes(H.shape[:-2], P.shape[:-2])
+    if math.prod(shape) > _PAIRS:
+        axis = int(np.argmax(shape)) - len(shape) - 2
+        parts = -(-math.prod(shape) // _PAIRS)
+        return np.concatenate(
+            [
+                cutoff_rate(*part, classes, noise)
+                for part in zip(_split(H, axis, parts), _split(P, axis, parts), strict=True)
+            ],
+            axis=axis + 2,
+        )
     A = _received(H, P, noise)
     z = coordinates(A.conj().mT @ A)
     flat = z.reshape(-1, z.shape[-1])
@@ -62,6 +78,13 @@ def cutoff_rate(
     return bounded
 
 
+def _split(M: Complex, axis: int, parts: int) -> Sequence[Complex]:
+    """Return M (..., N, N) in parts along an axis, or M itself for each if it has none there."""
+    if M.ndim < -axis or M.shape[axis] == 1:
+        return [M] * parts
+    return [*np.array_split(M, parts, axis)]
+
+
 def _mean(function: np.ufunc, z: Real, classes: DifferenceClasses) -> Real:
     """Return Σ weight `function`(-D) over the classes, (n,), at the coordinates z (n, N²)."""
     total = np.zeros(len(z))
@@ -71,6 +94,7 @@ def _mean(function: np.ufunc, z: Real, classes: DifferenceClasses) -> Real:
         weight = classes.weight[first : first + _CLASSES]
         for start in range(0, len(z), step):
             part = slice(start, start + step)
-            D = np.minimum(0.0, z[part] @ phi)
+            D = z[part] @ phi
+            np.minimum(D, 0.0, out=D)
             total[part] += function(D, out=D) @ weight
     return total

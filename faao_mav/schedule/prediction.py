@@ -64,7 +64,9 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     errors = deviation(solution.t, solution.w, t, w, solution.plan.mission.path_tolerance)
     I_U, I_G = rates_along(solution, at)
     nearest, shares = nearest_slots(solution, at), solution.shares
-    near_U, near_G = rates_along(solution, at, nearest)
+    other = np.flatnonzero(nearest != np.arange(len(at)))
+    near_U, near_G = I_U.copy(), I_G.copy()
+    near_U[other], near_G[other] = rates_along(solution, at, nearest, only=other)
     near_shares = shares[nearest] if shares is not None else None
     return Prediction(
         w=at,
@@ -80,19 +82,24 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     )
 
 
-def rates_along(solution: Solution, w: Real, slots: Integers | None = None) -> tuple[Real, Real]:
+def rates_along(
+    solution: Solution, w: Real, slots: Integers | None = None, *, only: Integers | None = None
+) -> tuple[Real, Real]:
     """Return I_U (7) and I_G (8), bits, each (n,), where the aircraft is at `w` (n, 2) in slot n.
 
     Each slot keeps its fading; the line of sight and the path gain are those at `w`. The
     precoders are those of the same slot, or of `slots` (n,), as `nearest_slots` gives for a radio
     that goes by position. Precoders that know the draw of an averaged fading stay with the draw.
+    With `only` (k,) they are the rates (k,) of those slots of the n alone.
     Raises `InputError` unless `w` has one position per slot.
     """
     if w.shape != solution.w.shape:
         raise InputError(f"positions {w.shape}; expected one per slot, {solution.w.shape}")
+    at = np.arange(len(w)) if only is None else only
+    of = at if slots is None else slots[at]
     links = build_problem(solution.plan).links
     I_U, I_G = (
-        link.rates(w, link.small_scale(w), P if slots is None else P[..., slots, :, :])
+        link.rates(w[at], link.small_scale(w)[..., at, :, :], P[..., of, :, :])
         for link, P in zip(links, (solution.P_B, solution.P_U), strict=True)
     )
     return I_U, I_G

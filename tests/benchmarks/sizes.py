@@ -7,11 +7,14 @@ copter's sample with its alphabet, antennas, fading and time step changed, in a 
 """
 
 import argparse
+import os
 import resource
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 from faao_mav import parse_plan, plan_mission
 from faao_mav.optimizer.size import cost

@@ -18,12 +18,12 @@ def antennas(base: int, relay: int, user: int) -> dict[str, Any]:
 
 TOO_LARGE: list[dict[str, Any]] = [
     {"radio.modulation": "bpsk"} | antennas(12, 12, 12),
-    {"radio.modulation": "qpsk", "radio.fading": "ergodic"} | antennas(6, 6, 6),
+    {"radio.modulation": "qpsk", "radio.fading": "ergodic"} | antennas(7, 7, 7),
     {"radio.modulation": "64qam"} | antennas(2, 3, 2),
     {"radio.modulation": "16qam", "radio.fading": "realization", "flight.duration": 500}
     | antennas(3, 3, 3),
     {"radio.modulation": "64qam", "optimizer.rate": "mutual_information", "flight.duration": 500},
-    {"radio.fading": "ergodic", "radio.fading_samples": 10_000, "flight.duration": 500},
+    {"radio.fading": "ergodic", "radio.fading_samples": 10_000, "flight.duration": 1000},
     {"radio.fading": "none", "optimizer.precoder": "mrt"} | antennas(64, 1, 1),
 ]
 

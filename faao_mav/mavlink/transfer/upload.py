@@ -171,9 +171,10 @@ class Upload(Exchange):
             return self._on_invalid_sequence(now)
         elif result in TENTATIVE:
             self._result = result
-            if self._phase == "items":
-                soon = 2 * self._timeouts.item
-                self._due = now + (soon if self._all_sent() else self._timeouts.response)
+            if self._phase in ("count", "items"):
+                self._retries_done = max(self._retries_done, 0)  # it hears: no need to hurry
+                sent = self._phase == "items" and self._all_sent()
+                self._due = now + (2 * self._timeouts.item if sent else self._timeouts.response)
         elif result in _NOT_YET and self._booting:
             self._result = result
             self._wait_for_boot(now)
@@ -258,7 +259,7 @@ class Upload(Exchange):
         if self._reminder() is None:
             return 2 * self._timeouts.response
         first = max(self._timeouts.item, self.pace.wait)
-        return min(first * 2.0**self._retries_done, self._timeouts.response)
+        return min(first * 2.0 ** max(self._retries_done - 1, 0), self._timeouts.response)
 
     def _item(self, seq: int) -> Message:
         self._sent.add(seq)
