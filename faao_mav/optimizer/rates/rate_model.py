@@ -26,9 +26,13 @@ _SURFACE_POINTS = (49, 65)
 Chosen so that tables differ from exact rates by less than 2e-4 bit in the tests
 (test_rate_models.py)."""
 
-_SEARCH_EVERY = 8
+_SEARCH_EVERY = 16
 """Every so many points of a curve the best precoders are searched from all starts; between, from
-those next to them. Points of a curve are one more than a multiple. Chosen."""
+those next to them: a power of two, of which the points of a curve are one more than a multiple.
+
+Measured on six curves of QPSK and 16-QAM beside every eighth, with 60 % of Newton's sums: the mean
+rate is at most 2e-5 bit lower on two antennas, and 6e-4 to 3e-3 bit higher with QPSK on three.
+"""
 
 _ALIKE = 0.3
 """The distance, in their size, up to which precoders of neighbouring points are of one kind: those
