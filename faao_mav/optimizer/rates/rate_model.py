@@ -158,8 +158,7 @@ def _along(link: Link, design: Design, H: Complex) -> Complex:
         at = np.arange(step, points - step, 2 * step)
         below, above = P[..., at - step, :, :], P[..., at + step, :, :]
         try_from(at, _between(below, above, np.full(len(at), 0.5)))
-        other = ~_alike(below, above)
-        other = other if other.ndim == 1 else other.any(axis=0)
+        other = np.any(~_alike(below, above).reshape(-1, len(at)), axis=0)  # of any of the draws
         try_from(at[other], above[..., other, :, :])
     return P
 
