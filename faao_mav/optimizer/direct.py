@@ -174,9 +174,9 @@ def direct(
     best = _best(problem, field, optima)
     final = _at_exact_rates(problem, scheme, field, best)
     for other in optima:  # where rates come from a table another may be the best in truth
-        if other is not best and other.value > final.value:
+        if other is not best and other.value > final.value + _EQUAL:
             exact = _at_exact_rates(problem, scheme, field, other)
-            final = exact if exact.value > final.value else final
+            final = exact if exact.value > final.value + _EQUAL else final
     solution = _solution(problem, scheme, field, final, history, by_start)
     if before is None:
         return solution

@@ -123,16 +123,17 @@ def _best_superposed(sums: ClassSum, G: Complex) -> Complex:
 def _from_starts(sums: ClassSum, G: Complex, starts: Complex, tolerance: float) -> Complex:
     """Return the best point (b, q, N) that is reached from the starts (K, b, q, N)."""
     K, b = starts.shape[:2]
-    each = np.tile(np.arange(b), K)
-    F = value(sums, G[each], _unit(starts.reshape(K * b, *starts.shape[2:])))
+    draws = slice(None, None, max(1, G.shape[1] // _DRAWS))
+    owner = np.tile(np.arange(b), K)
+    F = value(sums, G[owner, draws], _unit(starts.reshape(K * b, *starts.shape[2:])))
     depth = -np.min(F.reshape(K, b), axis=0)
     factor = _raised(G) * np.minimum(1.0, _SATURATED / np.maximum(depth, _SATURATED))
-    starts = np.concatenate([starts, _best_superposed(sums, _scaled(G, factor))])
+    scaled = _scaled(G, factor)
+    few = scaled[:, draws]
+    starts = np.concatenate([starts, _best_superposed(sums, few)])
     K = len(starts)
     owner = np.tile(np.arange(b), K)
     flat = starts.reshape(K * b, *starts.shape[2:])
-    scaled = _scaled(G, factor)
-    few = scaled[:, :: max(1, G.shape[1] // _DRAWS)]
     Q, F = minimise(sums, few[owner], flat, _COARSE)
     if few.shape != G.shape:
         F = value(sums, scaled[owner], Q)
