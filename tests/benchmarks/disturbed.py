@@ -5,9 +5,9 @@
 The sample 30 m above the ground, in simulators twice as fast as the world. Cases: `wind`, of which
 the plan knows nothing; `silence`, a link that carries nothing for 8 s of the flight; `pause`,
 another mode for 15 s and back, as a pilot sets them, who sends it home 10 s later if it then is
-still the pilot's; `loss 5 %` and `loss 20 %` of all packets each
-way; `outages` of 2 s of the world's time, one in ten. One row for each: how it ended, the delivered
-rate over the planned one without and with re-planning, and what was told of new courses.
+still the pilot's; `loss 5 %` and `loss 20 %` of all packets each way; `outages` of 2 s of the
+world's time, one in ten. One row for each: how it ended, the delivered rate over the planned one
+without and with re-planning, and what was told of new courses.
 """
 
 import math

@@ -157,10 +157,12 @@ def streamed(autopilots: Path, autopilot: str, result: Result, folder: Path) -> 
 
 
 @contextmanager
-def serving(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Iterator[str]:
+def serving(
+    autopilots: Path, autopilot: str, result: Result, folder: Path, speedup: int = 5
+) -> Iterator[str]:
     """Run a simulator in `folder`, in the plan's wind, that holds the mission of `result`.
 
-    It yields where it is heard, five times as fast as the world; its own log stays in `folder`.
+    It yields where it is heard, `speedup` times as fast as the world; its log stays in `folder`.
     """
     wind = result.solution.plan.site.wind
     assert result.conversion is not None
@@ -175,7 +177,7 @@ def serving(autopilots: Path, autopilot: str, result: Result, folder: Path) -> I
         (folder / "own.parm").write_text("\n".join(["LOG_BACKEND_TYPE 1", *timed, *air]))
         defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
         kind, options = "arducopter", ["--defaults", defaults]
-    with simulated(autopilots, kind, folder, "--speedup", "5", *options) as connection:
+    with simulated(autopilots, kind, folder, "--speedup", str(speedup), *options) as connection:
         upload(result.conversion.mission, connection, wait=60)
         time.sleep(SETTLES)
         yield connection

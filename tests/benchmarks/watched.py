@@ -32,7 +32,7 @@ def watched(autopilots: Path, autopilot: str, result: Result, folder: Path) -> s
     assert result.conversion is not None
     assert result.check is not None
     telling = Telling(result.solution, result.check.track, None, lambda _: None)
-    with serving(autopilots, autopilot, result, folder) as connection:
+    with serving(autopilots, autopilot, result, folder, speedup=10) as connection:
         report = fly(result.conversion.mission, connection, arm=True, wait=60, watching=telling)
     seen, ending = telling.debriefing(report), report.ending
     if ending is None or seen is None:

@@ -30,7 +30,9 @@ from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.flown import Line
+from faao_mav.validate.lean import beyond_lean
 from faao_mav.vehicle.px4 import PX4
+from faao_mav.vehicle.vehicle import vehicle_of
 
 _INT32 = 6
 """MAV_PARAM_TYPE of whole numbers, which PX4 sends as their bits."""
@@ -178,6 +180,9 @@ class Stream(Watch):
             self._end("refused", f"nothing was started: {text}, not within {_AT_HOME:.0f} m")
             return ()
         self.seen.told.append(f"without setpoints {self._rules.without(self._timeouts)}")
+        lean = beyond_lean(self.solution, vehicle_of(self.solution.plan))
+        if lean is not None:
+            self.seen.told.append(str(lean))
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
         self.phase = "engaging"
         if self._rules.takes_off_by_setpoints:
@@ -239,7 +244,7 @@ class Stream(Watch):
             self._step_aside()
         elif wanted is not None and wanted.intended_custom_mode == self._guided:
             self._unsure = None
-            text = f"mode {self.seen.mode}: its failsafe, until setpoints come again"
+            text = "it is in its failsafe, until setpoints come again"
             if self.seen.told[-1] != text:
                 self.seen.told.append(text)
         elif wanted is not None or (self._unsure is not None and now > self._unsure + _TOLD_BY):
