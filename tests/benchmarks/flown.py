@@ -76,6 +76,21 @@ FLOWN: dict[str, dict[str, Any]] = {
         "flight.start_velocity": "free",
         "flight.end_velocity": "free",
     },
+    "the same, 45 degrees of lean": {
+        "flight.duration": 90,
+        "vehicle.max_speed": 10,
+        "vehicle.max_acceleration": 2.5,
+        "vehicle.parameters": {"ANGLE_MAX": 4500},
+        "flight.start_velocity": "free",
+        "flight.end_velocity": "free",
+    },
+    "gentle, 90 s, 10 m/s": {
+        "flight.duration": 90,
+        "vehicle.max_speed": 10,
+        "vehicle.max_acceleration": 0.6,
+        "flight.start_velocity": "free",
+        "flight.end_velocity": "free",
+    },
     "16-QAM, 240 s, 5 m/s": {
         "flight.duration": 240,
         "vehicle.max_speed": 5,
@@ -169,10 +184,12 @@ def serving(
     files, script = result.write(folder / "mission.waypoints"), autopilots / RUNNERS[autopilot][0]
     if autopilot == "px4":
         kind, options = "px4", ["--keep", str(folder), *in_wind(script, wind)]
-        options += ["--params", "SIH_KDV=0.2,SDLOG_MODE=0"]
+        options += ["--params", "SIH_KDV=0.2"]
         options += ["--param-file", str(files[1])] if len(files) > 1 else []
     else:
-        timed = [f"{name} {value}" for name, value in result.conversion.parameters.items()]
+        plans = result.solution.plan.vehicle.parameters
+        told = {**plans, **result.conversion.parameters}
+        timed = [f"{name} {value}" for name, value in told.items()]
         air = [f"SIM_WIND_SPD {wind.speed}", f"SIM_WIND_DIR {wind.from_degrees}"]
         (folder / "own.parm").write_text("\n".join(["LOG_BACKEND_TYPE 1", *timed, *air]))
         defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"

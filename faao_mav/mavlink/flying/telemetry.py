@@ -1,7 +1,7 @@
 """What a vehicle tells of its flight, and asking it for what it does not tell by itself."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from faao_mav.mavlink.messages import (
@@ -181,6 +181,8 @@ class Telemetry:
                     self.wanted = None
             case CurrentMode():
                 self._needed[CURRENT_MODE], self.wanted = now, message
+                if self.heartbeat is not None:
+                    self.heartbeat = replace(self.heartbeat, custom_mode=message.custom_mode)
             case GlobalPositionInt():
                 self._on_position(message, now)
             case SysStatus():
