@@ -12,7 +12,7 @@ from faao_mav.mavlink.messages import (
     SetPositionTargetLocalNed,
 )
 from faao_mav.mavlink.protocol import Address
-from faao_mav.mission.item import Home
+from faao_mav.plan.sections import Origin
 from faao_mav.vehicle import AutopilotFamily
 
 LOCAL_NED = 1
@@ -28,7 +28,7 @@ class OwnFrame:
     `origin` is where its own frame has its origin, None until it tells.
     """
 
-    def __init__(self, family: AutopilotFamily, plan_origin: Home) -> None:
+    def __init__(self, family: AutopilotFamily, plan_origin: Origin) -> None:
         self._family = family
         self._plans = LocalFrame(plan_origin.latitude, plan_origin.longitude)
         self.origin: GpsGlobalOrigin | None = None
