@@ -177,13 +177,14 @@ def serving(
 ) -> Iterator[str]:
     """Run a simulator in `folder`, in the plan's wind, that holds the mission of `result`.
 
-    It yields where it is heard, `speedup` times as fast as the world; its log stays in `folder`.
+    It yields where it is heard, `speedup` times as fast as the world. ArduPilot's own log stays in
+    `folder`.
     """
     wind = result.solution.plan.site.wind
     assert result.conversion is not None
     files, script = result.write(folder / "mission.waypoints"), autopilots / RUNNERS[autopilot][0]
     if autopilot == "px4":
-        kind, options = "px4", ["--keep", str(folder), *in_wind(script, wind)]
+        kind, options = "px4", in_wind(script, wind)
         options += ["--params", "SIH_KDV=0.2"]
         options += ["--param-file", str(files[1])] if len(files) > 1 else []
     else:
