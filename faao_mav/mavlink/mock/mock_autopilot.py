@@ -39,6 +39,7 @@ from faao_mav.mavlink.mock.turn_back import home_outside, kept_inside
 from faao_mav.mavlink.modes import modes_of
 from faao_mav.mavlink.protocol import (
     ARMED,
+    CURRENT_MODE,
     GROUND_STATION,
     HOME_POSITION,
     LOCAL_ORIGIN,
@@ -117,6 +118,7 @@ class MockAutopilot(Machine[None]):
         self.lists = StoredLists(self.vehicle, home)
         rules = setpoint_rules(behaviour.family)
         self._comes_back = bool(rules.loss)
+        self._tells_wanted = False  # only once it is asked for CURRENT_MODE
         known = self.vehicle.defaults() | dict(rules.defaults)
         known |= dict(behaviour.firmware.parameters)
         self.parameters = ParameterServer(known | dict(parameters or {}))
@@ -175,7 +177,7 @@ class MockAutopilot(Machine[None]):
         if now >= self._next_beat:
             self._next_beat = now + self._beat
             out += [self._heartbeat(), self._mission_current(now), self._system_status()]
-            if self._comes_back:
+            if self._tells_wanted:
                 out.append(CurrentMode(self._mode, self._wanted))
         if self._period is not None and now >= self._next_report:
             self._next_report = now + self._period
@@ -259,6 +261,8 @@ class MockAutopilot(Machine[None]):
                 kind = whole(command.param1) if by_number else _AUTOPILOT_VERSION
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
+            case MavCommand.SET_INTERVAL if command.param1 == CURRENT_MODE:
+                self._tells_wanted = self._comes_back
             case MavCommand.SET_INTERVAL:
                 asked = whole(command.param2)  # microseconds; 0: the usual rate
                 if command.param1 == POSITION and asked > 0 and self._period is not None:
