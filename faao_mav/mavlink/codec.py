@@ -53,13 +53,13 @@ class Codec:
     """
 
     def __init__(self, address: Address, signing: Signing | None = None) -> None:
-        from pymavlink.dialects.v20 import common
+        from pymavlink.dialects.v20 import development  # common, and CURRENT_MODE
 
         self.address, self._signing = address, signing
         self.heard: set[Verdict] = set()
-        self._dialect: Any = common
-        self._reader: Any = common.MAVLink(None)
-        self._mav: Any = common.MAVLink(None, address.system, address.component)
+        self._dialect: Any = development
+        self._reader: Any = development.MAVLink(None)
+        self._mav: Any = development.MAVLink(None, address.system, address.component)
         if signing is not None:
             self._mav.signing.secret_key = signing.key
             self._mav.signing.sign_outgoing = True

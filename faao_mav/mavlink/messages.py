@@ -113,6 +113,13 @@ class MissionCurrent(Message):
     mission_id: int = 0
 
 
+class CurrentMode(Message):
+    """CURRENT_MODE: the mode, and the one that was asked for last, another in a failsafe."""
+
+    custom_mode: int
+    intended_custom_mode: int
+
+
 class MissionItemReached(Message):
     """MISSION_ITEM_REACHED."""
 

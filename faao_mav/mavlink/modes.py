@@ -63,7 +63,7 @@ def mode_name(heartbeat: Heartbeat) -> str:
     >>> mode_name(Heartbeat(type=2, autopilot=3, base_mode=1, custom_mode=17, system_status=4))
     'BRAKE'
     """
-    from pymavlink.dialects.v20.common import MAVLink_heartbeat_message
+    from pymavlink.dialects.v20.development import MAVLink_heartbeat_message
     from pymavlink.mavutil import mode_string_v10
 
     return str(mode_string_v10(MAVLink_heartbeat_message(*astuple(heartbeat))))

@@ -43,12 +43,21 @@ class SetpointRules:
     actions: Mapping[int, LossAction] = field(default_factory=dict)
     streamed: float = 0.0
     carries_on: bool = False
-    defaults: Mapping[str, float] = field(default_factory=dict)
+    defaults: dict[str, float] = field(default_factory=dict)
 
     @property
     def takes_off_by_setpoints(self) -> bool:
         """Whether it takes off by setpoints, which have to come before it enters the mode."""
         return self.streamed > 0
+
+    def comes_back_from(self, mode: int, values: Mapping[str, float]) -> bool:
+        """Tell whether it changes to `mode` for want of setpoints, and back when they come again.
+
+        That is so given its parameters' `values`, but not where sticks fly it: somebody may be at
+        them.
+        """
+        action = self.actions.get(int(values.get(self.loss, -1)))
+        return action is not None and action.mode == mode and not action.by_sticks
 
     def without(self, values: Mapping[str, float]) -> str:
         """Return in words what it does without setpoints, given its parameters' `values`."""
@@ -60,9 +69,12 @@ class SetpointRules:
         action = self.actions.get(int(values[self.loss]))
         told = ", ".join(f"{name} {values[name]:g}" for name in self.defaults)
         name = "another mode" if action is None else action.name
+        back = ""
         if action is not None and action.by_sticks:
             name += " (and sinks, unless sticks fly it)"
-        return f"it changes to {name} after {after:g} s ({told})"
+        elif action is not None:
+            back = ", until they come again"
+        return f"it changes to {name} after {after:g} s ({told}){back}"
 
 
 _RULES = {

@@ -4,9 +4,10 @@
 
 The sample 30 m above the ground, in simulators twice as fast as the world. Cases: `wind`, of which
 the plan knows nothing; `silence`, a link that carries nothing for 8 s of the flight; `pause`,
-another mode for 15 s and back, as a pilot sets them; `loss 5 %` and `loss 20 %` of all packets each
-way; `outages` of 2 s of the world's time, one in ten. One row for each: how it ended, the delivered
-rate over the planned one without and with re-planning, and what was told of new courses.
+another mode for 15 s and back, as a pilot sets them, who sends it home 10 s later if it then is
+still the pilot's; `loss 5 %` and `loss 20 %` of all packets each way; `outages` of 2 s of the
+world's time, one in ten. One row for each: how it ended, the delivered rate over the planned one
+without and with re-planning, and what was told of new courses.
 """
 
 import math
@@ -46,6 +47,9 @@ BEGIN = 25.0
 """Seconds of the plan's clock after which the link breaks, or a pilot sets a mode."""
 
 PILOT = Address(250, 1)
+HOLDS = "COM_OBL_RC_ACT=5"
+"""What PX4 does without setpoints: Hold."""
+
 WINDS = {"ardupilot": (7.0, 225.0), "px4": (7.0, 225.0)}
 """Speed, m/s, and where it comes from, degrees: against the middle of the flight."""
 
@@ -97,7 +101,9 @@ class Disturbance:
             self.silent_until = time.monotonic() + 8 / SPEEDUP
         modes = modes_of(watch._peer.vehicle)  # type: ignore[arg-type]
         assert modes.guided is not None
-        for name, mode, when in (("out", modes.hold, 0.0), ("back", modes.guided, 15.0)):
+        home = (modes.at_fence["return"], 25.0 if watch.phase == "aside" else math.inf)
+        does = {"out": (modes.hold, 0.0), "back": (modes.guided, 15.0), "home": home}
+        for name, (mode, when) in does.items():
             if self.case == "pause" and t > BEGIN + when and name not in self.done:
                 self.done.append(name)
                 self.write(Codec(PILOT).pack(SetMode(watch._peer.address.system, 1, mode)))
@@ -116,7 +122,7 @@ def flown(
             towards = math.radians(origin + 180)
             east, north = speed * math.sin(towards), speed * math.cos(towards)
             air = [f"--wind={east},{north}"] if speed else []
-            options = ["--speedup", str(SPEEDUP), "--params", "SIH_KDV=0.2", *air]
+            options = ["--speedup", str(SPEEDUP), "--params", f"SIH_KDV=0.2,{HOLDS}", *air]
         else:
             timed = [f"{name} {value}" for name, value in result.conversion.parameters.items()]
             air = [f"SIM_WIND_SPD {speed}", f"SIM_WIND_DIR {origin}"] if speed else []

@@ -127,14 +127,35 @@ def test_it_stops_when_setpoints_cease(kind: str) -> None:
         at.append(scene.mock._guided.at(now))
 
     events = [(14.0, cease), (26.0, look), (27.0, look)]
-    words = "stops after 3 s (GUID_TIMEOUT)" if kind == "ardupilot" else "changes to Return after 1"
+    words = (
+        "stops after 3 s (GUID_TIMEOUT)" if kind == "ardupilot" else "changes to Return after 1 s"
+    )
     ending = scene.run(events=events, until=90.0)
     assert scene.told(f"without setpoints it {words}")
     if kind == "ardupilot":
         assert np.linalg.norm(at[1].position - at[0].position) < 0.1
     else:
         assert ending == "taken over"
-        assert scene.told("the pilot or a failsafe has the aircraft")
+        assert scene.told("its failsafe, until setpoints come again")
+
+
+@pytest.mark.parametrize(
+    ("action", "pilot", "ending"),
+    [(5, False, "finished"), (5, True, "taken over"), (0, False, "taken over")],
+)
+def test_an_outage_on_px4_ends_the_setpoints_only_where_somebody_may_fly(
+    action: int, pilot: bool, ending: str
+) -> None:
+    """COM_OBL_RC_ACT 5 is Hold, 0 Position, by sticks; the pilot, too, sets Hold meanwhile."""
+    scene, sent = Scene("px4", solution=low(), parameters={"COM_OBL_RC_ACT": action}), list[int]()
+    events = [
+        (15.0, scene.sets(px4_mode(4, 3)) if pilot else lambda _: None),
+        (20.0, lambda _: sent.append(len(scene.orders))),
+        (25.0, scene.sets(px4_mode(4, 6)) if pilot else lambda _: None),
+    ]
+    assert scene.run(Faults(outages=((14.0, 16.5),), seed=1), events=events) == ending
+    assert (len(scene.orders) > sent[0]) == (ending == "finished")
+    assert scene.told("its failsafe") == (ending == "finished")
 
 
 def test_without_setpoints_or_sticks_px4_sinks_in_position() -> None:
@@ -167,6 +188,19 @@ def test_it_is_not_started_where_it_must_not_be(kind: str) -> None:
     assert scene.run() == "refused"
     assert scene.orders == []
     assert "111 m from the plan's home" in scene.watch.outcome.text
+
+
+@KINDS
+def test_a_pilot_may_have_the_mission_flown_instead(kind: str) -> None:
+    scene = Scene(kind, solution=low())
+    assert scene.run(events=[(18.0, scene.sets(scene.watch._modes.mission))]) == "taken over"
+    record = scene.watch.seen.samples.record()
+    steps = np.linalg.norm(np.diff(record.line(low()).w, axis=0), axis=1)
+    assert steps.max() < 1.5  # 10 m/s, ten times a second: it jumps nowhere
+    last = scene.mock.mission().items[-2]
+    path = LocalFrame(last.x, last.y).to_local(record.latitude, record.longitude)
+    assert np.linalg.norm(path, axis=1).min() < 1
+    assert not scene.mock.armed
 
 
 @KINDS

@@ -1,22 +1,21 @@
 """Flying a plan by setpoints: the trajectory itself, not way points along it."""
 
 import struct
-from collections import deque
 from collections.abc import Sequence
-from statistics import median
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.flying.course import Setpoint
 from faao_mav.mavlink.flying.itinerary import Itinerary
+from faao_mav.mavlink.flying.own_frame import OwnFrame
 from faao_mav.mavlink.flying.replan import Replan, Solver
+from faao_mav.mavlink.flying.round_trips import RoundTrips
 from faao_mav.mavlink.flying.watch import Watch
-from faao_mav.mavlink.local_frame import frame_of
 from faao_mav.mavlink.messages import (
     CommandLong,
+    CurrentMode,
     Envelope,
     GlobalPositionInt,
     GpsGlobalOrigin,
@@ -24,21 +23,16 @@ from faao_mav.mavlink.messages import (
     MissionCurrent,
     ParamRequestRead,
     ParamValue,
-    SetPositionTargetLocalNed,
     Timesync,
 )
-from faao_mav.mavlink.protocol import LOCAL_ORIGIN, MavCommand
+from faao_mav.mavlink.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
 from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.flown import Line
+from faao_mav.validate.lean import beyond_lean
 from faao_mav.vehicle.px4 import PX4
-
-LOCAL_NED = 1
-"""MAV_FRAME_LOCAL_NED."""
-
-_NO_YAW = 1 << 10 | 1 << 11
-"""POSITION_TARGET_TYPEMASK: yaw and yaw rate are ignored, all else counts."""
+from faao_mav.vehicle.vehicle import vehicle_of
 
 _INT32 = 6
 """MAV_PARAM_TYPE of whole numbers, which PX4 sends as their bits."""
@@ -53,10 +47,6 @@ Chosen."""
 _AT_HOME = 20.0
 """The aircraft has to stand within so many metres of the plan's home; chosen."""
 
-_ROUND_TRIPS, _LONGEST_TRIP = 9, 1.0
-"""How many round trips on the link are kept, one each half second, whose median counts; and the
-most that counts, s. Chosen."""
-
 _ARM_AGAIN = 2.0
 """Seconds after which it is asked to arm again that refused; chosen."""
 
@@ -66,6 +56,10 @@ _OFF_GROUND = 0.3
 _BACK = 1.5
 """Seconds for which the mode has to be the one for setpoints again until an aircraft counts as
 handed back: two heartbeats, for one may be a late packet. Chosen."""
+
+_MODE_AGAIN, _TOLD_BY = 0.5, 3.0
+"""Seconds between two messages about the mode that was asked for last; and after which, without
+one, it counts as the pilot who changed it: six of them. Chosen."""
 
 _EARLY = 0.8
 """The share of a period after which the next setpoint may go: they come irregularly; chosen."""
@@ -84,7 +78,8 @@ class Stream(Watch):
     `rate` times a second of the vehicle's own clock, whenever it tells where it is, it is told
     where to be: see `Itinerary`, of which `flight` is one; in the end what `mission.on_finish`
     says. While nothing is heard of it nothing is sent, and it does what its parameters say. A mode
-    that was not asked for ends the setpoints for good, but for a relay flight that has a `solver`:
+    that was not asked for ends the setpoints for good, but for a failsafe in which the vehicle
+    still wants them, as PX4's CURRENT_MODE tells, and for a relay flight that has a `solver`:
     whoever then sets the mode back hands it back, if no other ground station was heard. With
     `solver` the rest is solved again where the flight is off its plan: see `Replan`.
 
@@ -114,13 +109,16 @@ class Stream(Watch):
         self._finish = after["return" if finish == "rtl" else "land" if lands else "hold"]
         self._height, self._period = plan.flight.altitude, 1 / rate
         self._held = 0.0 if self._rules.carries_on else self._period / 2
-        self._round_trips: deque[tuple[float, int, float]] = deque(maxlen=_ROUND_TRIPS)
+        self._round_trips = RoundTrips()
         self.flight = Itinerary(solution, takes_off=not self._rules.takes_off_by_setpoints)
         self._replan = None if solver is None else Replan(self.flight, solver)
         self._handed_back = False
         self._back_since: float | None = float("inf")
-        self._frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-        self._origin: GpsGlobalOrigin | None = None
+        self._frame = OwnFrame(self._family, plan.origin)
+        self._unsure: float | None = None
+        self._last_heard = float("inf")
+        if self._rules.loss:
+            self.seen.ask_for(CURRENT_MODE, _MODE_AGAIN)
         self._timeouts: dict[str, float] = {}
         self._ground: Setpoint | None = None
         self._first_sent, self._last_sent = float("inf"), float("-inf")
@@ -131,18 +129,25 @@ class Stream(Watch):
         return self.flight.solution
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        if envelope.sender == self._peer.address:
+            silent = now - self._last_heard
+            if self._rules.loss and self.phase == "flying" and silent > self._without_setpoints:
+                self._unsure = now  # it may be in another mode since
+            self._last_heard = now
         out = super()._receive(envelope, now)
         if self.outcome is not None or envelope.sender != self._peer.address:
             return out
         match envelope.message:
             case GpsGlobalOrigin() as origin:
-                self._origin = origin
+                self._frame.origin = origin
             case ParamValue(name, value, kind) if name in self._rules.defaults:
                 if self._family == PX4 and kind == _INT32:
                     (value,) = struct.unpack("<i", struct.pack("<f", value))
                 self._timeouts[name] = value
-            case Timesync(tc1, ts1) if tc1 and 0 < ts1 / 1e9 <= now:
-                self._round_trips.append((now, tc1, now - ts1 / 1e9))
+            case Timesync() as answer:
+                self._round_trips.hear(answer, now)
+            case CurrentMode(custom_mode=mode) if self.phase == "flying":
+                self._see_who_flies(mode, now)
             case GlobalPositionInt() as position:
                 return [*out, *self._on_position(position, now)]
         return out
@@ -157,7 +162,7 @@ class Stream(Watch):
 
     def _check(self, now: float) -> Sequence[Message]:
         out, target = list(super()._check(now)), self._peer.address
-        if self._origin is None:
+        if self._frame.origin is None:
             ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
             out.append(CommandLong(target, *ask))
         unread = [name for name in self._rules.defaults if name not in self._timeouts]
@@ -165,16 +170,19 @@ class Stream(Watch):
 
     def _set_out(self, now: float) -> Sequence[Message]:
         position, known = self.seen.position, len(self._timeouts) == len(self._rules.defaults)
-        if position is None or self._origin is None:
+        if position is None or self._frame.origin is None:
             return ()
         if not known and now < self._begun + _ANSWER:
             return ()
-        away = float(np.linalg.norm(self._place(position)[:2]))
+        away = float(np.linalg.norm(self._frame.place(position)[:2]))
         if away > _AT_HOME:
             text = f"it stands {away:.0f} m from the plan's home (site.origin)"
             self._end("refused", f"nothing was started: {text}, not within {_AT_HOME:.0f} m")
             return ()
         self.seen.told.append(f"without setpoints {self._rules.without(self._timeouts)}")
+        lean = beyond_lean(self.solution, vehicle_of(self.solution.plan))
+        if lean is not None:
+            self.seen.told.append(str(lean))
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
         self.phase = "engaging"
         if self._rules.takes_off_by_setpoints:
@@ -204,7 +212,9 @@ class Stream(Watch):
             case "aside" if now - (self._back_since or 0.0) >= _BACK and self._may_go_on():
                 self.phase, self._handed_back = "flying", True
                 self.seen.told.append("handed back: it holds until there is a new course")
-            case "arming" | "starting" | "flying" if mode != self._guided:
+            case "flying":
+                self._see_who_flies(mode, now)
+            case "arming" | "starting" if mode != self._guided:
                 self._step_aside()
             case "ending" if mode == self._finish:
                 self._command = None
@@ -220,6 +230,27 @@ class Stream(Watch):
             ):
                 self._step_aside()
         return ()
+
+    def _see_who_flies(self, mode: int, now: float) -> None:
+        """Step aside for any other `mode` than for setpoints, but a failsafe that waits for them.
+
+        Then the one that was asked for last is still that for setpoints. Until that is told none
+        are sent.
+        """
+        wanted = self.seen.wanted
+        if mode == self._guided:
+            self._unsure = None
+        elif not self._rules.comes_back_from(mode, self._timeouts):
+            self._step_aside()
+        elif wanted is not None and wanted.intended_custom_mode == self._guided:
+            self._unsure = None
+            text = "it is in its failsafe, until setpoints come again"
+            if self.seen.told[-1] != text:
+                self.seen.told.append(text)
+        elif wanted is not None or (self._unsure is not None and now > self._unsure + _TOLD_BY):
+            self._step_aside()
+        elif self._unsure is None:
+            self._unsure = now
 
     def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:
         if self.phase == "arming" and now < self._begun + self._patience:
@@ -252,11 +283,11 @@ class Stream(Watch):
     # ---- where it is to be
 
     def _on_position(self, position: GlobalPositionInt, now: float) -> Sequence[Message]:
-        t, place = position.time_boot_ms / 1000, self._place(position)
+        t, place = position.time_boot_ms / 1000, self._frame.place(position)
         if self.phase == "starting" and place[2] > _OFF_GROUND:
             self._fly()
         setpoint, out = self._setpoint(t, place, position), list[Message]()
-        if self.phase == "flying" and self.flight.part == "over":
+        if self.phase == "flying" and self.flight.part == "over" and self._is_guided:
             self.phase = "ending"
             out += self._say(lambda: self._mode(self._finish), now)
         if self.phase == "engaging" and self._command is None and self._streamed(t):
@@ -264,8 +295,19 @@ class Stream(Watch):
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
             self._last_sent = t
             self._first_sent = min(self._first_sent, t)
-            out.append(self._message(setpoint, position))
+            out.append(self._frame.message(setpoint, position, self._peer.address))
         return out
+
+    @property
+    def _without_setpoints(self) -> float:
+        """For how many of the world's seconds it keeps its mode without setpoints."""
+        kept = (self._rules.defaults | self._timeouts)[self._rules.timeout]
+        return kept / max(self._round_trips.clock_speed, 1.0)
+
+    @property
+    def _is_guided(self) -> bool:
+        """Whether the mode is that for setpoints, as far as is known."""
+        return self.seen.heartbeat is None or self.seen.heartbeat.custom_mode == self._guided
 
     def _streamed(self, t: float) -> bool:
         """Tell whether the vehicle has had setpoints for long enough."""
@@ -273,14 +315,14 @@ class Stream(Watch):
 
     def _setpoint(self, t: float, place: Real, position: GlobalPositionInt) -> Setpoint | None:
         """Return where the aircraft is to be at `t`; None while nothing is to be sent."""
-        guided = self.seen.heartbeat is None or self.seen.heartbeat.custom_mode == self._guided
         asked = self.phase == "ending" and self._command is not None
-        if self.phase == "flying" or (asked and guided):
+        if (self.phase == "flying" and self._unsure is None) or (asked and self._is_guided):
             part = self.flight.part
             now = Setpoint.of(place[:2], position)
             if not self._on_course(t, now):
                 return None
-            setpoint = self.flight.setpoint(t + self._lead(), place, now.velocity)
+            due = t + self._held + self._round_trips.lasting
+            setpoint = self.flight.setpoint(due, place, now.velocity)
             if self.flight.part != part:
                 self.seen.told.append(_PARTS[self.flight.part])
                 self.relay_start = self.flight.relay_start
@@ -297,7 +339,7 @@ class Stream(Watch):
         if replan is None or start is None or self.flight.part != "relay":
             return True
         begin = replan.begin if self._handed_back and not replan.asking else replan.step
-        begin(self._flown, t - start, now, self._clock_speed())
+        begin(self._flown, t - start, now, self._round_trips.clock_speed)
         self.seen.told += replan.told
         replan.told.clear()
         if not self._handed_back or replan.asking:
@@ -318,41 +360,3 @@ class Stream(Watch):
         assert self.relay_start is not None
         t, w = self.seen.samples.record().line(self.flight.solution)
         return Line(t - self.relay_start, w)
-
-    def _clock_speed(self) -> float:
-        """Return how many seconds of the vehicle's clock a second of the world's has."""
-        if len(self._round_trips) < 2:
-            return 1.0
-        (first, there_first, _), (last, there_last, _) = self._round_trips[0], self._round_trips[-1]
-        return max((there_last - there_first) / 1e9 / max(last - first, 1e-9), 0.0)
-
-    def _lead(self) -> float:
-        """Return by how much later than a position was told the setpoint for it counts, s.
-
-        That is a round trip on the link, by the vehicle's clock.
-        """
-        if len(self._round_trips) < 2:
-            return self._held
-        trip = median(trip for _, _, trip in self._round_trips)
-        return self._held + min(self._clock_speed() * trip, _LONGEST_TRIP)
-
-    def _place(self, position: GlobalPositionInt) -> Real:
-        """Return where it is: (3,) m east, north, up of the plan's origin, which is its home."""
-        level = self._frame.to_local(position.lat / 1e7, position.lon / 1e7)
-        return np.append(level, position.relative_alt / 1000)
-
-    def _message(self, setpoint: Setpoint, position: GlobalPositionInt) -> Message:
-        """Return `setpoint` in the vehicle's own local frame."""
-        assert self._origin is not None
-        origin = frame_of(self._family, self._origin.latitude / 1e7, self._origin.longitude / 1e7)
-        p, v, a = setpoint
-        east, north = origin.to_local(*self._frame.to_geodetic(p[:2]))
-        home = (position.alt - position.relative_alt - self._origin.altitude) / 1000
-        values = (north, east, -(p[2] + home), v[1], v[0], -v[2], a[1], a[0], -a[2])
-        return SetPositionTargetLocalNed(
-            self._peer.address,
-            position.time_boot_ms,
-            LOCAL_NED,
-            _NO_YAW,
-            *map(float, values),
-        )

@@ -1,11 +1,12 @@
 """What a vehicle tells of its flight, and asking it for what it does not tell by itself."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from faao_mav.mavlink.messages import (
     CommandLong,
+    CurrentMode,
     Envelope,
     GlobalPositionInt,
     Heartbeat,
@@ -20,6 +21,7 @@ from faao_mav.mavlink.messages import (
 from faao_mav.mavlink.modes import mode_name
 from faao_mav.mavlink.protocol import (
     CURRENT_ITEM,
+    CURRENT_MODE,
     GROUND_STATION_TYPE,
     POSITION,
     SYSTEM_STATUS,
@@ -107,6 +109,7 @@ class Telemetry:
         said: what the vehicle said that is a warning or worse.
         samples: where it was.
         heartbeat, current, status, position: the last of these messages, None before the first.
+        wanted: the last CURRENT_MODE, None where the last heartbeat tells another mode.
         stations: other ground stations that were heard.
         ending: why nothing more can be known, None as long as something can.
     """
@@ -123,6 +126,7 @@ class Telemetry:
         self.current: MissionCurrent | None = None
         self.status: SysStatus | None = None
         self.position: GlobalPositionInt | None = None
+        self.wanted: CurrentMode | None = None
         self._periods = {POSITION: 1 / rate} | _PERIODS
         self.stations: set[str] = set()
         self.ending: Ending | None = None
@@ -134,6 +138,10 @@ class Telemetry:
         self._heard, self._silent = now, False
         self._needed = dict.fromkeys(self._periods, now - _MISSED)
         self._next_reading = now
+
+    def ask_for(self, kind: int, period: float) -> None:
+        """Ask for the messages of number `kind` too, `period` s apart, from `start` on."""
+        self._periods[kind] = period
 
     @property
     def items(self) -> int:
@@ -169,6 +177,12 @@ class Telemetry:
         match message:
             case Heartbeat():
                 self.heartbeat = message
+                if self.wanted is not None and self.wanted.custom_mode != message.custom_mode:
+                    self.wanted = None
+            case CurrentMode():
+                self._needed[CURRENT_MODE], self.wanted = now, message
+                if self.heartbeat is not None:
+                    self.heartbeat = replace(self.heartbeat, custom_mode=message.custom_mode)
             case GlobalPositionInt():
                 self._on_position(message, now)
             case SysStatus():

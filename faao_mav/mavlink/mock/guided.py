@@ -2,8 +2,8 @@
 
 Measured in simulation: ArduCopter 4.7 arms and takes off in GUIDED by a command, and stops in its
 place when setpoints cease; PX4 1.16.1 takes Offboard after a second of setpoints, takes off by
-them, and changes its mode when they cease, by default to Position, where it sinks without sticks:
-see `SetpointRules`.
+them, and changes its mode when they cease, by default to Position, where it sinks without sticks,
+and back when they come again: see `SetpointRules`.
 """
 
 import math

@@ -13,6 +13,7 @@ from faao_mav.mavlink.messages import (
     AutopilotVersion,
     CommandAck,
     CommandLong,
+    CurrentMode,
     Envelope,
     GpsGlobalOrigin,
     Heartbeat,
@@ -31,12 +32,14 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock.firmware import Behaviour, StoredLists, whole
 from faao_mav.mavlink.mock.flight import MockFlight, Posture, telemetry
+from faao_mav.mavlink.mock.from_the_air import taken_up
 from faao_mav.mavlink.mock.guided import Guided
 from faao_mav.mavlink.mock.parameter_protocol import ParameterServer
 from faao_mav.mavlink.mock.turn_back import home_outside, kept_inside
 from faao_mav.mavlink.modes import modes_of
 from faao_mav.mavlink.protocol import (
     ARMED,
+    CURRENT_MODE,
     GROUND_STATION,
     HOME_POSITION,
     LOCAL_ORIGIN,
@@ -111,9 +114,11 @@ class MockAutopilot(Machine[None]):
         self.behaviour, self.address, self.home = behaviour, address, home
         self.vehicle = vehicle_type(behaviour.family.key, aircraft)
         self._modes = modes_of(self.vehicle)
-        self._mode = self._modes.rest
+        self._mode = self._wanted = self._modes.rest
         self.lists = StoredLists(self.vehicle, home)
         rules = setpoint_rules(behaviour.family)
+        self._comes_back = bool(rules.loss)
+        self._tells_wanted = False  # only once it is asked for CURRENT_MODE
         known = self.vehicle.defaults() | dict(rules.defaults)
         known |= dict(behaviour.firmware.parameters)
         self.parameters = ParameterServer(known | dict(parameters or {}))
@@ -172,6 +177,8 @@ class MockAutopilot(Machine[None]):
         if now >= self._next_beat:
             self._next_beat = now + self._beat
             out += [self._heartbeat(), self._mission_current(now), self._system_status()]
+            if self._tells_wanted:
+                out.append(CurrentMode(self._mode, self._wanted))
         if self._period is not None and now >= self._next_report:
             self._next_report = now + self._period
             since_boot = (now - self._booted) * self._speedup
@@ -205,8 +212,9 @@ class MockAutopilot(Machine[None]):
             case MissionSetCurrent(seq=seq):
                 return self._set_current(seq, now)
             case SetPositionTargetLocalNed():
+                out = self._come_back() if self._comes_back and self._guided.flying else ()
                 self._guided.hear(message, self._mode, now)
-                return ()
+                return out
         if self._firmware.silent_at_boot and not self._is_ready():
             return ()
         return self._firmware.on(envelope, now)
@@ -240,7 +248,7 @@ class MockAutopilot(Machine[None]):
                 climbs = self._guided.take_off(command.param7, self._mode, now)
                 result = ACCEPTED if climbs else DENIED
             case MavCommand.START:
-                self._mode = self._modes.mission
+                self._mode = self._wanted = self._modes.mission
                 result = self._begin(now)
             case MavCommand.SET_MODE:
                 result = self._set_mode(self._firmware.requested_mode(command), now)
@@ -253,6 +261,8 @@ class MockAutopilot(Machine[None]):
                 kind = whole(command.param1) if by_number else _AUTOPILOT_VERSION
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
+            case MavCommand.SET_INTERVAL if command.param1 == CURRENT_MODE:
+                self._tells_wanted = self._comes_back
             case MavCommand.SET_INTERVAL:
                 asked = whole(command.param2)  # microseconds; 0: the usual rate
                 if command.param1 == POSITION and asked > 0 and self._period is not None:
@@ -291,10 +301,8 @@ class MockAutopilot(Machine[None]):
             return DENIED
         if mode == self._modes.guided and not self._guided.accepts(now):
             return DENIED
-        if mode == self._modes.mission and self._guided.flying:
-            return DENIED  # the mock has no way back into its mission from there
-        self._mode = mode
-        if self._guided.flying and mode != self._modes.guided:
+        self._mode = self._wanted = mode
+        if self._guided.flying and mode not in (self._modes.guided, self._modes.mission):
             self._guided.leave(mode, now)
         elif self.armed and mode == self._modes.guided:
             self._begin_guided(now)
@@ -329,6 +337,9 @@ class MockAutopilot(Machine[None]):
                 track = self._fly(mission)
             except InputError:
                 return DENIED
+            if self._guided.flying:
+                track = taken_up(track, self._guided.at(now), self._vehicle_now())
+                self._guided.reset()
             track, breach = kept_inside(track, mission.fence, self._vehicle_now())
             self._flight = MockFlight(track, mission.items, now, self._speedup, breach)
         return ACCEPTED
@@ -363,6 +374,13 @@ class MockAutopilot(Machine[None]):
             return [Statustext(MavSeverity.INFO, "Landed, disarming"), self._heartbeat()]
         before, self._mode = self._mode, self._guided.lost(self._mode, now)
         return [self._heartbeat()] if self._mode != before else []
+
+    def _come_back(self) -> list[Message]:
+        """End the failsafe for lost setpoints, now that they come again."""
+        if self._wanted != self._modes.guided or self._mode == self._wanted:
+            return []
+        self._mode = self._wanted
+        return [self._heartbeat(), CurrentMode(self._mode, self._wanted)]
 
     def _is_return(self, seq: int) -> bool:
         rows = self.lists.items(MissionType.MISSION)

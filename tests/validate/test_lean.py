@@ -1,0 +1,24 @@
+"""What a plan asks of a copter's lean: told where its parameters do not allow it."""
+
+from dataclasses import replace
+
+import numpy as np
+from conftest import FLYABLE, edited
+
+from faao_mav import optimize, parse_plan
+from faao_mav.validate.lean import beyond_lean
+from faao_mav.vehicle.vehicle import vehicle_of
+
+
+def test_drag_and_acceleration_add_up() -> None:
+    solution = optimize(parse_plan(edited(FLYABLE, {})))
+    vehicle = vehicle_of(solution.plan)
+    v, a = np.zeros_like(solution.v), np.zeros_like(solution.a)
+    v[:], a[:2] = (10.0, 0.0), (2.5, 0.0)  # drag of 5.4 m/s², and g tan 30 degrees is 5.66
+    asked = replace(solution, v=v, a=a)
+    lean = beyond_lean(asked, vehicle)
+    assert lean is not None
+    assert lean.seconds == 2 * solution.t[1]
+    assert "up to 39 degrees" in str(lean)
+    assert beyond_lean(asked, replace(vehicle, parameters={"ANGLE_MAX": 4500})) is None
+    assert beyond_lean(replace(asked, a=-a), vehicle) is None  # drag slows it down
