@@ -19,7 +19,7 @@ from faao_mav.schedule.initial_route import Splines, initial_route, slowest_leg
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
-from faao_mav.schedule.scheduler import Scheduler
+from faao_mav.schedule.scheduler import GOOD_COST, Scheduler
 from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
@@ -32,7 +32,7 @@ _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the accel
 _PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
-_GOOD = (0.0, 1.5)  # the rank, m, from which nothing better is looked for
+_GOOD = (0.0, GOOD_COST)  # the rank, m, from which nothing better is looked for
 
 _Scheduled: TypeAlias = tuple[Schedule, Scheduler]
 _Rank: TypeAlias = tuple[float, float]

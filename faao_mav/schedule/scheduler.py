@@ -22,6 +22,8 @@ from faao_mav.vehicle import FlightModel, Vehicle
 # simulator differ by up to 0.4 m rms.
 ALLOWED_ERROR = 0.8
 
+GOOD_COST = 1.5  # the cost of a schedule, m, from which nothing costlier is tried to better it
+
 _PASSING_WINDOW = 6.0  # s before and after a waypoint counts as reached, in which it is passed
 _ALIKE = (0.1, 0.03)  # relative differences of neighbours' speeds that are tried as one, in turn
 _SHARED_COST = 1.05  # the largest ratio of the costs with and without shared speeds to accept

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from faao_mav.errors import FaaoError
+from faao_mav.mission.command import Command
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector, Wind
 from faao_mav.vector import lengths
@@ -74,7 +75,8 @@ def wind_limit(
     if not known or track.t[-1] > _LONGEST:
         return None
     beside = (0.0, 0.0) if hovers or solution is None else solution.plan.wind
-    trial = _Trial(mission, vehicle, float(track.t[-1]), solution, lead, beside)
+    flown = mission if solution is None else _without_return(mission)
+    trial = _Trial(flown, vehicle, float(track.t[-1]), solution, lead, beside)
     degrees = [360.0 / _DIRECTIONS * k for k in range(_DIRECTIONS)]
     harmless = sorted((_harmless(track, top, each) if hovers else 0.0, each) for each in degrees)
     found = WindLimit(MOST_WIND, harmless[0][1], beside)
@@ -87,6 +89,13 @@ def wind_limit(
         if kept < found.speed:
             found = WindLimit(kept, start, beside)
     return replace(found, speed=_STEP * math.floor(found.speed / _STEP + 1e-9))
+
+
+def _without_return(mission: Mission) -> Mission:
+    """Return `mission` without the return at its end, in which no plan is carried out."""
+    items = mission.items
+    returns = bool(items) and items[-1].command == Command.NAV_RETURN_TO_LAUNCH
+    return replace(mission, items=items[:-1]) if returns else mission
 
 
 def _harmless(track: Track, top: float, degrees: float) -> float:

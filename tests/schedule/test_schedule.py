@@ -78,10 +78,10 @@ def test_arducopter_keeps_the_plan_in_space_and_time(
     plan = plan_with(recommend=recommend)
     conversion = converted(t, w, plan)
     found = conversion.schedule.deviation
-    assert found.rms < (2 if recommend else 3)
+    assert found.rms < (1 if recommend else 3)
     assert found.path < plan.mission.path_tolerance
     assert nearly_there(conversion, w) == pytest.approx(0, abs=0.5)
-    assert len(conversion.mission.items) < 60
+    assert len(conversion.mission.items) < 70
 
 
 def test_px4_keeps_the_plan_in_space_and_time() -> None:
