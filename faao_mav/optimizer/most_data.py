@@ -16,13 +16,14 @@ import numpy as np
 from faao_mav.arrays import Integers, Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.direct import LONG_SEARCH, ROUGH, direct
+from faao_mav.optimizer.direct import ROUGH, direct
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
     feasible,
     maximize,
 )
+from faao_mav.optimizer.interior.search import NEAR_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
@@ -169,7 +170,8 @@ class WithinEnergy:
             start,
             constraints=problem.constraints(kin),
             tolerance=max(ROUGH, options.tolerance),
-            max_iterations=LONG_SEARCH * options.max_iterations,
+            max_iterations=options.max_iterations,
+            strategy=NEAR_START if kin.min_speed > 0 else None,
             relay=problem.maximised_queue,
         )
         self.last = optimum.trajectory
