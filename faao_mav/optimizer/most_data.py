@@ -207,7 +207,7 @@ class WithinEnergy:
 
     def _from_all_starts(self, energy: float, possible: Integers) -> Solution:
         """Return the longest flight of `possible` slots that is found from all starts."""
-        tried = np.linspace(*possible[[0, -1]], _TRIES).astype(int)
+        tried = np.linspace(float(possible[0]), float(possible[-1]), _TRIES).astype(int)
         if self.straight[1] <= energy:
             tried = np.append(tried, round(self.straight[0] / self.plan.flight.time_step))
         for slots in np.unique(tried)[::-1].tolist():
