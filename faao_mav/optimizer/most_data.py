@@ -116,7 +116,11 @@ class WithinEnergy:
         def missed(slots: float) -> float:
             n = round(slots)
             if n not in found:
-                found[n] = self._rough(n, energy)
+                optimum = self._rough(n, energy)
+                most = max((self._worth(k, each) for k, each in found.items()), default=0.0)
+                if optimum is not None and self._worth(n, optimum) > most:
+                    self.last = optimum.trajectory  # one from the straight start may be far worse
+                found[n] = optimum
             return -self._worth(n, found[n])
 
         if high > low:
@@ -164,7 +168,7 @@ class WithinEnergy:
         start = next((flight for starts in either for flight in starts.values()), None)
         if start is None:
             return None
-        optimum = maximize(
+        return maximize(
             kin,
             field,
             start,
@@ -174,8 +178,6 @@ class WithinEnergy:
             strategy=NEAR_START if kin.min_speed > 0 else None,
             relay=problem.maximised_queue,
         )
-        self.last = optimum.trajectory
-        return optimum
 
     def _worth(self, slots: int, optimum: LocalOptimum | None) -> float:
         if optimum is None:
