@@ -7,6 +7,7 @@ T is then optimised from all starts. Energies are those of flight and relay, J.
 """
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
@@ -17,6 +18,7 @@ from faao_mav.arrays import Integers, Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import ROUGH, direct
+from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
@@ -24,22 +26,24 @@ from faao_mav.optimizer.interior.maximize import (
     maximize,
 )
 from faao_mav.optimizer.interior.search import NEAR_START
-from faao_mav.optimizer.kinematics import Trajectory
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.multistart import stretched
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.solution import Least, Observer, Progress, Solution, staged
 from faao_mav.plan import Plan, changed_plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.power import JOULES_PER_WH
 
-_PRECISION = 0.004
+_PRECISION = 0.01
 """The share of the longest duration to which the best one is looked for. Chosen."""
 
-_NEAR = 0.15
-"""The share by which durations are tried on both sides of that of a near energy. Chosen."""
+_NEAREST, _NEAR = 0.03, 0.15
+"""The least and the largest share by which durations are tried on both sides of that of a near
+energy: in between twice the share by which the energies differ. Chosen."""
 
 _BETTER = 1e-3
 """The share of data by which a flight from other starts has to be better to look for its duration
@@ -110,7 +114,8 @@ class WithinEnergy:
         low, high = possible[[0, -1]].tolist()
         if self.near:
             centre = len(self.last.w) * energy / self.near
-            low, high = max(low, int((1 - _NEAR) * centre)), min(high, int((1 + _NEAR) * centre))
+            aside = min(max(_NEAREST, 2 * abs(energy / self.near - 1)), _NEAR)
+            low, high = max(low, int((1 - aside) * centre)), min(high, int((1 + aside) * centre))
         found: dict[int, LocalOptimum | None] = {}
 
         def missed(slots: float) -> float:
@@ -161,23 +166,37 @@ class WithinEnergy:
             straight = straight_flight(kin)
         except InfeasibleError:
             return None
-        limits = (*constraints_of(kin), *fenced)
-        last = feasible(kin, straight, stretched(kin, self.last), limits)
-        kept = (*constraints_of(kin), *problem.constraints(kin))
-        either = (sparing_starts(kin, {"": start}, kept) for start in (last, straight))
-        start = next((flight for starts in either for flight in starts.values()), None)
+        own = problem.constraints(kin)
+        start = self._near(kin, own)
+        if start is None:
+            limits, kept = (*constraints_of(kin), *fenced), (*constraints_of(kin), *own)
+            last = feasible(kin, straight, stretched(kin, self.last), limits)
+            either = (sparing_starts(kin, {"": start}, kept) for start in (last, straight))
+            start = next((flight for starts in either for flight in starts.values()), None)
         if start is None:
             return None
         return maximize(
             kin,
             field,
             start,
-            constraints=problem.constraints(kin),
+            constraints=own,
             tolerance=max(ROUGH, options.tolerance),
             max_iterations=options.max_iterations,
             strategy=NEAR_START if kin.min_speed > 0 else None,
             relay=problem.maximised_queue,
         )
+
+    def _near(self, kin: Kinematics, kept: Sequence[Constraint]) -> Trajectory | None:
+        """Return the flight of `kin` nearest to the path of the last one, in its time.
+
+        That is for planes: a blend of two flights of a least speed need not have it, and another
+        circle about a flight that circles is no start.
+        """
+        if kin.min_speed == 0:
+            return None
+        then, now = (np.linspace(0, 1, n) for n in (kin.slots, len(self.last.w)))
+        path = np.stack([np.interp(then, now, w) for w in self.last.w.T], axis=1)
+        return nearest_flight(kin, path, kin.follow(stretched(kin, self.last)), kept)
 
     def _worth(self, slots: int, optimum: LocalOptimum | None) -> float:
         if optimum is None:
