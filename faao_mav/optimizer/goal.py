@@ -190,21 +190,26 @@ class _Energies(_Chords):
         super().__init__(plan, observe, 0, most)
         self.within = WithinEnergy(plan, observe)
         self.limit = self.within.unlimited_energy / JOULES_PER_WH
-        self.low = int(most * self.within.least_energy / self.within.unlimited_energy) - 1
-        self.optimizations = 1
+        least = float(self.within.least.min())
+        self.low = min(most, math.ceil(most * least / self.within.unlimited_energy)) - 1
+        self.whole = most
 
-    def optimised(self, number: int, known: Solution | None) -> Solution:
-        if known is None:
+    def optimised(self, number: int, known: Solution | None) -> Solution:  # noqa: ARG002
+        if number == self.whole:
             return self.within.unlimited
-        found = self.within.best(self.energy(number))
-        self.optimizations = self.within.optimizations
-        return found
+        return self.within.best(self.energy(number))
+
+    def guess(self) -> int:
+        """Return the chord's root, at first no less than the straight flight takes."""
+        if self.high < self.whole or self.low in self.solved:
+            return super().guess()
+        return max(super().guess(), math.ceil(self.within.straight[1] / self.energy(1)))
 
     def answer(self) -> Solution:
         found = super().answer()
         if found is not self.within.unlimited:
             found = self.within.ended(found, self.energy(self.high))
-            self.optimizations = self.within.optimizations
+        self.optimizations = self.within.optimizations
         return found
 
     def energy(self, number: int) -> float:

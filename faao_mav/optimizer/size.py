@@ -46,6 +46,7 @@ _CHANNEL_COPIES = 4  # copies of the channels of all slots and draws held at onc
 _NODES = 4096  # points of the noise in each mutual information that is optimised
 _NODE = 60  # exponentials that one such point costs beside one for each vector of symbols
 _FEWEST_DRAWS = 4  # draws below which no plan is proposed
+_GOAL = 7  # optimisations that a search for a goal takes at most (tests/benchmarks/goals.py)
 
 _ROTATIONS = {"bpsk": 2, "8psk": 8}
 """Phases that map an alphabet onto itself, by which differences merge; 4 where not listed."""
@@ -87,6 +88,8 @@ def _too_large(plan: Plan) -> str:
 def cost(plan: Plan) -> tuple[float, float]:
     """Return about how long a whole plan takes, s of one processor, and its memory, GB.
 
+    A goal that is searched for takes several optimisations.
+
     >>> from faao_mav import read_plan
     >>> seconds, gigabytes = cost(read_plan("missions/copter_relay.yaml"))
     >>> 1 < seconds < 3, gigabytes < 0.5
@@ -99,6 +102,7 @@ def cost(plan: Plan) -> tuple[float, float]:
     )
     channels = 16 * _CHANNEL_COPIES * _draws(radio) * slots * relay * (base + user)
     seconds = _ALWAYS + _FLIGHT_SLOT * slots + first + second
+    seconds *= _GOAL if plan.goal.searches else 1
     return seconds, _PROGRAM + (max(held, also) + channels) / 1e9
 
 

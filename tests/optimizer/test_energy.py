@@ -14,9 +14,11 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
+from faao_mav.optimizer.goal import ENERGY_SHARE
 from faao_mav.optimizer.interior.energy import EnergyLimit
 from faao_mav.optimizer.interior.maximize import constraints_of, maximize
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.most_data import WithinEnergy, least_energies
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
@@ -83,6 +85,7 @@ def test_the_energy_is_that_of_direct_integration(plan: Plan, wind: float, seed:
     problem = build_problem(plan)
     flight = random_flight(problem.kinematics, seed)
     assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
+    assert least_energies(plan, np.array([len(flight.w)]))[0] <= integrated(plan, flight)
 
 
 def limited(plan: Plan, share: float) -> tuple[Kinematics, Any, EnergyLimit, Trajectory]:
@@ -238,6 +241,21 @@ def test_the_least_energy_is_below_that_of_other_ways() -> None:
     assert told.startswith(f"least energy for {asked:.5g} megabytes: {used(found):.4g} Wh in ")
     goal = Result(found).as_dict()["goal"]
     assert goal["energy_wh"] == used(found)
+
+
+def test_where_no_less_energy_will_do_every_share_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried: list[float] = []
+
+    def none(_: WithinEnergy, energy: float) -> Solution:
+        tried.append(energy)
+        raise InfeasibleError("none")
+
+    monkeypatch.setattr(WithinEnergy, "best", none)
+    found = optimize(changed_plan(COPTER, {"goal": {"rate": 0.1, "minimise": "energy"}}))
+    assert len(tried) > 1
+    assert max(tried) == pytest.approx((1 - ENERGY_SHARE) * used(found) * 3600)
 
 
 def test_too_little_energy_says_what_the_straight_flight_takes() -> None:
