@@ -328,7 +328,7 @@ def test_a_plan_is_piped_in(tmp_path: Path) -> None:
         ({"optimizer.method": "algorithm1"}, "iteration 1 of at most 2: the best start, 2.5000"),
         (
             {"radio.causal": True, "goal": {"rate": 1.0, "minimise": "power"}},
-            "iteration 1 of at most 2: the best start",
+            "of about 11 s: the best start, 2.5000 bit/s/Hz",
         ),
     ],
 )

@@ -24,12 +24,11 @@ def optimizer_progress(plan: "Plan", *, shown: bool) -> "Iterator[Observer | Non
     """Give an observer of the work on `plan`, or None where nothing is `shown`.
 
     The bar is that of all the work, and fills with the time: how long it takes is reckoned from the
-    plan's sizes. For goals and Algorithm 1, whose number of steps is not known, it only moves.
+    plan's sizes. For Algorithm 1, whose number of steps is not known, it only moves.
     """
     columns = ("TimeBar", "TimeElapsedColumn", "{task.description}")
-    one = plan.goal.minimise is None and plan.goal.maximise != "data"
     total = None
-    if shown and one and plan.optimizer.method == "direct":
+    if shown and plan.optimizer.method == "direct":
         from faao_mav.optimizer.size import cost
 
         total = cost(plan)[0]
