@@ -1,15 +1,18 @@
-"""Least durations and powers: what they cost, and whether one step less could do.
+"""Least durations, powers and energies: what they cost, and whether one step less could do.
 
     python tests/benchmarks/goals.py [--starts 20] [CASE ...]
 
 One row for each goal: the answer, flights optimised, CPU seconds over those of one optimisation of
-the answer's size, what is needed (bit/s/Hz), and of one slot or 0.02 dB less: what the plan's
-starts reach, the best of so many random starts, and the upper bound, which decides where it is
-below what is needed.
+the answer's size and energy from all starts, what is needed (bit/s/Hz), and of one slot, 0.02 dB or
+one share of the energy less: what the plan's starts reach, the best of so many random starts, and
+the upper bound, which knows no energy and decides where it is below what is needed. For the most
+data of an energy it is the answer's own duration and energy, without a step less.
 """
 
 import argparse
+import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +20,29 @@ import numpy as np
 
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
-from faao_mav.optimizer.interior.maximize import maximize_all
+from faao_mav.optimizer.goal import ENERGY_SHARE
+from faao_mav.optimizer.interior.maximize import constraints_of, maximize_all
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
+from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import straight_flight, with_stops
+from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.search.ways import along, shortest_by
-from faao_mav.plan import Plan, changed_plan, read_plan
+from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import changed_plan, read_plan
 from faao_mav.plan.fields import dbm
 from faao_mav.plan.keys import ALIASES, POWER
+from faao_mav.power import JOULES_PER_WH
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 LESS_DB = 0.02
 TRIES = 10
 """Random ways that are tried for each start inside a fence."""
+
+PLANE = {"cruise_w": 120, "at": 15, "mass": 2}
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "500 megabytes, 20 MHz": ("quickest_delivery", {}),
@@ -49,6 +59,24 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "fence, least duration": (
         "fenced_relay",
         {"goal": {"rate": 2.1, "minimise": "duration"}},
+    ),
+    "800 megabytes, least energy": (
+        "battery",
+        {"goal": {"deliver_mbytes": 800, "minimise": "energy"}},
+    ),
+    "most data of 19 Wh": ("battery", {"goal": {"maximise": "data", "energy_wh": 19}}),
+    "plane, 1.2 bit/s/Hz, duration": (
+        "plane_relay",
+        {"goal": {"rate": 1.2, "minimise": "duration"}},
+    ),
+    "plane, 1 bit/s/Hz, power": ("plane_relay", {"goal": {"rate": 1.0, "minimise": "power"}}),
+    "plane, 1.2 bit/s/Hz, energy": (
+        "plane_relay",
+        {"goal": {"rate": 1.2, "minimise": "energy"}, "vehicle.power": PLANE},
+    ),
+    "plane, most data of 4.3 Wh": (
+        "plane_relay",
+        {"goal": {"maximise": "data", "energy_wh": 4.3}, "vehicle.power": PLANE},
     ),
 }
 
@@ -69,44 +97,66 @@ def at_random(kin: Kinematics, rng: np.random.Generator, reach: float) -> Trajec
     return straight
 
 
-def less(plan: Plan) -> Plan:
-    """Return `plan` with one slot, or with 0.02 dB less."""
-    if plan.goal.minimise == "duration":
-        return changed_plan(plan, {"flight.duration": plan.flight.duration - plan.flight.time_step})
-    powers = zip(ALIASES[POWER], plan.powers, strict=True)
-    return changed_plan(plan, {key: round(dbm(power) - LESS_DB, 6) for key, power in powers})
+def less(found: Solution) -> Problem:
+    """Return the problem of `found` with one slot, 0.02 dB or one share of the energy less."""
+    plan, goal = found.plan, found.plan.goal.minimise
+    assert found.least is not None
+    if goal == "duration":
+        step = plan.flight.time_step
+        return build_problem(changed_plan(plan, {"flight.duration": plan.flight.duration - step}))
+    if goal == "power":
+        powers = zip(ALIASES[POWER], plan.powers, strict=True)
+        changes = {key: round(dbm(power) - LESS_DB, 6) for key, power in powers}
+        return build_problem(changed_plan(plan, changes))
+    share = ENERGY_SHARE * found.least.limit * JOULES_PER_WH if goal == "energy" else 0.0
+    return replace(build_problem(plan), energy=found.energy_limit - share)
 
 
-def from_random(plan: Plan, count: int) -> float:
+def from_random(problem: Problem, count: int) -> float:
     """Return the best delivered rate from `count` random flights, bit/s/Hz."""
-    problem, rng = build_problem(plan), np.random.default_rng(1)
-    kin, kept = problem.kinematics, problem.constraints(problem.kinematics)
+    rng, kin = np.random.default_rng(1), problem.kinematics
+    kept = problem.constraints(kin)
     reach = float(np.linalg.norm(kin.end - kin.start))
     area, inside = problem.free_area, list[Trajectory]()
     for _ in range(TRIES * count):
         if len(inside) == count:
             break
-        if area is None:
-            inside.append(at_random(kin, rng, reach))
-            continue
-        middle = (kin.start + kin.end) / 2
-        stops = [
-            area.nearest(p, kin.start) for p in middle + rng.uniform(-reach, reach, (2, 2)) / 2
-        ]
-        way = shortest_by(area, [kin.start, *stops[: rng.integers(3)], kin.end])
-        flight = None if way is None else along(kin, way, kept)
+        flight: Trajectory | None
+        if kin.min_speed > 0:
+            flight = circling(kin, rng, reach)
+        elif area is None:
+            flight = at_random(kin, rng, reach)
+        else:
+            middle = (kin.start + kin.end) / 2
+            stops = [
+                area.nearest(p, kin.start) for p in middle + rng.uniform(-reach, reach, (2, 2)) / 2
+            ]
+            way = shortest_by(area, [kin.start, *stops[: rng.integers(3)], kin.end])
+            flight = None if way is None else along(kin, way, kept)
+        if flight is not None and problem.energy < math.inf:
+            every = (*constraints_of(kin), *kept)
+            flight = sparing_starts(kin, {"": flight}, every).get("")
         if flight is not None:
             inside.append(flight)
     optima = maximize_all(
         kin,
-        rate_field(problem, design(plan)),
+        rate_field(problem, design(problem.plan)),
         inside,
         constraints=kept,
         tolerance=1e-4,
         max_iterations=300,
         relay=problem.relay,
     )
-    return max(optimum.value for optimum in optima)
+    return max((optimum.value for optimum in optima), default=math.nan)
+
+
+def circling(kin: Kinematics, rng: np.random.Generator, reach: float) -> Trajectory | None:
+    """Return the flight of a least speed nearest to a way by two random places."""
+    places = [kin.start, *(kin.start + kin.end) / 2 + rng.uniform(-reach, reach, (2, 2)), kin.end]
+    share = np.sort(np.append(rng.uniform(0, 1, 2), (0.0, 1.0)))
+    at = np.linspace(0, 1, kin.slots)
+    path = np.stack([np.interp(at, share, x) for x in np.transpose(places)], axis=1)
+    return nearest_flight(kin, path, straight_flight(kin))
 
 
 def main() -> None:
@@ -122,19 +172,20 @@ def main() -> None:
         started = time.process_time()
         found = optimize(plan)
         taken = time.process_time() - started
-        started = time.process_time()
-        direct(build_problem(found.plan))
-        ratio = taken / (time.process_time() - started)
-        shorter = less(found.plan)
-        reached = direct(build_problem(shorter)).delivered_rate
-        bound = upper_bound(build_problem(shorter), reached).value
-        duration = plan.goal.minimise == "duration"
-        answer = found.plan.flight.duration if duration else dbm(found.plan.powers[1])
         assert found.least is not None
-        unit, flights = "s  " if duration else "dBm", found.least.optimizations
+        started = time.process_time()
+        direct(replace(build_problem(found.plan), energy=found.energy_limit))
+        ratio = taken / (time.process_time() - started)
+        shorter = less(found)
+        reached = direct(shorter).delivered_rate
+        bound = upper_bound(shorter, reached).value
+        answer, unit = {
+            "duration": (found.plan.flight.duration, "s  "),
+            "power": (dbm(found.plan.powers[1]), "dBm"),
+        }.get(plan.goal.minimise or "", (found.energy_limit / JOULES_PER_WH, "Wh "))
         print(
-            f"{name:28}  {answer:6.2f} {unit}  {flights:5} {ratio:5.1f}  "
-            f"{shorter.needed_rate:.4f}      {reached:.4f}  "
+            f"{name:30}  {answer:6.2f} {unit}  {found.least.optimizations:5} {ratio:5.1f}  "
+            f"{shorter.plan.needed_rate:.4f}      {reached:.4f}  "
             f"{from_random(shorter, options.starts):.4f}  {bound:.4f}",
             flush=True,
         )
