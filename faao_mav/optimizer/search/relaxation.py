@@ -190,9 +190,9 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     H_r[:, k, k] = singular
     if exact:
         # a path gain scales H and leaves the singular vectors, and with them P, as they are
-        P = best_precoders(H_r, link.power, link.modulation, link.noise).P
+        best = best_precoders(H_r, link.power, link.modulation, link.noise)
         H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
-        return cutoff_rate(H, P[:, None], link.classes, link.noise), True
+        return cutoff_rate(H, best.P[:, None], link.classes, link.noise), True
     diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
     if has_few_modes(link):
         rate = mode_rate(diagonal, gain_log.min(), gain_log.max())
