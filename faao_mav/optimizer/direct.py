@@ -97,9 +97,10 @@ def direct(
     relay = problem.maximised_queue
     # these take more steps, as shares and a buffer do
     slow, shared = kin.min_speed > 0, relay is not None and relay.half
+    fenced_in = problem.fence is not None
     long = shared or (relay is not None and math.isfinite(relay.buffer))
-    long = long or slow or problem.fence is not None or problem.energy < math.inf
-    warm = NEAR_START if slow else WARM_SHARES if shared else WARM_START
+    long = long or slow or fenced_in or problem.energy < math.inf
+    warm = NEAR_START if slow or fenced_in else WARM_SHARES if shared else WARM_START
     steps = options.max_iterations * (LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:

@@ -129,6 +129,25 @@ def test_a_disc_is_flown_round(make: Any) -> None:
     assert best.value == pytest.approx(expected, rel=1e-5)
 
 
+class NextSide(HalfPlanes):
+    """Its half-plane turns at x = 0 m, and is broken beyond."""
+
+    quantity: ClassVar[Literal["w", "v", "a"]] = "w"
+
+    def slack(self, x: Real) -> tuple[Real, Real]:
+        return np.where(x[0] > 0, -1.0, 0.5), np.stack([0 * x[0], 1 + 0 * x[0]])
+
+
+def test_slacks_stay_above_zero_when_a_half_plane_turns() -> None:
+    kin, side = copter(6, time_step=1.0, max_speed=10.0), NextSide()
+    flight, x, mu = ScaledFlight(kin, (side,)), -np.ones((2, 1, 6)), np.ones((1, 1))
+    state = side.begin(flight, Start(x, x, mu, 1.0, slice(0)))
+    fallen = -0.25 * state.on
+    then = state.moved(-x, x, 1.0, (fallen, 0 * fallen))
+    assert then.s == pytest.approx(np.where(state.on > 0, 0.025, 1.0), abs=1e-6)
+    assert then.violation() == pytest.approx(1.025, abs=1e-5)
+
+
 @dataclass(frozen=True)
 class Budget(Constraint):
     """The running sum e_{n+1} = e_n + normal . w_n / n of scaled positions never exceeds `most`.

@@ -70,6 +70,10 @@ start. Measured on `copter_relay.yaml` in half duplex: with T = 70, 120 and 200 
 16-QAM), the best of the starts converges; of the twelve with the adaptive rule, five.
 """
 
+_CENTRING_TURNING = 100.0
+"""The same where half-planes turn. Measured on seven sites of forty random polygons, in 40 slots:
+five searches converge with 100, two with 1,000 and three with 10, one of those 6 % lower."""
+
 _MAX_ATTEMPTS = 6
 """The directions tried at one iterate before its multipliers are centred; 3 to 12 do as well."""
 
@@ -333,6 +337,7 @@ class Search:
         adaptive = np.fmin(control.mu, keep * now)
         near = _SOLVED_TURNING if self.turning else _SOLVED
         solved = slope * control.steepness < near * control.mu
+        solved |= self.turning & (slope < self.tolerance)
         monotone = np.where(solved, _MONOTONE_FALL, 1.0) * control.mu
         hugged = queued & (control.centrings >= _MONOTONE_AFTER)
         waits = hugged | self.turning | self.bilinear | self.curved
@@ -428,7 +433,8 @@ class Search:
     def _centre(self, chosen: Flags) -> None:
         """Give the flights `chosen` multipliers from a larger mu: that leads away from limits."""
         control, at = self.control, self.at
-        factor = _CENTRING_BILINEAR if self.bilinear else _CENTRING_FACTOR
+        turned = _CENTRING_TURNING if self.turning else _CENTRING_FACTOR
+        factor = _CENTRING_BILINEAR if self.bilinear else turned
         larger = np.minimum(COLD_START.mu * control.steepness, factor * at.mean_gap())
         control.mu = np.where(chosen, larger, control.mu)
         self.at = merged(chosen, at.centred(control.mu, self.barrier_share), at)

@@ -232,18 +232,21 @@ class AxisBound:
 
         That is a step later with `sign` 1, a step earlier with -1.
         """
+        # one after the other: the cache of a processor holds one of them, not all
+        return np.concatenate([self._reached(each[None], sign) for each in values])
+
+    def _reached(self, values: Real, sign: int) -> Real:
         rows, most = values.shape[-1], int(self.columns[-1])
         room = most + max(reach for _, reach in self.steps)
         ahead = sign * self.columns[:, None]
         source = np.clip(ahead + np.arange(-room, rows + room), 0, rows - 1)
         sheared = np.take_along_axis(values, source[None], axis=-1)
-        best, widened = np.full_like(sheared, -np.inf), dict[int, Real]()
+        best = np.full_like(sheared, -np.inf)
+        widened = largest_within(sheared, (reach for _, reach in self.steps))
         up = np.maximum.accumulate(values, axis=-1)
         down = np.maximum.accumulate(values[..., ::-1], axis=-1)[..., ::-1]
         first, last = (np.full(values.shape[:-1], -np.inf) for _ in range(2))
         for change, reach in self.steps:
-            if reach not in widened:
-                widened[reach] = largest_within(sheared, reach)
             here = slice(max(0, -change), len(self.columns) - max(0, change))
             there = slice(max(0, change), len(self.columns) - max(0, -change))
             np.maximum(best[:, here], widened[reach][:, there], out=best[:, here])

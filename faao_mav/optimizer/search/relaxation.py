@@ -27,6 +27,7 @@ from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
 from faao_mav.optimizer.rates.rate_model import best_curve
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
+from faao_mav.radio.rate import cutoff_rate
 
 _LINES = 64  # tangents of the majorant of each slot
 _DISTANCES = 600  # distances at which the best rate of each slot is tabulated
@@ -188,8 +189,10 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     k = np.arange(singular.shape[1])
     H_r[:, k, k] = singular
     if exact:
+        # a path gain scales H and leaves the singular vectors, and with them P, as they are
+        best = best_precoders(H_r, link.power, link.modulation, link.noise)
         H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
-        return best_precoders(H, link.power, link.modulation, link.noise).rate, True
+        return cutoff_rate(H, best.P[:, None], link.classes, link.noise), True
     diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
     if has_few_modes(link):
         rate = mode_rate(diagonal, gain_log.min(), gain_log.max())

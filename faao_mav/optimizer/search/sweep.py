@@ -8,6 +8,7 @@ worth. Acceleration enters through how far the flight comes from its ends, fence
 left out.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,8 +80,9 @@ class Sweep:
     def _near(self, values: Real) -> Real:
         """Return the largest of `values` (..., i, j) in reach of one stage."""
         best = np.full_like(values, -np.inf)
+        within = largest_within(values, (columns for _, columns in self.rows))
         for rows, columns in self.rows:
-            near = largest_within(values, columns)
+            near = within[columns]
             if rows == 0:
                 np.maximum(best, near, out=best)
             elif rows < values.shape[-2]:
@@ -112,19 +114,30 @@ class Sweep:
         return cells
 
 
-def largest_within(values: Real, reach: int) -> Real:
-    """Return the largest of `values` (..., n) up to `reach` places away, by windows that double.
+def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
+    """Return for each of `reaches` the largest of `values` (..., n) up to so many places away.
 
-    scipy.ndimage has a filter for it, and takes 0.15 s to import.
+    Windows that double serve all of them. scipy.ndimage has a filter for one reach, and takes
+    0.15 s to import.
+
+    >>> largest_within(np.array([3.0, 0.0, 1.0, 0.0]), [1])[1].tolist()
+    [3.0, 3.0, 1.0, 1.0]
     """
-    length, width = values.shape[-1], 2 * reach + 1
-    edges = [(0, 0)] * (values.ndim - 1) + [(reach, reach)]
+    order = sorted(set(reaches))
+    length, most = values.shape[-1], order[-1]
+    edges = [(0, 0)] * (values.ndim - 1) + [(most, most)]
     largest, size = np.pad(values, edges, constant_values=-np.inf), 1
-    while 2 * size <= width:
-        largest = np.maximum(largest[..., :-size], largest[..., size:])
-        size *= 2
-    beyond = width - size
-    return np.maximum(largest[..., :length], largest[..., beyond : beyond + length])
+    found = {}
+    for reach in order:
+        width = 2 * reach + 1
+        while 2 * size <= width:
+            largest = np.maximum(largest[..., :-size], largest[..., size:])
+            size *= 2
+        first, last = most - reach, most + reach + 1 - size
+        found[reach] = np.maximum(
+            largest[..., first : first + length], largest[..., last : last + length]
+        )
+    return found
 
 
 def sweep_over(
