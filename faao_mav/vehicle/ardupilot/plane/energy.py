@@ -11,13 +11,8 @@ import math
 from faao_mav.power import GRAVITY
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 
-_TIME = 5.0  # TECS_TIME_CONST, s; as all of these ArduPlane's default
-_THROTTLE_DAMPING = 0.5  # TECS_THR_DAMP
-_PITCH_DAMPING = 0.3  # TECS_PTCH_DAMP
-_INTEGRAL_GAIN = 0.3  # TECS_INTEG_GAIN, 1/s
-_TURN = 10.0  # TECS_RLL2THR: power per unit of load factor squared beyond 1, m²/s³
 _TRIM = 0.5  # TRIM_THROTTLE of the simulator's plane; what is wrong about it goes with time
-_PITCH_LIMITS = (math.radians(-20), math.radians(15))  # PTCH_LIM_MIN_DEG of that, TECS_PITCH_MAX
+_LEAST_PITCH = math.radians(-20)  # PTCH_LIM_MIN_DEG of the simulator's plane
 _EASE = 0.2  # TECS_THR_ERATE, 1/s: how fast the full throttle of a take-off goes at most
 _CLIMBING = 1.0  # a flight that begins with so much of a climb, m/s, comes from a take-off; chosen
 _KINETIC_SHARE = 0.25  # of the range of pitch, the most that the integral of kinetic energy takes
@@ -54,6 +49,7 @@ class Energy:
     ) -> None:
         self.height, self.speed, self.climb = height, speed, climb
         self._limits, self._density = limits, density
+        self._pitches = _LEAST_PITCH, limits.climb_pitch or limits.pitch_limit
         self._level, self._demand = height, demand
         self._throttle_integral = self._pitch_integral = self._kinetic_integral = 0.0
         self._demanded_rate = self._flown_rate = self._rate = 0.0
@@ -76,7 +72,7 @@ class Energy:
         rate = min(max((speed - self._demand) / step, -loss), gain)
         self._demand += rate * step
         # of both rates only what is new counts: a high-pass filter
-        wash = -math.expm1(-step / _TIME)
+        wash = -math.expm1(-step / self._limits.energy_time)
         self._demanded_rate += (rate - self._demanded_rate) * wash
         self._flown_rate += (self._rate - self._flown_rate) * wash
         kinetic_demanded = flown * (rate - self._demanded_rate)
@@ -87,7 +83,7 @@ class Energy:
         potential_rate = GRAVITY * self.climb
         throttle = self._throttle(
             kinetic + potential,
-            kinetic_demanded + potential / _TIME,
+            kinetic_demanded + potential / self._limits.energy_time,
             kinetic_rate + potential_rate,
             load,
             step,
@@ -104,34 +100,34 @@ class Energy:
             -GRAVITY * self._limits.descent_speed,
         )
         demanded = min(max(demanded, least), most)
-        ahead = _TRIM + (demanded + _TURN * (load**2 - 1)) / (most - least)
-        gain = 1 / (_TIME * (most - least))
-        throttle = ahead + gain * (missing + _THROTTLE_DAMPING * (demanded - flown))
+        ahead = _TRIM + (demanded + self._limits.turn_power * (load**2 - 1)) / (most - least)
+        gain = 1 / (self._limits.energy_time * (most - least))
+        throttle = ahead + gain * (missing + self._limits.throttle_damping * (demanded - flown))
         self._least_throttle -= _EASE * step
         held = min(max(throttle + self._throttle_integral, self._least_throttle, 0.0), 1.0)
-        integral = self._throttle_integral + gain * _INTEGRAL_GAIN * missing * step
+        integral = self._throttle_integral + gain * self._limits.energy_integral * missing * step
         self._throttle_integral = min(max(integral, -throttle), 1 - throttle)
         return held
 
     def _pitch(self, missing: float, flown: float, kinetic: float, step: float) -> float:
         """Return the pitch, rad, for a difference of energies that is `missing`, m²/s²."""
-        least, most = _PITCH_LIMITS
+        least, most = self._pitches
         weight = GRAVITY * self.speed
-        demanded = missing / _TIME
+        demanded = missing / self._limits.energy_time
         error = demanded - flown
         limit = self._most_kinetic()
         self._kinetic_integral = min(
-            max(self._kinetic_integral - kinetic * step / _TIME, -limit), limit
+            max(self._kinetic_integral - kinetic * step / self._limits.energy_time, -limit), limit
         )
-        pitch = demanded + _PITCH_DAMPING * error
+        pitch = demanded + self._limits.pitch_damping * error
         pitch += self._pitch_integral + self._kinetic_integral
         if least * weight < pitch < most * weight or error * pitch < 0:
-            self._pitch_integral += _INTEGRAL_GAIN * error * step
+            self._pitch_integral += self._limits.energy_integral * error * step
         return min(max(pitch / weight, least), most)
 
     def _most_kinetic(self) -> float:
         """Return the greatest integral of kinetic energy's error, m²/s³."""
-        least, most = _PITCH_LIMITS
+        least, most = self._pitches
         return _KINETIC_SHARE * (most - least) * GRAVITY * self.speed
 
     def _move(self, throttle: float, pitch: float, load: float, step: float) -> None:
