@@ -49,6 +49,20 @@ def test_rate_and_data_grow_with_the_duration(by_duration: dict[int, float]) -> 
     assert (np.diff(rates * list(by_duration)) > 0).all()
 
 
+@settings(max_examples=6, deadline=None)
+@given(st.integers(20, 100), st.integers(12, 18), st.integers(0, 4), st.floats(0.0, 6.0))
+def test_more_time_and_more_power_never_deliver_less(
+    north: int, slots: int, more: int, db: float
+) -> None:
+    place = {"radio.ground_user.position": [80, north]}
+    less = delivered(place | {"flight.duration": slots})
+    longer = delivered(place | {"flight.duration": slots + more})
+    stronger = place | {"radio.base_station.power_dbm": 1 + db, "radio.relay.power_dbm": 20 + db}
+    assert longer > less - 1e-4
+    assert (slots + more) * longer > slots * less - 1e-4
+    assert delivered(stronger | {"flight.duration": slots}) > less - 1e-4
+
+
 @pytest.mark.parametrize(
     ("amount", "share"), [("rate", 0.0), ("rate", 0.6), ("deliver_mbytes", 0.3)]
 )
