@@ -3,9 +3,9 @@
     python tests/benchmarks/processors.py [--plans 20] [NAME ...]
 
 Each plan is planned and converted anew by the command for each of `PROCESSORS`, as OpenBLAS and
-NumPy let this machine pass for another one of its family. One row for each plan: the items, and for each
-processor whether its mission file has the same bytes as the first one's. Status 1 where one has
-not. NAMEs choose plans.
+NumPy let this machine pass for another one of its family. One row for each plan: the items, and for
+each processor whether its mission file has the same bytes as the first one's. Status 1 where one
+has not. NAMEs choose plans.
 """
 
 import argparse
