@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import record_plane
 from record_px4 import in_wind
-from simulators import simulated
+from simulators import simulated, start_log
 
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
@@ -195,23 +195,6 @@ def serving(
             start_log(autopilots, folder / "px4")
         upload(result.conversion.mission, connection, wait=60)
         yield connection
-
-
-def start_log(autopilots: Path, home: Path) -> None:
-    """Have the PX4 that runs in `home` write its `.ulg` there, from now on.
-
-    Its parameter SDLOG_MODE starts the logger at boot, to wake with each estimate: the logger then
-    waits for the simulator, which waits for it. By the clock, 20 times a second, it waits for none.
-    """
-    (lock,) = home.glob("run/px4-sock-*")
-    program, instance = autopilots / "px4" / "bin" / "px4-logger", lock.name.rsplit("-", 1)[-1]
-    subprocess.run(
-        [str(program), "--instance", instance, "start", "-f", "-r", "20"],
-        cwd=home,
-        env=os.environ | {"HOME": str(home)},
-        capture_output=True,
-        check=True,
-    )
 
 
 def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
