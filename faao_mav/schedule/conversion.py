@@ -188,18 +188,22 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
         """Order schedules: inside the fence first, then by cost."""
         return _outside(scheduled[0], plan.keep_in), scheduled[0].cost
 
-    found = _refined(((straight, scheduler) for scheduler in schedulers), rank)
-    best = min(found, key=rank)
+    def better(best: _Scheduled, trials: Iterable[tuple[Route, Scheduler]]) -> _Scheduled:
+        """Return `best`, or what is better of `trials` if all of these are flown to their end."""
+        try:
+            return min([best, *_refined(trials, rank)], key=rank)
+        except InputError:
+            return best
+
+    best = min(_refined(((straight, scheduler) for scheduler in schedulers), rank), key=rank)
     if rank(best) > _GOOD and given.type.hovers:
         ramped = with_ramps(straight, t, w, given.legs.least)
-        found = _refined(((ramped, scheduler) for scheduler in schedulers), rank)
-        best = min([best, *found], key=rank)
+        best = better(best, ((ramped, scheduler) for scheduler in schedulers))
     if rank(best) > _GOOD and given.type.dialect.splines:
         liveliest = schedulers[-1]
         bent = [initial_route(t, w, plan, splines=splines) for splines in _splines(liveliest)]
         new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
-        found = _refined(((route, liveliest) for route in new.values()), rank)
-        best = min([best, *found], key=rank)
+        best = better(best, ((route, liveliest) for route in new.values()))
     schedule, scheduler = best
     return Conversion(
         mission=assemble(schedule.route, plan),
