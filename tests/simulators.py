@@ -78,6 +78,23 @@ def simulated(
         yield connection
 
 
+def start_log(autopilots: Path, home: Path) -> None:
+    """Have the PX4 that runs in `home` write its `.ulg` there, from now on.
+
+    Its parameter SDLOG_MODE starts the logger at boot, to wake with each estimate: the logger then
+    waits for the simulator, which waits for it. By the clock, 20 times a second, it waits for none.
+    """
+    (lock,) = home.glob("run/px4-sock-*")
+    program, instance = autopilots / "px4" / "bin" / "px4-logger", lock.name.rsplit("-", 1)[-1]
+    subprocess.run(
+        [str(program), "--instance", instance, "start", "-f", "-r", "20"],
+        cwd=home,
+        env=os.environ | {"HOME": str(home)},
+        capture_output=True,
+        check=True,
+    )
+
+
 @contextmanager
 def rebootable(autopilots: Path, kind: str, where: Path) -> Iterator[Running]:
     """Run an autopilot as `simulated` does, and yield what cuts its power too.

@@ -15,7 +15,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
-from faao_mav.schedule.initial_route import Splines, initial_route, slowest_leg
+from faao_mav.schedule.initial_route import Splines, initial_route, slowest_leg, with_ramps
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
@@ -172,8 +172,10 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
     """Return the mission for `solution` within the path tolerance of `plan`.
 
     The sets of parameters that are recommended for the vehicle are compared by the error of the
-    first schedule, and refined in that order until one is good. If none is, a vehicle that flies
-    splines may do so with the liveliest: everywhere, or where legs are too short for their speed.
+    first schedule, and refined in that order until one is good. If none is, copters get legs of
+    their own for where the plan speeds up and slows down. If that is not good either, a vehicle
+    that flies splines may do so with the liveliest: everywhere, or where legs are too short for
+    their speed.
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
@@ -186,14 +188,22 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
         """Order schedules: inside the fence first, then by cost."""
         return _outside(scheduled[0], plan.keep_in), scheduled[0].cost
 
-    found = _refined(((straight, scheduler) for scheduler in schedulers), rank)
-    best = min(found, key=rank)
+    def better(best: _Scheduled, trials: Iterable[tuple[Route, Scheduler]]) -> _Scheduled:
+        """Return `best`, or what is better of `trials` if all of these are flown to their end."""
+        try:
+            return min([best, *_refined(trials, rank)], key=rank)
+        except InputError:
+            return best
+
+    best = min(_refined(((straight, scheduler) for scheduler in schedulers), rank), key=rank)
+    if rank(best) > _GOOD and given.type.hovers:
+        ramped = with_ramps(straight, t, w, given.legs.least)
+        best = better(best, ((ramped, scheduler) for scheduler in schedulers))
     if rank(best) > _GOOD and given.type.dialect.splines:
         liveliest = schedulers[-1]
         bent = [initial_route(t, w, plan, splines=splines) for splines in _splines(liveliest)]
         new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
-        found = _refined(((route, liveliest) for route in new.values()), rank)
-        best = min([best, *found], key=rank)
+        best = better(best, ((route, liveliest) for route in new.values()))
     schedule, scheduler = best
     return Conversion(
         mission=assemble(schedule.route, plan),

@@ -197,5 +197,6 @@ def _end_time(t: Real, w: Real, end: Real, tolerance: float, due: float) -> floa
     if len(outside) == 0:
         return float(t[0])
     k = int(outside[-1])
-    share = (apart[k] - tolerance) / (apart[k] - apart[k + 1])
+    nearer = apart[k] - apart[k + 1]
+    share = (apart[k] - tolerance) / nearer if nearer else 1.0  # it stands still, not there
     return float(t[k] + max(0.0, min(1.0, share)) * (t[k + 1] - t[k]))

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.errors import InputError
 from faao_mav.schedule.retimed import LegRetimed, LegTimes, Retimed, Retiming
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import LATE_WEIGHT, Clock, Schedule
@@ -78,7 +79,10 @@ def fit(
         tried, foreseen = _stepped(goal, unknowns, retimed, x, leash)
         if foreseen > (1 - _LEAST_GAIN) * cost:
             break
-        flown = flight(unknowns.commanded(tried))
+        try:
+            flown = flight(unknowns.commanded(tried))
+        except InputError:  # it is not followed to its end
+            break
         new = goal.cost(flown, unknowns.pull(tried))
         retimed.learn(flown)
         gain = 1 - new / cost

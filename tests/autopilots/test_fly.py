@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from conftest import MISSIONS, edited
-from simulators import simulated
+from simulators import simulated, start_log
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -36,13 +36,13 @@ def run(*arguments: object) -> list[dict[str, Any]]:
 
 
 def options_for(kind: str, autopilots: Path, parameters: Path, where: Path) -> tuple[str, ...]:
-    """Return options that make it fly with `parameters`, and quickly; ArduPilot logs the flight.
+    """Return options that make it fly with `parameters`, and quickly, and keep its log in `where`.
 
     Setpoints may cease for a minute of its time, which is seconds here, and the flight goes on.
     """
     if kind == "px4":
         tuned = ("--param-file", str(parameters), "--params", "SIH_KDV=0.2,COM_OF_LOSS_T=60")
-        return ("--speedup", "10", *tuned)
+        return ("--speedup", "10", "--keep", str(where), *tuned)
     lines = [line for line in parameters.read_text().splitlines() if not line.startswith("#")]
     own = where / "own.parm"
     own.write_text(
@@ -68,6 +68,8 @@ def test_a_plan_is_flown_watched_and_debriefed(kind: str, autopilots: Path, tmp_
     options = options_for(kind, autopilots, parameters, tmp_path)
     heard = tmp_path / "heard.tlog"
     with simulated(autopilots, kind, tmp_path, *options) as connection:
+        if kind == "px4":
+            start_log(autopilots, tmp_path)
         link = ("--to", connection, "--json", "--timeout", "40")
         assert run("upload", mission, *link)[0]["verified"]
         *_, end = run("fly", mission, *link, "--solution", save, "--arm", "--log", heard)
@@ -79,11 +81,10 @@ def test_a_plan_is_flown_watched_and_debriefed(kind: str, autopilots: Path, tmp_
     # a delay of the link counts as many times as the simulator is fast: setpoints then lag behind
     assert end["flight"]["flown"]["rms_position_error"] < 3
     assert end["flight"]["altitude_error"] < 1.5
-    own = [*(tmp_path / "logs").glob("*.BIN")] if kind == "arducopter" else []
-    for log in (heard, *own):
+    (own,) = tmp_path.rglob("*.ulg" if kind == "px4" else "*.BIN")
+    for log in (heard, own):
         (told,) = run("debrief", log, "--solution", save, "--json")
         # the autopilot's own log has both flights, of which the nearer to the plan is found
         flights = [each["flight"]["flown"] for each in ((end,) if log == heard else (end, again))]
         found, *seen = ([each[name] for name in RATES] for each in (told["flown"], *flights))
         assert any(found == pytest.approx(each, rel=1e-3) for each in seen)
-    assert len(own) == (kind == "arducopter")

@@ -17,7 +17,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,7 +26,7 @@ from typing import Any
 import numpy as np
 import record_plane
 from record_px4 import in_wind
-from simulators import simulated
+from simulators import simulated, start_log
 
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
@@ -49,10 +48,6 @@ RUNNERS = {
 
 BEYOND = 2.0
 """m/s more than the wind that a mission is said to keep."""
-
-SETTLES = 10.0
-"""Seconds of the world's time after which ArduCopter, too, has a position to begin a mission at:
-its checks before arming do not ask for one. Chosen."""
 
 FLOWN: dict[str, dict[str, Any]] = {
     name: PLANS[name]
@@ -177,15 +172,15 @@ def serving(
 ) -> Iterator[str]:
     """Run a simulator in `folder`, in the plan's wind, that holds the mission of `result`.
 
-    It yields where it is heard, `speedup` times as fast as the world. ArduPilot's own log stays in
-    `folder`.
+    It yields where it is heard, `speedup` times as fast as the world. The autopilot's own log stays
+    in `folder`.
     """
     wind = result.solution.plan.site.wind
     assert result.conversion is not None
     files, script = result.write(folder / "mission.waypoints"), autopilots / RUNNERS[autopilot][0]
     if autopilot == "px4":
         kind, options = "px4", in_wind(script, wind)
-        options += ["--params", "SIH_KDV=0.2"]
+        options += ["--params", "SIH_KDV=0.2", "--keep", str(folder / "px4")]
         options += ["--param-file", str(files[1])] if len(files) > 1 else []
     else:
         plans = result.solution.plan.vehicle.parameters
@@ -196,8 +191,9 @@ def serving(
         defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
         kind, options = "arducopter", ["--defaults", defaults]
     with simulated(autopilots, kind, folder, "--speedup", str(speedup), *options) as connection:
+        if autopilot == "px4":
+            start_log(autopilots, folder / "px4")
         upload(result.conversion.mission, connection, wait=60)
-        time.sleep(SETTLES)
         yield connection
 
 

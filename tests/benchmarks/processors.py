@@ -2,10 +2,10 @@
 
     python tests/benchmarks/processors.py [--plans 20] [NAME ...]
 
-Each plan is planned and converted anew for each of `PROCESSORS`, as OpenBLAS and NumPy let this
-machine pass for another one of its family. One row for each plan: the items, and for each
-processor whether its mission file has the same bytes as the first one's. Status 1 where one has
-not. NAMEs choose plans.
+Each plan is planned and converted anew by the command for each of `PROCESSORS`, as OpenBLAS and
+NumPy let this machine pass for another one of its family. One row for each plan: the items, and for
+each processor whether its mission file has the same bytes as the first one's. Status 1 where one
+has not. NAMEs choose plans.
 """
 
 import argparse
@@ -24,13 +24,12 @@ SAMPLES = Path(__file__).parents[2] / "missions"
 
 _VECTORS = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
 PROCESSORS = {
-    "Haswell": {"OPENBLAS_CORETYPE": "Haswell"},
+    "this one": {},
     "Nehalem": {"OPENBLAS_CORETYPE": "Nehalem"},
-    "Prescott": {"OPENBLAS_CORETYPE": "Prescott"},
-    "Nehalem, no AVX": {
-        "OPENBLAS_CORETYPE": "Nehalem",
-        "NPY_DISABLE_CPU_FEATURES": " ".join(_VECTORS),
+    "NumPy without AVX-512": {
+        "NPY_DISABLE_CPU_FEATURES": " ".join(each for each in _VECTORS if each != "X86_V3")
     },
+    "NumPy without AVX2": {"NPY_DISABLE_CPU_FEATURES": " ".join(_VECTORS)},
 }
 """The environment in which the program takes this processor for another one."""
 

@@ -4,9 +4,8 @@
 
 The plans of `flown.py`, in calm air. One row for each: how watching ended, rms position error at
 equal times (m), and the delivered rate over the planned one, as the watcher saw them and by
-ArduPilot's own log; in percent, the greatest difference between the two of the delivered rate and
-of the rates of both hops; the processor time of the debriefing, s. PX4's simulator writes no log
-while it serves: its rows end with the watcher.
+the autopilot's own log; in percent, the greatest difference between the two of the delivered rate
+and of the rates of both hops; the processor time of the debriefing, s.
 """
 
 import os
@@ -40,9 +39,8 @@ def watched(autopilots: Path, autopilot: str, result: Result, folder: Path) -> s
         return f"not flown: {ending}"
     share = 100 * seen.flown.delivered_rate / result.solution.delivered_rate
     cells = [f"{ending.kind:<10}{seen.flown.rms_position_error:5.2f} {share:7.2f} %"]
-    logs = sorted(folder.rglob("*.BIN"), key=lambda path: path.stat().st_size)
-    if not logs:
-        return cells[0]
+    logs = [path for path in folder.rglob("*") if path.suffix in {".BIN", ".ulg"}]
+    logs.sort(key=lambda path: path.stat().st_size)
     begun = time.process_time()
     own = debriefed(read_log(logs[-1]), result, logs[-1].name)
     share = 100 * own.flown.delivered_rate / result.solution.delivered_rate

@@ -2,9 +2,9 @@
 
 `tests/data/logs` has one mission as ArduCopter 4.7 logged it (`arducopter.bin`: every other POS,
 every 50th XKF2, the parameters that missions are timed for) and as `fly --log` did
-(`arducopter.tlog`: positions only), and `px4.tlog`, of the same plan flown by PX4 1.16. PX4's
-simulator stops when it logs to a file, so there is no `.ulg` of a real flight: those here are
-written by hand, after the ULog file format, with the positions of `px4.tlog`.
+(`arducopter.tlog`: positions only), and `px4.tlog`, of the same plan flown by PX4 1.16. The
+`.ulg` files here are written by hand, after the ULog file format, with the positions of `px4.tlog`;
+`tests/autopilots/test_fly.py` debriefs the log of a real PX4.
 """
 
 import json

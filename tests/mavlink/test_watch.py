@@ -200,6 +200,19 @@ def test_it_waits_for_the_checks_and_says_why_they_do_not_pass() -> None:
     assert scene.orders == []
 
 
+def test_it_arms_nothing_that_does_not_know_where_it_is() -> None:
+    scene = Scene("ardupilot", arm=True, place=20.0)
+    armed: list[bool] = []
+    assert scene.run(events=[(19.0, lambda _: armed.append(scene.mock.armed))]) == "finished"
+    assert armed == [False]
+    kinds = [order.command for order in scene.orders if isinstance(order, CommandLong)]
+    assert kinds == [MavCommand.ARM, MavCommand.START]
+    scene = Scene("ardupilot", arm=True, place=1e9)
+    assert scene.run() == "refused"
+    assert scene.orders == []
+    assert scene.watch.outcome.text.endswith("it does not know where it is")
+
+
 def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
     away = Fence((), (Circle((HOME.latitude + 0.1, HOME.longitude), 50.0, inclusion=True),))
     scene = Scene("ardupilot", a_mission(12, fence=away), arm=True, parameters={"FENCE_ENABLE": 1})

@@ -1,5 +1,7 @@
 """How far a flight is from the plan."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -23,6 +25,15 @@ def test_a_late_flight_is_off_in_time_and_not_in_space() -> None:
     assert 3.8 < found.rms < 4
     assert found.late == pytest.approx(0.5)
     assert lateness(t, planned, longer, late, 2.0) == found.late
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_flight_that_stops_short_has_an_end() -> None:
+    t = np.arange(0.0, 10.1)
+    short = np.column_stack([np.minimum(8 * t, 40.0), 0 * t])
+    found = deviation(t, np.column_stack([8 * t, 0 * t]), t, short, 2.0)
+    assert found.max == pytest.approx(40)
+    assert math.isfinite(found.late)
 
 
 def test_a_detour_and_a_short_cut_both_count_as_astray() -> None:

@@ -10,7 +10,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
-from faao_mav.schedule.initial_route import Splines, initial_route
+from faao_mav.schedule.initial_route import Splines, initial_route, with_ramps
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.waypoints import find_hovers
 from faao_mav.vector import distances_to_segment, lengths
@@ -111,6 +111,31 @@ def test_dash_hover_dash() -> None:
     assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1)
     assert route.distance == pytest.approx(500, abs=1)
     assert route.positions == pytest.approx(np.array([w[0], [150.0, 150.0], w[-1]]), abs=0.05)
+
+
+def test_ramps_are_legs_of_their_own() -> None:
+    t, w = dash_hover_dash(hover=40.0)  # at 8 m/s and 1.5 m/s²
+    route = initial_route(t, w, plan_with())
+    ramped = with_ramps(route, t, w, 5.0)
+    assert len(ramped.positions) == len(route.positions) + 4
+    pace = lengths(np.gradient(w, t, axis=0))
+    assert np.interp(ramped.arrivals[[1, 4]], t, pace) == pytest.approx(0.6 * 8, abs=1.5 * STEP)
+    assert ramped.leg_lengths[0] == pytest.approx((0.6 * 8) ** 2 / 3, abs=2)
+    assert path_error(w, ramped.positions) <= path_error(w, route.positions) + 1e-9
+    assert len(with_ramps(route, t, w, 20.0).positions) == len(route.positions)
+
+
+@STEADY
+@given(trajectories(), st.floats(0.1, 20))
+def test_ramps_of_any_flight_are_passed_in_its_order(flight: Trajectory, least: float) -> None:
+    t, w = flight
+    route = initial_route(t, w, plan_with())
+    ramped = with_ramps(route, t, w, least)
+    assert (ramped.arrivals[1:] > ramped.departures[:-1]).all()
+    assert set(map(tuple, route.positions)) <= set(map(tuple, ramped.positions))
+    at = np.searchsorted(t, ramped.arrivals)
+    new = ~np.isin(ramped.arrivals, route.arrivals)
+    assert (ramped.positions[new] == w[at[new]]).all()
 
 
 @pytest.mark.parametrize("far", [1.0, 2.1, 2.6])

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faao_mav.arrays import Real
+from faao_mav.errors import InputError
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Clock, Schedule
 from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD, fit
@@ -89,6 +90,26 @@ def test_a_flight_is_found_from_any_beginning(
     guess = route_with(np.array(begin), np.array([0.0, 0.0, 8.0, 0.0, 3.0]))
     before = Schedule(guess, flown(guess), clock).deviation.rms
     assert fitted(clock, guess).deviation.rms < max(0.6, 0.1 * before)
+
+
+def test_a_flight_without_an_end_is_not_the_one_that_fits() -> None:
+    clock = plan_of(route_with(SPEEDS, WAITS))
+    begin = route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS))
+
+    def flight(route: Route) -> Schedule:
+        if not np.allclose(route.speeds, begin.speeds):
+            raise InputError("the flight would take more than 21600 s")
+        return Schedule(route, flown(route), clock)
+
+    found = fit(
+        flight,
+        begin,
+        groups=np.arange(4),
+        free=np.zeros(5, dtype=bool),
+        min_speed=0.1,
+        max_speed=8.0,
+    )
+    assert found.route.speeds == pytest.approx(begin.speeds)
 
 
 def test_a_fit_takes_few_flights() -> None:

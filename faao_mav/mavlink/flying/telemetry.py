@@ -10,6 +10,7 @@ from faao_mav.mavlink.messages import (
     Envelope,
     GlobalPositionInt,
     Heartbeat,
+    LocalPositionNed,
     Message,
     MissionCurrent,
     MissionItemInt,
@@ -23,6 +24,7 @@ from faao_mav.mavlink.protocol import (
     CURRENT_ITEM,
     CURRENT_MODE,
     GROUND_STATION_TYPE,
+    LOCAL_POSITION,
     POSITION,
     SYSTEM_STATUS,
     MavCommand,
@@ -109,6 +111,8 @@ class Telemetry:
         said: what the vehicle said that is a warning or worse.
         samples: where it was.
         heartbeat, current, status, position: the last of these messages, None before the first.
+        knows_place: LOCAL_POSITION_NED was heard, which ArduPilot sends once its estimator knows
+            where it is.
         wanted: the last CURRENT_MODE, None where the last heartbeat tells another mode.
         stations: other ground stations that were heard.
         ending: why nothing more can be known, None as long as something can.
@@ -125,6 +129,7 @@ class Telemetry:
         self.heartbeat: Heartbeat | None = None
         self.current: MissionCurrent | None = None
         self.status: SysStatus | None = None
+        self.knows_place = False
         self.position: GlobalPositionInt | None = None
         self.wanted: CurrentMode | None = None
         self._periods = {POSITION: 1 / rate} | _PERIODS
@@ -187,6 +192,8 @@ class Telemetry:
                 self._on_position(message, now)
             case SysStatus():
                 self._needed[SYSTEM_STATUS], self.status = now, message
+            case LocalPositionNed():
+                self._needed[LOCAL_POSITION], self.knows_place = now, True
             case MissionCurrent():
                 self._needed[CURRENT_ITEM] = now
                 self._on_current(message)

@@ -16,7 +16,7 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.modes import modes_of
-from faao_mav.mavlink.protocol import MISSION_COMPLETE, MavCommand, MissionType
+from faao_mav.mavlink.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, MissionType
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.wire_items import home_items
 
@@ -56,11 +56,11 @@ class Watch(Machine[Ending]):
     """A machine that watches the vehicle of `peer` fly the mission `rows` to its end.
 
     `rows` are the items that it holds, the home row included where it has one. With `arm` it arms
-    and starts the mission once the autopilot's own checks pass and no other ground station was
-    heard; else somebody else does. `lands`: the flight ends on the ground. After `patience` seconds
-    without a message, or of checks that do not pass, it ends. `seen` is what it has heard; it asks
-    for `rate` positions a second. `relay_start` is when the plan's clock read 0, s on the
-    vehicle's, where that is known: in a `Stream`.
+    and starts the mission once the autopilot's own checks pass, it knows where it is and no other
+    ground station was heard; else somebody else does. `lands`: the flight ends on the ground.
+    After `patience` seconds without a message, or of checks that do not pass, it ends. `seen` is
+    what it has heard; it asks for `rate` positions a second. `relay_start` is when the plan's clock
+    read 0, s on the vehicle's, where that is known: in a `Stream`.
 
     Nothing is sent but what asks for telemetry, until `arm` or `cancel` has a reason; and nothing
     ever again once the mode is one that was not asked for: then the pilot, or a failsafe, has the
@@ -94,6 +94,8 @@ class Watch(Machine[Ending]):
         self._last = max(places, default=len(rows) - 1)
         self._arm, self._lands, self._patience = arm, lands, patience
         self.seen = Telemetry(peer, rows, patience, rate)
+        if arm:
+            self.seen.ask_for(LOCAL_POSITION, 1.0)
         self.phase: Phase = "checking" if arm else "waiting"
         self.relay_start: float | None = None
         self._begun = 0.0
@@ -262,11 +264,12 @@ class Watch(Machine[Ending]):
             text = f"it would go on at item {seen.row}, not at the beginning"
             self._end("refused", f"nothing was started: {text}; set the first item (or reboot)")
         elif waited >= self._patience:
-            said = "; ".join(dict.fromkeys(seen.said)) or "it does not say why"
+            silent = "it does not say why" if seen.knows_place else "it does not know where it is"
+            said = "; ".join(dict.fromkeys(seen.said)) or silent
             self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
         if self.outcome is not None or waited < _LISTEN or beat is None or current is None:
             return ()
-        if seen.status is None or not seen.status.may_arm:
+        if seen.status is None or not (seen.status.may_arm and seen.knows_place):
             return ()
         self._mode_before = beat.custom_mode
         return self._set_out(now)

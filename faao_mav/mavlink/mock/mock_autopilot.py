@@ -18,6 +18,7 @@ from faao_mav.mavlink.messages import (
     GpsGlobalOrigin,
     Heartbeat,
     HomePosition,
+    LocalPositionNed,
     Message,
     MissionCurrent,
     MissionSetCurrent,
@@ -60,7 +61,7 @@ from faao_mav.vehicle import Track, Vehicle, vehicle_type
 
 Fly: TypeAlias = Callable[[Mission], Track]
 
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 """MAV_RESULT."""
 
 
@@ -82,7 +83,8 @@ class MockAutopilot(Machine[None]):
     """It takes missions as ArduPilot or PX4 does, and flies them along `fly`'s track.
 
     `aircraft` is what its heartbeats say that it is, and whose missions it stores.
-    It boots for `boot` seconds, in which it refuses lists. Armed and set to the mission it flies
+    It boots for `boot` seconds, in which it refuses lists, and then knows after `place` seconds
+    where it is, before which it starts no mission. Armed and set to the mission it flies
     what it holds, and disarms where the flight ends on the ground; in another mode it stays where
     it is, and flies on when set to the mission again. It reports its position `rate` times a
     second until it is asked for another rate. Its clock runs `speedup` times as fast as the
@@ -108,6 +110,7 @@ class MockAutopilot(Machine[None]):
         rate: float = 4.0,
         beat: float = 1.0,
         boot: float = 0.0,
+        place: float = 0.0,
         wind: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         super().__init__()
@@ -126,7 +129,7 @@ class MockAutopilot(Machine[None]):
         self._fly, self._speedup = fly, speedup
         self._period = 1 / rate / speedup if rate > 0 else None
         self._beat = beat
-        self._boot = boot
+        self._boot, self._place = boot, place
         self._booted = self._ready_at = self._now = 0.0
         self._next_beat = self._next_report = 0.0
         self.armed = False
@@ -182,7 +185,10 @@ class MockAutopilot(Machine[None]):
         if self._period is not None and now >= self._next_report:
             self._next_report = now + self._period
             since_boot = (now - self._booted) * self._speedup
-            out += telemetry(self._posture(now), self.home, since_boot)
+            told = telemetry(self._posture(now), self.home, since_boot)
+            if not self._knows_place():
+                told = [each for each in told if not isinstance(each, LocalPositionNed)]
+            out += told
         return out
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
@@ -236,6 +242,9 @@ class MockAutopilot(Machine[None]):
     def _is_ready(self) -> bool:
         return self._now >= self._ready_at
 
+    def _knows_place(self) -> bool:
+        return self._now >= self._ready_at + self._place
+
     def _is_flying(self) -> bool:
         return self._flight is not None
 
@@ -247,6 +256,8 @@ class MockAutopilot(Machine[None]):
             case MavCommand.TAKEOFF:
                 climbs = self._guided.take_off(command.param7, self._mode, now)
                 result = ACCEPTED if climbs else DENIED
+            case MavCommand.START if not self._knows_place():
+                result = FAILED
             case MavCommand.START:
                 self._mode = self._wanted = self._modes.mission
                 result = self._begin(now)
