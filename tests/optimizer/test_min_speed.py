@@ -31,6 +31,7 @@ from faao_mav.workflow import Result
 
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]
 PLACES = {"bs": STATIONS[0], "user": STATIONS[1]}
+AT_ONCE: Any = {"most_fall": math.inf, "most_power": math.inf}
 FREE = {"flight.start_velocity": "free", "flight.end_velocity": "free"}
 
 
@@ -130,7 +131,7 @@ def test_the_gradients_and_curvatures_are_those_of_the_limits() -> None:
     before, after = (start.at(v + sign * step).slack for sign in (-1, 1))
     assert (after - before) / 2 == pytest.approx(ds + start.margin, abs=1e-9)
     assert after - 2 * start.slack + before == pytest.approx(twice, abs=1e-9)
-    turning = quadratic(start.stiffness().turning, step)
+    turning = quadratic(np.asarray(start.stiffness().turning), step)
     assert turning == pytest.approx(-(start.z * twice).sum(), rel=1e-9)
 
 
@@ -139,7 +140,7 @@ def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it(wind: Vector) -
     over_ground, through_air = (20.0 + math.hypot(*wind), 20.0) if any(wind) else (20.0, math.inf)
     kin = cruiser(100, 9.0, time_step=1.0, max_speed=over_ground)
     kin, stage = replace(kin, max_airspeed=through_air, wind=wind), links(bpsk, 4e4, 4e4)
-    at_once = replace(kin, most_fall=math.inf, most_power=math.inf)
+    at_once = replace(kin, **AT_ONCE)
     start = starts(kin, ["bs-user"], PLACES)["bs-user"]
     free = maximize(at_once, stage, start, tolerance=1e-4, max_iterations=150)
     best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=150)
@@ -186,7 +187,7 @@ def test_the_optimum_keeps_the_least_speed(
 
 
 def test_a_least_speed_that_does_not_bind_costs_nothing() -> None:
-    kin, stage = cruiser(25, 5.0, most_fall=math.inf), links(gaussian, 1e5, 1e5)
+    kin, stage = cruiser(25, 5.0, **AT_ONCE), links(gaussian, 1e5, 1e5)
     free = maximize(replace(kin, min_speed=0.0), stage, straight_flight(kin))
     assert np.linalg.norm(free.trajectory.v, axis=1).min() > 5
     best = maximize(kin, stage, straight_flight(kin))

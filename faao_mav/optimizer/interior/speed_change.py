@@ -195,7 +195,8 @@ def _ends(values: Real) -> Real:
 
 def _joined(ends: Real) -> Real:
     """Return the sums (flights, n) of `ends` (2, flights, n - 1), before and after each slot."""
-    return np.pad(ends[0], ((0, 0), (0, 1))) + np.pad(ends[1], ((0, 0), (1, 0)))
+    before, after = np.pad(ends[0], ((0, 0), (0, 1))), np.pad(ends[1], ((0, 0), (1, 0)))
+    return np.asarray(before + after)
 
 
 def speed_change(kin: Kinematics) -> SpeedChange:
