@@ -13,6 +13,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.plan import Plan, Vector
 from faao_mav.vector import chord
+from faao_mav.vehicle import vehicle_of
 
 LENGTH = 100.0
 """The unit of length inside the solvers, m: the extent of a mission is of the order of one.
@@ -36,7 +37,9 @@ class Kinematics:
 
     An end velocity of None is free. `bound_first_acceleration` extends (13f) to n = 0. Beyond the
     paper, every sample of the airspeed v - `wind` is at least `min_speed`, for fixed wings do not
-    hover, and at most `max_airspeed`, m/s.
+    hover, and at most `max_airspeed`, m/s. From each to the next its size falls by at most
+    `most_fall`, m/s^2, and half its square rises by at most `most_power`, m^2/s^3: what drag takes
+    and thrust gives. Neither is infinite alone, nor without a least speed.
 
     >>> kin = Kinematics(np.zeros(2), np.array([40.0, 0.0]), 9, 1.0, 6.0, 3.0, None, None, True)
     >>> flight = kin.follow(np.full((9, 2), [4.0, 0.0]))  # 4 m/s do not get there in 8 s: 5 m/s do
@@ -56,11 +59,19 @@ class Kinematics:
     min_speed: float = 0.0
     max_airspeed: float = math.inf
     wind: Vector = (0.0, 0.0)
+    most_fall: float = math.inf
+    most_power: float = math.inf
 
     @property
     def first_bounded_acceleration(self) -> int:
         """The least n for which (13f) holds."""
         return 0 if self.bound_first_acceleration else 1
+
+    @property
+    def even_rates(self) -> Vector:
+        """How fast the speed may rise and fall whatever it is, with no turn, m/s^2."""
+        rise = min(self.max_acceleration, self.most_power / self.max_speed)
+        return rise, min(self.max_acceleration, self.most_fall)
 
     def longest_ways(self) -> tuple[Real, Real]:
         """Return the longest ways (N + 2,), m, from w_I until each slot, and from there to w_F.
@@ -142,6 +153,11 @@ class Kinematics:
             found["end velocity"] = _largest(v[-1] - self.end_velocity)
         if self.min_speed > 0:
             found["minimum speed"] = float(max(0.0, self.min_speed - airspeed.min()))
+        if math.isfinite(self.most_fall):
+            first = self.first_bounded_acceleration
+            fall, power = np.diff(airspeed)[first:] / -dt, np.diff(airspeed**2)[first:] / (2 * dt)
+            found["fall of airspeed"] = float(max(0.0, fall.max() - self.most_fall))
+            found["power of airspeed"] = float(max(0.0, power.max() - self.most_power))
         if math.isfinite(self.max_airspeed):
             found["airspeed"] = float(max(0.0, airspeed.max() - self.max_airspeed))
         return found
@@ -180,6 +196,8 @@ def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
 def kinematics(plan: Plan) -> Kinematics:
     """Return the feasible set of `plan`."""
     flight, vehicle = plan.flight, plan.vehicle
+    aircraft = vehicle_of(plan)
+    rates = aircraft.type.speed_rates(aircraft)
 
     def vector(value: tuple[float, float] | None) -> Real | None:
         return None if value is None else np.array(value, dtype=float)
@@ -197,6 +215,8 @@ def kinematics(plan: Plan) -> Kinematics:
         min_speed=vehicle.min_speed,
         max_airspeed=plan.max_airspeed,
         wind=plan.wind,
+        most_fall=rates.fall,
+        most_power=rates.power,
     )
 
 

@@ -93,8 +93,27 @@ def flight_variables(kin: Kinematics, about: Real | None = None) -> FlightVariab
         )
         # given end velocities keep it already: twice said, they would leave no interior
         least = kin.min_speed / kin.max_speed * (1 + _INSIDE)
-        constraints.append(cp.sum(cp.multiply(ahead, v - wind), axis=1)[free] >= least)
+        along = cp.sum(cp.multiply(ahead, v - wind), axis=1)
+        constraints.append(along[free] >= least)
+        if np.isfinite(kin.most_fall):
+            constraints += _slow_to_change(kin, about, along, v - wind)
     return FlightVariables(kin, w, v, a, constraints)
+
+
+def _slow_to_change(kin: Kinematics, about: Real, along: Any, airspeed: Any) -> list[Any]:
+    """Return that the airspeed changes no faster than thrust and drag let it, convex and inside.
+
+    `along` (N + 2,) is the part of `airspeed` along that of the velocities `about`: never above its
+    size, which it is to first order.
+    """
+    speed, first = np.hypot(*(about - kin.wind).T) / kin.max_speed, kin.first_bounded_acceleration
+    fall = kin.most_fall * kin.time_step / kin.max_speed
+    rise = 2 * kin.most_power * kin.time_step / kin.max_speed**2
+    square = 2 * cp.multiply(speed, along) - speed**2
+    return [
+        (cp.norm(airspeed[:-1], axis=1) - along[1:])[first:] <= fall,
+        (cp.sum(cp.square(airspeed[1:]), axis=1) - square[:-1])[first:] <= rise,
+    ]
 
 
 def solve(problem: cp.Problem) -> str:

@@ -6,6 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
+
+from faao_mav.optimizer.kinematics import kinematics
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
@@ -16,6 +19,7 @@ from faao_mav.validate.check import Check
 from faao_mav.validate.demands import LinkCheck
 from faao_mav.validate.flown import Debriefing
 from faao_mav.validate.wind_limit import LEAST_RATE, MOST_LATE, MOST_WIND, WindLimit
+from faao_mav.vector import lengths
 from faao_mav.workflow import FenceSummary, Result
 
 Line: TypeAlias = tuple[str, str]
@@ -23,6 +27,9 @@ Line: TypeAlias = tuple[str, str]
 
 _LABEL_WIDTH = 13
 """Characters that a label takes on the terminal."""
+
+_AT_LIMIT = 0.999
+"""The share of a limit at which it counts as reached. Chosen."""
 
 _LOSS_TOLD = 0.01
 """Share of R_avg that may be lost on the way before a plan for R_avg is warned about. Chosen."""
@@ -84,10 +91,26 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     seconds = f", {result.seconds_optimize:.1f} s" if timed else ""
     steps = counted(solution.iterations, "iteration")
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
+    yield from _airspeed(solution)
     yield from _flown(result)
     yield from _wind(plan, result.check)
     yield from _energy(result.check)
     yield from _fenced(result.fence)
+
+
+def _airspeed(solution: Solution) -> Iterator[Line]:
+    """Yield how fast the airspeed changes at most, if the plan would have it change faster."""
+    kin = kinematics(solution.plan)
+    speed = lengths(solution.v - kin.wind)
+    change, square = np.diff(speed) / kin.time_step, np.diff(speed**2) / (2 * kin.time_step)
+    bound = (change < -_AT_LIMIT * kin.most_fall) | (square > _AT_LIMIT * kin.most_power)
+    if bound.any():
+        yield (
+            "airspeed",
+            f"falls by at most {kin.most_fall:.2g} m/s^2 and rises by at most "
+            f"{kin.most_power / kin.max_speed:.2g}, as the vehicle's does, which binds the plan "
+            f"for {kin.time_step * bound.sum():.3g} s",
+        )
 
 
 def _least(solution: Solution) -> Iterator[Line]:

@@ -29,7 +29,7 @@ from faao_mav.vehicle.vehicle import candidates
 _SPLINE_SPACING = 10.0  # the least distance of spline waypoints, m
 _SPLINE_TIMES = (2.0, 3.0)  # least times between spline waypoints to try, s
 _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the acceleration
-_PLANE_SHARE = 0.4  # of the path tolerance for a plane's initial route, as its flight strays
+_PLANE_SHARE = 0.8  # of the path tolerance for the initial route of a plane, which is then split
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
 _GOOD = (0.0, GOOD_COST)  # the rank, m, from which nothing better is looked for

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from faao_mav.schedule.ramped import RampedRetimed
+from faao_mav.schedule.lagged import LaggedRetimed
 from faao_mav.schedule.retimed import LegTimes, Retimed
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
@@ -28,7 +28,7 @@ _SPLITS = 2  # times that legs are split off which the flight strays too far; ch
 _STRAY = 0.5  # the share of the path tolerance beyond which a leg is split; chosen
 _ROUNDS = 3  # times that waypoints are moved and speeds fitted, in turn; chosen
 # Where the plan's speed changes by more than this share, its legs are split so often, s; chosen.
-_CHANGE, _CHANGE_SPACING = 0.05, 3.0
+_CHANGE, _CHANGE_SPACING = 0.05, 5.0
 _SHORTEST_TIME = 1.5  # the least time from a new waypoint to the next one, s; chosen
 
 
@@ -84,12 +84,11 @@ class PlaneScheduler(Scheduler):
         The vehicle takes as long for the plan's whole range of speeds as `speed_rates` says. So
         near are the times to where the plan's speed changes: half before it, half behind.
         """
-        rates = self.vehicle.type.speed_rates
-        if rates is None:
-            return []
         middle = (self.t[1:] + self.t[:-1]) / 2
         speed = lengths(np.diff(self.w, axis=0)) / np.diff(self.t)
-        reach = np.ptp(speed) / rates(self.vehicle)(speed)[0] / 2 + _CHANGE_SPACING
+        reach = (
+            np.ptp(speed) / self.vehicle.type.speed_rates(self.vehicle).fall / 2 + _CHANGE_SPACING
+        )
         times: list[float] = []
         for time in np.arange(self.t[0], self.t[-1], _CHANGE_SPACING).tolist():
             near = speed[np.abs(middle - time) <= reach]
@@ -112,10 +111,7 @@ class PlaneScheduler(Scheduler):
         best = min(tried, key=lambda each: each.cost)
         return self.rounded(self.shared(best, self.max_speed), self.max_speed)
 
-    def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:
-        """Return what `schedule` becomes at other commands, which are slow to take effect."""
-        kind = self.vehicle.type
-        if kind.speed_rates is None:
-            return super().retimed(schedule, times)
-        ratio = kind.true_over_commanded(self.vehicle, self.altitude)
-        return RampedRetimed(schedule, kind.speed_rates(self.vehicle), ratio)
+    def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:  # noqa: ARG002
+        """Return what `schedule` becomes at other commands, which take effect with a lag."""
+        ratio = self.vehicle.type.true_over_commanded(self.vehicle, self.altitude)
+        return LaggedRetimed(schedule, ratio, self.wind)

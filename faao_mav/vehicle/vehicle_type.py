@@ -56,8 +56,16 @@ class Ceiling:
     parameter: str = ""
 
 
-SpeedRates: TypeAlias = Callable[[Real], tuple[float, Real]]
-"""How fast a vehicle's true airspeed, m/s, is made to fall and to rise at most, above 0, m/s²."""
+@dataclass(frozen=True, slots=True)
+class SpeedRates:
+    """How fast a vehicle's true airspeed V is made to fall and to rise at most.
+
+    By at most `fall`, m/s², and by `power` / V, with the `power` in m²/s³: W per kg.
+    """
+
+    fall: float = math.inf
+    power: float = math.inf
+
 
 FenceAction: TypeAlias = Literal["nothing", "report", "hold", "return", "land", "terminate"]
 """What a vehicle does that leaves its fence: flies on, says so and flies on, and so forth."""
@@ -142,7 +150,7 @@ class VehicleType:
         models_wind: its flight model flies in wind: what hovers in more than it can hold as well.
         true_over_commanded: true airspeed over the one that a mission commands, at a height in m
             above sea level; 1 where missions command ground speeds.
-        speed_rates: how fast its airspeed changes; None if that takes less than a leg lasts.
+        speed_rates: how fast its airspeed changes; infinitely if that is its acceleration's.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
             radians; None if no such law is known.
     """
@@ -170,7 +178,7 @@ class VehicleType:
     max_airspeed: Callable[[ParameterValues], float] = lambda _: math.inf
     models_wind: bool = False
     true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
-    speed_rates: Callable[[ParameterValues], SpeedRates] | None = None
+    speed_rates: Callable[[ParameterValues], SpeedRates] = lambda _: SpeedRates()
     corner_speed: Callable[[ParameterValues, float], float] | None = None
 
     @property

@@ -135,6 +135,9 @@ def any_flight(kin: Kinematics, rng: np.random.Generator) -> Trajectory | None:
     opti.subject_to(opti.bounded(kin.min_speed**2 * (1 + 1e-9), speeds, kin.max_speed**2))
     steps = (v[:, 1:] - v[:, :-1])[:, kin.first_bounded_acceleration :]
     opti.subject_to(ca.sum1(steps**2) <= (kin.max_acceleration * dt) ** 2)
+    size, first = ca.sqrt(speeds), kin.first_bounded_acceleration
+    opti.subject_to((size[:-1] - size[1:])[first:] <= kin.most_fall * dt)
+    opti.subject_to((speeds[1:] - speeds[:-1])[first:] <= 2 * kin.most_power * dt)
     for end, velocity in ((0, kin.start_velocity), (n - 1, kin.end_velocity)):
         if velocity is not None:
             opti.subject_to(v[:, end] == velocity)

@@ -12,19 +12,32 @@ from hypothesis import strategies as st
 from test_interior import STATIONS, bpsk, gaussian, links, plane, reward, worst
 
 from faao_mav.errors import InfeasibleError, PlanError
+from faao_mav.optimizer.interior.constraint import (
+    Forces,
+    Move,
+    ScaledFlight,
+    Start,
+    quadratic,
+)
 from faao_mav.optimizer.interior.maximize import maximize
+from faao_mav.optimizer.interior.speed_change import speed_change
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.scaled import kkt_residual
 from faao_mav.optimizer.search.starts import starts, straight_flight
 from faao_mav.plan import Vector, parse_plan
+from faao_mav.report.summary import result_lines
+from faao_mav.workflow import Result
 
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]
 PLACES = {"bs": STATIONS[0], "user": STATIONS[1]}
+AT_ONCE: Any = {"most_fall": math.inf, "most_power": math.inf}
 FREE = {"flight.start_velocity": "free", "flight.end_velocity": "free"}
 
 
 def cruiser(duration: float, least: float, **changes: Any) -> Kinematics:
     values = {"time_step": 0.5, "max_speed": 25.0, "min_speed": least}
+    values |= {"most_fall": 0.8, "most_power": 24.5}  # the plane of ArduPilot's simulator
     return plane(duration, **(values | {"bound_first_acceleration": True} | changes))
 
 
@@ -39,7 +52,7 @@ def heading(speed: float, degrees: float) -> Any:
     st.one_of(st.none(), st.floats(-180, 180)),
     st.booleans(),
 )
-@settings(max_examples=25)
+@settings(max_examples=15)
 def test_every_start_keeps_the_least_speed(
     least: float, slots: int, first: float | None, last: float | None, closed: bool
 ) -> None:
@@ -107,6 +120,40 @@ def test_circles_turn_as_a_whole_until_the_search_has_converged(wind: Vector) ->
     assert best.value >= reward(stage, start)
 
 
+def test_the_gradients_and_curvatures_are_those_of_the_limits() -> None:
+    kin, random = cruiser(4, 8.0, wind=(3.0, -2.0)), np.random.default_rng(2)
+    limit, flight = speed_change(kin), ScaledFlight(kin, (speed_change(kin),))
+    v, step = 0.6 + 0.1 * random.normal(size=(2, 2, 1, kin.slots))
+    step = 1e-4 * (step - 0.6)
+    start = limit.begin(flight, Start(0 * v, v, np.ones((1, 1)), 1.0, slice(0)))
+    move = Move(0 * v, step, np.zeros(0))
+    (ds, _, twice), _ = start.solved(move, None, Forces())
+    before, after = (start.at(v + sign * step).slack for sign in (-1, 1))
+    assert (after - before) / 2 == pytest.approx(ds + start.margin, abs=1e-9)
+    assert after - 2 * start.slack + before == pytest.approx(twice, abs=1e-9)
+    turning = quadratic(np.asarray(start.stiffness().turning), step)
+    assert turning == pytest.approx(-(start.z * twice).sum(), rel=1e-9)
+
+
+@pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -2.0)])
+def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it(wind: Vector) -> None:
+    over_ground, through_air = (20.0 + math.hypot(*wind), 20.0) if any(wind) else (20.0, math.inf)
+    kin = cruiser(100, 9.0, time_step=1.0, max_speed=over_ground)
+    kin, stage = replace(kin, max_airspeed=through_air, wind=wind), links(bpsk, 4e4, 4e4)
+    at_once = replace(kin, **AT_ONCE)
+    start = starts(kin, ["bs-user"], PLACES)["bs-user"]
+    free = maximize(at_once, stage, start, tolerance=1e-4, max_iterations=150)
+    best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=150)
+    assert best.converged
+    assert worst(kin, best.trajectory) < 1e-8
+    change = np.diff(np.linalg.norm(best.trajectory.v - wind, axis=1))
+    assert change.min() == pytest.approx(-0.8, abs=1e-3)
+    assert worst(kin, free.trajectory) > 0.5
+    assert 0.99 * free.value < best.value < free.value
+    gradient = np.abs(stage(best.trajectory.w.T).gradient).max()
+    assert kkt_residual(kin, stage, best.trajectory) < 2e-3 * gradient
+
+
 def test_too_little_room_for_a_turn_is_refused_with_the_reason() -> None:
     kin = cruiser(5, 20.0)
     kin = replace(kin, end=kin.start)
@@ -140,7 +187,7 @@ def test_the_optimum_keeps_the_least_speed(
 
 
 def test_a_least_speed_that_does_not_bind_costs_nothing() -> None:
-    kin, stage = cruiser(25, 5.0), links(gaussian, 1e5, 1e5)
+    kin, stage = cruiser(25, 5.0, **AT_ONCE), links(gaussian, 1e5, 1e5)
     free = maximize(replace(kin, min_speed=0.0), stage, straight_flight(kin))
     assert np.linalg.norm(free.trajectory.v, axis=1).min() > 5
     best = maximize(kin, stage, straight_flight(kin))
@@ -174,17 +221,27 @@ def test_the_published_flight_is_reached() -> None:
     assert np.linalg.norm(best.trajectory.a, axis=1).mean() == pytest.approx(4.89, rel=0.03)
 
 
-@pytest.mark.parametrize("least", [9.0])
+@pytest.mark.parametrize("kind", ["copter", "plane"])
 def test_both_methods_solve_plans_with_it(
-    small_plan: MakePlan, paper_plan: MakePlan, least: float
+    small_plan: MakePlan, paper_plan: MakePlan, kind: str
 ) -> None:
-    changes = {"vehicle.min_speed": least, "flight.duration": 20, **FREE}
+    changes = {
+        "vehicle.min_speed": 9.0,
+        "vehicle.type": kind,
+        "vehicle.parameters": {"AIRSPEED_CRUISE": 22} if kind == "plane" else {},
+        "flight.duration": 20,
+        **FREE,
+    }
     powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
     for plan in (small_plan(changes | powers), paper_plan(changes | powers)):
         plan = replace(plan, optimizer=replace(plan.optimizer, max_iterations=15))
         solution = optimize(plan)
         residuals = solution.residuals()
         assert residuals.pop("minimum speed") < 1e-6
+        assert ("fall of airspeed" in residuals) == (kind == "plane")
+        told = [line for label, line in result_lines(Result(solution)) if label == "airspeed"]
+        assert bool(told) == (kind == "plane")
+        assert all(line.startswith("falls by at most 0.8 m/s^2") for line in told)
         assert max(residuals.values()) < 1e-6
         assert solution.rates.R_avg >= solution.history[0]
         assert solution.rates.R_avg > 1.05 * solution.history[0]

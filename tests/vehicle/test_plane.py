@@ -45,11 +45,11 @@ def test_a_straight_line_at_the_commanded_airspeed() -> None:
 
 def test_the_demanded_airspeed_falls_as_total_energy_control_lets_it() -> None:
     """The autopilot's log shows 0.80 m/s², and 1.65 m/s² with TECS_SINK_MIN 3 and cruise 16."""
-    fall, rise = ArduPlane(cruise_speed=22.0).speed_rates(17.7)
-    assert fall == pytest.approx(0.80, abs=0.01)
-    assert rise == pytest.approx(1.38, abs=0.01)
-    fall, _ = ArduPlane(cruise_speed=16.0, descent_speed=3.0).speed_rates(17.7)
-    assert fall == pytest.approx(1.65, abs=0.01)
+    rates = ArduPlane(cruise_speed=22.0).speed_rates
+    assert rates.fall == pytest.approx(0.80, abs=0.01)
+    assert rates.power / 17.7 == pytest.approx(1.38, abs=0.01)
+    rates = ArduPlane(cruise_speed=16.0, descent_speed=3.0).speed_rates
+    assert rates.fall == pytest.approx(1.65, abs=0.01)
 
 
 @given(speed=st.floats(0, 8), degrees=st.floats(0, 360))

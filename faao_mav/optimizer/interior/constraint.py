@@ -63,7 +63,7 @@ class Stiffness:
     by their multipliers, which is cut where it has the wrong sign. `turning` (3, flights, n) is
     more of K on v, `across` (2, 2, flights, n - 1) between v_n and v_{n+1}: of both, and of what is
     cut elsewhere, as large a share counts as leaves the model concave. The first constraint is then
-    no `FlightLimits`.
+    no `FlightLimits`. `between`, shaped as `across`, is what K itself has there.
     """
 
     w: Real | float = 0.0
@@ -75,6 +75,7 @@ class Stiffness:
     held: Sequence[int] = ()
     turning: Real | float = 0.0
     across: Real | float = 0.0
+    between: Real | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

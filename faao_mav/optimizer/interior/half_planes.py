@@ -39,7 +39,7 @@ from faao_mav.optimizer.interior.constraint import (
 )
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
-_MOST_MISSED = 0.3
+MOST_MISSED = 0.3
 """What a step may miss of a g with curvature in second order, where its slack is less.
 
 In squares of v_max or a_max. Measured on seven plans for planes that are hard, from 35 starts in
@@ -163,7 +163,7 @@ class HalfPlanesState(Slacks):
         """Return the share at which a slack or a multiplier vanishes, or too much is missed."""
         share = super().reach(step)
         if self.constraint.bend:
-            missed = self.on * step[2] / 2 / np.maximum(self.s, _MOST_MISSED)
+            missed = self.on * step[2] / 2 / np.maximum(self.s, MOST_MISSED)
             share = np.minimum(share, 1 / np.sqrt(np.maximum(largest(missed), TINY)))
         return share
 

@@ -18,6 +18,7 @@ from faao_mav.optimizer.interior.search import (
     Search,
     StartStrategy,
 )
+from faao_mav.optimizer.interior.speed_change import speed_change
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
 
@@ -184,7 +185,8 @@ def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
     """Return the constraints of `kin` itself, the limits on speed and acceleration first."""
     if kin.min_speed > 0:
-        return limits_with_least_speed(kin)
+        changes = () if math.isinf(kin.most_fall) else (speed_change(kin),)
+        return (*limits_with_least_speed(kin), *changes)
     if math.isinf(kin.max_airspeed):
         return (FlightLimits(),)
     east, north = (part / kin.max_speed for part in kin.wind)

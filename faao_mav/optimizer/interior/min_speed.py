@@ -20,7 +20,7 @@ from faao_mav.optimizer.interior.half_planes import HalfPlanes
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.plan import Vector
 
-_INSIDE = 1e-5
+INSIDE = 1e-5
 """By how much g is smaller: the margin that a search to a tolerance of 1e-4 may leave."""
 
 
@@ -32,7 +32,7 @@ class Below(HalfPlanes):
     most: float = 1.0
     wind: Vector = (0.0, 0.0)
     bend: ClassVar = -1.0
-    inside: ClassVar = _INSIDE
+    inside: ClassVar = INSIDE
 
     def slack(self, x: Real) -> tuple[Real, Real]:
         """Return g and its gradient wind - x."""
@@ -48,7 +48,7 @@ class Above(HalfPlanes):
     wind: Vector = (0.0, 0.0)
     quantity: ClassVar = "v"
     bend: ClassVar = 1.0
-    inside: ClassVar = _INSIDE
+    inside: ClassVar = INSIDE
 
     def slack(self, x: Real) -> tuple[Real, Real]:
         """Return g and its gradient v - wind."""

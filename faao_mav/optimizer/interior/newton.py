@@ -99,16 +99,18 @@ class Newton:
         entries += [Entry(place, place, np.repeat(proximal, n, axis=1)) for place in held]
         on_w = np.asarray(added([curvature, *(each.w for each in stiffness)]))
         on_v = np.asarray(added(each.v for each in stiffness))
-        turning, across = (added(getattr(e, part) for e in stiffness) for part in _SHARED)
+        turning, across, between = (added(getattr(e, part) for e in stiffness) for part in _ON_V)
         if isinstance(turning, np.ndarray):
-            share = _concave_share(flight, (on_w, on_v), (wrong, turning, across), compliance)
+            stiff, wrong_parts = (on_w, on_v, between), (wrong, turning, across)
+            share = _concave_share(flight, stiff, wrong_parts, compliance)
             on_w, curvature = on_w + share * wrong, curvature + share * wrong
             turning = share * turning
             turning[::2] += proximal
             on_v += turning
             across = share * across if isinstance(across, np.ndarray) else across
-        if isinstance(across, np.ndarray):
-            entries += [Entry(V.start + j, V.start + i, across[i, j], 1) for i, j in _PAIRS]
+        coupled = added((across, between))
+        if isinstance(coupled, np.ndarray):
+            entries += [Entry(V.start + j, V.start + i, coupled[i, j], 1) for i, j in _PAIRS]
         factors = matrix.factor(
             on_w,
             on_v,
@@ -223,7 +225,7 @@ class Newton:
         return np.asarray(reduce(np.add, of_constraints, bend) + kink.sum(axis=0))
 
 
-_SHARED = "turning", "across"
+_ON_V = "turning", "across", "between"
 _PAIRS = (0, 0), (0, 1), (1, 0), (1, 1)
 
 _SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0)
@@ -232,21 +234,21 @@ _SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0)
 
 def _concave_share(
     flight: ScaledFlight,
-    stiff: tuple[Real, Real],
+    stiff: tuple[Real, Real, Real | float],
     wrong: tuple[Real, Real, Real | float],
     compliance: Real,
 ) -> Real:
     """Return the largest share (flights, 1) of what is `wrong` with which the model is concave.
 
-    `stiff` are the blocks on w and v, `wrong` what more there is, the last between v_n and v_{n+1}.
+    `stiff` are the blocks on w and v and between v_n and v_{n+1}, `wrong` what more there is.
     """
     xx, xy, yy = compliance
     on_a = np.stack([yy, -xy, xx]) / (xx * yy - xy * xy)
-    on_w, on_v = stiff
+    on_w, on_v, between = stiff
     share = np.full((on_w.shape[1], 1), _SHARES[0])
     for lower in _SHARES[1:]:
         more_w, more_v, across = (share * each for each in wrong)
-        sound = flight.matrix.positive(on_w + more_w, on_v + more_v, on_a, across)
+        sound = flight.matrix.positive(on_w + more_w, on_v + more_v, on_a, between + across)
         if sound.all():
             break
         share = np.where(sound, share, lower)

@@ -79,9 +79,10 @@ def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
         if max(missed.values()) < _TOLERANCE:
             return flight
         speed = max(missed["(13e) speed"], missed["minimum speed"]) / kin.max_speed
-        near.append(
-            (speed + missed["(13f) acceleration"] / kin.max_acceleration, len(near), flight)
-        )
+        changing = missed["(13f) acceleration"] / kin.max_acceleration
+        changing += missed.get("fall of airspeed", 0) / kin.most_fall
+        changing += missed.get("power of airspeed", 0) / kin.most_power
+        near.append((speed + changing, len(near), flight))
     for steps, (_, _, flight) in product((_FEW_STEPS, MOST_STEPS), sorted(near)[:_REPAIRS]):
         drawn_in = (1 - _DRAWN_IN) * flight.w + _DRAWN_IN * flight.w.mean(axis=0)
         repaired = nearest_flight(kin, drawn_in, flight, steps=steps)
@@ -161,10 +162,10 @@ def _with_ends(
         angle = float(np.arctan2(v[1], v[0])) - theta[at]
         angle = (angle + np.pi) % (2 * np.pi) - np.pi + 2 * np.pi * more
         # turning and changing speed share the limit: the sum of their squares stays below its own
-        change = np.hypot(angle * max(size, c), size - c)
-        left = np.clip(
-            1 - since * _TURN_SHARE * kin.max_acceleration / max(change, _TOLERANCE), 0, 1
-        )
+        change = np.hypot(angle * max(size, c), size - c) / kin.max_acceleration
+        rising = (c > size) == (at == 0)
+        change = max(change, abs(size - c) / kin.even_rates[0 if rising else 1])
+        left = np.clip(1 - since * _TURN_SHARE / max(change, _TOLERANCE), 0, 1)
         theta += angle * left
         speed += (size - c) * left
     v = speed[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)

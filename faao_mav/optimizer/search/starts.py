@@ -171,18 +171,18 @@ def fewest_slots(kin: Kinematics, direction: Real, distance: float) -> int | Non
 def _speed_limits(kin: Kinematics, direction: Real) -> tuple[Real, Real]:
     """Return the least and the greatest speed (N + 2,) that the ends and the limits allow, m/s."""
     n = np.arange(kin.slots, dtype=float)
-    gain = kin.max_acceleration * kin.time_step
+    rise, fall = (kin.time_step * rate for rate in kin.even_rates)
     least, most = kin.speeds_along(direction)
     lower, upper = np.full(kin.slots, least), np.full(kin.slots, most)
     if kin.start_velocity is not None:
         first = float(kin.start_velocity @ direction)
         steps = n + (0.0 if kin.bound_first_acceleration else np.where(n > 0, np.inf, 0.0))
-        upper = np.minimum(upper, first + gain * steps)
-        lower = np.maximum(lower, first - gain * steps)
+        upper = np.minimum(upper, first + rise * steps)
+        lower = np.maximum(lower, first - fall * steps)
     if kin.end_velocity is not None:
         last, steps = float(kin.end_velocity @ direction), n[::-1]
-        upper = np.minimum(upper, last + gain * steps)
-        lower = np.maximum(lower, last - gain * steps)
+        upper = np.minimum(upper, last + fall * steps)
+        lower = np.maximum(lower, last - rise * steps)
     return lower, upper
 
 

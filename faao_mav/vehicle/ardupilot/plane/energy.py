@@ -48,7 +48,7 @@ class Energy:
         demand: float,
     ) -> None:
         self.height, self.speed, self.climb = height, speed, climb
-        self._limits, self._density = limits, density
+        self._limits, self._density, self._rates = limits, density, limits.speed_rates
         self._pitches = _LEAST_PITCH, limits.climb_pitch or limits.pitch_limit
         self._level, self._demand = height, demand
         self._throttle_integral = self._pitch_integral = self._kinetic_integral = 0.0
@@ -68,8 +68,8 @@ class Energy:
         limits, flown = self._limits, self.speed
         up, down = limits.climb_speed * step, limits.descent_speed * step
         self._level += min(max(height - self._level, -down), up)
-        loss, gain = limits.speed_rates(flown)
-        rate = min(max((speed - self._demand) / step, -loss), gain)
+        rates = self._rates
+        rate = min(max((speed - self._demand) / step, -rates.fall), rates.power / flown)
         self._demand += rate * step
         # of both rates only what is new counts: a high-pass filter
         wash = -math.expm1(-step / self._limits.energy_time)

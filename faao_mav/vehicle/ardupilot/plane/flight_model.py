@@ -135,7 +135,7 @@ class _Flight:
         """
         start, end, place = self._places[k - 1], self._places[k], self._motion.place
         given = float(self._path.radii[k])
-        radius = given if given > 0 else min(self._full_radius, self._motion.look_ahead()) * turn
+        radius = given if given > 0 else min(self._full_radius, self._motion.look_ahead) * turn
         leg, left = end - start, place - end
         passed = (left * leg.conjugate()).real / abs(leg) if leg else 0.0
         return max(passed, radius - abs(left))

@@ -65,15 +65,17 @@ class Motion:
         """
         self.time = 0.0
         self.place, self.heading = place, cmath.phase(airspeed)
-        self._limits, self._wind = limits, wind
+        self._limits, self._wind, self._ahead = limits, wind, limits.look_ahead
+        self._gain = 4 * limits.damping**2 / limits.look_ahead
         self._bank, density, flown = 0.0, density_ratio(altitude), math.hypot(abs(airspeed), climb)
         demand = flown if speed is None else speed
         self._energy = Energy(limits, density, height, flown, climb, demand)
         self._sideslip = SIDESLIP * density
+        self._look()
 
     def sample(self) -> tuple[float, ...]:
         """Return time, place (east, north, up) and velocity, SI."""
-        velocity = self._velocity()
+        velocity = self._velocity
         place = (self.place.real, self.place.imag, self._energy.height)
         return (self.time, *place, velocity.real, velocity.imag, self._energy.climb)
 
@@ -81,17 +83,15 @@ class Motion:
         """Return the horizontal part of the airspeed, m/s."""
         return math.sqrt(max(self._energy.speed**2 - self._energy.climb**2, 1.0))
 
-    def _velocity(self) -> complex:
-        """Return the velocity over ground."""
-        return cmath.rect(self._airspeed(), self.heading) + self._wind
-
-    def look_ahead(self) -> float:
-        """Return L, m."""
-        return self._limits.look_ahead * abs(self._velocity())
+    def _look(self) -> None:
+        """Take in the velocity over ground, and L of it."""
+        self._velocity = cmath.rect(self._airspeed(), self.heading) + self._wind
+        self._speed = abs(self._velocity)
+        self.look_ahead = self._ahead * self._speed
 
     def bearing_to(self, place: complex) -> float:
         """Return the angle from the course over ground to `place`."""
-        return cmath.phase((place - self.place) * self._velocity().conjugate())
+        return cmath.phase((place - self.place) * self._velocity.conjugate())
 
     def along(
         self, start: complex, end: complex, heights: tuple[float, float], speed: float, step: float
@@ -104,8 +104,8 @@ class Motion:
         track = leg / abs(leg)
         offset = (self.place - start) * track.conjugate()
         limit = math.sin(_INTERCEPT)
-        approach = math.asin(min(max(offset.imag / self.look_ahead(), -limit), limit))
-        eta = cmath.phase(track * cmath.rect(1.0, -approach) * self._velocity().conjugate())
+        approach = math.asin(min(max(offset.imag / self.look_ahead, -limit), limit))
+        eta = cmath.phase(track * cmath.rect(1.0, -approach) * self._velocity.conjugate())
         done = min(max(offset.real / abs(leg), 0.0), 1.0)
         height = heights[0] + done * (heights[1] - heights[0])
         self._go(self._lateral(eta), height, speed, step)
@@ -126,11 +126,11 @@ class Motion:
         side = -math.copysign(1.0, limits.loiter_radius)
         offset, radius = self.place - centre, abs(limits.loiter_radius)
         distance = max(abs(offset), radius / 2)
-        velocity = self._velocity()
+        velocity = self._velocity
         outward = (velocity * offset.conjugate()).real / distance
         stiffness = 2 * math.pi / limits.period
         excess = abs(offset) - radius
-        inward = abs(velocity) ** 2 / distance + stiffness**2 * excess
+        inward = self._speed**2 / distance + stiffness**2 * excess
         inward += 2 * limits.damping * stiffness * outward
         straight = self._lateral(self.bearing_to(centre))
         circling = excess <= 0 or side * straight >= inward
@@ -140,8 +140,7 @@ class Motion:
     def _lateral(self, eta: float) -> float:
         """Return the acceleration to the left that turns the course by `eta`, m/s²."""
         bounded = min(max(eta, -math.pi / 2), math.pi / 2)
-        gain = 4 * self._limits.damping**2 / self._limits.look_ahead
-        return gain * abs(self._velocity()) * math.sin(bounded)
+        return self._gain * self._speed * math.sin(bounded)
 
     def _go(self, lateral: float, height: float, speed: float, step: float) -> None:
         """Move on with `lateral` acceleration to the left, m/s², as far as it goes."""
@@ -159,3 +158,4 @@ class Motion:
         self.place += (cmath.rect(airspeed, self.heading + turn / 2) + self._wind) * step
         self.heading += turn
         self.time += step
+        self._look()

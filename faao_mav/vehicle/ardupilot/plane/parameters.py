@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass
 from math import pi, radians
-from typing import TypeVar
 
-from faao_mav.arrays import Real
 from faao_mav.power import GRAVITY
 from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
 from faao_mav.vehicle.atmosphere import density_ratio
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, table
+from faao_mav.vehicle.vehicle_type import SpeedRates
 
 
 def _parameter(
@@ -69,9 +68,6 @@ of 0 is the `pitch_limit`; a `return_height` below 0 keeps the height at which t
 takes the density out twice (ArduPilot's issue 31004), and it flies faster for it. A real aircraft
 has no such parameter, and a newer simulator does not need it."""
 
-Speed = TypeVar("Speed", float, Real)
-"""One speed or an array of them."""
-
 
 @dataclass(frozen=True, slots=True)
 class ArduPlaneLimits(ParameterRecord, table=TABLE):
@@ -112,15 +108,16 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
         held = min(max(wanted, self.min_speed), self.max_speed)
         return held * true_over_commanded(self.simulated_pitot, altitude)
 
-    def speed_rates(self, airspeed: Speed) -> tuple[float, Speed]:
-        """Return how fast the demanded true airspeed falls and rises at most, above 0, m/s².
+    @property
+    def speed_rates(self) -> SpeedRates:
+        """How fast the demanded true airspeed falls and rises at most.
 
-        At a true `airspeed` V, m/s, total energy control lets it fall by 0.9 g s / V_c and rise by
+        At a true airspeed V, m/s, total energy control lets it fall by 0.9 g s / V_c and rise by
         0.5 g c / V, with the `descent_speed` s, the `cruise_speed` V_c and the `climb_speed` c (as
         its logs show; in falls from above V_c it counts TECS_SINK_MAX too, which is left out).
         """
         fall = 0.9 * GRAVITY * self.descent_speed / self.cruise_speed
-        return fall, 0.5 * GRAVITY * self.climb_speed / airspeed
+        return SpeedRates(fall, 0.5 * GRAVITY * self.climb_speed)
 
 
 def true_over_commanded(simulated_pitot: float, altitude: float) -> float:
