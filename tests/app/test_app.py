@@ -163,8 +163,10 @@ def saved(page: "Page", served: Served) -> str:
 
 
 def command_line(*arguments: object) -> dict[str, Any]:
-    result = CliRunner().invoke(app, [*map(str, arguments), "--json"])
-    assert result.exit_code == 0, result.output
+    program = "from faao_mav.cli.main import run; run()"  # with the kernels that it chooses
+    command = [sys.executable, "-c", program, *map(str, arguments), "--json"]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
     told: dict[str, Any] = json.loads(result.stdout)
     return told
 
