@@ -9,7 +9,7 @@ import struct
 import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO
 
 import numpy as np
 
@@ -21,6 +21,12 @@ MAX_BYTES = 400_000_000
 
 _MAX_DIRECTORY = 100_000
 """Bytes of the archive's directory; chosen: 1,500 arrays, where a solution has 24."""
+
+_PIECE = 1_000_000
+"""Bytes that are unpacked at once; chosen."""
+
+_MAX_HEADER = 70_000
+"""Bytes in which the header of an .npy file has to end: that of version 1.0 has at most 65,545."""
 
 _END = struct.Struct("<4s8xL6x")
 """The record at the end of an archive without a comment: signature, size of the directory."""
@@ -60,12 +66,11 @@ def _arrays(file: BinaryIO, names: Sequence[str]) -> "Iterator[tuple[str, np.nda
         for name in names:
             if f"{name}.npy" not in held:
                 continue
-            with archive.open(f"{name}.npy") as member:
-                content = member.read(left + 1)  # a small member may unpack to any size
-            left -= len(content)
+            left -= (size := archive.getinfo(f"{name}.npy").file_size)  # no more is unpacked of it
             if left < 0:
                 raise _TooLargeError
-            yield name, _array(content)
+            with archive.open(f"{name}.npy") as member:
+                yield name, _array(_unpacked(member, size))
 
 
 def _check_directory(file: BinaryIO) -> None:
@@ -77,9 +82,22 @@ def _check_directory(file: BinaryIO) -> None:
         raise ValueError("no archive of a few arrays")
 
 
-def _array(content: bytes) -> "np.ndarray[Any, Any]":
+def _unpacked(member: IO[bytes], size: int) -> memoryview:
+    """Return the `size` bytes of `member`, which are in memory once; raise EOFError for fewer."""
+    content = memoryview(bytearray(size))
+    at = 0
+    while at < size:
+        piece = member.read(min(size - at, _PIECE))
+        if not piece:
+            raise EOFError
+        content[at : at + len(piece)] = piece
+        at += len(piece)
+    return content.toreadonly()
+
+
+def _array(content: memoryview) -> "np.ndarray[Any, Any]":
     """Return the array in the .npy file `content`; shape and type have to fit its length."""
-    stream = io.BytesIO(content)
+    stream = io.BytesIO(content[:_MAX_HEADER])
     read_header = {
         (1, 0): np.lib.format.read_array_header_1_0,
         (2, 0): np.lib.format.read_array_header_2_0,

@@ -161,9 +161,9 @@ class Flight(Section):
         key(
             "Height H above the origin.",
             "m",
-            "a height above the origin in metres, above 0 (at 0 the path gain rho_0 d^-2 has no "
-            "bound), at most 20000",
-            gt=0,
+            "a height above the origin in metres, 1 (an aircraft that is lower has hardly left the "
+            "ground) to 20000",
+            ge=1,
             le=20_000,
         ),
     ]
