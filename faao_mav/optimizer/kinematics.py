@@ -194,10 +194,15 @@ def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
 
 
 def kinematics(plan: Plan) -> Kinematics:
-    """Return the feasible set of `plan`."""
+    """Return the feasible set of `plan`.
+
+    A plane's acceleration is also limited to what turns it, at its least speed, no faster than its
+    guidance follows.
+    """
     flight, vehicle = plan.flight, plan.vehicle
     aircraft = vehicle_of(plan)
     rates = aircraft.type.speed_rates(aircraft)
+    turning = rates.turn * vehicle.min_speed if vehicle.min_speed > 0 else math.inf
 
     def vector(value: tuple[float, float] | None) -> Real | None:
         return None if value is None else np.array(value, dtype=float)
@@ -208,7 +213,7 @@ def kinematics(plan: Plan) -> Kinematics:
         slots=flight.slots,
         time_step=flight.time_step,
         max_speed=plan.max_ground_speed,
-        max_acceleration=vehicle.max_acceleration,
+        max_acceleration=min(vehicle.max_acceleration, turning),
         start_velocity=vector(flight.start_velocity),
         end_velocity=vector(flight.end_velocity),
         bound_first_acceleration=flight.bound_first_acceleration,

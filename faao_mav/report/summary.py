@@ -99,8 +99,14 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
 
 
 def _airspeed(solution: Solution) -> Iterator[Line]:
-    """Yield how fast the airspeed changes at most, if the plan would have it change faster."""
-    kin = kinematics(solution.plan)
+    """Yield how fast turns and the airspeed change at most, if the plan allows or wants more."""
+    kin, allowed = kinematics(solution.plan), solution.plan.vehicle.max_acceleration
+    if kin.max_acceleration < allowed:
+        yield (
+            "turns",
+            f"accelerate by at most {kin.max_acceleration:.3g} m/s^2, which the vehicle's guidance "
+            f"follows; the plan allows {allowed:g}",
+        )
     speed = lengths(solution.v - kin.wind)
     change, square = np.diff(speed) / kin.time_step, np.diff(speed**2) / (2 * kin.time_step)
     bound = (change < -_AT_LIMIT * kin.most_fall) | (square > _AT_LIMIT * kin.most_power)

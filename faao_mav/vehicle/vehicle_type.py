@@ -58,13 +58,15 @@ class Ceiling:
 
 @dataclass(frozen=True, slots=True)
 class SpeedRates:
-    """How fast a vehicle's true airspeed V is made to fall and to rise at most.
+    """How fast a vehicle's true airspeed V is made to change at most.
 
-    By at most `fall`, m/s², and by `power` / V, with the `power` in m²/s³: W per kg.
+    It falls by at most `fall`, m/s², and rises by `power` / V, with the `power` in m²/s³: W per kg.
+    Its guidance follows turns of at most `turn`, rad/s.
     """
 
     fall: float = math.inf
     power: float = math.inf
+    turn: float = math.inf
 
 
 FenceAction: TypeAlias = Literal["nothing", "report", "hold", "return", "land", "terminate"]

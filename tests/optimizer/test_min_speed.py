@@ -21,7 +21,7 @@ from faao_mav.optimizer.interior.constraint import (
 )
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.interior.speed_change import speed_change
-from faao_mav.optimizer.kinematics import Kinematics
+from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.scaled import kkt_residual
 from faao_mav.optimizer.search.starts import starts, straight_flight
@@ -221,6 +221,23 @@ def test_the_published_flight_is_reached() -> None:
     assert np.linalg.norm(best.trajectory.a, axis=1).mean() == pytest.approx(4.89, rel=0.03)
 
 
+PLANE = {"AIRSPEED_CRUISE": 22, "NAVL1_PERIOD": 5}
+"""Its guidance follows any turn of the plans here."""
+
+
+def test_a_plane_turns_no_faster_than_its_guidance_follows(small_plan: MakePlan) -> None:
+    changes = {"vehicle.min_speed": 9.0, "vehicle.type": "plane", **FREE}
+    plan = small_plan(changes)
+    look_ahead = 0.75 * 17 / math.pi  # NAVL1_DAMPING and NAVL1_PERIOD, s
+    limit = 9 / (1.05 * look_ahead)
+    assert limit < plan.vehicle.max_acceleration
+    assert kinematics(plan).max_acceleration == pytest.approx(limit)
+    lively = small_plan(changes | {"vehicle.parameters": PLANE})
+    assert kinematics(lively).max_acceleration == plan.vehicle.max_acceleration
+    told = dict(result_lines(Result(optimize(plan))))
+    assert told["turns"].startswith(f"accelerate by at most {limit:.3g} m/s^2")
+
+
 @pytest.mark.parametrize("kind", ["copter", "plane"])
 def test_both_methods_solve_plans_with_it(
     small_plan: MakePlan, paper_plan: MakePlan, kind: str
@@ -228,7 +245,7 @@ def test_both_methods_solve_plans_with_it(
     changes = {
         "vehicle.min_speed": 9.0,
         "vehicle.type": kind,
-        "vehicle.parameters": {"AIRSPEED_CRUISE": 22} if kind == "plane" else {},
+        "vehicle.parameters": PLANE if kind == "plane" else {},
         "flight.duration": 20,
         **FREE,
     }
