@@ -93,6 +93,18 @@ def symbol_vectors(modulation: str, antennas: int) -> Complex:
 
 
 @dataclass(frozen=True, eq=False)
+class Lattice:
+    """Differences of the real parts of two symbols of a square alphabet, and of the imaginary ones.
+
+    The parts are chosen independently: `values` (L,) are the differences of one, `counts` (L,) how
+    many ordered pairs of levels give each.
+    """
+
+    values: Real
+    counts: Real
+
+
+@dataclass(frozen=True, eq=False)
 class DifferenceClasses:
     """The non-zero differences u_mk = x_m - x_k of (7), merged up to a common unit phase.
 
@@ -101,13 +113,15 @@ class DifferenceClasses:
 
     `vectors` (k, N) has one representative u of each class, `multiplicity` (k,) how many ordered
     pairs (m, k) lie in it. `symbols` is rho**N, the number of input vectors and the size of the
-    zero class; `bits` is N log2(rho), what one channel use carries at most.
+    zero class; `bits` is N log2(rho), what one channel use carries at most. `lattice` holds the
+    differences of square alphabets by their parts, and is None for the others.
     """
 
     vectors: Complex
     multiplicity: Real
     symbols: int
     bits: float
+    lattice: Lattice | None
 
     @property
     def weight(self) -> Real:
@@ -168,6 +182,16 @@ def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     vectors, multiplicity = vectors[order], multiplicity[order]
     vectors.setflags(write=False)
     multiplicity.setflags(write=False)
+    bits = antennas * float(np.log2(len(grid)))
     return DifferenceClasses(
-        vectors, multiplicity, len(grid) ** antennas, antennas * float(np.log2(len(grid)))
+        vectors, multiplicity, len(grid) ** antennas, bits, _lattice(grid, scale)
     )
+
+
+def _lattice(grid: Complex, scale: float) -> Lattice | None:
+    """Return the differences of a square alphabet by their parts, None for other alphabets."""
+    levels = np.unique(grid.real)
+    if len(levels) ** 2 != len(grid):
+        return None
+    values, counts = np.unique(levels[:, None] - levels, return_counts=True)
+    return Lattice(values * scale, counts.astype(np.float64))
