@@ -25,10 +25,6 @@ _KEPT = 1 << 24
 _TINY = 1e-200
 """The least sum that is taken without a common factor. Chosen: far above the smallest number."""
 
-_FEWEST_VALUES = 4
-"""Differences of one part of a symbol from which ``LatticeSum`` is quicker than the classes. QPSK
-has three, 16-QAM seven: measured with two and three antennas, 1.5 to 7 times quicker, QPSK not."""
-
 
 class ClassSum:
     """The function s(z) = ln Σ_k multiplicity_k e^(-φ_k z) / rho^N, in bounded memory.
@@ -49,10 +45,11 @@ class ClassSum:
         self._weights = classes.multiplicity / classes.symbols
         self._rows, self._columns = np.triu_indices(self.antennas**2)
         self._kept: dict[bool, list[tuple[Real, Real]]] = {}
-        self._lattice = None
-        lattice = classes.lattice
-        if self.antennas > 1 and lattice is not None and len(lattice.values) >= _FEWEST_VALUES:
-            self._lattice = LatticeSum(lattice, self.antennas, classes.symbols)
+        self._by_parts = (
+            None
+            if classes.lattice is None
+            else LatticeSum(classes.lattice, self.antennas, classes.symbols)
+        )
 
     def _blocks(self, derivatives: bool) -> Iterable[tuple[Real, Real]]:
         """Return φᵀ and weight [1, φ, φ φ] of the classes, `_CLASSES` at once."""
@@ -75,10 +72,10 @@ class ClassSum:
         """Return Σ_k weight_k e^(least - D_k) [1, φ, φ φ] and least, 0 or the smallest D_k."""
         least = np.zeros(len(z))
         with np.errstate(over="ignore", invalid="ignore"):
-            if self._lattice is None:
+            if self._by_parts is None:
                 sums = self._shifted(z, least, derivatives)
             else:
-                sums = self._lattice.sums(z, derivatives)
+                sums = self._by_parts.sums(z, derivatives)
         far = np.flatnonzero(~((sums[:, 0] > _TINY) & (sums[:, 0] < 1 / _TINY)))
         if far.size:
             least[far] = self._least(z[far])

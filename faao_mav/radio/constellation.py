@@ -18,6 +18,10 @@ _DECIMALS = 9
 """Decimals by which differences are compared: only 8-PSK has irrational coordinates, whose spacing
 is far above 1e-9 and whose rounding errors are far below."""
 
+_FEWEST_LEVELS = 4
+"""Levels of each part of a square alphabet from which sums by parts are quicker than over classes:
+measured with two and three antennas, 1.3 to 7 times with 16- and 64-QAM; not with QPSK's two."""
+
 
 def _square_qam(side: int) -> Complex:
     levels = np.arange(1.0 - side, side, 2.0)
@@ -113,8 +117,8 @@ class DifferenceClasses:
 
     `vectors` (k, N) has one representative u of each class, `multiplicity` (k,) how many ordered
     pairs (m, k) lie in it. `symbols` is rho**N, the number of input vectors and the size of the
-    zero class; `bits` is N log2(rho), what one channel use carries at most. `lattice` holds the
-    differences of square alphabets by their parts, and is None for the others.
+    zero class; `bits` is N log2(rho), what one channel use carries at most. `lattice` has the
+    differences by their parts, where sums are formed by them.
     """
 
     vectors: Complex
@@ -184,14 +188,22 @@ def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     multiplicity.setflags(write=False)
     bits = antennas * float(np.log2(len(grid)))
     return DifferenceClasses(
-        vectors, multiplicity, len(grid) ** antennas, bits, _lattice(grid, scale)
+        vectors, multiplicity, len(grid) ** antennas, bits, lattice(modulation, antennas)
     )
 
 
-def _lattice(grid: Complex, scale: float) -> Lattice | None:
-    """Return the differences of a square alphabet by their parts, None for other alphabets."""
+def lattice(modulation: str, antennas: int) -> Lattice | None:
+    """Return the differences by their parts where sums are formed by them: ``lattice_sum``.
+
+    Those are sums over 16- and 64-QAM on several antennas. Raises `InputError` for an unknown
+    modulation.
+
+    >>> lattice("16qam", 2).counts.tolist(), lattice("8psk", 2)
+    ([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0], None)
+    """
+    grid, scale = _grid(modulation)
     levels = np.unique(grid.real)
-    if len(levels) ** 2 != len(grid):
+    if antennas == 1 or len(levels) < _FEWEST_LEVELS or len(levels) ** 2 != len(grid):
         return None
     values, counts = np.unique(levels[:, None] - levels, return_counts=True)
     return Lattice(values * scale, counts.astype(np.float64))

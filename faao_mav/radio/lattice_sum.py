@@ -1,6 +1,6 @@
 """The sums of ``class_sum`` for square alphabets, whose differences are lattices.
 
-The real and the imaginary part of a difference u_1 of two QPSK, 16- or 64-QAM symbols are chosen
+The real and the imaginary part of a difference u_1 of two 16- or 64-QAM symbols are chosen
 independently. With r the differences of the other streams, w = Σ_j Z_1j r_j / Z_11 and the Schur
 complement S = Z_rr - Z_r1 Z_1r / Z_11,
 

@@ -24,7 +24,7 @@ def pair_sums(modulation: str, antennas: int, Z: Complex) -> Real:
     return np.array([(pairs * np.exp(-d)) @ terms for d in D])
 
 
-@pytest.mark.parametrize(("modulation", "antennas"), [("qpsk", 3), ("16qam", 2), ("16qam", 3)])
+@pytest.mark.parametrize(("modulation", "antennas"), [("16qam", 2), ("16qam", 3)])
 def test_sums_over_all_differences(
     modulation: str, antennas: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
