@@ -86,7 +86,8 @@ def log_ratio(
     """Compute ln Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z, for every slot and noise.
 
     ``points`` (M, D) and ``maps`` (n, D, d) make s, ``sent`` (n, q) says m, ``z`` is (n, q, d);
-    the result is (n, q). With ||y - s_k||² expanded, all sums over k are one product of matrices.
+    the result is (n, q). With ||y - s_k||² expanded, all exponents are one product of matrices.
+    That of the vector sent is -||z||² / 2: the sum never underflows for noises that are drawn.
     ``estimates`` (n, q, D), where given, is filled with the means of the points given y.
     """
     result = np.empty(sent.shape)
@@ -96,19 +97,18 @@ def log_ratio(
     for first in range(0, len(maps), group):
         slots = slice(first, first + group)
         S = points @ maps[slots]
-        half = 0.5 * np.sum(S**2, axis=-1)[..., None]
+        ones = np.ones((*S.shape[:2], 1))
+        left = np.concatenate([S, -0.5 * np.sum(S**2, axis=-1, keepdims=True), -ones], axis=-1)
         for start in range(0, sent.shape[1], step):
             part = slice(start, start + step)
-            s = np.take_along_axis(S, sent[slots, part, None], axis=1)
-            y = s + z[slots, part]
-            logs = S @ np.swapaxes(y, 1, 2)
-            logs -= half
-            largest = logs.max(axis=1)
-            logs -= largest[:, None]
+            noise = z[slots, part]
+            y = np.take_along_axis(S, sent[slots, part, None], axis=1) + noise
+            half = 0.5 * np.sum(y**2, axis=-1, keepdims=True)
+            right = np.concatenate([y, np.ones_like(half), half], axis=-1)
+            logs = left @ np.swapaxes(right, 1, 2)
             np.exp(logs, out=logs)
-            own = np.sum((y - 0.5 * s) * s, axis=-1)
             total = logs.sum(axis=1)
-            result[slots, part] = np.log(total) + largest - own
+            result[slots, part] = np.log(total) + 0.5 * np.sum(noise**2, axis=-1)
             if estimates is not None:
                 estimates[slots, part] = (logs.mT @ points) / total[..., None]
     return result
