@@ -29,6 +29,7 @@ _MOST_PAIRS = 1000  # pairs of slot and draw up to which all are averaged
 _SAMPLED_PAIRS = 200  # pairs of the sample beyond
 _COARSER = 3.0  # tolerance of the noise average of a sample, in that of the result
 _DEGREE = 5  # of the polynomial from cutoff rates to mutual information
+_DECIMALS = 9  # of the cutoff rates, bit, by which the sample is ordered; chosen
 _FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
 _FRESH_SLOTS = 2000  # slots with new draws, at most
 _FEW_FRESH_SLOTS = 128  # the same where their rates take long: a search, noises, ...
@@ -99,7 +100,8 @@ def _information(
         return float(np.mean(all_pairs.value)), each, all_pairs.mean_error
     cutoff = cutoff_rate(H, P, link.classes, link.noise)
     evenly = np.linspace(0, len(H) - 1, _SAMPLED_PAIRS).astype(np.intp)  # both ends among them
-    part = np.argsort(cutoff, kind="stable")[evenly]
+    # Rounded: the order of equal rates, and so the sample, is the same whoever sums them.
+    part = np.argsort(np.round(cutoff, _DECIMALS), kind="stable")[evenly]
     sample = pooled_mutual_information(
         H[part], P[part], link.modulation, link.noise, rng=rng, tolerance=_COARSER * tolerance
     )

@@ -2,9 +2,10 @@
 
 Nearly all time goes into sums over the difference classes of the two alphabets, of which there are
 about as many as difference vectors over the rotations of the alphabet. A sum costs one exponential
-a class; one with second derivatives by the precoder, for Newton's method, as many products as there
-are pairs of the N_t² real coordinates of P^H H^H H P, and algebra on matrices of 2 N_t² rows. How
-often each is formed follows from the slots and the draws of the fading.
+a class, or fewer where one stream is summed by its parts (``radio.lattice_sum``); one with second
+derivatives by the precoder, for Newton's method, as many products as there are pairs of the N_t²
+real coordinates of P^H H^H H P, and algebra on matrices of 2 N_t² rows. How often each is formed
+follows from the slots and the draws of the fading.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -15,7 +16,12 @@ from faao_mav.errors import PlanError
 from faao_mav.plan import Plan
 from faao_mav.plan.radio import Radio
 from faao_mav.radio.best_precoder import has_closed_form
-from faao_mav.radio.constellation import MODULATIONS, constellation, difference_vector_count
+from faao_mav.radio.constellation import (
+    MODULATIONS,
+    constellation,
+    difference_vector_count,
+    lattice,
+)
 from faao_mav.radio.real_channel import MAX_INPUTS
 
 _Value = TypeVar("_Value", int, float, str)
@@ -25,8 +31,8 @@ MAX_SECONDS, MAX_GIGABYTES = 600.0, 8.0
 
 # Fitted to the plans of tests/benchmarks/sizes.py, whose times they give within a factor of two.
 # Not those of algorithm1, which has a limit of its own.
-_EXPONENTIAL = 1.3e-9  # s for one exponential of a class
-_PRODUCT = 3e-11  # s for one product of a class with a pair of coordinates
+_EXPONENTIAL = 1.3e-9  # s for one exponential
+_PRODUCT = 3e-11  # s for one product of an exponential with a pair of coordinates
 _DENSE = 6e-10  # s for one product of the dense algebra after the sums over the classes
 _ALWAYS = 1.5  # s of any plan
 _PROGRAM = 0.1  # GB of any plan
@@ -118,7 +124,10 @@ def _link_cost(plan: Plan, transmit: int, receive: int) -> tuple[float, float]:
     classes = vectors / _ROTATIONS.get(radio.modulation, 4)
     inputs = float(len(constellation(radio.modulation))) ** transmit
     draws, modes = _draws(radio), min(transmit, receive * _draws(radio))
-    each = _EXPONENTIAL * classes
+    parts = lattice(radio.modulation, transmit)
+    # Of one stream two sums over L values stand for L² differences, four alike by rotation.
+    terms = classes if parts is None else 0.5 * vectors / len(parts.values)
+    each = _EXPONENTIAL * terms
     seconds = _SUMS * slots * draws * each + (_SAMPLED if draws > 1 else _EXACT) * inputs
     if options.rate == "mutual_information":
         seconds += _EXPONENTIAL * (_SUMS * slots + _CURVE) * _NODES * (inputs + _NODE)
@@ -126,7 +135,7 @@ def _link_cost(plan: Plan, transmit: int, receive: int) -> tuple[float, float]:
     searched = options.precoder == "faao" and options.inputs != "gaussian"
     if options.method == "direct" and searched and not exact:
         pairs = 0.5 * transmit**4
-        each += _PRODUCT * classes * pairs + _DENSE * (2 * modes * transmit) ** 2 * transmit**2
+        each += _PRODUCT * terms * pairs + _DENSE * (2 * modes * transmit) ** 2 * transmit**2
         seconds += each * _newton_sums(radio, slots, few_modes=min(transmit, receive) <= 2)
     known = _HELD_BYTES * slots * classes if radio.fading == "realization" else 0.0
     return seconds, _CLASS_BYTES * vectors * transmit * (transmit + 1) + known

@@ -2,7 +2,8 @@
 
 - ``constellation``: the alphabets, and the differences between their vectors merged into classes;
 - ``channel``: path gain, line of sight, fading, (1) and (2);
-- ``rate``: the cutoff rate, (7) and (8), from the sums of ``class_sum``;
+- ``rate``: the cutoff rate, (7) and (8), from the sums of ``class_sum``, which
+  ``lattice_sum`` forms for square alphabets;
 - ``mutual_information``: the mutual information, (5) and (6): ``real_channel`` reduces the link,
   ``noise_average`` averages over the noise;
 - ``precoder``: the classical linear precoders and the optimum for BPSK on two antennas;

@@ -3,16 +3,18 @@
 With Z = P^H H^H H P / (4 σ²), every exponent of (7) and (8) is linear in Z:
 D_k = u_k^H Z u_k = Σ_a φ_ka z_a, z the N² real coordinates of Z. The classes, thousands of them,
 therefore enter only through products of matrices with the features φ, which are the same for all
-channels.
+channels. Those of 16- and 64-QAM are summed by ``lattice_sum``.
 """
 
 from collections.abc import Iterable, Iterator
-from itertools import combinations
+from functools import lru_cache
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 from faao_mav.radio.constellation import DifferenceClasses
+from faao_mav.radio.lattice_sum import LatticeSum
+from faao_mav.radio.quadratic_form import basis, features
 
 _BLOCK, _CLASSES = 1 << 17, 2048
 """Exponents held at once, 1 MB, and classes taken together: they stay in the cache. Chosen."""
@@ -22,38 +24,6 @@ _KEPT = 1 << 24
 
 _TINY = 1e-200
 """The least sum that is taken without a common factor. Chosen: far above the smallest number."""
-
-
-def _basis(antennas: int) -> Complex:
-    """Return the N² Hermitian B_a with z_a = tr(B_a Z), (N², N, N).
-
-    The coordinates z are the diagonal of Z, then Re and Im of the entries above it.
-    """
-    B = np.zeros((antennas**2, antennas, antennas), dtype=np.complex128)
-    B[np.arange(antennas), np.arange(antennas), np.arange(antennas)] = 1.0
-    for a, (i, j) in enumerate(combinations(range(antennas), 2)):
-        B[antennas + 2 * a, i, j] = B[antennas + 2 * a, j, i] = 0.5
-        B[antennas + 2 * a + 1, i, j] = 0.5j
-        B[antennas + 2 * a + 1, j, i] = -0.5j
-    return B
-
-
-def features(u: Complex) -> Real:
-    """Return φ (k, N²) with Σ_a φ_a B_a = u u^H for u (k, N)."""
-    columns = [np.abs(u[:, i]) ** 2 for i in range(u.shape[1])]
-    for i, j in combinations(range(u.shape[1]), 2):
-        product = 2.0 * u[:, i] * u[:, j].conj()
-        columns += [product.real, product.imag]
-    return np.column_stack(columns)
-
-
-def coordinates(Z: Complex) -> Real:
-    """Return the real coordinates z of Z, (..., N, N) to (..., N²)."""
-    antennas = Z.shape[-1]
-    columns = [Z[..., i, i].real for i in range(antennas)]
-    for i, j in combinations(range(antennas), 2):
-        columns += [Z[..., i, j].real, Z[..., i, j].imag]
-    return np.stack(columns, axis=-1)
 
 
 class ClassSum:
@@ -70,11 +40,16 @@ class ClassSum:
 
     def __init__(self, classes: DifferenceClasses) -> None:
         self.antennas = classes.vectors.shape[1]
-        self.basis = _basis(self.antennas)
+        self.basis = basis(self.antennas)
         self._phi = features(classes.vectors)
         self._weights = classes.multiplicity / classes.symbols
         self._rows, self._columns = np.triu_indices(self.antennas**2)
         self._kept: dict[bool, list[tuple[Real, Real]]] = {}
+        self._by_parts = (
+            None
+            if classes.lattice is None
+            else LatticeSum(classes.lattice, self.antennas, classes.symbols)
+        )
 
     def _blocks(self, derivatives: bool) -> Iterable[tuple[Real, Real]]:
         """Return φᵀ and weight [1, φ, φ φ] of the classes, `_CLASSES` at once."""
@@ -97,7 +72,10 @@ class ClassSum:
         """Return Σ_k weight_k e^(least - D_k) [1, φ, φ φ] and least, 0 or the smallest D_k."""
         least = np.zeros(len(z))
         with np.errstate(over="ignore", invalid="ignore"):
-            sums = self._shifted(z, least, derivatives)
+            if self._by_parts is None:
+                sums = self._shifted(z, least, derivatives)
+            else:
+                sums = self._by_parts.sums(z, derivatives)
         far = np.flatnonzero(~((sums[:, 0] > _TINY) & (sums[:, 0] < 1 / _TINY)))
         if far.size:
             least[far] = self._least(z[far])
@@ -144,3 +122,9 @@ class ClassSum:
         covariance[:, self._rows, self._columns] = product
         covariance[:, self._columns, self._rows] = product
         return np.log(sums[:, 0]) - least, mean, covariance
+
+
+@lru_cache(maxsize=2)
+def class_sum(classes: DifferenceClasses) -> ClassSum:
+    """Return the sum over `classes`, the same for all who ask: its features take long to form."""
+    return ClassSum(classes)

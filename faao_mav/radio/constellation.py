@@ -18,6 +18,10 @@ _DECIMALS = 9
 """Decimals by which differences are compared: only 8-PSK has irrational coordinates, whose spacing
 is far above 1e-9 and whose rounding errors are far below."""
 
+_FEWEST_LEVELS = 4
+"""Levels of each part of a square alphabet from which sums by parts are quicker than over classes:
+measured with two and three antennas, 1.3 to 7 times with 16- and 64-QAM; not with QPSK's two."""
+
 
 def _square_qam(side: int) -> Complex:
     levels = np.arange(1.0 - side, side, 2.0)
@@ -93,6 +97,18 @@ def symbol_vectors(modulation: str, antennas: int) -> Complex:
 
 
 @dataclass(frozen=True, eq=False)
+class Lattice:
+    """Differences of the real parts of two symbols of a square alphabet, and of the imaginary ones.
+
+    The parts are chosen independently: `values` (L,) are the differences of one, `counts` (L,) how
+    many ordered pairs of levels give each.
+    """
+
+    values: Real
+    counts: Real
+
+
+@dataclass(frozen=True, eq=False)
 class DifferenceClasses:
     """The non-zero differences u_mk = x_m - x_k of (7), merged up to a common unit phase.
 
@@ -101,13 +117,15 @@ class DifferenceClasses:
 
     `vectors` (k, N) has one representative u of each class, `multiplicity` (k,) how many ordered
     pairs (m, k) lie in it. `symbols` is rho**N, the number of input vectors and the size of the
-    zero class; `bits` is N log2(rho), what one channel use carries at most.
+    zero class; `bits` is N log2(rho), what one channel use carries at most. `lattice` has the
+    differences by their parts, where sums are formed by them.
     """
 
     vectors: Complex
     multiplicity: Real
     symbols: int
     bits: float
+    lattice: Lattice | None
 
     @property
     def weight(self) -> Real:
@@ -168,6 +186,36 @@ def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     vectors, multiplicity = vectors[order], multiplicity[order]
     vectors.setflags(write=False)
     multiplicity.setflags(write=False)
+    bits = antennas * float(np.log2(len(grid)))
     return DifferenceClasses(
-        vectors, multiplicity, len(grid) ** antennas, antennas * float(np.log2(len(grid)))
+        vectors, multiplicity, len(grid) ** antennas, bits, lattice(modulation, antennas)
     )
+
+
+def levels(modulation: str) -> Real | None:
+    """Return the values of either part of a symbol where sums are formed by parts: 16-, 64-QAM.
+
+    Raises `InputError` for an unknown modulation.
+    """
+    grid, scale = _grid(modulation)
+    found = np.unique(grid.real)
+    if len(found) < _FEWEST_LEVELS or len(found) ** 2 != len(grid):
+        return None
+    return np.asarray(found * scale)
+
+
+def lattice(modulation: str, antennas: int) -> Lattice | None:
+    """Return the differences by their parts where sums are formed by them: ``lattice_sum``.
+
+    Those are sums over 16- and 64-QAM on several antennas. Raises `InputError` for an unknown
+    modulation.
+
+    >>> lattice("16qam", 2).counts.tolist(), lattice("8psk", 2)
+    ([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0], None)
+    """
+    parts = levels(modulation)
+    if antennas == 1 or parts is None:
+        return None
+    _, scale = _grid(modulation)
+    steps, counts = np.unique(np.rint((parts[:, None] - parts) / scale), return_counts=True)
+    return Lattice(steps * scale, counts.astype(np.float64))

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
-from faao_mav.radio.noise_average import log_ratio
+from faao_mav.radio.likelihood import log_ratio
 from faao_mav.radio.real_channel import RealInputs, real_inputs
 
 _LN2 = float(np.log(2.0))

@@ -8,13 +8,12 @@ lines of the project's own: importing scipy.stats.qmc takes 1.4 s, this module 0
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.radio.likelihood import CHUNK, log_ratio, log_ratio_by_parts
 from faao_mav.radio.real_channel import RealInputs
 
 _LN2 = float(np.log(2.0))
 
 # Chosen, unless another reason is given; what a change costs is not measured.
-_CHUNK = 1 << 18  # likelihoods held at once: 2 MB, which stay in a processor's cache
-_NOISES = 128  # noise samples handled together at least, which keeps the inner loops long
 _REACH = 6.5  # radius of the grid, standard deviations: less than 1e-9 of the mass lies beyond
 _FIRST_SPACING, _LAST_SPACING = 0.8, 0.03  # of the grids, standard deviations; √2 finer each time
 _SHIFTS = 16  # random shifts per lattice; their spread is the standard error
@@ -80,40 +79,6 @@ def normal_from_uniform(uniform: Real) -> Real:
     return np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def log_ratio(
-    points: Real, maps: Real, sent: Integers, z: Real, estimates: Real | None = None
-) -> Real:
-    """Compute ln Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z, for every slot and noise.
-
-    ``points`` (M, D) and ``maps`` (n, D, d) make s, ``sent`` (n, q) says m, ``z`` is (n, q, d);
-    the result is (n, q). With ||y - s_k||² expanded, all sums over k are one product of matrices.
-    ``estimates`` (n, q, D), where given, is filled with the means of the points given y.
-    """
-    result = np.empty(sent.shape)
-    # Long rows of noises keep the inner loops long; the rest of the room goes to slots.
-    group = max(1, _CHUNK // (len(points) * min(sent.shape[1], _NOISES)))
-    step = max(1, _CHUNK // (len(points) * group))
-    for first in range(0, len(maps), group):
-        slots = slice(first, first + group)
-        S = points @ maps[slots]
-        half = 0.5 * np.sum(S**2, axis=-1)[..., None]
-        for start in range(0, sent.shape[1], step):
-            part = slice(start, start + step)
-            s = np.take_along_axis(S, sent[slots, part, None], axis=1)
-            y = s + z[slots, part]
-            logs = S @ np.swapaxes(y, 1, 2)
-            logs -= half
-            largest = logs.max(axis=1)
-            logs -= largest[:, None]
-            np.exp(logs, out=logs)
-            own = np.sum((y - 0.5 * s) * s, axis=-1)
-            total = logs.sum(axis=1)
-            result[slots, part] = np.log(total) + largest - own
-            if estimates is not None:
-                estimates[slots, part] = (logs.mT @ points) / total[..., None]
-    return result
-
-
 def by_quadrature(maps: Real, inputs: RealInputs, tolerance: float) -> tuple[Real, Real]:
     """Return (5) or (6) by the trapezoidal rule over the noise, on ever finer grids.
 
@@ -136,7 +101,7 @@ def by_quadrature(maps: Real, inputs: RealInputs, tolerance: float) -> tuple[Rea
         z, weight = normal_grid(d, spacing)
         sent = np.repeat(inputs.sent, len(z))[None]
         z = np.tile(z, (len(inputs.sent), 1))[None]
-        step = max(1, _CHUNK // (z.shape[1] * d))
+        step = max(1, CHUNK // (z.shape[1] * d))
         for start in range(0, len(active), step):
             slots = active[start : start + step]
             size = (len(slots), *z.shape[1:])
@@ -256,18 +221,23 @@ def by_lattice(
         z = normal_from_uniform(u[..., antennas:])[..., :d]
         sent = np.concatenate([sent, sent], axis=-1).reshape(len(slots), -1)
         z = np.concatenate([z, -z], axis=-2).reshape(len(slots), -1, d)
-        logs = log_ratio(inputs.points, maps[slots], sent, z)
+        logs = likelihood(maps[slots], sent, z)
         if pooled and not rare:
             controls = gaussian_controls(inputs, maps[slots], moment, sent, z)
             return _controlled(*(_both_signs(x, len(grid)) for x in (logs, controls)))
         if rare:
             logs *= _mixture_weight(z)
-            wide = log_ratio(inputs.points, maps[slots], sent, _WIDE * z)
+            wide = likelihood(maps[slots], sent, _WIDE * z)
             logs = 0.5 * (logs + wide * _mixture_weight(_WIDE * z))
         return np.asarray(logs.reshape(len(slots), _SHIFTS, -1).mean(axis=-1))
 
+    def likelihood(maps: Real, sent: Integers, z: Real) -> Real:
+        if inputs.levels is None:
+            return log_ratio(inputs.points, maps, sent, z)
+        return log_ratio_by_parts(inputs.points, inputs.levels, maps, sent, z)
+
     def all_means(slots: Integers, grid: Real) -> Real:
-        step = max(1, _CHUNK // (2 * _SHIFTS * len(grid)))
+        step = max(1, CHUNK // (2 * _SHIFTS * len(grid)))
         parts = [means(slots[i : i + step], grid) for i in range(0, len(slots), step)]
         return np.concatenate(parts)
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.radio.class_sum import ClassSum, coordinates
+from faao_mav.radio.class_sum import ClassSum
+from faao_mav.radio.quadratic_form import coordinates
 
 _SATURATED = -36.0
 """s below which ln δ, δ = ln(1 + e^s), equals s to the last digit: e^s / 2 < 1.2e-16."""

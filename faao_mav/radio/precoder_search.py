@@ -11,7 +11,7 @@ The constants below were chosen; unless one says so, what a change costs is not 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.radio.class_sum import ClassSum
+from faao_mav.radio.class_sum import ClassSum, class_sum
 from faao_mav.radio.constellation import DifferenceClasses
 from faao_mav.radio.precoder_objective import (
     Objective,
@@ -214,7 +214,7 @@ def search(
     V = Vh.conj().mT
     modes = A @ V[:, None]
     G = modes.conj().mT @ modes
-    sums = ClassSum(classes)
+    sums = class_sum(classes)
     if start is not None:
         Q, _ = _improved(sums, G, _unit(Vh @ start), tolerance)
         return np.where(s[:, :1, None] > 0.0, V @ Q, start)

@@ -7,8 +7,9 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
-from faao_mav.radio.class_sum import coordinates, features
+from faao_mav.radio.class_sum import class_sum
 from faao_mav.radio.constellation import DifferenceClasses
+from faao_mav.radio.quadratic_form import coordinates, features
 
 _CHUNK = 1 << 16  # exponents held at once: 512 kB stay in the cache, 15 % quicker than 16 MB
 _PAIRS = 1 << 17  # channels with their precoders taken together: bounds the memory; chosen
@@ -70,10 +71,9 @@ def cutoff_rate(
     A = _received(H, P, noise)
     z = coordinates(A.conj().mT @ A)
     flat = z.reshape(-1, z.shape[-1])
-    remaining = _mean(np.exp, flat, classes)
-    rate = classes.bits - np.log1p(classes.symbols * remaining) / np.log(2.0)
-    low = remaining + 1.0 / classes.symbols > 0.5
-    rate[low] = -np.log1p(_mean(np.expm1, flat[low], classes)) / np.log(2.0)
+    rate = classes.bits - np.logaddexp(0.0, class_sum(classes).value(flat)) / np.log(2.0)
+    low = rate < 1.0
+    rate[low] = -np.log1p(_mean_fall(flat[low], classes)) / np.log(2.0)
     bounded: Real = np.clip(rate, 0.0, classes.bits).reshape(z.shape[:-1])[()]
     return bounded
 
@@ -85,8 +85,8 @@ def _split(M: Complex, axis: int, parts: int) -> Sequence[Complex]:
     return [*np.array_split(M, parts, axis)]
 
 
-def _mean(function: np.ufunc, z: Real, classes: DifferenceClasses) -> Real:
-    """Return Σ weight `function`(-D) over the classes, (n,), at the coordinates z (n, N²)."""
+def _mean_fall(z: Real, classes: DifferenceClasses) -> Real:
+    """Return Σ weight (e^-D - 1) over the classes, (n,), at the coordinates z (n, N²)."""
     total = np.zeros(len(z))
     step = max(1, _CHUNK // min(_CLASSES, len(classes.vectors)))
     for first in range(0, len(classes.vectors), _CLASSES):
@@ -96,5 +96,5 @@ def _mean(function: np.ufunc, z: Real, classes: DifferenceClasses) -> Real:
             part = slice(start, start + step)
             D = z[part] @ phi
             np.minimum(D, 0.0, out=D)
-            total[part] += function(D, out=D) @ weight
+            total[part] += np.expm1(D, out=D) @ weight
     return total

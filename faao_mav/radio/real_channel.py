@@ -10,7 +10,7 @@ import numpy as np
 
 from faao_mav.arrays import Integers, Real, RealOrComplex
 from faao_mav.errors import InputError
-from faao_mav.radio.constellation import constellation, symbol_vectors
+from faao_mav.radio.constellation import constellation, levels, symbol_vectors
 
 MAX_INPUTS = 1 << 16
 """Input vectors accepted at most. Chosen: the time of a slot is proportional to their number."""
@@ -23,7 +23,8 @@ class RealInputs:
     `points` (M, D) are all of them in D real coordinates. `sent` (r,) are the rows of ``points`` to
     average over; the others contribute the same by symmetry. `choices` says how many symbols of
     each antenna occur in ``sent``, the last antenna running fastest; their product is r. `variance`
-    is the mean square of each real coordinate, `bits` log2 M, bit per channel use.
+    is the mean square of each real coordinate, `bits` log2 M, bit per channel use. `levels` (L,)
+    are the values of each coordinate where sums are formed by parts (``constellation.levels``).
     """
 
     points: Real
@@ -31,6 +32,7 @@ class RealInputs:
     choices: tuple[int, ...]
     variance: float
     bits: float
+    levels: Real | None
 
 
 def real_inputs(modulation: str, antennas: int) -> RealInputs:
@@ -62,7 +64,14 @@ def real_inputs(modulation: str, antennas: int) -> RealInputs:
     # The first entry runs slowest in symbol_vectors.
     sent = np.flatnonzero(np.repeat(keep, size // len(symbols)))
     choices = (int(np.count_nonzero(keep)), *[len(symbols)] * (antennas - 1))
-    return RealInputs(np.ascontiguousarray(points), sent, choices, variance, float(np.log2(size)))
+    return RealInputs(
+        np.ascontiguousarray(points),
+        sent,
+        choices,
+        variance,
+        float(np.log2(size)),
+        levels(modulation),
+    )
 
 
 def real_channel(H: RealOrComplex, P: RealOrComplex, noise: float, real: bool) -> tuple[Real, Real]:

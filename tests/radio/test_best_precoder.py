@@ -58,7 +58,9 @@ def check(
 @SETTINGS
 @given(
     seed=SEEDS,
-    case=st.sampled_from([("bpsk", 3, 2), ("qpsk", 2, 1), ("qpsk", 2, 2), ("8psk", 2, 2)]),
+    case=st.sampled_from(
+        [("bpsk", 3, 2), ("qpsk", 2, 1), ("qpsk", 2, 2), ("8psk", 2, 2), ("16qam", 2, 2)]
+    ),
     draws=st.integers(1, 3),
     snr=st.floats(0.03, 30.0),
 )

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from faao_mav.arrays import Complex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import MODULATIONS, difference_classes, symbol_vectors
+from faao_mav.radio.likelihood import log_ratio, log_ratio_by_parts
 from faao_mav.radio.mutual_information import mutual_information, pooled_mutual_information
 from faao_mav.radio.noise_average import (
     by_lattice,
@@ -293,3 +294,23 @@ def test_pooled_errors_are_those_beside_quadrature() -> None:
         stated = np.sqrt(np.mean(error**2))
         assert np.sqrt(np.mean((value - exact) ** 2)) < 1.25 * stated
         assert abs(np.mean(value - exact)) < 4 * stated / np.sqrt(n)
+
+
+@pytest.mark.parametrize("modulation", ["16qam", "64qam"])
+def test_likelihoods_by_parts(modulation: str) -> None:
+    rng, inputs = np.random.default_rng(4), real_inputs(modulation, 2)
+    H = rng.standard_normal((6, 2, 2)) + 1j * rng.standard_normal((6, 2, 2))
+    H[1, :, 0] = 0.0  # a symbol that is not received
+    H[2] = H[2, :, :1] * [1.0, 1e-3]  # both on one mode, one weakly
+    H[3] *= 1e-6
+    H[4] *= 30.0
+    _, maps = real_channel(H, np.broadcast_to(np.eye(2), H.shape), 1.0, real=False)
+    sent = rng.integers(len(inputs.points), size=(6, 40))
+    z = 2.0 * rng.standard_normal((6, 40, maps.shape[-1]))
+    assert inputs.levels is not None
+    found = log_ratio_by_parts(inputs.points, inputs.levels, maps, sent, z)
+    np.testing.assert_allclose(found, log_ratio(inputs.points, maps, sent, z), rtol=1e-9, atol=1e-9)
+    y = inputs.points[sent[0]] @ maps[0] + z[0]
+    apart = np.sum((y[:, None] - inputs.points @ maps[0]) ** 2, axis=-1)
+    expected = np.log(np.exp(-0.5 * apart).sum(axis=1)) + 0.5 * np.sum(z[0] ** 2, axis=-1)
+    np.testing.assert_allclose(found[0], expected, rtol=1e-9, atol=1e-9)

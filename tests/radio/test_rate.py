@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from faao_mav.arrays import Complex
 from faao_mav.errors import InputError
-from faao_mav.radio import rate
+from faao_mav.radio import class_sum, rate
 from faao_mav.radio.constellation import MODULATIONS, difference_classes, symbol_vectors
 from faao_mav.radio.precoder import bpsk_two_antennas
 from faao_mav.radio.rate import cutoff_rate, exponents
@@ -136,9 +136,12 @@ def test_log_sum_stays_finite_and_gives_the_gap(modulation: str) -> None:
 def test_chunks_do_not_change_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
     classes = difference_classes("qpsk", 2)
     H, P = channel(11, 4, 7, 2, 2), channel(12, 7, 2, 2)
-    whole = cutoff_rate(H, P, classes, 0.5)
+    whole = cutoff_rate(H, P, classes, 5.0)
+    assert np.any(whole < 1.0)
+    assert np.any(whole > 1.0)
     monkeypatch.setattr(rate, "_CHUNK", 200)
-    np.testing.assert_allclose(cutoff_rate(H, P, classes, 0.5), whole, rtol=1e-14)
+    monkeypatch.setattr(class_sum, "_BLOCK", 200)
+    np.testing.assert_allclose(cutoff_rate(H, P, classes, 5.0), whole, rtol=1e-14)
     assert whole.shape == (4, 7)
 
 
