@@ -104,7 +104,7 @@ class LatticeSum:
         if derivatives not in self._kept:
             polynomials = [*_columns(self._rest, derivatives)]
             self._kept[derivatives] = []
-            for power in product(range(5), repeat=2):
+            for power in product(range(5), range(5)):
                 columns = [c for c, terms in enumerate(polynomials) if power in terms]
                 if columns:
                     terms = np.column_stack([polynomials[c][power] for c in columns])

@@ -92,11 +92,11 @@ def _by_parts(y: Real, levels: Real, rows: Real, others: Real) -> Real:
         at = (levels + sent[:, part, None]).reshape(-1, 1)
         each = np.exp(-0.5 * energy * _squares(at, received[:, part, None]))
         sums *= each.reshape(len(others), len(levels), -1).sum(axis=1)
-    return sums.sum(axis=0)
+    return np.asarray(sums.sum(axis=0))
 
 
 def _squares(a: Real, b: Real) -> Real:
     """Return ||a_i - b_j||², (i, j), of a (i, d) and b (j, d) as one product of matrices."""
     left = np.column_stack([a, np.sum(a**2, axis=1), np.ones(len(a))])
     right = np.column_stack([-2.0 * b, np.ones(len(b)), np.sum(b**2, axis=1)])
-    return left @ right.T
+    return np.asarray(left @ right.T)
