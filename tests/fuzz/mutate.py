@@ -1,4 +1,4 @@
-"""Inputs near sound ones: mutations of text by its words and numbers, and of NumPy archives."""
+"""Inputs near sound ones: mutations of text by its words and numbers, of archives and of bytes."""
 
 import io
 import re
@@ -121,6 +121,15 @@ def archive(content: bytes, others: Sequence[bytes], random: Random) -> bytes:
         for name, data in members.items():
             file.writestr(name, data)
     return packed.getvalue()
+
+
+def binary(content: bytes, others: Sequence[bytes], random: Random) -> bytes:
+    """Return `content` with some bytes changed, or a part of it left out, repeated or moved."""
+    if random.random() < 0.5:
+        return _bytes_changed(content, random)
+    words = [content[at : at + 16] for at in range(0, len(content), 16)]
+    random.choice((_delete, _repeat, _move, _flip, _cut))(words, others, random)
+    return b"".join(words)
 
 
 def _bytes_changed(content: bytes, random: Random) -> bytes:

@@ -7,10 +7,12 @@ from pathlib import Path
 import mutate
 from conftest import MISSIONS, SMALL
 from harness import Target
+from ulog import kept, ulog
 
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import MissionFileError
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mavlink.flying.logs import read_log
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.formats import losses_in, read_mission_file, render_mission
 from faao_mav.mission.formats.fence_file import read_fence
@@ -53,6 +55,9 @@ fence:
 _LARGEST_SEED = 5_000
 """Bytes of a mission that is mutated; chosen: small ones are read often."""
 
+_CHANGES = {".npz": mutate.archive} | dict.fromkeys((".bin", ".tlog", ".ulg"), mutate.binary)
+"""How files with these endings are mutated; others are as text."""
+
 _VALUES = (b"flight.duration=60:120:30", b"power_dbm=-40:0:5,7", b"radio.modulation=bpsk,8psk")
 
 
@@ -66,8 +71,7 @@ def targets(directory: Path) -> dict[str, Target]:
             path.write_bytes(content)
             return read(path)
 
-        change = mutate.archive if file.endswith(".npz") else mutate.text
-        found[name] = Target(name, run, seeds, change)
+        found[name] = Target(name, run, seeds, _CHANGES.get(Path(file).suffix, mutate.text))
 
     plans = [path.read_bytes() for path in sorted(MISSIONS.glob("*.yaml"))]
     add("plan", "plan.yaml", read_plan, SMALL.encode(), _STUDY.encode(), *plans)
@@ -89,6 +93,8 @@ def targets(directory: Path) -> dict[str, Target]:
         return table(found), comparison(found)
 
     add("rows", ROWS, rows, (directory / ROWS).read_bytes())
+    for ending, content in _logs().items():
+        add(ending, f"flight.{ending}", read_log, content)
     found["vary"] = Target("vary", _vary, _VALUES, mutate.text)
     return found
 
@@ -104,6 +110,16 @@ def _missions(*patterns: str) -> list[bytes]:
                 _mission(path)
                 found.append(path.read_bytes())
     return found
+
+
+def _logs() -> dict[str, bytes]:
+    """Return the beginnings of logs by their endings."""
+    logs = _DATA / "logs"
+    return {
+        "bin": (logs / "arducopter.bin").read_bytes()[:6000],
+        "tlog": (logs / "px4.tlog").read_bytes()[:1000],
+        "ulg": ulog(kept(read_log(logs / "px4.tlog"), slice(0, 60))),
+    }
 
 
 def _mission(path: Path) -> object:

@@ -5,7 +5,19 @@ from harness import Target, fuzz, outcome
 from targets import targets
 
 _FENCES = ("fenced_plan", "kml", "geojson")
-NAMES = ("plan", *_FENCES, "wpl", "qgc_plan", "parameters", "npz", "rows", "vary")
+NAMES = (
+    "plan",
+    *_FENCES,
+    "wpl",
+    "qgc_plan",
+    "parameters",
+    "npz",
+    "rows",
+    "bin",
+    "tlog",
+    "ulg",
+    "vary",
+)
 CASES = 300
 """Cases of each target in the suite; chosen: half a second."""
 

@@ -3,27 +3,26 @@
 `tests/data/logs` has one mission as ArduCopter 4.7 logged it (`arducopter.bin`: every other POS,
 every 50th XKF2, the parameters that missions are timed for) and as `fly --log` did
 (`arducopter.tlog`: positions only), and `px4.tlog`, of the same plan flown by PX4 1.16. The
-`.ulg` files here are written by hand, after the ULog file format, with the positions of `px4.tlog`;
+`.ulg` files here are made by `tests/ulog.py` with the positions of `px4.tlog`;
 `tests/autopilots/test_fly.py` debriefs the log of a real PX4.
 """
 
 import json
 import struct
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import edited
-from hypothesis import given
-from hypothesis import strategies as st
+from pymavlink import mavutil
 from typer.testing import CliRunner
+from ulog import kept, ulog
 
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError
+from faao_mav.mavlink.flying.log_messages import bin_messages, tlog_messages
 from faao_mav.mavlink.flying.logs import read_log
-from faao_mav.mavlink.flying.record import FlightRecord
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import save_solution
 from faao_mav.plan import parse_plan
@@ -49,37 +48,6 @@ def debriefed(log: Path, solution: Path, *more: str) -> dict[str, Any]:
     assert result.exit_code == 0, result.output
     told: dict[str, Any] = json.loads(result.stdout)
     return told
-
-
-def ulog(record: FlightRecord, *, wind: tuple[float, float] | None = None) -> bytes:
-    """Return a `.ulg` file: https://docs.px4.io/main/en/dev_log/ulog_file_format."""
-
-    def message(kind: bytes, content: bytes) -> bytes:
-        return struct.pack("<H", len(content)) + kind + content
-
-    formats = {
-        "vehicle_global_position": "uint64_t timestamp;double lat;double lon;float alt;",
-        "home_position": "uint64_t timestamp;float alt;",
-        "wind": "uint64_t timestamp;float windspeed_north;float windspeed_east;",
-    }
-    out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", int(record.t[0] * 1e6))
-    out += message(b"B", bytes(40))
-    for name, fields in formats.items():
-        out += message(b"F", f"{name}:{fields}".encode())
-    parameter = b"float MPC_XY_CRUISE"
-    out += message(b"P", bytes([len(parameter)]) + parameter + struct.pack("<f", 6.0))
-    for number, name in enumerate(formats):
-        out += message(b"A", struct.pack("<BH", 0, number) + name.encode())
-    start = int(record.t[0] * 1e6)
-    out += message(b"D", struct.pack("<HQf", 1, start, 584.0))
-    rows = zip(record.t, record.latitude, record.longitude, record.height, strict=True)
-    for t, latitude, longitude, height in rows:
-        time = round(t * 1e6)
-        place = struct.pack("<HQddf", 0, time, latitude, longitude, 584.0 + height)
-        out += message(b"D", place)
-        if wind is not None:
-            out += message(b"D", struct.pack("<HQff", 2, time, wind[1], wind[0]))
-    return out
 
 
 def test_both_logs_of_a_flight_tell_the_same(solutions: dict[str, Path]) -> None:
@@ -144,9 +112,24 @@ def test_a_log_that_ends_in_the_middle_is_told_as_far_as_it_goes(
     assert "the plan's flight is not in it" in result.output
 
 
-def kept(record: FlightRecord, which: Any) -> FlightRecord:
-    columns = (record.t, record.latitude, record.longitude, record.height)
-    return FlightRecord(*(column[which] for column in columns))
+@pytest.mark.parametrize(
+    ("log", "read", "names"),
+    [
+        ("arducopter.bin", bin_messages, ["POS", "XKF2", "PARM"]),
+        ("px4.tlog", tlog_messages, ["GLOBAL_POSITION_INT"]),
+    ],
+)
+def test_messages_are_those_that_pymavlink_reads(log: str, read: Any, names: list[str]) -> None:
+    theirs = mavutil.mavlink_connection(str(LOGS / log))
+    for found in read(LOGS / log, names):
+        name, values = found if isinstance(found, tuple) else (found.get_type(), found.to_dict())
+        expected = theirs.recv_match(type=names).to_dict()
+        assert name == expected.pop("mavpackettype")
+        assert values.pop("Name", None) == expected.pop("Name", None)
+        values.pop("mavpackettype", None)
+        assert values == pytest.approx(expected, rel=1e-12, nan_ok=True)
+    assert theirs.recv_match(type=names) is None
+    (theirs.filehandle if log.endswith(".bin") else theirs).close()
 
 
 def test_boots_in_one_log_stand_one_after_the_other(tmp_path: Path) -> None:
@@ -165,46 +148,23 @@ def test_boots_in_one_log_stand_one_after_the_other(tmp_path: Path) -> None:
     [
         ("flight.log", b"", "give a flight log: .bin, .tlog, .ulg"),
         ("flight.bin", b"", "empty"),
-        ("flight.bin", b"no log at all" * 100, "not a .bin log|0 positions"),
-        ("flight.tlog", b"no log at all" * 100, "0 positions|not a .tlog log"),
+        ("flight.bin", b"no log at all" * 100, "0 positions"),
+        ("flight.bin", bytes(11_000_000), "more than 10,000,000 bytes that are no messages"),
+        ("flight.tlog", b"no log at all" * 100, "0 positions"),
+        ("flight.tlog", bytes(11_000_000), "more than 10,000,000 bytes that are no messages"),
+        ("flight.tlog", b"\0" * 8 + b"\xfe\0\0\1\1\x21\0\0", "0 positions"),
+        ("flight.tlog", (b"\0" * 8 + b"\xfe\0\0\1\1\x21\0\0") * 11_000, "10,000 damaged messages"),
         ("flight.ulg", b"no log at all" * 100, "not a .ulg log"),
-        ("flight.ulg", b"", "not a .ulg log"),
+        ("flight.ulg", b"", "empty"),
     ],
 )
-def test_what_is_no_log_is_told(tmp_path: Path, name: str, content: bytes, told: str) -> None:
+def test_what_is_no_log_is_told(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, content: bytes, told: str
+) -> None:
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(InputError, match=told):
         read_log(path)
+    assert capfd.readouterr() == ("", "")
     with pytest.raises(InputError, match="no such file"):
         read_log(tmp_path / f"missing{path.suffix if path.suffix != '.log' else '.bin'}")
-
-
-@cache
-def contents() -> dict[str, bytes]:
-    return {
-        ".bin": (LOGS / "arducopter.bin").read_bytes()[:6000],
-        ".tlog": (LOGS / "px4.tlog").read_bytes()[:3000],
-        ".ulg": ulog(kept(read_log(LOGS / "px4.tlog"), slice(0, 60))),
-    }
-
-
-@given(
-    kind=st.sampled_from([".bin", ".tlog", ".ulg"]),
-    place=st.floats(0, 1),
-    bytes_=st.binary(min_size=1, max_size=20),
-    end=st.floats(0, 1),
-)
-def test_damaged_logs_are_read_or_told(
-    tmp_path_factory: pytest.TempPathFactory, kind: str, place: float, bytes_: bytes, end: float
-) -> None:
-    data = bytearray(contents()[kind])
-    at = int(place * len(data))
-    data[at : at + len(bytes_)] = bytes_
-    path = tmp_path_factory.getbasetemp() / f"damaged{kind}"
-    path.write_bytes(data[: int(len(data) * max(end, 0.05))])
-    try:
-        record = read_log(path)
-    except InputError:
-        return
-    assert (np.diff(record.t) > 0).all()

@@ -242,7 +242,7 @@ def test_a_page_of_a_mission_by_itself_and_beside_its_plan(run: Run, sound: Path
         assert f"<h2>{heading}</h2>" in text
     assert "<h2>Route</h2>" not in text
     assert sound.name in text
-    odd = sound.with_name(os.fsdecode(b"\xff.waypoints"))
+    odd, page = (sound.with_name(os.fsdecode(b"\xff" + end)) for end in (b".waypoints", b".html"))
     odd.write_bytes(sound.read_bytes())
     assert run(odd, "--report", page, "--json", predicted=True).exit_code == 0
     assert r"<title>\udcff.waypoints</title>" in page.read_text()

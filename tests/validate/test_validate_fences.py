@@ -150,3 +150,8 @@ def test_the_rule_speaks_and_is_silent(
     rule: str, trips: Given, item: int | None, passes: Given
 ) -> None:
     check(rule, trips, item, passes)
+
+
+def test_of_px4_it_is_told_that_it_flies_all_the_same() -> None:
+    (finding,) = Given(flown(fence=fence(square(100, east=50.1))), PX4).by("fence-home")
+    assert "PX4 says so (Geofence invalid), and flies the mission all the same" in finding.message

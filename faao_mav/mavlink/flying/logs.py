@@ -1,15 +1,16 @@
 """Flights from the logs of autopilots and ground stations."""
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from faao_mav.errors import InputError
+from faao_mav.mavlink.flying.log_messages import bin_messages, sound_ulog, tlog_messages
 from faao_mav.mavlink.flying.record import FlightRecord
 
 _REBOOT, _BETWEEN = 2.0, 1000.0
@@ -18,6 +19,9 @@ the seconds that are put between two boots. Chosen: no flight goes on across the
 
 _LEAST = 10
 """Positions that a flight has at least; chosen."""
+
+_LARGEST = 2**30
+"""Bytes of a log that is read; chosen: hours of a `.bin`."""
 
 _Fix: TypeAlias = tuple[float, float, float, float]
 """Time, s; latitude and longitude, degrees; height above home, m."""
@@ -40,6 +44,8 @@ def read_log(path: Path) -> FlightRecord:
         raise InputError(f"{path}: give a flight log: {', '.join(readers)}")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
+    if not 0 < path.stat().st_size <= _LARGEST:
+        raise InputError(f"{path}: empty, or larger than {_LARGEST:,} bytes; expected a flight log")
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # the readers' own remarks
             record = reader(path)
@@ -56,33 +62,27 @@ def read_log(path: Path) -> FlightRecord:
 
 
 def _read_bin(path: Path) -> FlightRecord:
-    from pymavlink.DFReader import DFReader_binary
-
     fixes: list[_Fix] = []
     winds: list[_Wind] = []
     parameters = {}
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: empty")
-    for message in _messages(DFReader_binary, path, ["POS", "XKF2", "NKF2", "PARM"]):
-        if message.get_type() == "POS":
-            height = getattr(message, "RelHomeAlt", math.nan)
-            fixes.append((message.TimeUS / 1e6, message.Lat, message.Lng, height))
-        elif message.get_type() == "PARM":
-            parameters[message.Name] = float(message.Value)
-        elif getattr(message, "C", 0) == 0:  # the first of the estimators
-            winds.append((message.TimeUS / 1e6, message.VWE, message.VWN))
+    for name, said in bin_messages(path, ("POS", "XKF2", "NKF2", "PARM")):
+        if name == "POS":
+            height = said.get("RelHomeAlt", math.nan)
+            fixes.append((said["TimeUS"] / 1e6, said["Lat"], said["Lng"], height))
+        elif name == "PARM":
+            parameters[said["Name"]] = float(said["Value"])
+        elif said.get("C", 0) == 0:  # the first of the estimators
+            winds.append((said["TimeUS"] / 1e6, said["VWE"], said["VWN"]))
     return _record(fixes, winds, parameters)
 
 
 def _read_tlog(path: Path) -> FlightRecord:
-    from pymavlink.mavutil import mavlogfile
-
     fixes: list[_Fix] = []
     winds: list[_Wind] = []
     parameters = {}
     system = None
-    kinds = ["GLOBAL_POSITION_INT", "WIND", "WIND_COV", "PARAM_VALUE"]
-    for message in _messages(mavlogfile, path, kinds):
+    names = ("GLOBAL_POSITION_INT", "WIND", "WIND_COV", "PARAM_VALUE")
+    for message in tlog_messages(path, names):
         kind = message.get_type()
         if kind == "GLOBAL_POSITION_INT" and system in (None, message.get_srcSystem()):
             system = message.get_srcSystem()
@@ -107,8 +107,8 @@ def _read_ulg(path: Path) -> FlightRecord:
         raise InputError(
             f"{path}: PX4's logs are read by pyulog: pip install 'faao-mav[debrief]'"
         ) from None
-    with path.open("rb") as file:
-        log = ULog(file, ["vehicle_global_position", "home_position", "wind"])
+    names = ["vehicle_global_position", "home_position", "wind"]
+    log = ULog(sound_ulog(path, names), names)
     topics = {each.name: each.data for each in log.data_list if each.multi_id == 0}
     if "vehicle_global_position" not in topics:
         raise InputError(f"{path}: no vehicle_global_position in this log")
@@ -124,18 +124,6 @@ def _read_ulg(path: Path) -> FlightRecord:
         winds = list(zip(*columns, strict=True))
     parameters = {str(name): float(value) for name, value in log.initial_parameters.items()}
     return _record(list(fixes), winds, parameters)
-
-
-def _messages(reader: Any, path: Path, kinds: list[str]) -> Iterator[Any]:
-    """Yield the messages of some `kinds` in the log at `path`, by a `reader` of pymavlink."""
-    log = reader.__new__(reader)
-    try:
-        log.__init__(str(path))  # where that fails half-way there is a file to close all the same
-        while (message := log.recv_match(type=kinds)) is not None:
-            yield message
-    finally:
-        with suppress(AttributeError):
-            log.close()
 
 
 def _record(fixes: list[_Fix], winds: list[_Wind], parameters: dict[str, float]) -> FlightRecord:
