@@ -1,4 +1,4 @@
-"""PX4's logs (`.ulg`), written by hand: its simulator stops when it logs to a file."""
+"""PX4 logs (`.ulg`) of a given flight, after the description of the format."""
 
 import struct
 from typing import Any

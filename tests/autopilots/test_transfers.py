@@ -1,5 +1,6 @@
 """Verified uploads to the real autopilots, over links that lose, repeat, delay and disorder."""
 
+import dataclasses
 import sys
 import threading
 import time
@@ -39,22 +40,18 @@ def vehicle(
 
 
 FAULTS = Faults(
-    loss=0.1,
-    duplication=0.05,
-    reordering=0.1,
-    delay=0.3,
-    latency=0.0,
-    outages=((2.0, 3.5),),
-    seed=1,
+    duplication=0.05, reordering=0.1, delay=0.3, latency=0.0, outages=((2.0, 3.5),), seed=1
 )
-"""A link about as bad as `uploads.py` measures: an outage in the middle too."""
+"""A link about as bad as `sessions.py` draws, but for loss: an outage in the middle too."""
 
 
+@pytest.mark.parametrize("loss", [0.0, 0.2])
 def test_everything_is_stored_read_back_and_cleared(
-    vehicle: str, monkeypatch: pytest.MonkeyPatch
+    vehicle: str, loss: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    faults = dataclasses.replace(FAULTS, loss=loss)
     monkeypatch.setattr(
-        link, "open_transport", lambda text: FaultyTransport(open_transport(text), FAULTS)
+        link, "open_transport", lambda text: FaultyTransport(open_transport(text), faults)
     )
     report = upload(MISSION, vehicle, wait=PATIENCE)
     assert report.problems == ()
@@ -65,13 +62,14 @@ def test_everything_is_stored_read_back_and_cleared(
     assert clear(vehicle, wait=PATIENCE).problems == ()
 
 
-def test_signed(autopilots: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["arducopter", "arduplane"])  # PX4 1.16 does not sign
+def test_signed(kind: str, autopilots: Path, tmp_path: Path) -> None:
     key, right, wrong = signing_key("valley"), tmp_path / "right.key", tmp_path / "wrong.key"
     for file, content in ((right, key), (wrong, signing_key("hill"))):
         file.write_bytes(content)
         file.chmod(0o600)
     ticks = int((time.time() - SIGNING_EPOCH) * 1e5)
-    with simulated(autopilots, "arducopter", tmp_path) as connection:
+    with simulated(autopilots, kind, tmp_path) as connection:
         setup = mavutil.mavlink_connection(connection)
         setup.wait_heartbeat(timeout=PATIENCE)
         for _ in range(3):  # there is no answer to it
@@ -83,7 +81,10 @@ def test_signed(autopilots: Path, tmp_path: Path) -> None:
             upload(MISSION, connection, wait=3, signing_key=wrong)
 
 
-@pytest.mark.parametrize(("kind", "moment"), [("arducopter", "reading"), ("px4", "uploading")])
+@pytest.mark.parametrize(
+    ("kind", "moment"),
+    [("arducopter", "reading"), ("arduplane", "uploading"), ("px4", "uploading")],
+)
 def test_a_reboot_in_the_middle(kind: str, moment: str, autopilots: Path, tmp_path: Path) -> None:
     """The power goes while a mission replaces another: what is said of it afterwards is true."""
     old, new = a_mission(60, shift=0.01), a_mission(80)

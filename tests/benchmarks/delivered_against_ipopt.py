@@ -55,6 +55,12 @@ PLANS: tuple[tuple[str, dict[str, Any]], ...] = (
         {"flight.duration": 150, "flight.start_velocity": "free", "flight.end_velocity": "free"},
     ),
     ("copter_relay", {"radio.bandwidth_mhz": 20, "radio.relay.buffer_mbytes": 100}),
+    ("copter_relay", {"radio.modulation": "8psk"}),
+    ("copter_relay", {"radio.modulation": "16qam"}),
+    ("copter_relay", {"radio.modulation": "64qam"}),
+    ("copter_relay", {"radio.modulation": "8psk", "antennas": 3}),
+    ("copter_relay", {"radio.modulation": "16qam", "antennas": 3}),
+    ("copter_relay", {"radio.modulation": "qpsk", "antennas": 4}),
     ("paper_active", {"flight.duration": 40}),
     ("paper_active", {"flight.duration": 50, "power": 10}),
     ("paper_active", {"flight.duration": 100, "power": 10}),
@@ -70,6 +76,10 @@ def plan(name: str, changes: dict[str, Any]) -> Plan:
         if key == "power":
             data["radio"]["base_station"]["power_dbm"] = value
             data["radio"]["relay"]["power_dbm"] = value
+            continue
+        if key == "antennas":
+            for station in ("base_station", "relay", "ground_user"):
+                data["radio"][station]["antennas"] = value
             continue
         *parents, last = key.split(".")
         section = data
