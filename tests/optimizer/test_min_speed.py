@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import SMALL, MakePlan, edited
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_interior import STATIONS, bpsk, gaussian, links, plane, reward, worst
 
@@ -106,6 +106,44 @@ def test_back_to_the_start_is_no_refusal_where_a_circle_does(
     kin = cruiser(60, 12.0, start_velocity=velocities[0], end_velocity=velocities[1])
     kin = replace(kin, end=kin.start)
     assert worst(kin, straight_flight(kin)) < 1e-8
+
+
+@given(
+    st.lists(st.sampled_from([-1, 0, 1]), min_size=3, max_size=3),
+    st.lists(st.floats(3.0, 25.0), min_size=3, max_size=3),
+    st.floats(-180, 180),
+    st.booleans(),
+    st.booleans(),
+)
+@example([0, 1, 1], [7.0, 21.0, 8.0], 0.0, False, False)
+@example([1, 1, -1], [16.0, 16.0, 6.0], 0.0, True, False)
+@settings(max_examples=6)
+def test_no_refusal_where_a_dubins_path_keeps_every_limit(
+    sides: list[int], seconds: list[float], first: float, begins_free: bool, ends_free: bool
+) -> None:
+    speed, limit, step = 12.2, 2.1, 0.5
+    time = step * np.arange(int(sum(seconds) / step) + 1)
+    since = np.cumsum([0.0, *seconds[:2]])
+    pieces = zip(sides, since, seconds, strict=True)
+    turning = sum(side * np.clip(time - t, 0, lasts) for side, t, lasts in pieces)
+    theta = np.radians(first) + 0.99 * limit / speed * turning
+    v = speed * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    kin = Kinematics(
+        start=np.zeros(2),
+        end=step * (v[1:] + v[:-1]).sum(axis=0) / 2,
+        slots=time.size,
+        time_step=step,
+        max_speed=15.0,
+        max_acceleration=limit,
+        start_velocity=None if begins_free else v[0],
+        end_velocity=None if ends_free else v[-1],
+        bound_first_acceleration=True,
+        min_speed=11.5,
+        most_fall=0.8,
+        most_power=24.5,
+    )
+    assert worst(kin, kin.follow(v)) < 1e-9
+    assert worst(kin, straight_flight(kin)) < 1e-9
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -2.0)])

@@ -3,12 +3,13 @@
 A curve flown at one speed c is its headings theta(n); the displacement is c delta_t sum (cos, sin)
 theta(n). Where there is more time than the line from w_I to w_F takes, the curve weaves about the
 line or has full circles on the way, as many as the limits allow, or fewer and wider ones; given end
-velocities turn its ends. Such a curve meets w_F but for what its ends add. The flight nearest to
-the curve that keeps every limit is found by the interior-point method.
+velocities turn its ends. Such a curve meets w_F but for what its ends add. Where none of them keeps
+every limit, `turning_curves` are tried too, then the interior-point method finds the flight nearest
+to one of them all that does.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.track import MOST_STEPS, nearest_flight
+from faao_mav.optimizer.search.turning import turning_curves
 
 _TURN_SHARE = 0.95
 """Share of a_max that turns use; the rest is for meeting the ends. Chosen."""
@@ -47,12 +49,13 @@ is the curve itself has no gradient there."""
 
 
 def cruise(kin: Kinematics) -> Trajectory:
-    """Return a feasible flight that weaves towards w_F or circles on the way.
+    """Return a feasible flight that weaves towards w_F, circles on the way or turns otherwise.
 
     Raises:
         InfeasibleError: none was found, which is no proof that there is none.
     """
-    flight = _first_flight(kin, _curves(kin))
+    turning = (v for c in _speeds(kin) for v in turning_curves(kin, c))
+    flight = _first_flight(kin, chain(_curves(kin), turning))
     if flight is None:
         raise InfeasibleError(
             f"no flight from start to end was found that keeps at least {kin.min_speed:g} m/s "
