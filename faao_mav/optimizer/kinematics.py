@@ -196,13 +196,14 @@ def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
 def kinematics(plan: Plan) -> Kinematics:
     """Return the feasible set of `plan`.
 
-    A plane's acceleration is also limited to what turns it, at its least speed, no faster than its
-    guidance follows.
+    A plane's acceleration is also limited to what turns it no faster than its guidance follows, at
+    its least speed against the wind, or at half its least airspeed if that is more.
     """
     flight, vehicle = plan.flight, plan.vehicle
     aircraft = vehicle_of(plan)
     rates = aircraft.type.speed_rates(aircraft)
-    turning = rates.turn * vehicle.min_speed if vehicle.min_speed > 0 else math.inf
+    slowest = max(vehicle.min_speed - math.hypot(*plan.wind), vehicle.min_speed / 2)
+    turning = rates.turn * slowest if vehicle.min_speed > 0 else math.inf
 
     def vector(value: tuple[float, float] | None) -> Real | None:
         return None if value is None else np.array(value, dtype=float)

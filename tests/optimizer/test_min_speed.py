@@ -264,12 +264,14 @@ PLANE = {"AIRSPEED_CRUISE": 22, "NAVL1_PERIOD": 5}
 
 
 def test_a_plane_turns_no_faster_than_its_guidance_follows(small_plan: MakePlan) -> None:
-    changes = {"vehicle.min_speed": 9.0, "vehicle.type": "plane", **FREE}
+    changes = {"vehicle.min_speed": 9.0, "vehicle.type": "plane", "flight.duration": 40, **FREE}
     plan = small_plan(changes)
     look_ahead = 0.75 * 17 / math.pi  # NAVL1_DAMPING and NAVL1_PERIOD, s
-    limit = 9 / (1.05 * look_ahead)
+    limit = 9 / (1.2 * look_ahead)
     assert limit < plan.vehicle.max_acceleration
     assert kinematics(plan).max_acceleration == pytest.approx(limit)
+    windy = small_plan(changes | {"site.wind": {"speed": 3.0, "from": 200.0}})
+    assert kinematics(windy).max_acceleration == pytest.approx(limit * (9 - 3) / 9)
     lively = small_plan(changes | {"vehicle.parameters": PLANE})
     assert kinematics(lively).max_acceleration == plan.vehicle.max_acceleration
     told = dict(result_lines(Result(optimize(plan))))

@@ -60,7 +60,8 @@ def cruise(kin: Kinematics) -> Trajectory:
         raise InfeasibleError(
             f"no flight from start to end was found that keeps at least {kin.min_speed:g} m/s "
             f"(vehicle.min_speed) for {kin.time_step * kin.slots:g} s within {kin.max_speed:g} "
-            f"m/s, {kin.max_acceleration:g} m/s^2 and the end velocities; give a longer or shorter "
+            f"m/s, {kin.max_acceleration:.3g} m/s^2 (vehicle.max_acceleration, or less where its "
+            "guidance follows no more) and the end velocities; give a longer or shorter "
             "flight.duration, free end velocities or a lower vehicle.min_speed"
         )
     return flight
