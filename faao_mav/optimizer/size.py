@@ -29,20 +29,24 @@ _Value = TypeVar("_Value", int, float, str)
 MAX_SECONDS, MAX_GIGABYTES = 600.0, 8.0
 """Time of one processor and memory beyond which a plan is refused. Chosen."""
 
-# Fitted to the plans of tests/benchmarks/sizes.py, whose times they give within a factor of two.
+# Fitted to the plans of tests/benchmarks/sizes.py, whose times they give within a factor of two,
+# and to 200 random ones of tests/benchmarks/any_plan.py.
 # Not those of algorithm1, which has a limit of its own.
 _EXPONENTIAL = 1.3e-9  # s for one exponential
 _PRODUCT = 3e-11  # s for one product of an exponential with a pair of coordinates
 _DENSE = 6e-10  # s for one product of the dense algebra after the sums over the classes
 _ALWAYS = 1.5  # s of any plan
+_LEAST_SPEED = 2.0  # s more of one with a least speed
+_LEAST_SPEED_SLOT = 7.5e-3  # s more of it for each slot
 _PROGRAM = 0.1  # GB of any plan
 _FLIGHT_SLOT = 7e-4  # s for each slot, of the flight and of the mission that flies it
 _SUMS = 16  # sums for each slot and draw: of the flight found, of its prediction, in wind
 _CURVE = 1700  # sums with derivatives for each draw in the table of a link's rate
 _SLOT = 3  # the same for each draw of a slot of the flight found
-_TABLE = 300_000  # sums with derivatives for the table of known draws, of two modes at most
-_KNOWN_SLOT = 200  # the same for each slot of the flight found, with known draws
-_SEARCHED_SLOT = 15_000  # the same for each slot where the search is repeated at every place
+_KNOWN = 0.7  # s more of a plan with known draws
+_TABLE = 250_000  # sums with derivatives for the table of known draws, of two modes at most
+_KNOWN_SLOT = 3000  # the same for each slot of the flight found, with known draws
+_SEARCHED_SLOT = 25_000  # the same for each slot where the search is repeated at every place
 _SAMPLED = 1.6e-4  # s for each vector of symbols, for the mutual information of a summary
 _EXACT = 5e-4  # the same where the slots are not a sample of those of many draws
 _CLASS_BYTES = 40  # for each difference vector and each number by which they are merged
@@ -108,6 +112,10 @@ def cost(plan: Plan) -> tuple[float, float]:
     )
     channels = 16 * _CHANNEL_COPIES * _draws(radio) * slots * relay * (base + user)
     seconds = _ALWAYS + _FLIGHT_SLOT * slots + first + second
+    if plan.vehicle.min_speed > 0:
+        seconds += _LEAST_SPEED + _LEAST_SPEED_SLOT * slots
+    if radio.fading == "realization":
+        seconds += _KNOWN
     seconds *= _GOAL if plan.goal.searches else 1
     return seconds, _PROGRAM + (max(held, also) + channels) / 1e9
 

@@ -18,7 +18,7 @@ from recorded import FLIGHTS, mission_of, wind_of
 
 COLUMNS = ("t_s", "lat", "lon", "alt_rel_m", "seq")
 WINDS = {
-    "arducopter": ("wind3from250", "wind6from20", "wind9from130"),
+    "arducopter": ("wind3from250", "wind6from20", "wind9from130", "wind9from210", "wind9from300"),
     "arduplane": ("wind3from250", "wind6from20"),
     "px4": ("wind3from250", "wind6from20", "wind9from130"),
 }

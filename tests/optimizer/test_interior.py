@@ -1,7 +1,7 @@
 """The interior-point method: feasible, never worse than its start, and optimal."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import cvxpy as cp
@@ -232,6 +232,28 @@ def test_a_reward_that_fails_somewhere_is_avoided() -> None:
     assert worst(kin, best.trajectory) < 1e-6
     assert best.trajectory.w.sum(axis=1).max() <= 400
     assert best.value > 0.577
+
+
+def test_rewards_are_not_asked_for_where_a_direction_leads_nowhere(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kin, stage, corrector = plane(20), links(gaussian, 1e5, 1e5), Newton.corrector
+    lost: list[Any] = []
+
+    def finite(w: Real) -> StageValues:
+        assert np.isfinite(w).all()
+        return stage(w)
+
+    def nowhere(self: Newton, *args: Any) -> Any:
+        direction = corrector(self, *args)
+        if lost:
+            return direction
+        lost.append(direction)
+        return replace(direction, move=replace(direction.move, w=np.nan * direction.move.w))
+
+    monkeypatch.setattr(Newton, "corrector", nowhere)
+    assert maximize(kin, finite, straight_flight(kin)).converged
+    assert lost
 
 
 def test_an_iteration_cut_short_is_feasible_and_no_worse() -> None:

@@ -395,8 +395,10 @@ class Search:
 
     def _accept(self, newton: Newton, direction: Direction, share: Real, asked: Flags) -> Flags:
         """Move those of the flights `asked` whose rewards do not fall short of the model."""
-        at, control = newton.at, self.control
-        w, v = at.w + share * direction.move.w, at.v + share * direction.move.v
+        at, control, move = newton.at, self.control, direction.move
+        asked = asked & np.isfinite(largest(move.w) + largest(move.v))
+        w = np.where(asked, at.w + share * move.w, at.w)  # rewards are not asked for nowhere
+        v = np.where(asked, at.v + share * move.v, at.v)
         total, gradient, hessian = self.rewards(w)
         finite = np.isfinite(total.sum(axis=0) + summed(gradient) + summed(hessian))
         weights = at.weights + share * direction.weights

@@ -103,7 +103,7 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
     north_metre: float = 1.0
     lag: float = 0.17
     linear_drag: float = 0.28
-    quadratic_drag: float = 0.026
+    quadratic_drag: float = 0.0261
 
     @classmethod
     def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> Self:
