@@ -11,7 +11,8 @@ import numpy as np
 
 from faao_mav.app.answers import thinned
 from faao_mav.errors import FaaoError, PlanError
-from faao_mav.report.summary import debriefing_lines, joined
+from faao_mav.report.flights import debriefing_lines
+from faao_mav.report.lines import joined
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle
 from faao_mav.workflow import Result
 

@@ -15,7 +15,7 @@ from faao_mav.files import PAGES, check_apart, check_ending, check_writable, wri
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.flying.record import FlightRecord
-    from faao_mav.report.summary import Line
+    from faao_mav.report.lines import Line
     from faao_mav.validate.calibrate import Calibrated
     from faao_mav.validate.flown import Debriefing
     from faao_mav.workflow import Result
@@ -55,7 +55,8 @@ def debrief(
     from faao_mav.mavlink.flying.logs import read_log
     from faao_mav.mavlink.flying.radio import UdpRadio, replay, replayed
     from faao_mav.report.debrief import debriefed, other_parameters, remarks_on
-    from faao_mav.report.summary import debriefing_lines, joined
+    from faao_mav.report.flights import debriefing_lines
+    from faao_mav.report.lines import joined
     from faao_mav.validate.flown import Line
     from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from faao_mav.report.findings import by_rule, count_of, items_of, line_of, message_of
-from faao_mav.report.summary import check_lines
+from faao_mav.report.flights import check_lines
 from faao_mav.validate import Level, Rule
 from faao_mav.validate.check import Check
 

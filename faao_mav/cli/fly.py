@@ -74,7 +74,7 @@ def fly(
     from faao_mav.mavlink.flying.telling import Feed, Telling, as_text
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.report.debrief import flight_lines
-    from faao_mav.report.summary import joined
+    from faao_mav.report.lines import joined
 
     def say(told: dict[str, Any]) -> None:
         typer.echo(json.dumps(told, allow_nan=False) if as_json else as_text(told))

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from faao_mav.errors import FaaoError
 from faao_mav.mavlink.flying.fly import FlightReport
 from faao_mav.mavlink.flying.record import FlightRecord
-from faao_mav.report.summary import Line, debriefing_lines
+from faao_mav.report.flights import debriefing_lines
+from faao_mav.report.lines import Line
 from faao_mav.validate import flown
 from faao_mav.validate.flown import Debriefing
 from faao_mav.workflow import Result

@@ -8,8 +8,10 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from faao_mav.report.findings import by_rule, said_of
+from faao_mav.report.flights import check_lines, debriefing_lines
+from faao_mav.report.lines import Line
 from faao_mav.report.style import inline_svg
-from faao_mav.report.summary import Line, check_lines, debriefing_lines, result_lines
+from faao_mav.report.summary import result_lines
 from faao_mav.validate import Finding
 from faao_mav.validate.check import Check
 from faao_mav.validate.flown import Debriefing
