@@ -19,7 +19,7 @@ SIDESLIP = 0.286
 """The share of a coordinated turn's acceleration that sideslip takes, at sea level's density: the
 simulator's aircraft turns without enough rudder."""
 
-_SLOW = 14.0
+_SLOW = 13.0
 """The airspeed, m/s, below which that share falls in proportion to the speed. A flight of 12 m/s
 showed it: in its log, sideslip times the airspeed's square is less there, and turns are tighter."""
 
