@@ -87,5 +87,6 @@ def test_a_plan_is_flown_watched_and_debriefed(kind: str, autopilots: Path, tmp_
         # the autopilot's own log has both flights, of which the nearer to the plan is found
         flights = [each["flight"]["flown"] for each in ((end,) if log == heard else (end, again))]
         found, *seen = ([each[name] for name in RATES] for each in (told["flown"], *flights))
-        # `watched.py` has 0.04 % at most; a busy machine hears less of so short a flight
-        assert any(found == pytest.approx(each, rel=5e-3) for each in seen), (log, found, seen)
+        # on a busy machine PX4's own log of so short a flight was once further from what was heard
+        apart = 5e-3 if log == own and kind == "px4" else 1e-3
+        assert any(found == pytest.approx(each, rel=apart) for each in seen), (log, found, seen)

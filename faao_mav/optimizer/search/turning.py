@@ -18,7 +18,7 @@ _PIECES = 8
 
 _TRIES = 8
 """Random turn rates that are begun with at each speed. Chosen: of six random plans that nothing
-else found a flight for, the two that IPOPT has one for are found by the first or second."""
+else found a flight for, they find one for the two that IPOPT has one for."""
 
 _TURN_SHARE = 0.98
 """Share of a_max that turns use; the rest is for rounding to samples. Chosen."""
@@ -28,7 +28,7 @@ _MOST_EVALUATIONS = 60
 
 
 def turning_curves(kin: Kinematics, c: float) -> Iterator[Real]:
-    """Yield velocities (N + 2, 2), m/s, of curves at speed c that end near w_F in a calm.
+    """Yield velocities (N + 2, 2), m/s, of curves at speed c that end near w_F, in calm air.
 
     >>> kin = Kinematics(np.zeros(2), np.array([0.0, 90.0]), 61, 1.0, 14.0, 2.5, None, None, True,
     ...                  min_speed=12.0)
@@ -36,7 +36,7 @@ def turning_curves(kin: Kinematics, c: float) -> Iterator[Real]:
     >>> bool(min(max(kin.residuals(flight).values()) for flight in flights) < 1e-9)
     True
     """
-    from scipy.optimize import least_squares  # takes a fifth of a second to load
+    from scipy.optimize import least_squares  # slow to load, and seldom needed
 
     time = kin.time_step * np.arange(kin.slots, dtype=float)
     speed, goal = _speeds(kin, c, time), kin.end - kin.start
