@@ -16,16 +16,12 @@ Mobile Relaying Systems", IEEE Transactions on Communications, 2016.
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-
-_TOLERANCE = 1e-10
-"""Of the linear program for shares: what is then delivered is within 1e-7 bit/s/Hz of the most, on
-flights of 250 to 2,500 slots beside HiGHS."""
+from faao_mav.radio.queue_levels import queue_levels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,55 +111,23 @@ def forward_by_shares(
 def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf, held: float = 0.0) -> Real:
     """Return the shares (n,) of the slots to receive in with which a route delivers most.
 
-    The linear program of the module's half duplex in the shares, f and q, by Clarabel, whose time
-    grows linearly: 1.5 s at 10,000 slots, where HiGHS takes 12 s. What is delivered is within 1e-7
-    bit/s/Hz of the most. Raises `InputError` as `forward_greedily` does.
+    Each slot brings the queue as near as it can to the level that is best for the slots after it:
+    see `queue_levels`. Raises `InputError` as `forward_greedily` does.
 
     >>> rates = np.array([2.0, 2.0, 2.0, 2.0])
     >>> round(forward_by_shares(rates, rates, best_shares(rates, rates)).rate, 6)
     1.0
     """
     _check(I_U, I_G, buffer, held)
-    return _best_shares(I_U.tobytes(), I_G.tobytes(), buffer, held)
-
-
-@lru_cache(maxsize=32)  # an optimiser asks about its starts and its results more than once
-def _best_shares(rates_U: bytes, rates_G: bytes, buffer: float, held: float) -> Real:
-    """Return the best shares, read-only, at the rates whose bytes are given."""
-    import clarabel
-    from scipy import sparse
-
-    I_U, I_G = np.frombuffer(rates_U), np.frombuffer(rates_G)
-    n = len(I_U)
-    one, none = sparse.eye_array(n, format="csr"), sparse.csr_array((n, n))
-    arriving, leaving = (sparse.diags_array(rates, format="csr") for rates in (I_U, I_G))
-    step = one - sparse.eye_array(n, k=-1, format="csr")
-    before = one - step
-    ones, zeros, begun = np.ones(n), np.zeros(n), held * (np.arange(n) == 0)
-    limits = [
-        ([leaving, one, none], I_G),  # f_n <= (1 - x_n) I_G
-        ([none, one, -one], zeros),  # f_n <= q_n
-        ([-(before @ arriving), before, step], begun),  # q_n <= q_{n-1} + x_{n-1} I_U - f_{n-1}
-        ([-one, none, none], zeros),
-        ([one, none, none], ones),
-        ([none, -one, none], zeros),
-    ]
-    if math.isfinite(buffer):
-        limits.append(([none, none, one], buffer * ones))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
-    solver = clarabel.DefaultSolver(
-        sparse.csc_matrix((3 * n, 3 * n)),
-        np.concatenate([zeros, -ones, zeros]),
-        sparse.csc_matrix(sparse.vstack([sparse.hstack(row) for row, _ in limits])),
-        np.concatenate([most for _, most in limits]),
-        [clarabel.NonnegativeConeT(n * len(limits))],
-        settings,
-    )
-    shares: Real = np.clip(np.array(solver.solve().x[:n]), 0.0, 1.0)
-    shares.setflags(write=False)
-    return shares
+    slots = I_U.tolist(), I_G.tolist()
+    shares, waiting = [], held
+    for u, g, level in zip(*slots, queue_levels(*slots, buffer, held), strict=True):
+        sending = 0.0
+        if g > 0:
+            sending = max(0.0, min(1.0, waiting / g, (waiting + u - level) / (u + g)))
+        shares.append(1 - sending)
+        waiting = max(0.0, min(buffer, waiting + (1 - sending) * u - sending * g))
+    return np.array(shares)
 
 
 def _check(I_U: Real, I_G: Real, buffer: float, held: float) -> None:

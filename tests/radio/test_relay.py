@@ -69,6 +69,14 @@ def test_best_shares_are_those_of_the_program(route: tuple[Real, Real], buffer: 
     assert relayed.rate == pytest.approx(most(*route, buffer, half=True), abs=1e-7)
 
 
+def test_a_long_hover_has_rates_that_are_equal_but_for_rounding() -> None:
+    n, u, g = 1000, 1.39, 0.63
+    noise = 1 + 1e-15 * np.random.default_rng(1).standard_normal((2, n))
+    I_U, I_G = u * noise[0], g * noise[1]
+    rate = forward_by_shares(I_U, I_G, best_shares(I_U, I_G)).rate
+    assert rate == pytest.approx(u * g / (u + g), abs=1 / n)
+
+
 @given(routes(), BUFFERS, BITS)
 def test_what_is_held_at_the_beginning_is_delivered_too(
     route: tuple[Real, Real], buffer: float, held: float
