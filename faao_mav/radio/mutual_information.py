@@ -6,6 +6,7 @@ them, and z ~ N(0, I) there. Then:
 
 - next to no signal: the expansion of I in powers of the SNR;
 - next to no errors: the ceiling N log2(rho), with the cutoff rate as the proof;
+- one symbol of a square alphabet: twice the information of one of its parts, which is real;
 - one or two dimensions and few points: quadrature on a grid that is refined until it settles;
 - everything else: randomly shifted lattice rules, doubled until the spread is small enough.
 """
@@ -29,7 +30,9 @@ _NEGLIGIBLE = 1e-6  # amplitude of a dimension, noise deviations, that adds less
 _WEAK = 1e-3  # total SNR below which two terms of the series in the SNR are right to six digits
 _ROUGH = 0.1  # largest standard error of one slot among many, bits
 _RARE = 0.5  # gap of the cutoff rate to its ceiling, bits, below which errors count as rare
-_GRID_INPUTS = 64  # input vectors up to which a grid for each is quicker than lattices
+# Input vectors up to which a grid for each is quicker than lattices: for single slots, and where
+# only the mean over many counts (with 64 vectors 1.1 s and 0.15 s for two links of 200 slots)
+_GRID_INPUTS, _POOLED_GRID_INPUTS = 64, 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +93,19 @@ def _estimate(
     value[saturated], error[saturated] = inputs.bits, gap[saturated]
     remaining = ~weak & ~saturated
 
+    part = inputs.part
+    if part is not None:  # both dimensions are alike, and either carries a part of the symbol
+        slots = np.flatnonzero(remaining)
+        each, missed = by_quadrature(singular[slots, :1, None], part, tolerance / 2)
+        value[slots], error[slots] = 2 * each, 2 * missed
+        return Estimate(value, error, random)
+    most = _POOLED_GRID_INPUTS if pooled else _GRID_INPUTS
     floor = _NEGLIGIBLE * np.minimum(1.0, singular[:, :1])
     dimensions = np.maximum(1, np.sum(singular > floor, axis=1))
     for d in np.unique(dimensions[remaining]):
         slots = np.flatnonzero(remaining & (dimensions == d))
         reduced = np.ascontiguousarray(maps[slots, :, :d])
-        if d <= 2 and len(inputs.points) <= _GRID_INPUTS:
+        if d <= 2 and len(inputs.points) <= most:
             value[slots], error[slots] = by_quadrature(reduced, inputs, tolerance)
             continue
         random[slots] = True

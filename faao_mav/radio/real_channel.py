@@ -34,6 +34,16 @@ class RealInputs:
     bits: float
     levels: Real | None
 
+    @property
+    def part(self) -> "RealInputs | None":
+        """One of the two parts of a single symbol, if they are independent; None for others."""
+        if self.levels is None or self.points.shape[1] != 2:
+            return None
+        above = np.flatnonzero(self.levels > 0)  # those below contribute the same
+        return RealInputs(
+            self.levels[:, None], above, (len(above),), self.variance, self.bits / 2, None
+        )
+
 
 def real_inputs(modulation: str, antennas: int) -> RealInputs:
     """Return the input vectors x of (3) in real coordinates, [x] for BPSK and [Re x, Im x] else.

@@ -92,6 +92,18 @@ def test_equation_5_as_printed(modulation: str, snr: float) -> None:
     assert estimate.error[0] <= 1e-3
 
 
+@pytest.mark.parametrize("modulation", ["16qam", "64qam"])
+def test_two_parts_of_one_symbol_carry_what_a_grid_says(modulation: str) -> None:
+    H = np.sqrt(20.0) * channel(3, 12, 2, 1)
+    one, rng = np.ones((12, 1, 1)), np.random.default_rng(1)
+    found = mutual_information(H, one, modulation, 1.0, rng=rng, tolerance=1e-5)
+    maps = real_channel(H, one, 1.0, real=False)[1]
+    exact, _ = by_quadrature(maps, real_inputs(modulation, 1), 1e-6)
+    assert not found.random.any()
+    assert (found.error <= 1e-5).all()
+    assert np.abs(found.value - exact).max() <= 1.1e-5
+
+
 @pytest.mark.parametrize(("modulation", "antennas"), [("bpsk", 2), ("bpsk", 3), ("qpsk", 2)])
 @pytest.mark.parametrize("snr", [0.1, 1.0, 10.0, 100.0])
 def test_both_methods_agree_within_their_errors(modulation: str, antennas: int, snr: float) -> None:
