@@ -109,7 +109,7 @@ def _information(
     fit, *_ = np.linalg.lstsq(powers[part], sample.value)
     missed = sample.value - powers[part] @ fit
     error = float(np.sqrt(np.sum(missed**2) / (len(part) - _DEGREE - 1) / len(part)))
-    each = np.clip(powers @ fit, 0.0, link.classes.bits).reshape(pairs).mean(axis=0)
+    each = np.clip(powers @ fit, 0.0, link.classes.bits).reshape(-1, pairs[-1]).mean(axis=0)
     return float(each.mean()), each, max(error, sample.mean_error)
 
 

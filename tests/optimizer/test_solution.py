@@ -216,6 +216,18 @@ def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None
     assert price(solution) == information
 
 
+@pytest.mark.parametrize("fading", ["none", "realization"])
+def test_mutual_information_of_many_slots_is_that_of_few(small_plan: MakePlan, fading: str) -> None:
+    powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
+    few, many = (
+        price(optimize(small_plan(powers | {"radio.fading": fading, "flight.time_step": step})))
+        for step in (0.05, 0.005)  # 200 slots, and 2000, which are sampled
+    )
+    near = 0.01 if fading == "none" else 0.1  # another step has other draws
+    assert many.average == pytest.approx(few.average, abs=near)
+    assert many.delivered == pytest.approx(few.delivered, abs=near)
+
+
 def test_spare_power_is_what_could_be_saved(paper_plan: MakePlan) -> None:
     powers = {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40}
     found = optimize(paper_plan(powers))
