@@ -32,6 +32,8 @@ _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the accel
 _PLANE_SHARE = 0.8  # of the path tolerance for the initial route of a plane, which is then split
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
+# The largest ratio of a schedule's cost and that of the best before it for trials to go on; chosen.
+_WORTHWHILE = 0.95
 _GOOD = (0.0, GOOD_COST)  # the rank, m, from which nothing better is looked for
 
 _Scheduled: TypeAlias = tuple[Schedule, Scheduler]
@@ -172,10 +174,10 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
     """Return the mission for `solution` within the path tolerance of `plan`.
 
     The sets of parameters that are recommended for the vehicle are compared by the error of the
-    first schedule, and refined in that order until one is good. If none is, copters get legs of
-    their own for where the plan speeds up and slows down. If that is not good either, a vehicle
-    that flies splines may do so with the liveliest: everywhere, or where legs are too short for
-    their speed.
+    first schedule, and refined in that order until one is good, or hardly better than the best
+    before. If none is good, copters get legs of their own for where the plan speeds up and slows
+    down. If that is not good either, a vehicle that flies splines may do so with the liveliest:
+    everywhere, or where legs are too short for their speed.
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
@@ -191,11 +193,11 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
     def better(best: _Scheduled, trials: Iterable[tuple[Route, Scheduler]]) -> _Scheduled:
         """Return `best`, or what is better of `trials` if all of these are flown to their end."""
         try:
-            return min([best, *_refined(trials, rank)], key=rank)
+            return _refined(trials, rank, best)
         except InputError:
             return best
 
-    best = min(_refined(((straight, scheduler) for scheduler in schedulers), rank), key=rank)
+    best = _refined(((straight, scheduler) for scheduler in schedulers), rank)
     if rank(best) > _GOOD and given.type.hovers:
         ramped = with_ramps(straight, t, w, given.legs.least)
         best = better(best, ((ramped, scheduler) for scheduler in schedulers))
@@ -249,16 +251,27 @@ def _true_over_commanded(plan: Plan) -> float:
 
 
 def _refined(
-    trials: Iterable[tuple[Route, Scheduler]], rank: Callable[[_Scheduled], _Rank]
-) -> list[_Scheduled]:
-    """Return the schedules of the trials refined, the most promising first, up to a good one."""
+    trials: Iterable[tuple[Route, Scheduler]],
+    rank: Callable[[_Scheduled], _Rank],
+    best: _Scheduled | None = None,
+) -> _Scheduled:
+    """Return the best of `best` and the schedules of the trials, refined.
+
+    They are refined one after the other, the most promising first, up to one that is good, or
+    hardly better than the best before it.
+    """
     firsts = [(scheduler.first(route), scheduler) for route, scheduler in trials]
-    refined: list[_Scheduled] = []
     for first, scheduler in sorted(firsts, key=lambda each: each[0].error):
-        refined.append((scheduler.refined(first), scheduler))
-        if rank(refined[-1]) <= _GOOD:
+        tried = scheduler.refined(first), scheduler
+        if best is not None:
+            outside, cost = rank(best)
+            if rank(tried) > (outside, _WORTHWHILE * cost):
+                return min(best, tried, key=rank)
+        best = tried
+        if rank(best) <= _GOOD:
             break
-    return refined
+    assert best is not None, "no trials"
+    return best
 
 
 def _splines(scheduler: Scheduler) -> Iterator[Splines]:

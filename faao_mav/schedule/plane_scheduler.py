@@ -107,7 +107,10 @@ class PlaneScheduler(Scheduler):
         """Return `first` with the speeds that fit best, few and as they are sent."""
         tried = [first]
         for _ in range(_ROUNDS):
-            tried.append(self.fitted(self._kept(tried[-1].route).route, self.max_speed))
+            kept = self._kept(tried[-1].route).route
+            if len(tried) > 1 and np.array_equal(kept.positions, tried[-1].route.positions):
+                break  # the waypoints are where they were, and so would be the speeds
+            tried.append(self.fitted(kept, self.max_speed))
         best = min(tried, key=lambda each: each.cost)
         return self.rounded(self.shared(best, self.max_speed), self.max_speed)
 
