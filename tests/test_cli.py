@@ -324,11 +324,11 @@ def test_a_plan_is_piped_in(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({}, "of about 2 s: the best start, 2.5000 bit/s/Hz"),
+        ({}, "of about 1 s: the best start, 2.5000 bit/s/Hz"),
         ({"optimizer.method": "algorithm1"}, "iteration 1 of at most 2: the best start, 2.5000"),
         (
             {"radio.causal": True, "goal": {"rate": 1.0, "minimise": "power"}},
-            "of about 11 s: the best start, 2.5000 bit/s/Hz",
+            "of about 7 s: the best start, 2.5000 bit/s/Hz",
         ),
     ],
 )

@@ -35,7 +35,7 @@ MAX_SECONDS, MAX_GIGABYTES = 600.0, 8.0
 _EXPONENTIAL = 1.3e-9  # s for one exponential
 _PRODUCT = 3e-11  # s for one product of an exponential with a pair of coordinates
 _DENSE = 6e-10  # s for one product of the dense algebra after the sums over the classes
-_ALWAYS = 1.5  # s of any plan
+_ALWAYS = 1.0  # s of any plan
 _LEAST_SPEED = 2.0  # s more of one with a least speed
 _LEAST_SPEED_SLOT = 7.5e-3  # s more of it for each slot
 _PROGRAM = 0.1  # GB of any plan
@@ -43,7 +43,7 @@ _FLIGHT_SLOT = 7e-4  # s for each slot, of the flight and of the mission that fl
 _SUMS = 16  # sums for each slot and draw: of the flight found, of its prediction, in wind
 _CURVE = 1700  # sums with derivatives for each draw in the table of a link's rate
 _SLOT = 3  # the same for each draw of a slot of the flight found
-_KNOWN = 0.7  # s more of a plan with known draws
+_KNOWN = 0.3  # s more of a plan with known draws
 _TABLE = 250_000  # sums with derivatives for the table of known draws, of two modes at most
 _KNOWN_SLOT = 3000  # the same for each slot of the flight found, with known draws
 _SEARCHED_SLOT = 25_000  # the same for each slot where the search is repeated at every place
@@ -136,7 +136,9 @@ def _link_cost(plan: Plan, transmit: int, receive: int) -> tuple[float, float]:
     # Of one stream two sums over L values stand for L² differences, four alike by rotation.
     terms = classes if parts is None else 0.5 * vectors / len(parts.values)
     each = _EXPONENTIAL * terms
-    seconds = _SUMS * slots * draws * each + (_SAMPLED if draws > 1 else _EXACT) * inputs
+    seconds = _SUMS * slots * draws * each
+    if transmit > 1:  # of one symbol it takes next to nothing
+        seconds += (_SAMPLED if draws > 1 else _EXACT) * inputs
     if options.rate == "mutual_information":
         seconds += _EXPONENTIAL * (_SUMS * slots + _CURVE) * _NODES * (inputs + _NODE)
     exact = draws == 1 and has_closed_form(radio.modulation, transmit)
