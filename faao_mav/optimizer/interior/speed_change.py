@@ -195,8 +195,10 @@ def _ends(values: Real) -> Real:
 
 def _joined(ends: Real) -> Real:
     """Return the sums (flights, n) of `ends` (2, flights, n - 1), before and after each slot."""
-    before, after = np.pad(ends[0], ((0, 0), (0, 1))), np.pad(ends[1], ((0, 0), (1, 0)))
-    return np.asarray(before + after)
+    sums = np.zeros((ends.shape[1], ends.shape[2] + 1))
+    sums[:, :-1] += ends[0]
+    sums[:, 1:] += ends[1]
+    return sums
 
 
 def speed_change(kin: Kinematics) -> SpeedChange:

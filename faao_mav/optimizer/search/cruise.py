@@ -89,7 +89,7 @@ def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
         near.append((speed + changing, len(near), flight))
     for steps, (_, _, flight) in product((_FEW_STEPS, MOST_STEPS), sorted(near)[:_REPAIRS]):
         drawn_in = (1 - _DRAWN_IN) * flight.w + _DRAWN_IN * flight.w.mean(axis=0)
-        repaired = nearest_flight(kin, drawn_in, flight, steps=steps)
+        repaired = nearest_flight(kin, drawn_in, flight, steps=steps, first=True)
         if repaired is not None:
             return repaired
     return None

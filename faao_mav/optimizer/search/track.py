@@ -26,6 +26,10 @@ ALLOWED = 1e-9
 MOST_STEPS = 200
 """Steps after which a search ends. Chosen."""
 
+_LOOK = 5
+"""Steps after which it is looked again for a flight that keeps the limits, where any one will do.
+Chosen."""
+
 
 @dataclass(frozen=True)
 class Closeness:
@@ -49,20 +53,29 @@ def nearest_flight(
     start: Trajectory,
     constraints: Sequence[Constraint] = (),
     steps: int = MOST_STEPS,
+    *,
+    first: bool = False,
 ) -> Trajectory | None:
     """Return the flight nearest to `path` (n, 2) m that keeps the limits of `kin`.
 
     None where none is found within `steps` that keeps `constraints` too. `start` is any flight of
-    `kin`.
+    `kin`. With `first` the way there ends with a flight that keeps them.
     """
     for kept in ((), tuple(constraints)) if constraints else ((),):
         every = (*constraints_of(kin), *kept)
         w, v = start.w.T[:, None], start.v.T[:, None]
         rewards = ScaledRewards(Closeness(path), w)
         search = Search(kin, every, rewards, w, v, tolerance=_TOLERANCE, strategy=COLD_START)
-        with np.errstate(all="ignore"):
-            results = search.run(steps)
-        if 0 in results:
+        for most in range(_LOOK, steps + _LOOK, _LOOK) if first else (steps,):
+            with np.errstate(all="ignore"):
+                results = search.run(min(most, steps))
+            if 0 not in results:
+                break
             start = kin.follow(results[0].v.T * kin.max_speed)
-    every = (*constraints_of(kin), *constraints)
-    return start if max(each.excess(kin, start) for each in every) <= ALLOWED else None
+            if results[0].converged or (first and _keeps(kin, every, start)):
+                break
+    return start if _keeps(kin, (*constraints_of(kin), *constraints), start) else None
+
+
+def _keeps(kin: Kinematics, constraints: Sequence[Constraint], flight: Trajectory) -> bool:
+    return max(each.excess(kin, flight) for each in constraints) <= ALLOWED
