@@ -19,7 +19,7 @@ from faao_mav.schedule.initial_route import Splines, initial_route, slowest_leg,
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
-from faao_mav.schedule.scheduler import GOOD_COST, Scheduler
+from faao_mav.schedule.scheduler import GOOD_COST, WORTHWHILE, Scheduler
 from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
@@ -32,8 +32,6 @@ _BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the accel
 _PLANE_SHARE = 0.8  # of the path tolerance for the initial route of a plane, which is then split
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
-# The largest ratio of a schedule's cost and that of the best before it for trials to go on; chosen.
-_WORTHWHILE = 0.95
 _GOOD = (0.0, GOOD_COST)  # the rank, m, from which nothing better is looked for
 
 _Scheduled: TypeAlias = tuple[Schedule, Scheduler]
@@ -265,7 +263,7 @@ def _refined(
         tried = scheduler.refined(first), scheduler
         if best is not None:
             outside, cost = rank(best)
-            if rank(tried) > (outside, _WORTHWHILE * cost):
+            if rank(tried) > (outside, WORTHWHILE * cost):
                 return min(best, tried, key=rank)
         best = tried
         if rank(best) <= _GOOD:

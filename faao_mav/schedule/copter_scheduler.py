@@ -15,7 +15,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
-from faao_mav.schedule.scheduler import ALLOWED_ERROR, GOOD_COST, Scheduler
+from faao_mav.schedule.scheduler import ALLOWED_ERROR, GOOD_COST, WORTHWHILE, Scheduler
 from faao_mav.vector import lengths
 from faao_mav.vehicle.vehicle_type import OVERSPEED
 
@@ -30,7 +30,6 @@ _MOST_WAYPOINTS, _MOST_TO_MEND = 24, 40
 
 _FIRST_FLIGHTS = 3  # the most flights of a first fit: they tell which parameters to go on with
 _ROUNDS = 5  # the most rounds of splitting legs, and of moving waypoints
-_WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
 _LEAST = 1e-9  # the least duration, s, and length, m, of a leg: there is no speed without them
 _MOVE_SHARE = 0.8  # of its offset from the plan by which a waypoint is moved the other way
@@ -63,7 +62,7 @@ class CopterScheduler(Scheduler):
                     min((self.fitted(route, top_speed) for route in beginnings), key=_cost)
                     for beginnings in changes(best)
                 )
-                good = (each for each in tried if each.cost <= _WORTHWHILE * best.cost)
+                good = (each for each in tried if each.cost <= WORTHWHILE * best.cost)
                 better = next(good, None)
                 if better is None:
                     break

@@ -52,6 +52,13 @@ class Route:
         return lengths(np.diff(self.positions, axis=0))
 
     @property
+    def joined(self) -> Flags:
+        """Which legs follow another without a stop, (m - 1,)."""
+        joined: Flags = self.waits[:-1] == 0
+        joined[0] = False
+        return joined
+
+    @property
     def distance(self) -> float:
         """Length of the route from w_I to w_F, m."""
         return float(self.leg_lengths[self.first : self.last].sum())

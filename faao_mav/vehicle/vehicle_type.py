@@ -90,6 +90,20 @@ class FenceResponse:
         return self.action not in ("nothing", "report")
 
 
+class LegDurations(Protocol):
+    """How long the legs (m - 1,) of a route take, from passing one end to passing the other."""
+
+    @property
+    def most(self) -> Real:
+        """The greatest commands that make a difference, (m - 1,), m/s."""
+
+    def flown(self, speeds: Real) -> tuple[Real, Real]:
+        """Return the speeds, m/s, that legs come to at the commands `speeds`, and durations, s.
+
+        Both have the shape of `speeds` (..., m - 1), m/s.
+        """
+
+
 class LegLimits(Protocol):
     """How a vehicle with given parameters flies a leg between two waypoints."""
 
@@ -153,6 +167,8 @@ class VehicleType:
         true_over_commanded: true airspeed over the one that a mission commands, at a height in m
             above sea level; 1 where missions command ground speeds.
         speed_rates: how fast its airspeed changes; infinitely if that is its acceleration's.
+        leg_durations: how long straight legs of given lengths, m, take, of which those are marked
+            that follow one without a stop; None if only a flight tells.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
             radians; None if no such law is known.
     """
@@ -181,6 +197,7 @@ class VehicleType:
     models_wind: bool = False
     true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
     speed_rates: Callable[[ParameterValues], SpeedRates] = lambda _: SpeedRates()
+    leg_durations: Callable[[ParameterValues, Real, Flags], LegDurations] | None = None
     corner_speed: Callable[[ParameterValues, float], float] | None = None
 
     @property

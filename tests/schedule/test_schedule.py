@@ -195,7 +195,7 @@ def test_values_are_what_is_sent(flight: Callable[[], Trajectory]) -> None:
     assert positions == pytest.approx(route.positions, abs=1e-3)
     assert speeds == list(route.speeds)
     assert waits[1:] == pytest.approx((route.waits)[1:])
-    assert (route.waits == np.round(route.waits, 1)).all()
+    assert (route.waits == np.round(route.waits, 2)).all()
     assert np.round(route.speeds, 3) == pytest.approx(route.speeds, abs=1e-12)
     assert route.speeds.min() > 0
     assert route.speeds.max() <= 1.1 * plan.vehicle.max_speed

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 
+from faao_mav.arrays import Flags, Real
 from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
+from faao_mav.vehicle.ardupilot.copter.durations import StraightDurations
 from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter as ArduCopter
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs as ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
@@ -68,6 +70,10 @@ def _max_airspeed(vehicle: ParameterValues) -> float:
     return round(HELD * ArduCopterLimits.from_vehicle(vehicle).top_speed, 2)
 
 
+def _leg_durations(vehicle: ParameterValues, lengths: Real, joined: Flags) -> StraightDurations:
+    return StraightDurations(lengths, joined, ArduCopterLegs.from_vehicle(vehicle).bounds)
+
+
 ARDUCOPTER = VehicleType(
     family=ARDUPILOT,
     kind="copter",
@@ -89,5 +95,6 @@ ARDUCOPTER = VehicleType(
     ceilings=_ceilings,
     max_airspeed=_max_airspeed,
     models_wind=True,
+    leg_durations=_leg_durations,
 )
 """ArduCopter 4.1 and later; measured on 4.7."""

@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import ClassVar, TypeAlias
@@ -10,6 +10,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.vehicle.ardupilot.copter.durations import ramps
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.ramp import (
     LegBounds,
@@ -31,10 +32,6 @@ _SHORTEST = 4.0
 """The least length of a leg, m, where the path needs no shorter one: on such centimetres decide how
 long the target waits for an aircraft that has passed it. Flown: a mission with 1.1 m before a hover
 left there 4.1 s late, one with 2.3 m 0.4 s."""
-
-_JERK_TIMES = 12
-"""The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
-which none is longer than a second: the autopilot's own rule."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +131,7 @@ def at_speed(leg: StraightLeg, speed: float, elapsed: float) -> StraightLeg:
 
 def _second(speed: float, limits: LegBounds, cruise: float) -> Ramp | None:
     """The ramp between `speed` and the limit that the `cruise` metres have room for."""
-    room = _JERK_TIMES * min(limits.rise, 1.0)
+    room = limits.second_ramp
     if limits.speed == speed or speed * room >= cruise:
         return None
     if limits.speed < speed:
@@ -196,24 +193,17 @@ class ArduCopterLegs(ArduCopterLimits):
         >>> float(ArduCopterLegs().shortest_leg(np.array(8.0)).round(1))
         48.0
         """
-        return _each(lambda v: 2 * self._ramp_length(v), speed)
+        return ramps(self.bounds).at(speed, "lengths")
 
     def reachable_speed(self, length: Real) -> Real:
         """Return the speed that legs of `length`, m, reach, m/s; same shape."""
-        bounds = self._bounds(math.inf)
-        return _each(lambda way: ramp_from_rest(bounds, way / 2).high if way > 0 else 0.0, length)
+        return ramps(self.bounds).reached(length)
 
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
         """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
         return np.zeros_like(turn)
 
-    def _ramp_length(self, speed: float) -> float:
-        return ramp_from_rest(self._bounds(speed), math.inf).length if speed > 0 else 0.0
-
-    def _bounds(self, speed: float) -> LegBounds:
-        return LegBounds(speed, self.acceleration, self.jerk, self.rise)
-
-
-def _each(law: Callable[[float], float], values: Real) -> Real:
-    found: Real = np.array([law(value) for value in np.ravel(values).tolist()])
-    return found.reshape(np.shape(values))
+    @property
+    def bounds(self) -> LegBounds:
+        """What bounds the motion along a level leg at any speed."""
+        return LegBounds(math.inf, self.acceleration, self.jerk, self.rise)

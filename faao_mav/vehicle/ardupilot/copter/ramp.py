@@ -16,6 +16,11 @@ Phase: TypeAlias = tuple[float, float, float]
 """(T, c, d): T seconds with the jerk c + d cos(pi t / T)."""
 
 
+_JERK_TIMES = 12
+"""The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
+which none is longer than a second: the autopilot's own rule."""
+
+
 @dataclass(frozen=True, slots=True)
 class LegBounds:
     """What bounds the motion along a leg: m/s, m/s², m/s³.
@@ -33,6 +38,11 @@ class LegBounds:
     def snap(self) -> float:
         """The largest rate of change of the jerk, pi J / (2 t_j), m/s⁴."""
         return math.pi * self.jerk / (2 * self.rise)
+
+    @property
+    def second_ramp(self) -> float:
+        """The least duration of a cruise, s, that has room for a second ramp."""
+        return _JERK_TIMES * min(self.rise, 1.0)
 
     def at(self, speed: float) -> "LegBounds":
         """Return these limits with another speed."""
