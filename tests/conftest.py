@@ -12,12 +12,16 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from xdist.scheduler import LoadScopeScheduling
 
-from faao_mav.optimizer.search import bound
-from faao_mav.optimizer.search.map_bound import map_bound
-from faao_mav.plan import Plan, parse_plan
-from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+from faao_mav.cli.main import pin_kernels
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
+# As the command does, and before NumPy is imported: what is computed is then the same.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+pin_kernels()
+
+from faao_mav.optimizer.search import bound  # noqa: E402
+from faao_mav.optimizer.search.map_bound import map_bound  # noqa: E402
+from faao_mav.plan import Plan, parse_plan  # noqa: E402
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml  # noqa: E402
 
 # Hypothesis tries numbers that it reads in the project's modules loaded so far. Which are loaded
 # depends on how the tests are shared out among processes: without them, examples are the same.

@@ -17,7 +17,7 @@ from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates import RateModel
 from faao_mav.optimizer.rates.field import RateField
-from faao_mav.optimizer.rates.rate_model import rate_model
+from faao_mav.optimizer.rates.rate_model import rate_models
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.plan import Plan
@@ -140,4 +140,4 @@ def _tables(shared: _Keyed) -> tuple[RateModel, ...]:
     assert isinstance(step, int)
     scheme = design(shared.plan)
     links = build_problem(shared.plan).links
-    return tuple(rate_model(link, scheme, _REACH**step) for link in links)
+    return rate_models(links, scheme, [_REACH**step] * len(links))

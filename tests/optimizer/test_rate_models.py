@@ -11,7 +11,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
-from faao_mav.optimizer.rates.rate_model import CurveRate, rate_model
+from faao_mav.optimizer.rates.rate_model import CurveRate, rate_models
 from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate, FixedRate
 from faao_mav.radio.precoder import SCHEMES
 from faao_mav.radio.rate import cutoff_rate
@@ -144,7 +144,7 @@ def test_tables_hold_the_rate_at_every_place(
     )
     wanted = design(plan)
     for link in build_problem(plan).links:
-        rate, w = rate_model(link, wanted, FARTHEST), places(link)
+        rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
         tabled = rate.value(*coordinates(link, w))
         assert tabled == pytest.approx(exactly(link, wanted, w), abs=2e-4)
 
@@ -154,6 +154,36 @@ def test_tables_hold_the_rate_at_every_place(
         gradient, hessian = derivatives(link, rate, w)
         assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
         assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+
+
+@pytest.mark.parametrize("user_antennas", [2, 3])
+@pytest.mark.parametrize("relay_antennas", [2, 3])
+@pytest.mark.parametrize(
+    ("fading", "csi"),
+    [("none", "statistical"), ("ergodic", "statistical"), ("ergodic", "instantaneous")],
+)
+def test_both_links_together_have_the_curves_of_each_alone(
+    small_plan: MakePlan, fading: str, csi: str, relay_antennas: int, user_antennas: int
+) -> None:
+    plan = small_plan(
+        {
+            "radio.modulation": "qpsk",
+            "radio.fading": fading,
+            "radio.csi": csi,
+            "radio.fading_samples": 4,
+            "radio.relay.antennas": relay_antennas,
+            "radio.relay.power_dbm": 13,
+            "radio.ground_user.antennas": user_antennas,
+            "radio.ground_user.noise_dbm": -85,
+        }
+    )
+    wanted, links = design(plan), build_problem(plan).links
+    for link, together in zip(links, rate_models(links, wanted, [FARTHEST] * 2), strict=True):
+        assert isinstance(together, CurveRate)
+        alone, at = rate_models([link], wanted, [FARTHEST])[0], coordinates(link, places(link))
+        assert together.value(*at) == pytest.approx(alone.value(*at), abs=1e-4)
+        power = np.sum(np.abs(together.initial_precoders(*at)) ** 2, axis=(-2, -1))
+        assert power == pytest.approx(link.power, rel=0.05)  # between two points of the grid
 
 
 @pytest.mark.parametrize(
@@ -172,7 +202,7 @@ def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precode
         }
     )
     wanted, link = design(plan), build_problem(plan).bs_uav
-    rate, w = rate_model(link, wanted, FARTHEST), places(link)
+    rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
     assert isinstance(rate, CurveRate)
     at = coordinates(link, w)
     H = link.channel(w, link.small_scale(w))

@@ -27,7 +27,7 @@ model                 fading, precoders                   method
 ====================  ==================================  =========================================
 
 To change which model a plan gets, or to add one: write a class with ``value`` and ``partials`` and
-return it from ``rate_model.rate_model``, the only place that chooses. What counts as the rate
+return it from ``rate_model.rate_models``, the only place that chooses. What counts as the rate
 (cutoff rate, mutual information) is ``radio.measure``; Gaussian inputs and how precoders follow a
 channel are ``optimizer.design``.
 """

@@ -9,7 +9,7 @@ from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
-from faao_mav.optimizer.rates.rate_model import rate_model
+from faao_mav.optimizer.rates.rate_model import rate_models
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,8 +43,8 @@ def rate_field(problem: Problem, design: Design) -> RateField:
     """Return the rates of `problem` under `design`, as far as a flight can reach."""
     kin = problem.kinematics
     reach = kin.max_speed * kin.time_step * (kin.slots - 1)
-    rates = []
+    farthest = []
     for link in problem.links:
         from_ends = max(np.linalg.norm(end - link.station) for end in (kin.start, kin.end))
-        rates.append(rate_model(link, design, float(from_ends) + reach / 2))
-    return RateField(problem.links, tuple(rates))
+        farthest.append(float(from_ends) + reach / 2)
+    return RateField(problem.links, rate_models(problem.links, design, farthest))

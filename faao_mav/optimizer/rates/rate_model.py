@@ -7,7 +7,9 @@ depends on the direction too: a surface. With a draw known for every slot the sl
 links of two modes at most share one function of their singular values.
 """
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -97,70 +99,139 @@ class SurfaceRate:
         return RatePartials(value, by_l, by_ll, DirectionPartials(by_u, by_lu, by_uu))
 
 
-def rate_model(link: Link, design: Design, farthest: float) -> RateModel:
-    """Return the rate model of `link` under `design`.
+def rate_models(
+    links: Sequence[Link], design: Design, farthest: Sequence[float]
+) -> tuple[RateModel, ...]:
+    """Return the rate model of each of the `links` under `design`.
 
-    `farthest` is the largest horizontal distance from the station, in metres, that it covers.
+    `farthest` are the largest horizontal distances from their stations, in metres, that they cover.
     """
-    nearest = np.log(link.reference_gain / link.altitude**2)
-    least = np.log(link.reference_gain / (farthest**2 + link.altitude**2))
+    ranges = []
+    for link, distance in zip(links, farthest, strict=True):
+        squared_distance = np.array([distance, 0.0]) ** 2 + link.altitude**2
+        ranges.append(np.log(link.reference_gain / squared_distance))
+    if all(_depends_on_distance_alone(link, design) for link in links):
+        return best_curves(links, design, ranges)
+    return tuple(_model(link, design, span) for link, span in zip(links, ranges, strict=True))
+
+
+def _depends_on_distance_alone(link: Link, design: Design) -> bool:
     if link.nlos is not None and not design.averaged:
-        if not design.optimal:
-            return DifferencedRate(link, partial(_rate, link, design))
-        return mode_rate(link, least, nearest) if has_few_modes(link) else BestRate(link)
-    if design.optimal or (design.gaussian and design.scheme == "faao") or not link.follows_position:
-        return best_curve(link, design, least, nearest)
-    return _surface(link, design, least, nearest)
+        return False
+    gaussian = design.gaussian and design.scheme == "faao"
+    return design.optimal or gaussian or not link.follows_position
 
 
-def best_curve(link: Link, design: Design, least: float, most: float) -> CurveRate:
-    """Return the rate of `link` tabulated from l = `least` to l = `most`."""
-    gain_log = _grid(least, most, _CURVE_POINTS)
-    H_r = link.fade(link.line_of_sight_at(np.zeros(len(gain_log))))
-    H = np.exp(gain_log / 2)[:, None, None] * H_r
+def _model(link: Link, design: Design, span: Real) -> RateModel:
+    """Return the model of one link from the least to the largest l, `span` (2,)."""
+    if _depends_on_distance_alone(link, design):
+        return best_curves([link], design, [span])[0]
+    if link.nlos is None or design.averaged:
+        return _surface(link, design, *span)
     if not design.optimal:
-        P = design.precoders(link, H)
-    elif link.measure == "cutoff" or design.blind or not (design.averaged and has_few_modes(link)):
-        P = _along(link, design, H)
-    else:  # one for each draw: those of the table of modes
-        P = mode_rate(link, least, most).initial_precoders(gain_log, 0 * gain_log)
-    return CurveRate(link, CubicSpline.through(gain_log, design.rate(link, H, P)), gain_log, P)
+        return DifferencedRate(link, partial(_rate, link, design))
+    return mode_rate(link, *span) if has_few_modes(link) else BestRate(link)
 
 
-def _along(link: Link, design: Design, H: Complex) -> Complex:
-    """Return the best precoders ((S,) m, N_t, N_t) of the channels H along the grid of a curve.
+def best_curves(
+    links: Sequence[Link], design: Design, spans: Sequence[Real]
+) -> tuple[CurveRate, ...]:
+    """Return the rates of the `links`, each tabulated from the least to the largest l of its span.
+
+    `spans` are (2,) each.
+    """
+    grids = [_grid(span[0], span[1], _CURVE_POINTS) for span in spans]
+    channels = []
+    for link, gain_log in zip(links, grids, strict=True):
+        H_r = link.fade(link.line_of_sight_at(np.zeros(len(gain_log))))
+        channels.append(np.exp(gain_log / 2)[:, None, None] * H_r)
+    precoders = _curve_precoders(links, design, grids, channels)
+    return tuple(
+        CurveRate(link, CubicSpline.through(gain_log, design.rate(link, H, P)), gain_log, P)
+        for link, gain_log, H, P in zip(links, grids, channels, precoders, strict=True)
+    )
+
+
+def _curve_precoders(
+    links: Sequence[Link], design: Design, grids: Sequence[Real], channels: Sequence[Complex]
+) -> list[Complex]:
+    """Return the best precoders ((S,) m, N_t, N_t) of each link's channels along its grid of l."""
+    if not design.optimal:
+        return [design.precoders(link, H) for link, H in zip(links, channels, strict=True)]
+    found: dict[int, Complex] = {}
+    alike: dict[tuple[str, str, int], list[int]] = {}
+    for j, link in enumerate(links):
+        of_each_draw = design.averaged and not design.blind and link.measure == "mutual_information"
+        if of_each_draw and has_few_modes(link):
+            table = mode_rate(link, grids[j].min(), grids[j].max())
+            found[j] = table.initial_precoders(grids[j], 0 * grids[j])
+        else:
+            alike.setdefault((link.measure, link.modulation, link.transmit), []).append(j)
+    for group in alike.values():
+        along = _along([links[j] for j in group], design, [channels[j] for j in group])
+        found.update(zip(group, along, strict=True))
+    return [found[j] for j in range(len(links))]
+
+
+def _along(links: Sequence[Link], design: Design, channels: Sequence[Complex]) -> list[Complex]:
+    """Return the best precoders ((S,) m, N_t, N_t) of each link's channels along its grid of l.
+
+    The `links` share alphabet, measure and N_t. Scaled by sqrt(W) / sigma, their channels have the
+    precoders of unit power and noise, so that the points of all are searched together.
 
     Every `_SEARCH_EVERY`-th point is searched from all starts, and from the results of those next
-    to it. Halfway between two points that are known the search starts from both, or where they are
-    of one kind from between, until all are. The better is kept: where two kinds of precoder cross,
-    the curve follows the upper one.
+    to it. Halfway between two points that are known the search starts from between, or where they
+    are of two kinds from both, until all are. The better is kept: where two kinds of precoder
+    cross, the curve follows the upper one.
     """
-    points = H.shape[-3]
-    searched = np.arange(0, points, _SEARCH_EVERY)
-    P = np.repeat(design.precoders(link, H[..., searched, :, :]), _SEARCH_EVERY, axis=-3)
-    P = P[..., :points, :, :]
-    rate = np.full(points, -np.inf)
-    rate[searched] = design.rate(link, H[..., searched, :, :], P[..., searched, :, :])
+    unit = replace(links[0], power=1.0, noise=1.0)
+    H = np.concatenate(_scaled_alike(links, channels), axis=-3)
+    points, transmit = channels[0].shape[-3], unit.transmit
+    firsts = points * np.arange(len(links))[:, None]
+    draws = () if design.blind else H.shape[:-3]
+    P = np.zeros((*draws, H.shape[-3], transmit, transmit), dtype=np.complex128)
+    rate = np.full(H.shape[-3], -np.inf)
 
-    def try_from(at: Integers, start: Complex) -> None:
-        tried = design.precoders(link, H[..., at, :, :], start=start)
-        reached = design.rate(link, H[..., at, :, :], tried)
-        better = reached > rate[at] + _SAME
-        rate[at[better]] = reached[better]
-        P[..., at[better], :, :] = tried[..., better, :, :]
+    def better_from(at: Integers, start: Complex | None) -> Flags:
+        """Search the points `at` from `start`, keep what is better; return where (all points,)."""
+        better = np.zeros(len(rate), dtype=np.bool_)
+        if len(at):
+            tried = design.precoders(unit, H[..., at, :, :], start=start)
+            reached = design.rate(unit, H[..., at, :, :], tried)
+            for k, i in enumerate(at):
+                if reached[k] > rate[i] + _SAME:
+                    rate[i], better[i] = reached[k], True
+                    P[..., i, :, :] = tried[..., k, :, :]
+        return better
 
+    searched = firsts + np.arange(0, points, _SEARCH_EVERY)
+    better = better_from(searched.ravel(), None)
     for _ in range(2):
-        try_from(searched[1:], P[..., searched[:-1], :, :])
-        try_from(searched[:-1], P[..., searched[1:], :, :])
+        pairs = searched[:, :-1].ravel(), searched[:, 1:].ravel()
+        at, near = np.concatenate(pairs), np.concatenate(pairs[::-1])
+        fresh = better[near]
+        better = better_from(at[fresh], P[..., near[fresh], :, :])
     step = _SEARCH_EVERY
     while step > 1:
         step //= 2
-        at = np.arange(step, points - step, 2 * step)
+        at = (firsts + np.arange(step, points - step, 2 * step)).ravel()
         below, above = P[..., at - step, :, :], P[..., at + step, :, :]
-        try_from(at, _between(below, above, np.full(len(at), 0.5)))
+        between = _between(below, above, np.full(len(at), 0.5))
         other = np.any(~_alike(below, above).reshape(-1, len(at)), axis=0)  # of any of the draws
-        try_from(at[other], above[..., other, :, :])
-    return P
+        starts = np.concatenate([between, above[..., other, :, :]], axis=-3)
+        better_from(np.concatenate([at, at[other]]), starts)
+    power = np.repeat([link.power for link in links], points)
+    return np.split(P * np.sqrt(power)[:, None, None], len(links), axis=-3)
+
+
+def _scaled_alike(links: Sequence[Link], channels: Sequence[Complex]) -> list[Complex]:
+    """Return the channels for unit power and noise, with rows of zeros to the most antennas."""
+    most = max(link.receive for link in links)
+    scaled = []
+    for link, H in zip(links, channels, strict=True):
+        rows = [(0, 0)] * (H.ndim - 2) + [(0, most - link.receive), (0, 0)]
+        scaled.append(np.pad(math.sqrt(link.power / link.noise) * H, rows))
+    return scaled
 
 
 def _alike(here: Complex, there: Complex) -> Flags:

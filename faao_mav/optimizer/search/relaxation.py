@@ -25,7 +25,7 @@ from faao_mav.optimizer.design import design
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
-from faao_mav.optimizer.rates.rate_model import best_curve
+from faao_mav.optimizer.rates.rate_model import best_curves
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 from faao_mav.radio.rate import cutoff_rate
 
@@ -182,7 +182,8 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     exact = has_closed_form(link.modulation, link.transmit) and link.measure == "cutoff"
     gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
     if link.nlos is None or optimal.averaged:
-        curve = best_curve(link, optimal, gain_log.min(), gain_log.max())
+        span = np.array([gain_log.min(), gain_log.max()])
+        curve = best_curves([link], optimal, [span])[0]
         return curve.value(gain_log, gain_log), not optimal.averaged and exact
     singular = _largest_singular_values(link, len(r))
     H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
