@@ -19,6 +19,7 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.radio.constellation import Lattice
+from faao_mav.radio.level_sum import level_sum
 from faao_mav.radio.quadratic_form import coordinates, features
 
 _BLOCK = 1 << 18
@@ -44,8 +45,8 @@ class LatticeSum:
     """
 
     def __init__(self, lattice: Lattice, antennas: int, symbols: int) -> None:
-        self._antennas, self._levels = antennas, len(lattice.values)
-        self._squares = np.stack([np.ones(self._levels), lattice.values, lattice.values**2])
+        self._antennas, self._lattice = antennas, lattice
+        self._squares = lattice.values ** np.arange(3)[:, None]
         self._powers = lattice.counts * lattice.values ** np.arange(5)[:, None]
         alone, counts = _quarter(lattice, 1)
         self._alone = np.abs(alone[:, 0]) ** 2
@@ -61,7 +62,7 @@ class LatticeSum:
         """Return the sums, (b, 1 + N² + N² (N² + 1) / 2) or without `derivatives` (b, 1)."""
         # Of the largest Z_ii, so that w is short and rounding errors are those of Z.
         first = np.argmax(z[:, : self._antennas], axis=1)
-        step = max(1, _BLOCK // (2 * self._levels * len(self._rest)))
+        step = max(1, _BLOCK // (2 * len(self._lattice.values) * len(self._rest)))
         width = 1 + derivatives * (z.shape[1] * (z.shape[1] + 3) // 2)
         result = np.empty((len(z), width))
         for stream, (order, sign, columns, signs) in enumerate(self._swaps):
@@ -81,12 +82,14 @@ class LatticeSum:
         real, imaginary = z[:, N : 3 * N - 2 : 2], z[:, N + 1 : 3 * N - 2 : 2]
         r = self._rest.T
         row = np.stack([real @ r.real - imaginary @ r.imag, real @ r.imag + imaginary @ r.real])
-        # Z_11 (u + w)² of either part of u_1, by powers of it.
-        D = np.stack([-share * row**2, -2.0 * row, np.broadcast_to(-own, row.shape)])
-        D = self._squares.T @ D.reshape(3, -1)
-        powers = self._powers[: 1 + 4 * derivatives]
-        moments = powers @ np.exp(D, out=D)
-        x, y = moments.reshape(len(powers), *row.shape).swapaxes(0, 1)
+        if derivatives:
+            # Z_11 (u + w)² of either part of u_1, by powers of it.
+            D = np.stack([-share * row**2, -2.0 * row, np.broadcast_to(-own, row.shape)])
+            D = self._squares.T @ D.reshape(3, -1)
+            moments = self._powers @ np.exp(D, out=D)
+            x, y = moments.reshape(len(moments), *row.shape).swapaxes(0, 1)
+        else:
+            x, y = level_sum(share * row, self._lattice.values, self._lattice.counts, own)[:, None]
         schur = _schur(z, share, N)
         x *= np.exp(-(schur @ self._rest_features))
 

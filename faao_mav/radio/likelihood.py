@@ -1,13 +1,16 @@
 """The log-likelihood in (5) and (6) of vectors received through a ``real_channel``."""
 
+import math
+
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.radio.level_sum import level_sum
 
 # Chosen; what a change costs is not measured.
 CHUNK = 1 << 18  # likelihoods held at once: 2 MB, which stay in a processor's cache
 _NOISES = 128  # noise samples handled together at least, which keeps the inner loops long
-_ARRAYS = 4  # arrays that sums by parts hold at once, beside one of all likelihoods
+_ARRAYS = 4  # arrays that sums by parts hold at once
 
 
 def log_ratio(
@@ -57,17 +60,18 @@ def log_ratio_by_parts(points: Real, levels: Real, maps: Real, sent: Integers, z
     N = maps.shape[1] // 2
     result = np.empty(sent.shape)
     strongest = np.argmax(np.sum(maps[:, :N] ** 2, axis=-1), axis=1)
-    rest = {first: _others(points, levels, first) for first in np.unique(strongest)}
-    step = max(1, CHUNK * len(levels) // (_ARRAYS * len(points)))
-    for slot, first in enumerate(strongest):
-        rows = maps[slot, [first, N + first]]
-        others = rest[first] @ maps[slot]
-        for start in range(0, sent.shape[1], step):
-            part = slice(start, start + step)
-            noise = z[slot, part]
-            y = points[sent[slot, part]] @ maps[slot] + noise
-            sums = _by_parts(y, levels, rows, others)
-            result[slot, part] = np.log(sums) + 0.5 * np.sum(noise**2, axis=-1)
+    for first in np.unique(strongest):
+        others = _others(points, levels, first)
+        step = max(1, CHUNK // (_ARRAYS * len(others)))
+        group = max(1, step // sent.shape[1])
+        slots = np.flatnonzero(strongest == first)
+        for chosen in np.array_split(slots, math.ceil(len(slots) / group)):
+            rows = maps[chosen][:, [first, N + first]]
+            for start in range(0, sent.shape[1], step):
+                part = np.s_[chosen, start : start + step]
+                y = points[sent[part]] @ maps[chosen] + z[part]
+                sums = _by_parts(y, levels, rows, others @ maps[chosen])
+                result[part] = np.log(sums) + 0.5 * np.sum(z[part] ** 2, axis=-1)
     return result
 
 
@@ -80,23 +84,26 @@ def _others(points: Real, levels: Real, first: int) -> Real:
 
 
 def _by_parts(y: Real, levels: Real, rows: Real, others: Real) -> Real:
-    """Return Σ_k exp(-||y - s_k||² / 2), (q,), for received y (q, d).
+    """Return Σ_k exp(-||y - s_k||² / 2), (n, q), for received y (n, q, d).
 
-    `rows` (2, d) are b and b', `others` (R, d) what the other symbols send.
+    `rows` (n, 2, d) are b and b', `others` (n, R, d) what the other symbols send.
     """
-    energy = float(rows[0] @ rows[0])
-    share = 1.0 / energy if energy > 0.0 else 0.0
-    received, sent = share * y @ rows.T, share * others @ rows.T
+    energy = np.sum(rows[:, :1] ** 2, axis=-1, keepdims=True)  # |b|², (n, 1, 1)
+    along = rows.mT / np.where(energy > 0.0, energy, 1.0)
+    received, sent = y @ along, others @ along
     sums = np.exp(-0.5 * _squares(others - sent @ rows, y - received @ rows))
     for part in range(2):
-        at = (levels + sent[:, part, None]).reshape(-1, 1)
-        each = np.exp(-0.5 * energy * _squares(at, received[:, part, None]))
-        sums *= each.reshape(len(others), len(levels), -1).sum(axis=1)
-    return np.asarray(sums.sum(axis=0))
+        apart = received[:, None, :, part] - sent[:, :, None, part]
+        sums *= level_sum(apart, levels, np.ones(len(levels)), 0.5 * energy)
+    return np.asarray(sums.sum(axis=1))
 
 
 def _squares(a: Real, b: Real) -> Real:
-    """Return ||a_i - b_j||², (i, j), of a (i, d) and b (j, d) as one product of matrices."""
-    left = np.column_stack([a, np.sum(a**2, axis=1), np.ones(len(a))])
-    right = np.column_stack([-2.0 * b, np.ones(len(b)), np.sum(b**2, axis=1)])
-    return np.asarray(left @ right.T)
+    """Return ||a_i - b_j||², (n, i, j), of a (n, i, d) and b (n, j, d) as products of matrices."""
+
+    def both(x: Real) -> tuple[Real, Real]:
+        return np.sum(x**2, axis=-1, keepdims=True), np.ones((*x.shape[:-1], 1))
+
+    (aa, one), (bb, other) = both(a), both(b)
+    left = np.concatenate([a, aa, one], axis=-1)
+    return np.asarray(left @ np.concatenate([-2.0 * b, other, bb], axis=-1).mT)
