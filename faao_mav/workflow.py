@@ -7,7 +7,7 @@ import time
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_together
@@ -24,7 +24,6 @@ from faao_mav.optimizer.pricing import (
     saturation,
 )
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.search.bound import Bound
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.autopilots import autopilots
@@ -37,6 +36,9 @@ from faao_mav.validate.flown import Debriefing
 from faao_mav.vehicle.files import parameter_path, plan_target
 from faao_mav.vehicle.predict import predict
 from faao_mav.vehicle.vehicle import candidates
+
+if TYPE_CHECKING:
+    from faao_mav.optimizer.search.bound import Bound
 
 DRAWING_START = datetime(2000, 1, 1, tzinfo=UTC)
 """When the flight in a drawing (.kml) begins: a plan says how long it takes, not when it is."""
@@ -78,7 +80,7 @@ class Result:
     information: MutualInformation | None = None
     fresh: FreshRates | None = None
     saturation: Saturation | None = None
-    bound: Bound | None = None
+    bound: "Bound | None" = None
     conversion: Conversion | None = None
     prediction: Prediction | None = None
     check: Check | None = None

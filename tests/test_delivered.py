@@ -18,8 +18,9 @@ from faao_mav.optimizer.pricing import fresh_rates, saturation
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
 from faao_mav.radio.relay import forward_greedily
-from faao_mav.report import render_report, summary
+from faao_mav.report import summary
 from faao_mav.report.figures import queue
+from faao_mav.report.page import render_report
 from faao_mav.schedule.precoder_table import precoder_table
 from faao_mav.schedule.prediction import price_flight
 from faao_mav.study import make_cases, run_study

@@ -71,7 +71,7 @@ def debrief(
     if calibrate:
         remarks += _calibration_lines(calibrated)
     if report is not None:
-        from faao_mav.report import render_report
+        from faao_mav.report.page import render_report
 
         page = render_report(result, title=f"{log.name}", debriefing=found, remarks=remarks)
         write_whole(report, page.encode())

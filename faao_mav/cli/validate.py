@@ -147,7 +147,7 @@ def _judge(
 
 
 def _write_report(report: Path, checked: "CheckedFile", solution: "Solution | None") -> None:
-    from faao_mav.report import render_report
+    from faao_mav.report.page import render_report
     from faao_mav.workflow import Result
 
     about = Result(solution, check=checked.check) if solution is not None else checked.check

@@ -16,7 +16,8 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.pricing import FreshRates, MutualInformation, Saturation
 from faao_mav.optimizer.search.bound import Bound
-from faao_mav.report import render_report, summary
+from faao_mav.report import summary
+from faao_mav.report.page import render_report
 from faao_mav.validate.check import Check
 from faao_mav.workflow import Result
 
