@@ -136,6 +136,10 @@ def flown(
     files = result.write(folder / "mission.waypoints")
     command = [sys.executable, str(autopilots / script), str(files[0])]
     command += ["--param-file", str(files[1])] if len(files) > 1 else []
+    own = folder / "own.parm"  # what the plan says that the vehicle has
+    told = result.solution.plan.vehicle.parameters
+    own.write_text("".join(f"{name} {value}\n" for name, value in told.items()))
+    command += ["--param-file", str(own)] if told else []
     command += in_wind(autopilots / script, wind or result.solution.plan.site.wind)
     track = folder / "track.csv"
     for _ in range(4):
