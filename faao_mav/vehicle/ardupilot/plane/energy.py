@@ -49,7 +49,9 @@ class Energy:
     ) -> None:
         self.height, self.speed, self.climb = height, speed, climb
         self._limits, self._density, self._rates = limits, density, limits.speed_rates
-        self._pitches = _LEAST_PITCH, limits.climb_pitch or limits.pitch_limit
+        self._pitches = least, most = _LEAST_PITCH, limits.climb_pitch or limits.pitch_limit
+        self._kinetic_weight = _KINETIC_SHARE * (most - least) * GRAVITY
+        self._powers = -GRAVITY * limits.descent_speed, GRAVITY * limits.climb_speed
         self._level, self._demand = height, demand
         self._throttle_integral = self._pitch_integral = self._kinetic_integral = 0.0
         self._demanded_rate = self._flown_rate = self._rate = 0.0
@@ -65,14 +67,16 @@ class Energy:
 
         `load` is the load factor.
         """
-        limits, flown = self._limits, self.speed
+        limits, rates, flown = self._limits, self._rates, self.speed
         up, down = limits.climb_speed * step, limits.descent_speed * step
-        self._level += min(max(height - self._level, -down), up)
-        rates = self._rates
-        rate = min(max((speed - self._demand) / step, -rates.fall), rates.power / flown)
+        rise, rate = height - self._level, (speed - self._demand) / step
+        self._level += -down if rise < -down else up if rise > up else rise
+        quickest = rates.power / flown
+        rate = -rates.fall if rate < -rates.fall else rate
+        rate = quickest if rate > quickest else rate
         self._demand += rate * step
         # of both rates only what is new counts: a high-pass filter
-        wash = -math.expm1(-step / self._limits.energy_time)
+        wash = -math.expm1(-step / limits.energy_time)
         self._demanded_rate += (rate - self._demanded_rate) * wash
         self._flown_rate += (self._rate - self._flown_rate) * wash
         kinetic_demanded = flown * (rate - self._demanded_rate)
@@ -83,7 +87,7 @@ class Energy:
         potential_rate = GRAVITY * self.climb
         throttle = self._throttle(
             kinetic + potential,
-            kinetic_demanded + potential / self._limits.energy_time,
+            kinetic_demanded + potential / limits.energy_time,
             kinetic_rate + potential_rate,
             load,
             step,
@@ -95,47 +99,47 @@ class Energy:
         self, missing: float, demanded: float, flown: float, load: float, step: float
     ) -> float:
         """Return the throttle, 0 to 1, for an energy that is `missing`, m²/s², and its rates."""
-        most, least = (
-            GRAVITY * self._limits.climb_speed,
-            -GRAVITY * self._limits.descent_speed,
-        )
-        demanded = min(max(demanded, least), most)
-        ahead = _TRIM + (demanded + self._limits.turn_power * (load**2 - 1)) / (most - least)
-        gain = 1 / (self._limits.energy_time * (most - least))
-        throttle = ahead + gain * (missing + self._limits.throttle_damping * (demanded - flown))
+        limits, (least, most) = self._limits, self._powers
+        demanded = least if demanded < least else most if demanded > most else demanded
+        ahead = _TRIM + (demanded + limits.turn_power * (load**2 - 1)) / (most - least)
+        gain = 1 / (limits.energy_time * (most - least))
+        throttle = ahead + gain * (missing + limits.throttle_damping * (demanded - flown))
         self._least_throttle -= _EASE * step
-        held = min(max(throttle + self._throttle_integral, self._least_throttle, 0.0), 1.0)
-        integral = self._throttle_integral + gain * self._limits.energy_integral * missing * step
-        self._throttle_integral = min(max(integral, -throttle), 1 - throttle)
-        return held
+        held = max(throttle + self._throttle_integral, self._least_throttle, 0.0)
+        integral = self._throttle_integral + gain * limits.energy_integral * missing * step
+        integral = -throttle if integral < -throttle else integral
+        self._throttle_integral = 1 - throttle if integral > 1 - throttle else integral
+        return 1.0 if held > 1.0 else held
 
     def _pitch(self, missing: float, flown: float, kinetic: float, step: float) -> float:
         """Return the pitch, rad, for a difference of energies that is `missing`, m²/s²."""
-        least, most = self._pitches
+        limits, (least, most) = self._limits, self._pitches
         weight = GRAVITY * self.speed
-        demanded = missing / self._limits.energy_time
+        demanded = missing / limits.energy_time
         error = demanded - flown
         limit = self._most_kinetic()
-        self._kinetic_integral = min(
-            max(self._kinetic_integral - kinetic * step / self._limits.energy_time, -limit), limit
-        )
-        pitch = demanded + self._limits.pitch_damping * error
-        pitch += self._pitch_integral + self._kinetic_integral
+        integral = self._kinetic_integral - kinetic * step / limits.energy_time
+        integral = -limit if integral < -limit else limit if integral > limit else integral
+        self._kinetic_integral = integral
+        pitch = demanded + limits.pitch_damping * error
+        pitch += self._pitch_integral + integral
         if least * weight < pitch < most * weight or error * pitch < 0:
-            self._pitch_integral += self._limits.energy_integral * error * step
-        return min(max(pitch / weight, least), most)
+            self._pitch_integral += limits.energy_integral * error * step
+        angle = pitch / weight
+        return least if angle < least else most if angle > most else angle
 
     def _most_kinetic(self) -> float:
         """Return the greatest integral of kinetic energy's error, m²/s³."""
-        least, most = self._pitches
-        return _KINETIC_SHARE * (most - least) * GRAVITY * self.speed
+        return self._kinetic_weight * self.speed
 
     def _move(self, throttle: float, pitch: float, load: float, step: float) -> None:
         """Let the aircraft fly for `step` seconds."""
-        angle = math.asin(min(max(self.climb / self.speed, -1.0), 1.0))
+        steepness = self.climb / self.speed
+        angle = math.asin(-1.0 if steepness < -1.0 else 1.0 if steepness > 1.0 else steepness)
         angle += (pitch - self._attack(load) - angle) * -math.expm1(-step / _PITCH_LAG)
         self._rate = _THRUST * throttle - self._drag(load) - GRAVITY * math.sin(angle)
-        self.speed = max(self.speed + self._rate * step, 1.0)
+        speed = self.speed + self._rate * step
+        self.speed = 1.0 if speed < 1.0 else speed
         self.climb = self.speed * math.sin(angle)
         self.height += self.climb * step
 

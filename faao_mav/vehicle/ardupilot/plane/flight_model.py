@@ -10,7 +10,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
-from faao_mav.vehicle.ardupilot.plane.motion import STEP, Motion
+from faao_mav.vehicle.ardupilot.plane.motion import STEP, Motion, Track
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.atmosphere import density_ratio
 from faao_mav.vehicle.flight_path import FlightPath, Flown
@@ -78,12 +78,15 @@ class _Flight:
 
     def __init__(self, plane: ArduPlane, path: FlightPath) -> None:
         self._plane, self._path = plane, path
-        self._places = [complex(east, north) for east, north in path.points[:, :2]]
-        altitude = path.elevation + float(path.points[:, 2].max())
+        self._places = [complex(east, north) for east, north in path.points[:, :2].tolist()]
+        self._heights, self._holds = path.points[:, 2].tolist(), path.holds.tolist()
+        ends = zip(pairwise(self._places), pairwise(self._heights), strict=True)
+        self._tracks = [Track(*places, *heights) for places, heights in ends]
+        altitude = path.elevation + max(self._heights)
         commands = path.speeds.tolist() or [0.0]
         self._speeds = [plane.true_airspeed(command, altitude) for command in commands]
         self._full_radius = plane.waypoint_radius / density_ratio(altitude)
-        height = float(path.points[0, 2])
+        height = self._heights[0]
         wind, climb, demanded = complex(*path.wind), 0.0, None
         if path.entry is None:
             moves = [b - a for a, b in pairwise(self._places) if b != a]
@@ -103,10 +106,10 @@ class _Flight:
             if k > 0:
                 arrivals[k] = self._fly_leg(k)
             departures[k] = arrivals[k]
-            if self._path.holds[k] > 0:
+            if self._holds[k] > 0:
                 began = self._circle(k)
                 arrivals[k] = began if k > 0 else 0.0
-                departures[k] = self._loiter(k, arrivals[k] + float(self._path.holds[k]))
+                departures[k] = self._loiter(k, arrivals[k] + self._holds[k])
         t = np.arange(math.ceil(departures[-1] / step - 1e-9) + 1, dtype=float) * step
         while self._motion.time < t[-1]:
             self._step_on(count - 1, STEP)
@@ -115,31 +118,30 @@ class _Flight:
     def _fly_leg(self, k: int) -> float:
         """Fly to point `k` and return when it is reached; a loiter's point is only approached."""
         motion = self._motion
-        if self._path.holds[k] > 0:
+        if self._holds[k] > 0:
             return motion.time
-        turn = self._turn(k)
-        before = self._beyond(k, turn)
+        turn, given = self._turn(k), float(self._path.radii[k])
+        before = self._beyond(k, turn, given)
         due = motion.time + _NOTICED if before >= 0 else math.inf
         while motion.time < due - 1e-9:
             step = min(STEP, due - motion.time)
             self._step_on(k, step)
-            if due == math.inf and (after := self._beyond(k, turn)) >= 0:
+            if due == math.inf and (after := self._beyond(k, turn, given)) >= 0:
                 due = motion.time - step * after / (after - before) + _NOTICED
             elif due == math.inf:
                 before = after
         return due
 
-    def _beyond(self, k: int, turn: float) -> float:
+    def _beyond(self, k: int, turn: float, given: float) -> float:
         """Return how far beyond where point `k` is reached the aircraft is, m, below 0 before it.
 
-        `turn` is the angle there over 90 degrees, at most 1.
+        `turn` is the angle there over 90 degrees, at most 1; `given` is the acceptance radius, m,
+        or 0.
         """
-        start, end, place = self._places[k - 1], self._places[k], self._motion.place
-        given = float(self._path.radii[k])
-        radius = given if given > 0 else min(self._full_radius, self._motion.look_ahead) * turn
-        leg, left = end - start, place - end
-        passed = (left * leg.conjugate()).real / abs(leg) if leg else 0.0
-        return max(passed, radius - abs(left))
+        motion = self._motion
+        radius = given if given > 0 else min(self._full_radius, motion.look_ahead) * turn
+        passed = self._tracks[k - 1].passed(motion.place)
+        return max(passed, radius - abs(motion.place - self._places[k]))
 
     def _turn(self, k: int) -> float:
         if k + 1 == len(self._places):
@@ -173,22 +175,19 @@ class _Flight:
 
     def _step_on(self, k: int, step: float) -> None:
         """Go on by `step` seconds along the leg that ends at point `k`."""
-        if k == 0 or self._path.holds[k] > 0:
+        if k == 0 or self._holds[k] > 0:
             self._step_round(k)
             return
-        begin, end = float(self._path.points[k - 1, 2]), float(self._path.points[k, 2])
         if k == 1 and self._path.entry is not None:
-            self._motion.towards(self._places[1], end, self._speeds[0], step)
+            self._motion.towards(self._places[1], self._heights[1], self._speeds[0], step)
         else:
-            self._motion.along(
-                self._places[k - 1], self._places[k], (begin, end), self._speeds[k - 1], step
-            )
+            self._motion.along(self._tracks[k - 1], self._speeds[k - 1], step)
         self._keep()
 
     def _step_round(self, k: int) -> bool:
         """Go on by one step round point `k` and return whether the circle is being flown."""
-        height, speed = float(self._path.points[k, 2]), self._speeds[max(k - 1, 0)]
-        circling = self._motion.round(self._places[k], height, speed, STEP)
+        speed = self._speeds[max(k - 1, 0)]
+        circling = self._motion.round(self._places[k], self._heights[k], speed, STEP)
         self._keep()
         return circling
 

@@ -26,8 +26,27 @@ showed it: in its log, sideslip times the airspeed's square is less there, and t
 _ROLL_TURN = 0.01
 """How far the course turns while the aircraft banks, over the change of bank."""
 
-_INTERCEPT = math.radians(45)
-"""The steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
+_INTERCEPT = math.sin(math.radians(45))
+"""The sine of the steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
+
+
+class Track:
+    """The leg from `start` to `end`, at the heights `begin` and `finish`, m."""
+
+    def __init__(self, start: complex, end: complex, begin: float, finish: float) -> None:
+        self.start, self.end, self.begin, self.finish = start, end, begin, finish
+        self.leg = end - start
+        self.length = abs(self.leg)
+        self.course = self.leg / self.length if self.leg else 0j
+
+    def passed(self, place: complex) -> float:
+        """Return how far `place` is beyond the perpendicular through the end, m, below 0 before.
+
+        It is 0 for a leg without a length.
+        """
+        if not self.leg:
+            return 0.0
+        return ((place - self.end) * self.leg.conjugate()).real / self.length
 
 
 class Motion:
@@ -71,7 +90,7 @@ class Motion:
         demand = flown if speed is None else speed
         self._energy = Energy(limits, density, height, flown, climb, demand)
         self._sideslip = SIDESLIP * density
-        self._look()
+        self._look(self._airspeed())
 
     def sample(self) -> tuple[float, ...]:
         """Return time, place (east, north, up) and velocity, SI."""
@@ -81,11 +100,12 @@ class Motion:
 
     def _airspeed(self) -> float:
         """Return the horizontal part of the airspeed, m/s."""
-        return math.sqrt(max(self._energy.speed**2 - self._energy.climb**2, 1.0))
+        square = self._energy.speed**2 - self._energy.climb**2
+        return math.sqrt(square) if square > 1.0 else 1.0
 
-    def _look(self) -> None:
-        """Take in the velocity over ground, and L of it."""
-        self._velocity = cmath.rect(self._airspeed(), self.heading) + self._wind
+    def _look(self, airspeed: float) -> None:
+        """Take in the velocity over ground, and L of it; `airspeed` is its horizontal part, m/s."""
+        self._velocity = cmath.rect(airspeed, self.heading) + self._wind
         self._speed = abs(self._velocity)
         self.look_ahead = self._ahead * self._speed
 
@@ -93,22 +113,19 @@ class Motion:
         """Return the angle from the course over ground to `place`."""
         return cmath.phase((place - self.place) * self._velocity.conjugate())
 
-    def along(
-        self, start: complex, end: complex, heights: tuple[float, float], speed: float, step: float
-    ) -> None:
-        """Go on by `step` seconds along the track from `start` to `end`, between `heights`, m."""
-        leg = end - start
-        if leg == 0:
-            self.towards(end, heights[1], speed, step)
+    def along(self, track: Track, speed: float, step: float) -> None:
+        """Go on by `step` seconds along the `track`."""
+        if not track.leg:
+            self.towards(track.end, track.finish, speed, step)
             return
-        track = leg / abs(leg)
-        offset = (self.place - start) * track.conjugate()
-        limit = math.sin(_INTERCEPT)
-        approach = math.asin(min(max(offset.imag / self.look_ahead, -limit), limit))
-        eta = cmath.phase(track * cmath.rect(1.0, -approach) * self._velocity.conjugate())
-        done = min(max(offset.real / abs(leg), 0.0), 1.0)
-        height = heights[0] + done * (heights[1] - heights[0])
-        self._go(self._lateral(eta), height, speed, step)
+        offset = (self.place - track.start) * track.course.conjugate()
+        sine = offset.imag / self.look_ahead
+        sine = -_INTERCEPT if sine < -_INTERCEPT else _INTERCEPT if sine > _INTERCEPT else sine
+        aim = track.course * cmath.rect(1.0, -math.asin(sine))
+        done = offset.real / track.length
+        done = 0.0 if done < 0.0 else 1.0 if done > 1.0 else done
+        height = track.begin + done * (track.finish - track.begin)
+        self._go(self._lateral(cmath.phase(aim * self._velocity.conjugate())), height, speed, step)
 
     def towards(self, end: complex, height: float, speed: float, step: float) -> None:
         """Go on by `step` seconds straight to `end`."""
@@ -139,23 +156,24 @@ class Motion:
 
     def _lateral(self, eta: float) -> float:
         """Return the acceleration to the left that turns the course by `eta`, m/s²."""
-        bounded = min(max(eta, -math.pi / 2), math.pi / 2)
+        square = math.pi / 2
+        bounded = -square if eta < -square else square if eta > square else eta
         return self._gain * self._speed * math.sin(bounded)
 
     def _go(self, lateral: float, height: float, speed: float, step: float) -> None:
         """Move on with `lateral` acceleration to the left, m/s², as far as it goes."""
-        before = self._energy.climb
-        self._energy.hold(height, speed, 1 / math.cos(self._bank), step)
-        limits = self._limits
+        energy, limits = self._energy, self._limits
+        before, most = energy.climb, limits.roll_limit
+        energy.hold(height, speed, 1 / math.cos(self._bank), step)
         bank = math.atan2(lateral, GRAVITY)
-        bank = min(max(bank, -limits.roll_limit), limits.roll_limit)
+        bank = -most if bank < -most else most if bank > most else bank
         change = (bank - self._bank) * -math.expm1(-step / limits.roll_time)
         self._bank += change
         airspeed = self._airspeed()
-        lift = GRAVITY + (self._energy.climb - before) / step
-        turning = 1 - self._sideslip * min(1.0, airspeed / _SLOW)
+        lift = GRAVITY + (energy.climb - before) / step
+        turning = 1 - self._sideslip * (1.0 if airspeed > _SLOW else airspeed / _SLOW)
         turn = turning * lift * math.tan(self._bank) / airspeed * step + _ROLL_TURN * change
         self.place += (cmath.rect(airspeed, self.heading + turn / 2) + self._wind) * step
         self.heading += turn
         self.time += step
-        self._look()
+        self._look(airspeed)
