@@ -9,6 +9,8 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import DirectionPartials, RatePartials
+from faao_mav.radio.class_sum import class_sum
+from faao_mav.radio.quadratic_form import coordinates
 from faao_mav.radio.rate import cutoff_rate
 
 _LN2 = float(np.log(2.0))
@@ -87,36 +89,42 @@ class FixedRate:
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
         """Return the rate and its exact derivatives by l and u, bits (n,).
 
-        With D_k = e^l q_k(u) and the weights p_k = mult_k e^-D_k / sum, the zero class included,
-        R_0 = const - log2 sum_k mult_k e^-D_k has the slope sum p_k D_k' / ln 2 and the second
-        derivative (sum p_k (D_k'' - D_k'²) + (sum p_k D_k')²) / ln 2.
+        With D_k = φ_k z the exponents, linear in the coordinates z of Z = P^H H^H H P / (4 σ²), and
+        weights over all classes but zero that have the mean m, the covariance C and the share p of
+        all classes' sum, R_0 has the slopes p m z_a / ln 2 and the second derivatives
+        p (m z_ab - z_a C z_b - (1 - p) (m z_a) (m z_b)) / ln 2; z and its derivative by l are one.
         """
-        link, classes = self.link, self.link.classes
+        link = self.link
         P, H_r, H_u, H_uu = self._by_cosine(cosine)
-        Pu = np.sqrt(np.exp(gain_log) / (4 * link.noise))[..., None, None] * (P @ classes.vectors.T)
-        z = H_r @ Pu
-        D = _inner(z, z)
-        least = np.minimum(0.0, np.log(classes.symbols / classes.multiplicity).min())
-        e = classes.multiplicity * np.exp(-D + least)
-        total = e.sum(axis=-1) + classes.symbols * np.exp(least)
-        p = e / total[..., None]
-        value = cutoff_rate(np.exp(gain_log / 2)[..., None, None] * H_r, P, classes, link.noise)
+        scale = np.sqrt(np.exp(gain_log) / (4 * link.noise))[..., None, None]
+        A = scale * (H_r @ P)
+        z = coordinates(A.conj().mT @ A)
+        width = z.shape[-1]
+        s, mean, covariance = class_sum(link.classes).moments(z.reshape(-1, width))
+        mean, covariance = mean.reshape(z.shape), covariance.reshape(*z.shape, width)
+        share = np.exp(s - np.logaddexp(0.0, s)).reshape(z.shape[:-1])
+        value = cutoff_rate(
+            np.exp(gain_log / 2)[..., None, None] * H_r, P, link.classes, link.noise
+        )
 
-        def mean(terms: Real) -> Real:
-            return np.asarray(np.sum(p * terms, axis=-1))
+        def along(dz: Real) -> Real:
+            return np.asarray(np.sum(mean * dz, axis=-1))
 
-        m_l = mean(D)
-        by_ll = mean(D - D**2) + m_l**2
+        def second(a: Real, b: Real, ab: Real) -> Real:
+            spread = np.sum(a * (covariance @ b[..., None])[..., 0], axis=-1)
+            bent = along(ab) - spread - (1 - share) * along(a) * along(b)
+            return np.asarray(share * bent / _LN2)
+
+        by_l, by_ll = share * along(z) / _LN2, second(z, z, z)
         if H_u is None or H_uu is None:
-            return RatePartials(value, m_l / _LN2, by_ll / _LN2)
-        dz = H_u @ Pu
-        D_u = 2 * _inner(z, dz)
-        D_uu = 2 * (_inner(dz, dz) + _inner(z, H_uu @ Pu))
-        m_u = mean(D_u)
-        by_lu = mean(D_u - D * D_u) + m_l * m_u
-        by_uu = mean(D_uu - D_u**2) + m_u**2
-        direction = DirectionPartials(m_u / _LN2, by_lu / _LN2, by_uu / _LN2)
-        return RatePartials(value, m_l / _LN2, by_ll / _LN2, direction)
+            return RatePartials(value, by_l, by_ll)
+        A_u, A_uu = scale * (H_u @ P), scale * (H_uu @ P)
+        z_u = 2 * coordinates(_hermitian(A.conj().mT @ A_u))
+        z_uu = 2 * coordinates(_hermitian(A.conj().mT @ A_uu) + A_u.conj().mT @ A_u)
+        direction = DirectionPartials(
+            share * along(z_u) / _LN2, second(z, z_u, z_u), second(z_u, z_u, z_uu)
+        )
+        return RatePartials(value, by_l, by_ll, direction)
 
     def _by_cosine(self, cosine: Real) -> tuple[Complex, Complex, Complex | None, Complex | None]:
         """Return P, H_r and the derivatives of H_r by u and uu, in the frame where P is fixed.
@@ -177,6 +185,6 @@ def channel(link: Link, gain_log: Real, cosine: Real) -> Complex:
     return np.asarray(np.exp(gain_log / 2)[..., None, None] * H_r)
 
 
-def _inner(a: Complex, b: Complex) -> Real:
-    """Return Re a^H b over the receiving antennas, (..., k) for a and b (..., N_r, k)."""
-    return np.asarray(np.sum(a.real * b.real + a.imag * b.imag, axis=-2))
+def _hermitian(X: Complex) -> Complex:
+    """Return the Hermitian part of X (..., N, N)."""
+    return np.asarray((X + X.conj().mT) / 2)
