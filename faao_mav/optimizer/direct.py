@@ -173,12 +173,13 @@ def direct(
     if values.max() > max(optimum.value for optimum in optima):
         optima += optimized([flights[int(values.argmax())]])
     best = _best(problem, field, optima)
-    final = _at_exact_rates(problem, scheme, field, best)
+    final, rates_there = _at_exact_rates(problem, scheme, field, best)
     for other in optima:  # where rates come from a table another may be the best in truth
         if other is not best and other.value > final.value + _EQUAL:
-            exact = _at_exact_rates(problem, scheme, field, other)
-            final = exact if exact.value > final.value + _EQUAL else final
-    solution = _solution(problem, scheme, field, final, history, by_start)
+            exact, rates_elsewhere = _at_exact_rates(problem, scheme, field, other)
+            if exact.value > final.value + _EQUAL:
+                final, rates_there = exact, rates_elsewhere
+    solution = _solution(problem, scheme, rates_there, final, history, by_start)
     if before is None:
         return solution
     return replace(solution, gain=float(solution.history[-1]) - _worth(problem, before))
@@ -212,23 +213,25 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
 
 def _at_exact_rates(
     problem: Problem, scheme: Design, field: RateField, optimum: LocalOptimum
-) -> LocalOptimum:
+) -> tuple[LocalOptimum, RateField]:
     """Return `optimum`, taken a little further where it was found in an approximate table.
 
-    With the precoders held, the rates are exact, and whatever they gain the best ones gain too.
+    With the precoders held, the rates are exact, and whatever they gain the best ones gain too. The
+    rates are returned with it.
     """
     if problem.plan.optimizer.rate != "cutoff":
-        return optimum
+        return optimum, field
     if not any(isinstance(rate, ModeRate) and not rate.exact for rate in field.rates):
-        return optimum
+        return optimum, field
     w = optimum.trajectory.w
     held = []
     for link, rate in zip(field.links, field.rates, strict=True):
         H = link.channel(w, link.small_scale(w))
         held.append(FixedRate(link, _precoders(link, rate, scheme, w, H)))
+    exact = RateField(field.links, tuple(held))
     further = maximize(
         problem.kinematics,
-        RateField(field.links, tuple(held)),
+        exact,
         optimum.trajectory,
         constraints=problem.constraints(problem.kinematics),
         tolerance=problem.plan.optimizer.tolerance,
@@ -236,7 +239,7 @@ def _at_exact_rates(
         strategy=NEAR_START if problem.kinematics.min_speed > 0 else None,
         relay=problem.maximised_queue,
     )
-    return replace(optimum, trajectory=further.trajectory, value=further.value)
+    return replace(optimum, trajectory=further.trajectory, value=further.value), exact
 
 
 def _rates(scheme: Design, field: RateField, w: Real) -> Real:
@@ -286,7 +289,13 @@ def _solution(
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex) -> Complex:
-    """Return the precoders at positions w (n, 2), searched from the best that `rate` knows."""
+    """Return the precoders at positions w (n, 2), searched from the best that `rate` knows.
+
+    From a table of two modes they are searched afresh too, and the better kept; from one of a
+    single mode that gained 2e-6 bit in the mean, on twelve random plans.
+    """
+    if isinstance(rate, FixedRate):
+        return scheme.precoders(link, H, start=rate.P)
     where = link_coordinates(link, w.T)
     at = where.gain_log, where.cosine
     if not scheme.optimal or not isinstance(rate, CurveRate | BestRate | ModeRate):
@@ -295,7 +304,7 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex)
     if link.measure != "cutoff":
         return known
     carried = scheme.precoders(link, H, start=known)
-    if isinstance(rate, CurveRate):
+    if isinstance(rate, CurveRate) or (min(link.receive, link.transmit) == 1 and not rate.exact):
         return carried
     afresh = scheme.precoders(link, H)
     if rate.exact:

@@ -7,6 +7,7 @@ H = sqrt(gain) H_r, a = l + ln(W λ_1² / σ²) of H_r, and κ does not depend o
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -108,19 +109,38 @@ def has_few_modes(link: Link) -> bool:
     return min(link.receive, link.transmit) <= 2
 
 
-def mode_rate(link: Link, least: float, most: float) -> ModeRate:
-    """Return the best rate of `link`, whose draws are known, from l = `least` to l = `most`."""
+def mode_rates(links: Sequence[Link], spans: Sequence[Real]) -> tuple[ModeRate, ...]:
+    """Return the best rates of `links`, whose draws are known, each for the l of its span (2,).
+
+    Links of one alphabet and one number of modes share a table, if their strengths overlap.
+    """
+    kinds = [
+        (link.measure, link.modulation, link.transmit, min(2, link.receive, link.transmit))
+        for link in links
+    ]
+    ends = [_ends(link, *span) for link, span in zip(links, spans, strict=True)]
+    if len(set(kinds)) == 1 and max(low for low, _ in ends) <= min(high for _, high in ends):
+        ends = [(min(low for low, _ in ends), max(high for _, high in ends))] * len(links)
+    rates = []
+    for link, kind, reach in zip(links, kinds, ends, strict=True):
+        table, fixed = _table(*kind, *reach), None
+        if not link.follows_position:
+            fixed = _located(table, *_modes(link, np.zeros(_slots(link))))
+        rates.append(ModeRate(link, table, fixed))
+    return tuple(rates)
+
+
+def _slots(link: Link) -> int:
+    return 1 if link.nlos is None else len(link.nlos)
+
+
+def _ends(link: Link, least: float, most: float) -> tuple[int, int]:
+    """Return the least and the largest a of `link` from l = `least` to l = `most`, rounded out."""
     directions = np.linspace(-1, 1, _DIRECTIONS) if link.follows_position else np.zeros(1)
-    slots = 1 if link.nlos is None else len(link.nlos)
-    strengths = [_modes(link, np.full(slots, u))[0] for u in directions]
+    strengths = [_modes(link, np.full(_slots(link), u))[0] for u in directions]
     low = least + min(s.min() for s in strengths) - _MARGIN
     high = most + max(s.max() for s in strengths) + _MARGIN
-    ends = (math.floor(low / _WHOLE) * _WHOLE, math.ceil(high / _WHOLE) * _WHOLE)
-    modes = min(2, link.receive, link.transmit)
-    table = _table(link.measure, link.modulation, link.transmit, modes, *ends)
-    if link.follows_position:
-        return ModeRate(link, table, None)
-    return ModeRate(link, table, _located(table, *_modes(link, np.zeros(slots))))
+    return math.floor(low / _WHOLE) * _WHOLE, math.ceil(high / _WHOLE) * _WHOLE
 
 
 def _located(table: ModeTable, strength: Real, ratio: Real) -> tuple[Real, GridPosition]:
@@ -137,12 +157,15 @@ def _table(
     spacing = _SPACING if cutoff else _INFORMATION_SPACING
     gains = np.linspace(low, high, round((high - low) / spacing) + 1)
     ratios = np.linspace(0, 1, _RATIOS if cutoff else _INFORMATION_RATIOS)
-    H = np.zeros((len(gains), len(ratios), modes, antennas), dtype=np.complex128)
+    searched = ratios if modes == 2 else ratios[:1]  # of one mode κ is 0
+    H = np.zeros((len(gains), len(searched), modes, antennas), dtype=np.complex128)
     H[..., 0, 0] = np.exp(gains / 2)[:, None]
     if modes == 2:
-        H[..., 1, 1] = np.exp(gains / 2)[:, None] * ratios
+        H[..., 1, 1] = np.exp(gains / 2)[:, None] * searched
     rate, Q, exact = _search(measure, modulation, H)
-    return ModeTable(BicubicSpline.through(gains, ratios, rate), gains, ratios, Q, exact)
+    alike = len(ratios) // len(searched)
+    spline = BicubicSpline.through(gains, ratios, np.repeat(rate, alike, axis=1))
+    return ModeTable(spline, gains, ratios, np.repeat(Q, alike, axis=1), exact)
 
 
 def _search(measure: Measure, modulation: str, H: Complex) -> tuple[Real, Complex, bool]:
@@ -164,7 +187,7 @@ def _search(measure: Measure, modulation: str, H: Complex) -> tuple[Real, Comple
     i, j = np.arange(H.shape[0]) // every_a, np.arange(H.shape[1]) // every_k
     rate, Q = np.full(H.shape[:2], -np.inf), np.zeros((*H.shape[:2], *coarse.shape[2:]), complex)
     for up in (0, 1):
-        for right in (0, 1):
+        for right in range(min(2, coarse.shape[1])):
             near = coarse[np.minimum(i + up, coarse.shape[0] - 1)]
             near = near[:, np.minimum(j + right, coarse.shape[1] - 1)]
             reached, P = searched(H, near)

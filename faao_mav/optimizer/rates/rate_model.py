@@ -18,7 +18,7 @@ from faao_mav.arrays import Complex, Flags, Integers, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import DirectionPartials, RateModel, RatePartials
-from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
+from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rates
 from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate
 from faao_mav.optimizer.rates.spline import BicubicSpline, CubicSpline
 
@@ -112,6 +112,8 @@ def rate_models(
         ranges.append(np.log(link.reference_gain / squared_distance))
     if all(_depends_on_distance_alone(link, design) for link in links):
         return best_curves(links, design, ranges)
+    if design.optimal and all(has_few_modes(link) for link in links):
+        return mode_rates(links, ranges)
     return tuple(_model(link, design, span) for link, span in zip(links, ranges, strict=True))
 
 
@@ -130,7 +132,7 @@ def _model(link: Link, design: Design, span: Real) -> RateModel:
         return _surface(link, design, *span)
     if not design.optimal:
         return DifferencedRate(link, partial(_rate, link, design))
-    return mode_rate(link, *span) if has_few_modes(link) else BestRate(link)
+    return mode_rates([link], [span])[0] if has_few_modes(link) else BestRate(link)
 
 
 def best_curves(
@@ -163,8 +165,8 @@ def _curve_precoders(
     for j, link in enumerate(links):
         of_each_draw = design.averaged and not design.blind and link.measure == "mutual_information"
         if of_each_draw and has_few_modes(link):
-            table = mode_rate(link, grids[j].min(), grids[j].max())
-            found[j] = table.initial_precoders(grids[j], 0 * grids[j])
+            (rate,) = mode_rates([link], [grids[j][[0, -1]]])
+            found[j] = rate.initial_precoders(grids[j], 0 * grids[j])
         else:
             alike.setdefault((link.measure, link.modulation, link.transmit), []).append(j)
     for group in alike.values():

@@ -24,7 +24,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rate
+from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rates
 from faao_mav.optimizer.rates.rate_model import best_curves
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 from faao_mav.radio.rate import cutoff_rate
@@ -196,7 +196,7 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
         return cutoff_rate(H, best.P[:, None], link.classes, link.noise), True
     diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
     if has_few_modes(link):
-        rate = mode_rate(diagonal, gain_log.min(), gain_log.max())
+        (rate,) = mode_rates([diagonal], [np.array([gain_log.min(), gain_log.max()])])
         return np.stack([rate.value(column, column) for column in gain_log.T], axis=1), False
     # One distance after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
