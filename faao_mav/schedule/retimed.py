@@ -3,7 +3,8 @@
 Legs are causal. The speed of a leg changes how long the part of it takes that is flown at the
 command, a wait how long the aircraft stays; everything behind comes later by as much, along the
 same path. So one predicted flight tells how all its positions depend on all its commands, and no
-further flight has to be predicted for a slope.
+further flight has to be predicted for a slope. How long legs take at other speeds is known of some
+autopilots (``vehicle_type.LegDurations``); of others the flight tells.
 
 Constants that name no source are chosen; what a change costs is not measured.
 """
