@@ -83,7 +83,7 @@ def test_precoders_are_as_good_as_a_search_from_all_starts(
     link = build_problem(solution.plan).bs_uav
     H = link.channel(solution.w, solution.H_rB)
     found = best_precoders(H, link.power, modulation, link.noise).rate
-    assert (solution.I_U >= found - 1e-9).all()
+    assert (solution.I_U >= found - 1e-6).all()  # the tolerance of either search
 
 
 @pytest.mark.parametrize(
