@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector, Wind
 from faao_mav.vector import lengths
 from faao_mav.vehicle import Track, Vehicle
+from faao_mav.vehicle.vehicle_type import HELD
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
@@ -31,8 +33,16 @@ _SLOWER = 3.0
 relay's part has to be in time, the ways from home and back need not."""
 
 _DIRECTIONS = 8
-_STEP, _FIRST_STEP = 0.25, 1.0
-"""The step of the limit, and the first one beyond a wind that is surely kept, m/s. Chosen."""
+_STEP = 0.25
+"""The step of the limit, m/s. Chosen."""
+
+_STEPS = round(MOST_WIND / _STEP)
+
+_INSTANTS = 300
+"""The most instants of a flight at which its lateness in wind is foreseen. Chosen."""
+
+_SLOWEST = 0.1
+"""The least ground speed, m/s, that is foreseen: an aircraft that the wind holds is late anyway."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +77,8 @@ def wind_limit(
 
     Within the airspeed of a vehicle that hovers a wind changes nothing; an aeroplane's flight is
     changed by any. From the strongest wind in which all of `track` is within that, the limit is
-    sought upwards by predicted flights: in the direction where that wind is weakest, then in those
-    where less than the limit found so far is kept.
+    sought by predicted flights: first in the direction where the least wind makes the flight late
+    by its airspeeds, then in those where less than the limit found so far is kept.
     """
     top, hovers = vehicle.type.max_airspeed(vehicle), vehicle.type.hovers
     known = math.isfinite(top) if hovers else vehicle.type.models_wind
@@ -77,18 +87,23 @@ def wind_limit(
     beside = (0.0, 0.0) if hovers or solution is None else solution.plan.wind
     flown = mission if solution is None else _without_return(mission)
     trial = _Trial(flown, vehicle, float(track.t[-1]), solution, lead, beside)
+    relayed = (track.t, track.velocity[:, :2])
+    if solution is not None:
+        relayed = (solution.t, np.gradient(solution.w, solution.t, axis=0))
+    fastest = top / HELD if hovers else None
     degrees = [360.0 / _DIRECTIONS * k for k in range(_DIRECTIONS)]
-    harmless = sorted((_harmless(track, top, each) if hovers else 0.0, each) for each in degrees)
-    found = WindLimit(MOST_WIND, harmless[0][1], beside)
+    foreseen = sorted((_foreseen(*relayed, fastest, beside, each), each) for each in degrees)
+    steps, worst = _STEPS, foreseen[0][1]
     if not trial.fulfilled(track):
-        return replace(found, speed=0.0)
-    for least, start in harmless:
-        kept = min(least, found.speed)
-        if kept < found.speed and vehicle.type.models_wind:
-            kept = trial.strongest(kept, found.speed, start)
-        if kept < found.speed:
-            found = WindLimit(kept, start, beside)
-    return replace(found, speed=_STEP * math.floor(found.speed / _STEP + 1e-9))
+        return WindLimit(0.0, worst, beside)
+    for guess, start in foreseen:
+        least = _harmless(track, top, start) if hovers else 0.0
+        kept = min(math.floor(least / _STEP + 1e-9), steps)
+        if kept < steps and vehicle.type.models_wind:
+            kept = trial.strongest(kept, steps, guess if steps == _STEPS else steps, start)
+        if kept < steps:
+            steps, worst = kept, start
+    return WindLimit(_STEP * steps, worst, beside)
 
 
 def _without_return(mission: Mission) -> Mission:
@@ -111,6 +126,32 @@ def _harmless(track: Track, top: float, degrees: float) -> float:
     return float(max(0.0, np.where(room > 0, strongest, 0.0).min()))
 
 
+def _foreseen(t: Real, v: Real, top: float | None, beside: Vector, degrees: float) -> int:
+    """Return the strongest wind from `degrees`, in steps, in which airspeeds make no flight late.
+
+    The flight has the ground speeds `v` (n, 2), m/s, at `t` (n,), s, in a wind `beside`. Along the
+    same way it is as fast in another wind W as an airspeed a, `top` or without it the flight's own,
+    leaves along its direction u,
+
+        g = u·W + sqrt(a² - |W|² + (u·W)²),
+
+    and what hovers no faster than before.
+    """
+    stride = max(1, len(t) // _INSTANTS)
+    lasting = np.diff(t[::stride], append=t[-1])
+    v = v[::stride]
+    speed = np.maximum(lengths(v), _SLOWEST)
+    own = lengths(v - beside) if top is None else top
+    wind = beside + _STEP * np.arange(_STEPS + 1)[:, None] * Wind(1.0, degrees).velocity
+    along = wind @ (v / speed[:, None]).T
+    across = (wind * wind).sum(axis=1)[:, None] - along * along
+    left = np.maximum(along + np.sqrt(np.maximum(own**2 - across, 0.0)), _SLOWEST)
+    if top is not None:
+        left = np.minimum(left, speed)
+    late = np.abs((speed / left - 1) @ lasting) > MOST_LATE
+    return int(np.argmax(np.append(late, True))) - 1
+
+
 @dataclass(frozen=True, slots=True)
 class _Trial:
     """A mission that is predicted in one wind after the other; `duration`, s, is what it takes.
@@ -125,23 +166,22 @@ class _Trial:
     lead: float | None
     beside: Vector
 
-    def strongest(self, low: float, high: float, degrees: float) -> float:
-        """Return the strongest wind from `degrees` that is kept, between `low` and `high` m/s.
+    def strongest(self, low: int, high: int, guess: int, degrees: float) -> int:
+        """Return the strongest wind from `degrees` that is kept, in steps from `low` to `high`.
 
-        `low` is kept. Unless it is the strongest of all, `high` is what other directions keep.
+        `low` is kept. From the `guess` on winds are tried, farther and farther, up to one that is
+        kept and one that is not.
         """
-        if high < MOST_WIND and self.keeps(high, degrees):
-            return high
-        step = _FIRST_STEP
-        while high == MOST_WIND and low < high:
-            if self.keeps(min(low + step, high), degrees):
-                low, step = min(low + step, high), 2 * step
-            else:
-                high = min(low + step, high)
-                break
-        while high - low > _STEP:
-            middle = (low + high) / 2
-            low, high = (middle, high) if self.keeps(middle, degrees) else (low, middle)
+        step, found = 1, set()
+        while low < high:
+            tried = min(max(guess, low + 1), high)
+            kept = self.keeps(_STEP * tried, degrees)
+            found.add(kept)
+            low, high = (tried, high) if kept else (low, tried - 1)
+            guess = tried + step if kept else tried - step
+            step *= 2
+            if len(found) == 2:
+                guess = (low + high + 1) // 2
         return low
 
     def keeps(self, speed: float, degrees: float) -> bool:
