@@ -55,7 +55,7 @@ class CopterScheduler(Scheduler):
         best, top_speed = first, self.max_speed
         if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
             top_speed *= OVERSPEED
-            best = self.fitted(best.route, top_speed)
+            best = self.fitted(best.route, top_speed, begun=best)
         for changes in (self._splits, self._moves):
             for _ in range(_ROUNDS):
                 tried = (

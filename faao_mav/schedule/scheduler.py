@@ -81,11 +81,12 @@ class Scheduler(ABC):
         *,
         groups: Integers | None = None,
         flights: int = MOST_FLIGHTS,
+        begun: Schedule | None = None,
     ) -> Schedule:
         """Return the flight of `route` with the speeds and waits that fit best.
 
         No speed is above `top_speed`, m/s; legs with the same number in `groups` share one. So many
-        `flights` are predicted at most.
+        `flights` are predicted at most; `begun` is that of `route`, where it is known.
         """
         route = self._with_radii(route)
         free = (route.waits > 0) & (np.arange(len(route.waits)) != 0)
@@ -100,6 +101,7 @@ class Scheduler(ABC):
             max_speed=top_speed,
             flights=flights,
             retime=self.retimed,
+            begun=begun,
         )
 
     def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:
@@ -147,14 +149,18 @@ class Scheduler(ABC):
             waits=np.round(route.waits, _WAIT_DIGITS),
             lead=round(route.lead, _WAIT_DIGITS),
         )
-        sent = self.flight(route)
         if route.last < len(route.waits) - 1:
-            return sent
-        # the relay is needed to the end of the plan's last slot
+            return self.flight(route)
+        sent = self.flight(self._lasting(route, schedule))
+        lasting = self._lasting(route, sent)
+        return sent if lasting.waits[-1] == sent.route.waits[-1] else self.flight(lasting)
+
+    def _lasting(self, route: Route, schedule: Schedule) -> Route:
+        """Return `route`, flown like `schedule`, with a wait to the end of the plan's last slot."""
         lasting = self.t[-1] - self.t[0] + self.t[-1] - self.t[-2]
-        early = lasting + sent.clock.start(sent.flown) - sent.flown.arrivals[-1]
+        early = lasting + schedule.clock.start(schedule.flown) - schedule.flown.arrivals[-1]
         last_wait = max(SHORTEST_HOLD, np.ceil(early))
-        return self.flight(replace(route, waits=np.append(route.waits[:-1], last_wait)))
+        return replace(route, waits=np.append(route.waits[:-1], last_wait))
 
     def _with_radii(self, route: Route) -> Route:
         """Return `route` with the acceptance radii that suit its legs and turns."""

@@ -57,6 +57,7 @@ def fit(
     max_speed: float,
     flights: int = MOST_FLIGHTS,
     retime: Callable[[Schedule, LegTimes], Retimed] = LegRetimed,
+    begun: Schedule | None = None,
 ) -> Schedule:
     """Return the `flight` of `route` with the speeds, the waits and the lead that fit best.
 
@@ -64,13 +65,14 @@ def fit(
     within `min_speed` and `max_speed` (m/s), the waits at the points `free` (m,) at or above
     `SHORTEST_HOLD`; the others stay as they are. The lead is within `MOST_LEAD`, 0 for a flight
     that begins at speed. Being late or early at the end counts as well: `LATE_WEIGHT`.
-    So many `flights` are predicted at most.
+    So many `flights` are predicted at most, with that of `route` itself, which is `begun` if it is
+    known.
     """
     if len(route.speeds) == 0:
         return flight(route)
     unknowns = _Unknowns(route, groups, free, min_speed, max_speed)
     x = unknowns.initial
-    best = flight(unknowns.commanded(x))
+    best = begun or flight(unknowns.commanded(x))
     goal = _Goal(best.clock)
     cost = goal.cost(best, unknowns.pull(x))
     times, leash = LegTimes(len(groups)), 0.0
