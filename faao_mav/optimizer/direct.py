@@ -7,7 +7,7 @@ every slot are a problem of their own, so that the rates become functions of the
 by the envelope theorem their gradients are those at the best precoders. What is left is a flight
 through two fields of rates, which `interior` solves in time linear in the number of slots.
 
-Measured (tests/benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT from the same
+Measured (benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT from the same
 starts, and several times quicker.
 """
 

@@ -29,8 +29,8 @@ _Value = TypeVar("_Value", int, float, str)
 MAX_SECONDS, MAX_GIGABYTES = 600.0, 8.0
 """Time of one processor and memory beyond which a plan is refused. Chosen."""
 
-# Fitted to the plans of tests/benchmarks/sizes.py, whose times they give within a factor of two,
-# and to 200 random ones of tests/benchmarks/any_plan.py.
+# Fitted to the plans of benchmarks/sizes.py, whose times they give within a factor of two,
+# and to 200 random ones of benchmarks/any_plan.py.
 # Not those of algorithm1, which has a limit of its own.
 _EXPONENTIAL = 1.3e-9  # s for one exponential
 _PRODUCT = 3e-11  # s for one product of an exponential with a pair of coordinates
@@ -56,7 +56,7 @@ _CHANNEL_COPIES = 4  # copies of the channels of all slots and draws held at onc
 _NODES = 4096  # points of the noise in each mutual information that is optimised
 _NODE = 60  # exponentials that one such point costs beside one for each vector of symbols
 _FEWEST_DRAWS = 4  # draws below which no plan is proposed
-_GOAL = 7  # optimisations that a search for a goal takes at most (tests/benchmarks/goals.py)
+_GOAL = 7  # optimisations that a search for a goal takes at most (benchmarks/goals.py)
 
 _ROTATIONS = {"bpsk": 2, "8psk": 8}
 """Phases that map an alphabet onto itself, by which differences merge; 4 where not listed."""

@@ -11,11 +11,11 @@ from faao_mav.vector import distances_to_path, lengths
 from faao_mav.vehicle import Flown
 
 # Metres of position error that one second too late or too early at the end costs. Raised from 3
-# when two plans of tests/benchmarks/missions.py ended 0.6 and 0.7 s off.
+# when two plans of benchmarks/missions.py ended 0.6 and 0.7 s off.
 LATE_WEIGHT = 5.0
 
 # Metres of position error that one metre of path error costs beyond a share of the path tolerance.
-# Raised from 5, with which not every plan of tests/benchmarks/missions.py kept its tolerance.
+# Raised from 5, with which not every plan of benchmarks/missions.py kept its tolerance.
 _PATH_WEIGHT, _PATH_SHARE = 8.0, 0.95
 
 # Of so many samples of the flown path, 0.1 s apart, one is compared, for speed: at 5 m/s², an arc

@@ -131,7 +131,7 @@ def test_flat_rates_leave_the_start_as_it_is() -> None:
 
 @dataclass(frozen=True)
 class Known:
-    """What CasADi + IPOPT delivers on the copter's sample (tests/benchmarks)."""
+    """What CasADi + IPOPT delivers on the copter's sample (benchmarks)."""
 
     duration: float
     duplex: str

@@ -35,6 +35,6 @@ To add a constraint, write one file here and hand its objects to `maximize(const
   test_constraints.py has a running sum like a queue.
 
 Why not a library: CasADi + IPOPT takes 9 to 68 times as long for the same optimum on five plans of
-250 to 10,000 slots (tests/benchmarks/direct_against_ipopt.py: 0.47 s against 0.05 s at 250, 8.6 s
+250 to 10,000 slots (benchmarks/direct_against_ipopt.py: 0.47 s against 0.05 s at 250, 8.6 s
 against 0.6 s at 10,000), and Clarabel solves convex problems only.
 """

@@ -32,7 +32,7 @@ stations are visited in this order, in none, or in the other. Chosen."""
 
 PATHS = 2
 """Paths that become flights; one where flights are too short for the coarse copy. Measured on the
-plans of `tests/benchmarks`, with the straight flight beside them: no optimum is below
+plans of `benchmarks`, with the straight flight beside them: no optimum is below
 that of the five named starts by more than 1e-4. With 1 that of the paper's plan with T = 100 s and
 10 dBm is by 1.4 %."""
 

@@ -1,7 +1,7 @@
 """An aeroplane with the guidance that banks it and the energy that carries it.
 
 Constants that say no other are fitted to flights of ArduPilot's simulator from sea level
-(`tests/benchmarks/flights_arduplane.py`): they are its aircraft's.
+(`benchmarks/flights_arduplane.py`): they are its aircraft's.
 """
 
 import cmath

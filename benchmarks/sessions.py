@@ -1,7 +1,7 @@
 """Many uploads over links that lose, repeat, delay and disorder: is "verified" ever wrong?
 
-    python tests/benchmarks/sessions.py mocks [--sessions 10000] [--jobs 2]
-    FAAO_AUTOPILOTS=... python tests/benchmarks/sessions.py arducopter [--sessions 100]
+    python benchmarks/sessions.py mocks [--sessions 10000] [--jobs 2]
+    FAAO_AUTOPILOTS=... python benchmarks/sessions.py arducopter [--sessions 100]
 
 Each session has its own seed: what is sent (mission, fence or rally points), how the link treats
 it, and what the vehicle held before. Mocks run on a simulated clock, and what they hold is looked
@@ -27,8 +27,8 @@ from pathlib import Path
 from random import Random
 from unittest.mock import patch
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mavlink"))
 
 from joblib import Parallel, delayed
 from mavsdk.plugins.mission_raw import MissionRaw

@@ -1,6 +1,6 @@
 """How well missions keep their plans: predicted flights of relay plans.
 
-    python tests/benchmarks/missions.py [--px4] [--keep] [--random FIRST,COUNT]
+    python benchmarks/missions.py [--px4] [--keep] [--random FIRST,COUNT]
 
 One row for each plan: CPU seconds of the conversion, items with home, rms and largest position
 error at equal times, path error (m), how much later than planned the flight is over (s), the
@@ -20,7 +20,7 @@ from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.schedule.conversion import convert
 from faao_mav.schedule.prediction import predict_delivery
 
-SAMPLE = Path(__file__).parents[2] / "missions" / "copter_relay.yaml"
+SAMPLE = Path(__file__).parents[1] / "missions" / "copter_relay.yaml"
 
 PLANS: dict[str, dict[str, Any]] = {
     "copter_relay, 120 s, 8 m/s": {},

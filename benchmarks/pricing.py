@@ -1,6 +1,6 @@
 """Print the processor time and stated error of the mutual information along the copter's sample.
 
-    python tests/benchmarks/pricing.py [--before CHECKOUT] [MODULATION ...]
+    python benchmarks/pricing.py [--before CHECKOUT] [MODULATION ...]
 
 With `--before` the same is run with the package of another checkout, by its `.venv`, on the same
 solutions.
@@ -18,7 +18,7 @@ from faao_mav import optimize, parse_plan, price, saturation
 from faao_mav.optimizer.solution import load_solution, save_solution
 
 _HERE = Path(__file__).resolve()
-_SAMPLE = _HERE.parents[2] / "missions" / "copter_relay.yaml"
+_SAMPLE = _HERE.parents[1] / "missions" / "copter_relay.yaml"
 
 
 def measure(path: str) -> None:

@@ -1,6 +1,6 @@
 """Least durations, powers and energies: what they cost, and whether one step less could do.
 
-    python tests/benchmarks/goals.py [--starts 20] [CASE ...]
+    python benchmarks/goals.py [--starts 20] [CASE ...]
 
 One row for each goal: the answer, flights optimised, CPU seconds over those of one optimisation of
 the answer's size and energy from all starts, what is needed (bit/s/Hz), and of one slot, 0.02 dB or
@@ -37,7 +37,7 @@ from faao_mav.plan.fields import dbm
 from faao_mav.plan.keys import ALIASES, POWER
 from faao_mav.power import JOULES_PER_WH
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[1] / "missions"
 LESS_DB = 0.02
 TRIES = 10
 """Random ways that are tried for each start inside a fence."""

@@ -1,6 +1,6 @@
 """Predicted against recorded ArduCopter flights (tests/data/flights/arducopter).
 
-    python tests/benchmarks/flights_arducopter.py
+    python benchmarks/flights_arducopter.py
 
 How the aircraft leans and what the air takes are fitted to six flights over plain waypoints; the
 rest follows from the autopilot's parameters. Nine more flights over plain waypoints and all three

@@ -1,4 +1,4 @@
-"""How transfers fare by loss rate, on a simulated clock: `python tests/benchmarks/links.py`.
+"""How transfers fare by loss rate, on a simulated clock: `python benchmarks/links.py`.
 
 A mission is uploaded to each mock autopilot and read back, over links that lose packets both ways,
 from several seeds. Times are means in seconds; "sent" are items and requests for items per item of
@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from statistics import fmean
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mavlink"))
 
 from stations import mock_of, rows_for, there_and_back, upload_to
 

@@ -1,6 +1,6 @@
 """How long uploads take over links that lose packets, beside MAVSDK, in one run.
 
-    python tests/benchmarks/uploads.py [--quick]
+    python benchmarks/uploads.py [--quick]
 
 Both upload the same missions to the same mock autopilot over loopback UDP that loses packets both
 ways, from the same seeds. MAVSDK uploads only; ours reads back and compares as well, which is
@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-sys.path.insert(0, str(Path(__file__).parent.parent / "mavlink"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mavlink"))
 
 from conftest import free_port
 from mavsdk.component_type import ComponentType

@@ -1,7 +1,7 @@
 """Plans with a fence: the direct method beside CasADi + IPOPT from random starts, in one run.
 
     pip install -e '.[bench]'
-    python tests/benchmarks/fences.py [--starts N] [--step S] [NAME ...]
+    python benchmarks/fences.py [--starts N] [--step S] [NAME ...]
 
 The scenarios are those of the tests (tests/fenced.py). IPOPT has the same constraints: an angle for
 every obstacle and interval, whose half-plane parts both ends of the chord from the obstacle. Its
@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import numpy as np
 from fenced import FENCES, dense_path, fenced

@@ -1,6 +1,6 @@
 """What plans that nobody chose cost, whole commands: any alphabet, antennas, fading, ends, powers.
 
-    python tests/benchmarks/any_plan.py [--plans FIRST,COUNT] [--limit SECONDS]
+    python benchmarks/any_plan.py [--plans FIRST,COUNT] [--limit SECONDS]
 
 One row for each plan: seconds of the processor, Python's start included, and what `optimizer.size`
 reckons; the plan; the greatest of its constraints' residuals and how the search ended, or how it

@@ -1,4 +1,4 @@
-"""Plans per minute of a study: `python tests/benchmarks/study_speed.py [--quick]`.
+"""Plans per minute of a study: `python benchmarks/study_speed.py [--quick]`.
 
 The grid of `missions/paper_fig4.yaml`, with one process and with two, without a directory. Rows
 have to be the same. The time is that of the whole study, the start of the processes included.
@@ -12,7 +12,7 @@ from pathlib import Path
 from faao_mav.plan import read_plan
 from faao_mav.study import StudyCase, StudyRow, make_cases, run_study
 
-PLAN = Path(__file__).parent.parent.parent / "missions" / "paper_fig4.yaml"
+PLAN = Path(__file__).parents[1] / "missions" / "paper_fig4.yaml"
 
 
 def cases(seeds: int) -> tuple[StudyCase, ...]:

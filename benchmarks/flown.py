@@ -1,6 +1,6 @@
 """Missions that real autopilots flew in their simulators, beside their plans.
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/flown.py [ardupilot | px4 | plane] [PLAN ...]
+    FAAO_AUTOPILOTS=FOLDER python benchmarks/flown.py [ardupilot | px4 | plane] [PLAN ...]
         [--wind SPEED,FROM] [--stream] [--limits] [--random FIRST,COUNT]
 
 With a wind, m/s and degrees, plans are made for it, and flown in it; else in calm air. With

@@ -1,6 +1,6 @@
 """Print what plans of many sizes cost, beside what `optimizer.size` reckons: whole plans.
 
-    python tests/benchmarks/sizes.py [--longest SECONDS]
+    python benchmarks/sizes.py [--longest SECONDS]
 
 Plans reckoned to take longer than `--longest`, 30 s unless told, are left out. Each plan is the
 copter's sample with its alphabet, antennas, fading and time step changed, in a process of its own.
@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 from faao_mav import parse_plan, plan_mission
 from faao_mav.optimizer.size import cost
 
-_SAMPLE = Path(__file__).resolve().parents[2] / "missions" / "copter_relay.yaml"
+_SAMPLE = Path(__file__).resolve().parents[1] / "missions" / "copter_relay.yaml"
 
 _SIZES = (
     "qpsk 2 ergodic 0.5",

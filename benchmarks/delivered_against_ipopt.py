@@ -1,7 +1,7 @@
 """What is delivered: the direct method beside CasADi + IPOPT with the same queue, in one run.
 
     pip install -e '.[bench]'
-    python tests/benchmarks/delivered_against_ipopt.py [--quick] [--random 20]
+    python benchmarks/delivered_against_ipopt.py [--quick] [--random 20]
 
 The peer starts from five routes by way of the stations, as far as there is time to fly them, and
 `--random` ones. Rates are delivered rates in bit/s/Hz, computed for both by the same function from
@@ -34,7 +34,7 @@ from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[1] / "missions"
 PATIENCE = 60.0
 """Processor seconds that the peer may take for one start."""
 

@@ -1,6 +1,6 @@
 """Fly recorded missions again in wind, in real autopilots' simulators, and keep the thinned tracks.
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/record_wind.py [FOLDER ...] [NAME ...]
+    FAAO_AUTOPILOTS=FOLDER python benchmarks/record_wind.py [FOLDER ...] [NAME ...]
 
 A flight NAME-windSPEEDfromDEGREES is that of the mission NAME (of the folders arducopter, arduplane
 and px4 in tests/data/flights) in a steady wind, m/s and degrees clockwise from north; ArduCopter's

@@ -1,6 +1,6 @@
 """How long predicting whole missions of ArduCopter and PX4 takes, by their number of items.
 
-python tests/benchmarks/predict.py
+python benchmarks/predict.py
 """
 
 import time

@@ -1,4 +1,4 @@
-"""How long a validation takes: `python tests/benchmarks/validation.py`.
+"""How long a validation takes: `python benchmarks/validation.py`.
 
 A mission of 650 items with home, as long as ArduPilot surely stores: waypoints along a spiral, a
 speed before each, a fence of two polygons and four circles, and a predicted flight at 10 Hz.

@@ -1,7 +1,7 @@
 """The direct method side by side with CasADi + IPOPT and with Algorithm 1, in one run.
 
     pip install -e '.[bench]'
-    python tests/benchmarks/direct_against_ipopt.py [--quick] [--random 20]
+    python benchmarks/direct_against_ipopt.py [--quick] [--random 20]
 
 Rates are R_avg in bit/s/Hz, measured for all three by the same function; times are seconds, with
 the building of the model. Everything printed is measured in the run.
@@ -20,7 +20,7 @@ from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import numpy as np
 from peer import GAIN, ROUNDS, Model, at_best, at_precoders, peer_starts
@@ -40,7 +40,7 @@ from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.radio.best_precoder import best_precoders
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[1] / "missions"
 PATIENCE = 30.0
 """Seconds that the peer may take for one start."""
 FLIGHTS = 10_000

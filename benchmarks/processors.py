@@ -1,6 +1,6 @@
 """Whether other processors write the same missions: samples and random plans, byte for byte.
 
-    python tests/benchmarks/processors.py [--plans 20] [NAME ...]
+    python benchmarks/processors.py [--plans 20] [NAME ...]
 
 Each plan is planned and converted anew by the command for each of `PROCESSORS`, as OpenBLAS and
 NumPy let this machine pass for another one of its family. One row for each plan: the items, and for
@@ -20,7 +20,7 @@ import numpy as np
 
 from faao_mav.plan.yaml_text import dump_yaml
 
-SAMPLES = Path(__file__).parents[2] / "missions"
+SAMPLES = Path(__file__).parents[1] / "missions"
 
 _VECTORS = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
 PROCESSORS = {

@@ -1,6 +1,6 @@
 """Fly missions in a real ArduPlane's simulator and keep the tracks (tests/data/flights/arduplane).
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/record_plane.py [NAME ...]
+    FAAO_AUTOPILOTS=FOLDER python benchmarks/record_plane.py [NAME ...]
 
 Each mission is flown without wind, from sea level (`sea-`) or from 584 m (`high-`), with the
 parameters that ArduPilot's simulator has for its plane: those of `PARAMETERS` shape the flight.
@@ -27,7 +27,7 @@ from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.schedule.conversion import convert
 
 FOLDER = FLIGHTS / "arduplane"
-SAMPLE = Path(__file__).parents[2] / "missions" / "plane_relay.yaml"
+SAMPLE = Path(__file__).parents[1] / "missions" / "plane_relay.yaml"
 PLACE = (-35.363262, 149.165237)
 HEIGHT = 100.0  # of the plain shapes, m above home
 

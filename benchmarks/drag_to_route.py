@@ -1,6 +1,6 @@
 """Time from a drag of the user in the planner page to the redrawn route, in Chromium.
 
-    python tests/benchmarks/drag_to_route.py [PLAN.yaml] [--drags 50]
+    python benchmarks/drag_to_route.py [PLAN.yaml] [--drags 50]
 
 Each drag moves the user by some metres. What is timed, by the browser's clock, is from the mouse
 move to the next route that is drawn; and beside it, by the processor's, what a worker computes for
@@ -23,7 +23,7 @@ from faao_mav.app.answers import rough
 from faao_mav.app.document import Document
 from faao_mav.plan import parse_plan
 
-PLAN = Path(__file__).parents[2] / "missions" / "copter_relay.yaml"
+PLAN = Path(__file__).parents[1] / "missions" / "copter_relay.yaml"
 RUN = "from faao_mav.cli.main import run\nif __name__ == '__main__':\n    run()\n"
 
 WATCH = """() => {

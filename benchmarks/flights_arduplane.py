@@ -1,6 +1,6 @@
 """Predicted against recorded ArduPlane flights (tests/data/flights/arduplane).
 
-    python tests/benchmarks/flights_arduplane.py
+    python benchmarks/flights_arduplane.py
 
 The constants of the model are fitted to flights from sea level (`FITTED`); the other flights from
 there, all from 584 m and all in wind, are held out of every fit. Predictions begin where the

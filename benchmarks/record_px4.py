@@ -1,6 +1,6 @@
 """Fly missions in a real PX4's simulator and keep the thinned tracks (tests/data/flights/px4).
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/record_px4.py [NAME ...] [--again OTHER]
+    FAAO_AUTOPILOTS=FOLDER python benchmarks/record_px4.py [NAME ...] [--again OTHER]
 
 Each mission is written with its parameters, flown without wind and with little drag, and its track
 is kept every half second and at each change of the current item. With --again those of the flights
@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import numpy as np
 from flights_px4 import FOLDER, HELD_OUT

@@ -1,6 +1,6 @@
 """Random plans for planes: does the direct method converge, and does it refuse rightly?
 
-    python tests/benchmarks/random_planes.py [--plans 100] [--first 0] [--jobs 1]
+    python benchmarks/random_planes.py [--plans 100] [--first 0] [--jobs 1]
 
 One row for each plan: how the method ended, its rate and the best rate of its starts (bit/s/Hz),
 steps, CPU seconds. A plan that is refused is given to CasADi + IPOPT, which looks for a flight that

@@ -1,6 +1,6 @@
 """Missions that real autopilots fly under the eyes of `fly --arm`, and what their own logs say.
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/watched.py [ardupilot | px4] [PLAN ...]
+    FAAO_AUTOPILOTS=FOLDER python benchmarks/watched.py [ardupilot | px4] [PLAN ...]
 
 The plans of `flown.py`, in calm air. One row for each: how watching ended, rms position error at
 equal times (m), and the delivered rate over the planned one, as the watcher saw them and by

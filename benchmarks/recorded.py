@@ -22,7 +22,7 @@ from faao_mav.mission.formats.wpl import read_wpl
 from faao_mav.plan import Wind
 from faao_mav.vehicle.flight_path import FlightPath, Flown
 
-FLIGHTS = Path(__file__).parent.parent / "data" / "flights"
+FLIGHTS = Path(__file__).parents[1] / "tests" / "data" / "flights"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Predicted against recorded flights, of all three autopilots.
 
-python tests/benchmarks/flights.py
+python benchmarks/flights.py
 """
 
 import flights_arducopter

@@ -1,6 +1,6 @@
 """Plans that real autopilots fly by setpoints in trouble, with and without --replan.
 
-    FAAO_AUTOPILOTS=FOLDER python tests/benchmarks/disturbed.py [ardupilot | px4] [CASE ...]
+    FAAO_AUTOPILOTS=FOLDER python benchmarks/disturbed.py [ardupilot | px4] [CASE ...]
 
 The sample 30 m above the ground, in simulators twice as fast as the world. Cases: `wind`, of which
 the plan knows nothing; `silence`, a link that carries nothing for 8 s of the flight; `pause`,
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from conftest import MISSIONS, edited
 from simulators import simulated

@@ -1,6 +1,6 @@
 """Predicted against recorded PX4 flights (tests/data/flights/px4).
 
-    python tests/benchmarks/flights_px4.py [OTHER]
+    python benchmarks/flights_px4.py [OTHER]
 
 The constants that the model calls fitted make the rms over the "fitted" flights of the arrival
 error (s) and a third of the position error (m) small, as round figures near a flat minimum. The
