@@ -1,24 +1,15 @@
 """`faao-mission debrief`: what became of a plan in a real flight, from its log."""
 
 import json
-from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
-from faao_mav.cli.shared import AsJson, File, Radio, exit_status, flag, note, option
+from faao_mav.cli.shared import AsJson, File, Radio, exit_status, note, option
 from faao_mav.errors import InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
-
-if TYPE_CHECKING:
-    from faao_mav.mavlink.flying.record import FlightRecord
-    from faao_mav.report.lines import Line
-    from faao_mav.validate.calibrate import Calibrated
-    from faao_mav.validate.flown import Debriefing
-    from faao_mav.workflow import Result
 
 
 @exit_status()
@@ -27,9 +18,6 @@ def debrief(
     plan_file: PlanFile = None,
     solution_file: SolutionFile = None,
     report: Annotated[File, option("PAGE.html", "One page with all three tracks.")] = None,
-    calibrate: Annotated[
-        bool, flag("--calibrate", "Say which parameters would have predicted the flight better.")
-    ] = False,
     radio: Radio = None,
     as_json: AsJson = False,
 ) -> None:
@@ -38,8 +26,6 @@ def debrief(
     Finds the relay flight in the log of an ArduPilot (.bin), a PX4 (.ulg, with pyulog) or a ground
     station (.tlog), and tells how late it was, how far from plan and path, and what each hop
     carried along the real track with the planned precoders, beside what was planned and predicted.
-    --calibrate looks for parameters of the vehicle, each alone, with which the mission's flight
-    would have been predicted nearer to the real one, in the wind that the autopilot estimated.
     --radio replays the flight to radios, at the pace at which it was flown.
 
     Exit status: 0 told; 1 the plan's flight is not in the log; 2 unusable arguments or input.
@@ -67,23 +53,17 @@ def debrief(
     result = with_mission(Result(solution))
     found = debriefed(record, result, str(log))
     remarks = list(remarks_on(record, found, result))
-    calibrated = _calibrated(record, found, result) if calibrate else []
-    if calibrate:
-        remarks += _calibration_lines(calibrated)
     if report is not None:
         from faao_mav.report.page import render_report
 
         page = render_report(result, title=f"{log.name}", debriefing=found, remarks=remarks)
         write_whole(report, page.encode())
     if as_json:
+        wind = record.mean_wind(found.start, solution.plan.flight.duration)
         told = debriefing_as_dict(found) | {
-            "wind": None,
+            "wind": None if wind is None else wind.tolist(),
             "parameters": other_parameters(record, result),
         }
-        if calibrate:
-            told["calibrated"] = [asdict(each) for each in calibrated]
-        wind = record.mean_wind(found.start, solution.plan.flight.duration)
-        told["wind"] = None if wind is None else wind.tolist()
         typer.echo(json.dumps(told, allow_nan=False))
     else:
         typer.echo(joined([*debriefing_lines(found), *remarks]))
@@ -91,29 +71,3 @@ def debrief(
         flight = record.line(solution)
         lines = replayed(solution, Line(flight.t - found.start, flight.w))
         note(f"{replay(lines, to.send)} slots were told to {radio}")
-
-
-def _calibrated(
-    record: "FlightRecord", found: "Debriefing", result: "Result"
-) -> "list[Calibrated]":
-    """Return which parameters would have predicted the flight better."""
-    from faao_mav.errors import FaaoError
-    from faao_mav.validate.calibrate import calibrate
-    from faao_mav.validate.flown import Line
-
-    if result.conversion is None:
-        raise FaaoError(f"--calibrate: the plan has no mission: {result.no_mission}")
-    flight = record.line(found.solution)
-    wind = record.mean_wind(found.start, found.solution.plan.flight.duration)
-    air = found.solution.plan.wind if wind is None else (float(wind[0]), float(wind[1]))
-    moved = Line(flight.t - found.start, flight.w)
-    return calibrate(found.solution, result.conversion, moved, air)
-
-
-def _calibration_lines(calibrated: "list[Calibrated]") -> "Iterator[Line]":
-    if not calibrated:
-        yield "calibrated", "no parameter alone predicts the flight better by a tenth"
-    for each in calibrated:
-        change = f"{each.name} {each.better:g} instead of {each.value:g}"
-        text = f"{each.rms_better:.2f} m rms from the flight instead of {each.rms:.2f}"
-        yield "calibrated", f"{change}: the prediction is {text}"
