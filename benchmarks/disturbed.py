@@ -1,13 +1,11 @@
-"""Plans that real autopilots fly by setpoints in trouble, with and without --replan.
+"""Plans that real autopilots fly by setpoints in trouble.
 
     FAAO_AUTOPILOTS=FOLDER python benchmarks/disturbed.py [ardupilot | px4] [CASE ...]
 
 The sample 30 m above the ground, in simulators twice as fast as the world. Cases: `wind`, of which
-the plan knows nothing; `silence`, a link that carries nothing for 8 s of the flight; `pause`,
-another mode for 15 s and back, as a pilot sets them, who sends it home 10 s later if it then is
-still the pilot's; `loss 5 %` and `loss 20 %` of all packets each way; `outages` of 2 s of the
-world's time, one in ten. One row for each: how it ended, the delivered rate over the planned one
-without and with re-planning, and what was told of new courses.
+the plan knows nothing; `silence`, a link that carries nothing for 8 s of the flight; `loss 5 %` and
+`loss 20 %` of all packets each way; `outages` of 2 s of the world's time, one in ten. One row for
+each: how it ended, the delivered rate over the planned one, and m rms from the plan at equal times.
 """
 
 import math
@@ -15,9 +13,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -30,23 +26,17 @@ from simulators import simulated
 from faao_mav import Result, plan_mission
 from faao_mav.mavlink import link
 from faao_mav.mavlink.client import upload
-from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.faults import Faults, FaultyTransport
 from faao_mav.mavlink.flying.fly import FlightReport, fly
-from faao_mav.mavlink.flying.solving import ProcessSolver
 from faao_mav.mavlink.flying.watch import Watch
-from faao_mav.mavlink.messages import SetMode
-from faao_mav.mavlink.modes import modes_of
-from faao_mav.mavlink.protocol import Address
 from faao_mav.mavlink.transport import Transport, open_transport
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.prediction import price_flight
 
 SPEEDUP = 2
 BEGIN = 25.0
-"""Seconds of the plan's clock after which the link breaks, or a pilot sets a mode."""
+"""Seconds of the plan's clock after which the link breaks."""
 
-PILOT = Address(250, 1)
 HOLDS = "COM_OBL_RC_ACT=5"
 """What PX4 does without setpoints: Hold."""
 
@@ -59,7 +49,7 @@ FAULTS = {
     "loss 20 %": Faults(loss=0.2, seed=1),
     "outages": Faults(outages=OUTAGES, seed=1),
 }
-CASES = ("none", "wind", "silence", "pause", *FAULTS)
+CASES = ("none", "wind", "silence", *FAULTS)
 
 
 @dataclass
@@ -69,7 +59,6 @@ class Disturbance:
     case: str
     transport: Transport | None = None
     silent_until: float = 0.0
-    done: list[str] = field(default_factory=list)
 
     def opened(self, text: str) -> "Disturbance | FaultyTransport":
         """Open the link."""
@@ -91,27 +80,16 @@ class Disturbance:
         self.transport.close()
 
     def __call__(self, watch: Watch) -> None:
-        """Do what is due."""
+        """Break the link when that is due."""
         samples, start = watch.seen.samples, watch.relay_start
         if start is None or not samples.t:
             return
         t = samples.t[-1] - start
-        if self.case == "silence" and t > BEGIN and not self.done:
-            self.done.append("silent")
+        if self.case == "silence" and t > BEGIN and not self.silent_until:
             self.silent_until = time.monotonic() + 8 / SPEEDUP
-        modes = modes_of(watch._peer.vehicle)  # type: ignore[arg-type]
-        assert modes.guided is not None
-        home = (modes.at_fence["return"], 25.0 if watch.phase == "aside" else math.inf)
-        does = {"out": (modes.hold, 0.0), "back": (modes.guided, 15.0), "home": home}
-        for name, (mode, when) in does.items():
-            if self.case == "pause" and t > BEGIN + when and name not in self.done:
-                self.done.append(name)
-                self.write(Codec(PILOT).pack(SetMode(watch._peer.address.system, 1, mode)))
 
 
-def flown(
-    autopilots: Path, autopilot: str, result: Result, case: str, *, replan: bool
-) -> FlightReport:
+def flown(autopilots: Path, autopilot: str, result: Result, case: str) -> FlightReport:
     """Fly the plan of `result` by setpoints in a simulator."""
     speed, origin = WINDS[autopilot] if case == "wind" else (0.0, 0.0)
     assert result.conversion is not None
@@ -130,38 +108,17 @@ def flown(
             defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
             options = ["--speedup", str(SPEEDUP), "--defaults", defaults]
         kind = "px4" if autopilot == "px4" else "arducopter"
-        with (
-            simulated(autopilots, kind, folder, *options) as connection,
-            ProcessSolver() if replan else nullcontext() as solver,
-        ):
+        with simulated(autopilots, kind, folder, *options) as connection:
             upload(result.conversion.mission, connection, wait=60)
             with patch.object(link, "open_transport", disturbance.opened):
-                told: list[str] = []
-                watching = telling(disturbance, told)
-                report = fly(
+                return fly(
                     result.conversion.mission,
                     connection,
                     stream=result.solution,
-                    solver=solver,
                     rate=10,
                     wait=60,
-                    watching=watching,
+                    watching=disturbance,
                 )
-    for text in told:
-        print("   ", text)
-    return report
-
-
-def telling(disturbance: Disturbance, told: list[str]) -> Callable[[Watch], None]:
-    """Return what is called after every step of a watch."""
-
-    def watching(watch: Watch) -> None:
-        disturbance(watch)
-        told[:] = [
-            text for text in watch.seen.told if "course" in text or "plan" in text or "mode" in text
-        ]
-
-    return watching
 
 
 def delivered(result: Result, report: FlightReport) -> str:
@@ -169,10 +126,10 @@ def delivered(result: Result, report: FlightReport) -> str:
     ending: str = report.ending.kind if report.ending is not None else "different"
     if report.ending is not None and ending != "finished":
         ending += f" ({report.ending.text})"
-    if report.relay_start is None or report.solution is None:
+    if report.relay_start is None:
         return f"{ending}, -"
-    t, w = report.samples.record().line(report.solution)
-    real = price_flight(report.solution, t - report.relay_start, w)
+    t, w = report.samples.record().line(result.solution)
+    real = price_flight(result.solution, t - report.relay_start, w)
     share = 100 * real.delivered_rate / result.solution.delivered_rate
     return f"{ending}, {share:.2f} %, {real.rms_position_error:.2f} m rms"
 
@@ -185,12 +142,8 @@ def main() -> None:
         text = (MISSIONS / "copter_relay.yaml").read_text()
         result = plan_mission(parse_plan(edited(text, changes)))
         for case in [each for each in CASES if each in chosen] or CASES:
-            for replan in (False, True):
-                if case in FAULTS and replan:
-                    continue
-                report = flown(autopilots, autopilot, result, case, replan=replan)
-                name = "re-planned" if replan else "as planned"
-                print(f"{autopilot:<10}{case:<11}{name:<12}{delivered(result, report)}", flush=True)
+            report = flown(autopilots, autopilot, result, case)
+            print(f"{autopilot:<10}{case:<11}{delivered(result, report)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -2,25 +2,17 @@
 
 import json
 import socket
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import FLYABLE, edited, free_port
 from served import running
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.main import app
-from faao_mav.errors import InfeasibleError
-from faao_mav.mavlink.flying import solving
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.formats import render_mission
-from faao_mav.optimizer.rest import Rest, solve_rest
-from faao_mav.optimizer.solution import Solution, load_solution
-from faao_mav.vehicle import Track, Vehicle
-from faao_mav.vehicle.predict import predict
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 LOG = Path(__file__).parent / "data" / "logs" / "arducopter.tlog"
@@ -55,7 +47,6 @@ def mission(tmp_path: Path) -> Path:
             "--stream: needs --arm",
         ),
         (("fly", "{mission}", "--to", "a", "--stream", "--arm"), "--stream: needs --plan"),
-        (("fly", "{mission}", "--to", "a", "--replan"), "--replan: needs --plan"),
         (("fly", "{mission}", "--to", "a", "--radio", "udp:h:1"), "--radio: needs --plan"),
         (("debrief", LOG), "--plan or --solution: give the plan that was flown"),
         (("debrief", "flight.txt", "--plan", "a.yaml"), "give a flight log: .bin, .tlog, .ulg"),
@@ -100,58 +91,6 @@ def test_a_plan_is_streamed_and_its_radio_told(tmp_path: Path) -> None:
     assert flown["delivered_rate"] > 0.97 * planned["delivered_rate"]
     assert slots[0] == 0
     assert slots == sorted(set(slots))
-
-
-class Immediate:
-    """A solver of this process, which has its answer at the next look."""
-
-    def __enter__(self) -> "Immediate":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """There is nothing to close."""
-
-    def ask(self, rest: Rest) -> None:
-        self._answer: Solution | str
-        try:
-            self._answer = solve_rest(rest)
-        except InfeasibleError as error:
-            self._answer = str(error)
-
-    def answer(self) -> Solution | str:
-        return self._answer
-
-
-def test_of_a_mission_that_is_late_it_is_said_what_a_new_course_would_deliver(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plan, made, saved = (tmp_path / name for name in ("p.yaml", "m.waypoints", "r.npz"))
-    slow = {"vehicle.max_speed": 6, "flight.duration": 40, "mission.on_finish": "land"}
-    ends = {f"flight.{end}_velocity": "hover" for end in ("start", "end")}
-    plan.write_text(edited(FLYABLE, slow | ends | {"flight.altitude": 10}))
-    assert run(plan, "--out", made, "--save", saved, "--quiet").exit_code == 0
-    solution = load_solution(saved)
-
-    def held_up(mission: Mission) -> Track:
-        """Return the predicted flight, with a pause of 8 s when it has left flight.start."""
-        track = predict(mission, Vehicle("ardupilot", "copter", {}))
-        gone = np.linalg.norm(track.position[:, :2] - solution.w[0], axis=1)
-        there = int(np.flatnonzero(gone < 1)[0])
-        begin = there + int(np.flatnonzero(gone[there:] > 24)[0])
-        late = 8.0 * (np.arange(len(track.t)) >= begin)
-        reached = track.reached + 8.0 * (track.reached > track.t[begin])
-        return replace(track, t=track.t + late, reached=reached)
-
-    monkeypatch.setattr(solving, "ProcessSolver", Immediate)
-    port = free_port()
-    to = ("--to", f"udpout:127.0.0.1:{port}", "--json")
-    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1, speedup=8.0, fly=held_up)
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        assert run("upload", made, *to).exit_code == 0
-        result = run("fly", made, *to, "--solution", saved, "--arm", "--replan")
-        assert result.exit_code == 0, result.output
-    notes = [json.loads(line).get("note", "") for line in result.stdout.splitlines()]
-    assert any("on a new course it would deliver" in note for note in notes)
 
 
 def test_another_mission_is_not_flown(mission: Path) -> None:

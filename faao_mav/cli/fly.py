@@ -1,7 +1,6 @@
 """`faao-mission fly`: watch a mission to its end, beside its plan."""
 
 import json
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,7 +23,6 @@ from faao_mav.cli.shared import (
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.flying.solving import ProcessSolver
     from faao_mav.mission.formats import MissionFile
     from faao_mav.optimizer.solution import Solution
     from faao_mav.vehicle import Track
@@ -41,10 +39,6 @@ def fly(
         bool, flag("--stream", "Fly the plan by setpoints instead of the mission; needs --arm.")
     ] = False,
     rate: Annotated[float, option("HZ", "Setpoints a second of --stream.", min=4, max=50)] = 10.0,
-    replan: Annotated[
-        bool,
-        flag("--replan", "Solve the rest again where the flight is off its plan; needs a plan."),
-    ] = False,
     radio: Radio = None,
     as_json: Annotated[bool, flag("--json", "Print JSON objects, one a line.")] = False,
     system: System = None,
@@ -60,9 +54,7 @@ def fly(
     both hops, and what is delivered so far and by the end. It arms and starts only with --arm, once
     the autopilot's own checks pass and no other ground station is on the link. A pilot who changes
     the mode has the aircraft: nothing more is sent. With --stream a copter that holds the mission
-    flies the trajectory of the plan by setpoints (GUIDED, Offboard), not the mission; with --replan
-    the rest is solved again, and flown, where wind or a pause has put it off its plan by more than
-    a second. Of a mission --replan only says what that would deliver. Ctrl-C asks a
+    flies the trajectory of the plan by setpoints (GUIDED, Offboard), not the mission. Ctrl-C asks a
     flight that was started here to hold, a second one leaves it; in other flights the first one
     leaves.
 
@@ -82,7 +74,7 @@ def fly(
     check_one(plan_file, solution_file)
     if stream and not arm:
         raise InputError("--stream: needs --arm: it arms the vehicle, and flies it")
-    for name, given in (("--stream", stream), ("--replan", replan), ("--radio", radio)):
+    for name, given in (("--stream", stream), ("--radio", radio)):
         if given and plan_file is None and solution_file is None:
             raise InputError(f"{name}: needs --plan or --solution: the flight that is planned")
     file = read_mission_file(mission_file)
@@ -95,25 +87,21 @@ def fly(
     rate = rate if stream else POSITION_RATE
     if feed is not None:
         rate = max(rate, feed.slots_per_second * 2)  # two positions for each slot at least
-    with _solver(wanted=replan) as solver:
-        if solver is not None and solution is not None and not stream:
-            telling.foresee(solver)
-        report = run(
-            file.mission,
-            to,
-            arm=arm,
-            lands=track is None or track.lands,
-            stream=solution if stream else None,
-            solver=solver,
-            rate=rate,
-            watching=telling,
-            system=system,
-            component=component,
-            log=log,
-            signing_key=signing_key,
-            wait=timeout,
-            note=note,
-        )
+    report = run(
+        file.mission,
+        to,
+        arm=arm,
+        lands=track is None or track.lands,
+        stream=solution if stream else None,
+        rate=rate,
+        watching=telling,
+        system=system,
+        component=component,
+        log=log,
+        signing_key=signing_key,
+        wait=timeout,
+        note=note,
+    )
     ending = report.ending
     found = telling.debriefing(report)
     if as_json:
@@ -132,14 +120,6 @@ def fly(
         note("the vehicle holds another mission than the file: upload it first")
     if ending is None or ending.kind != "finished":
         raise typer.Exit(1)
-
-
-def _solver(*, wanted: bool) -> "AbstractContextManager[ProcessSolver | None]":
-    if not wanted:
-        return nullcontext()
-    from faao_mav.mavlink.flying.solving import ProcessSolver
-
-    return ProcessSolver()
 
 
 def _predicted(

@@ -152,15 +152,13 @@ class Link:
 class Problem:
     """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue.
 
-    The relay holds `held`, bit/Hz, when the flight begins. `energy` is what flight and relay may
-    take, J.
+    `energy` is what flight and relay may take, J.
     """
 
     plan: Plan
     kinematics: Kinematics
     bs_uav: Link
     uav_user: Link
-    held: float = 0.0
     energy: float = math.inf
 
     @cached_property
@@ -223,7 +221,7 @@ class Problem:
         radio = self.plan.radio
         room, bandwidth = radio.relay.buffer_mbytes, radio.bandwidth_mhz
         buffer = math.inf if room is None or bandwidth is None else 8 * room / bandwidth
-        return RelayQueue(half=radio.duplex == "half", buffer=buffer, held=self.held)
+        return RelayQueue(half=radio.duplex == "half", buffer=buffer)
 
     @property
     def links(self) -> tuple[Link, Link]:

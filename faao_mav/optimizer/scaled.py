@@ -160,7 +160,7 @@ def _forwarded(
         forwarded - queue <= (now.queue - now.forwarded) / unit,
         received >= -now.received / unit,
         forwarded >= -now.forwarded / unit,
-        queue[0] == 0,  # what is held at the beginning does not change
+        queue[0] == 0,
         queue[1:] == (queue + received - forwarded)[:-1],
     ]
     if shares is None:

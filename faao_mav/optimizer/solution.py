@@ -85,12 +85,11 @@ class Solution:
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end. `shares` (n,) of each slot are those in which a
-    half-duplex relay receives; it sends in the rest. The relay holds `held`, bit/Hz, when the
-    flight begins: not 0 for the rest of a flight only, and not saved. All rates are those that the
-    plan counts, `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6),
-    and `gain` is by how much the rate that it maximises is above that of the plan for the cutoff
-    rate. `least` tells of a plan whose `goal` minimises, `energy_limit` is what flight and relay
-    may take for a `goal`, J; they are not saved.
+    half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
+    `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
+    by how much the rate that it maximises is above that of the plan for the cutoff rate. `least`
+    tells of a plan whose `goal` minimises, `energy_limit` is what flight and relay may take for a
+    `goal`, J; they are not saved.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -127,7 +126,6 @@ class Solution:
     shares: Real | None = None
     gain: float | None = None
     least: Least | None = None
-    held: float = 0.0
     energy_limit: float = math.inf
 
     @property
@@ -142,8 +140,8 @@ class Solution:
 
     def relay(self, I_U: Real, I_G: Real, shares: Real | None = None) -> Relayed:
         """Return what the plan's relay makes of rates (n,), bits, with these or the best shares."""
-        queue = replace(build_problem(self.plan).relay, held=self.held)
-        return queue.relayed(I_U, I_G, self.plan.flight.time_step, shares)
+        queue, step = build_problem(self.plan).relay, self.plan.flight.time_step
+        return queue.relayed(I_U, I_G, step, shares)
 
     @property
     def delivered_rate(self) -> float:
@@ -280,7 +278,6 @@ def make_solution(
         ending=ending,
         starts=starts or {},
         shares=problem.relay.best_shares(I_U, I_G, problem.kinematics.time_step),
-        held=problem.held,
         energy_limit=problem.energy,
     )
 

@@ -3,10 +3,9 @@
 Per slot n the relay receives r_n and forwards f_n, and q_n waits in its queue, all in bits per
 slot and hertz of bandwidth:
 
-    q_0 = held,  q_{n+1} = q_n + r_n - f_n,  0 <= f_n <= q_n,  0 <= r_n,  q_n <= buffer for n > 0
+    q_0 = 0,    q_{n+1} = q_n + r_n - f_n,    0 <= f_n <= q_n,    0 <= r_n,    q_n <= buffer
 
-so that what comes in during slot n leaves from slot n + 1 on. A flight begins with an empty queue
-(`held` = 0), the rest of one with what the relay then holds. A relay on two bands (full duplex)
+so that what comes in during slot n leaves from slot n + 1 on. A relay on two bands (full duplex)
 has r_n <= I_U,n and f_n <= I_G,n of (7), (8); one that shares a band between both hops (half
 duplex) has r_n / I_U,n + f_n / I_G,n <= 1. The delivered rate is the mean of f_n, bit/s/Hz.
 
@@ -45,48 +44,43 @@ class Relayed:
 class RelayQueue:
     """How a relay forwards: sharing one band between both hops if `half`; its buffer, bit/Hz.
 
-    It holds `held`, bit/Hz, when the flight begins. In slots of `time_step` seconds these are
-    `buffer / time_step` and `held / time_step` bits per slot.
+    In slots of `time_step` seconds the buffer is that of `buffer / time_step` bits per slot.
     """
 
     half: bool = False
     buffer: float = math.inf
-    held: float = 0.0
 
     def best_shares(self, I_U: Real, I_G: Real, time_step: float) -> Real | None:
         """Return the best shares of receiving (n,) at rates (n,), None in full duplex."""
-        if not self.half:
-            return None
-        return best_shares(I_U, I_G, self.buffer / time_step, self.held / time_step)
+        return best_shares(I_U, I_G, self.buffer / time_step) if self.half else None
 
     def relayed(
         self, I_U: Real, I_G: Real, time_step: float, shares: Real | None = None
     ) -> Relayed:
         """Return what is delivered at rates (n,): greedily, with given or else the best shares."""
-        limits = self.buffer / time_step, self.held / time_step
+        room = self.buffer / time_step
         if not self.half:
-            return forward_greedily(I_U, I_G, *limits)
+            return forward_greedily(I_U, I_G, room)
         if shares is None:
-            shares = best_shares(I_U, I_G, *limits)
-        return forward_by_shares(I_U, I_G, shares, *limits)
+            shares = best_shares(I_U, I_G, room)
+        return forward_by_shares(I_U, I_G, shares, room)
 
 
-def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf, held: float = 0.0) -> Relayed:
+def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:
     """Return what a full-duplex relay delivers that sends what it holds as fast as it can.
 
     f_n = min(q_n, I_G,n) and r_n = min(I_U,n, buffer - q_n + f_n) for rates `I_U`, `I_G` (n,),
-    bits, a `buffer` of that many bits per hertz, and q_0 = `held`. No other forwarding along the
-    same route delivers more: a bit that can leave now and waits only takes room. Raises
-    `InputError` for rates of different shapes, negative or not finite ones, a buffer not above 0,
-    or a queue that begins below 0 or above the buffer.
+    bits, and a `buffer` of that many bits per hertz. No other forwarding along the same route
+    delivers more: a bit that can leave now and waits only takes room. Raises `InputError` for
+    rates of different shapes, negative or not finite ones, or a buffer not above 0.
 
     >>> relayed = forward_greedily(np.array([2.0, 1.0, 0.0]), np.array([5.0, 1.0, 1.5]))
     >>> relayed.queue.tolist(), relayed.forwarded.tolist()
     ([0.0, 2.0, 2.0], [0.0, 1.0, 1.5])
     """
-    _check(I_U, I_G, buffer, held)
+    _check(I_U, I_G, buffer)
     received, forwarded, queue = np.empty((3, len(I_U)))
-    waiting = held
+    waiting = 0.0
     for n, (arriving, leaving) in enumerate(zip(I_U.tolist(), I_G.tolist(), strict=True)):
         queue[n] = waiting
         forwarded[n] = min(waiting, leaving)
@@ -95,9 +89,7 @@ def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf, held: float
     return Relayed(received, forwarded, queue)
 
 
-def forward_by_shares(
-    I_U: Real, I_G: Real, shares: Real, buffer: float = math.inf, held: float = 0.0
-) -> Relayed:
+def forward_by_shares(I_U: Real, I_G: Real, shares: Real, buffer: float = math.inf) -> Relayed:
     """Return what a half-duplex relay delivers that receives in the `shares` (n,) of each slot.
 
     The rates are `shares` I_U and (1 - `shares`) I_G; within them it forwards what it holds: see
@@ -105,10 +97,10 @@ def forward_by_shares(
     """
     if shares.shape != I_U.shape or not ((shares >= 0) & (shares <= 1)).all():
         raise InputError(f"shares {shares.shape}: expected one of 0 to 1 for each of {len(I_U)}")
-    return forward_greedily(shares * I_U, (1 - shares) * I_G, buffer, held)
+    return forward_greedily(shares * I_U, (1 - shares) * I_G, buffer)
 
 
-def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf, held: float = 0.0) -> Real:
+def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
     """Return the shares (n,) of the slots to receive in with which a route delivers most.
 
     Each slot brings the queue as near as it can to the level that is best for the slots after it:
@@ -118,10 +110,10 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf, held: float = 0.
     >>> round(forward_by_shares(rates, rates, best_shares(rates, rates)).rate, 6)
     1.0
     """
-    _check(I_U, I_G, buffer, held)
+    _check(I_U, I_G, buffer)
     slots = I_U.tolist(), I_G.tolist()
-    shares, waiting = [], held
-    for u, g, level in zip(*slots, queue_levels(*slots, buffer, held), strict=True):
+    shares, waiting = [], 0.0
+    for u, g, level in zip(*slots, queue_levels(*slots, buffer), strict=True):
         sending = 0.0
         if g > 0:
             sending = max(0.0, min(1.0, waiting / g, (waiting + u - level) / (u + g)))
@@ -130,12 +122,10 @@ def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf, held: float = 0.
     return np.array(shares)
 
 
-def _check(I_U: Real, I_G: Real, buffer: float, held: float) -> None:
+def _check(I_U: Real, I_G: Real, buffer: float) -> None:
     if I_U.ndim != 1 or I_U.shape != I_G.shape or not len(I_U):
         raise InputError(f"rates {I_U.shape} and {I_G.shape}; expected one per slot of each hop")
     if not (np.isfinite(I_U).all() and np.isfinite(I_G).all() and min(I_U.min(), I_G.min()) >= 0):
         raise InputError("rates of a relay: expected finite bits of at least 0")
     if not buffer > 0:
         raise InputError(f"buffer {buffer}; expected bits per hertz above 0")
-    if not (0 <= held <= buffer and math.isfinite(held)):
-        raise InputError(f"held {held}; expected bits per hertz of 0 to the buffer, {buffer}")

@@ -8,7 +8,6 @@ from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
 
 from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.flying.replan import Solver
 from faao_mav.mavlink.flying.stream import Stream
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Machine
@@ -45,7 +44,6 @@ class Scene:
         *,
         lands: bool = True,
         solution: Solution | None = None,
-        solver: Solver | None = None,
         **options: Any,
     ) -> None:
         self.arm = bool(options.pop("arm", False))
@@ -57,7 +55,7 @@ class Scene:
         rows = self.mock.lists.items(MissionType.MISSION)
         self.watch: Any = Watch(peer_of(kind), rows, arm=self.arm, lands=lands)
         if solution is not None:
-            self.watch = Stream(peer_of(kind), solution, solver=solver)
+            self.watch = Stream(peer_of(kind), solution)
         self.client = Counted(self.watch)
 
     def run(self, faults: Faults | None = None, until: float = 300.0, **more: Any) -> str:

@@ -26,7 +26,7 @@ def routes(draw: st.DrawFn) -> tuple[Real, Real]:
     return I_U, I_G
 
 
-def most(I_U: Real, I_G: Real, buffer: float, *, half: bool, held: float = 0.0) -> float:
+def most(I_U: Real, I_G: Real, buffer: float, *, half: bool) -> float:
     """The greatest delivered rate by the constraints as they are written, slot by slot."""
     n = len(I_U)
     cost = np.concatenate([np.zeros(n), -np.ones(n)]) / n
@@ -37,10 +37,10 @@ def most(I_U: Real, I_G: Real, buffer: float, *, half: bool, held: float = 0.0) 
         if k < n:  # f_k <= q_k
             this = np.eye(2 * n)[n + k]
             rows.append(this - came + left_before)
-            bounds.append(held)
+            bounds.append(0.0)
         if math.isfinite(buffer) and k < n:
             rows.append(came - left_before)
-            bounds.append(buffer - held)
+            bounds.append(buffer)
     if half:
         for k in range(n):
             if I_U[k] > 0 and I_G[k] > 0:
@@ -75,32 +75,6 @@ def test_a_long_hover_has_rates_that_are_equal_but_for_rounding() -> None:
     I_U, I_G = u * noise[0], g * noise[1]
     rate = forward_by_shares(I_U, I_G, best_shares(I_U, I_G)).rate
     assert rate == pytest.approx(u * g / (u + g), abs=1 / n)
-
-
-@given(routes(), BUFFERS, BITS)
-def test_what_is_held_at_the_beginning_is_delivered_too(
-    route: tuple[Real, Real], buffer: float, held: float
-) -> None:
-    held = min(held, buffer)
-    relayed = forward_greedily(*route, buffer, held)
-    assert relayed.queue[0] == held
-    assert relayed.rate == pytest.approx(most(*route, buffer, half=False, held=held), abs=1e-9)
-    shared = forward_by_shares(*route, best_shares(*route, buffer, held), buffer, held)
-    assert shared.rate == pytest.approx(most(*route, buffer, half=True, held=held), abs=1e-7)
-    assert relayed.rate >= forward_greedily(*route, buffer, held / 2).rate
-
-
-@given(routes(), BUFFERS, st.integers(0, 12))
-def test_a_route_that_is_cut_delivers_as_much(
-    route: tuple[Real, Real], buffer: float, cut: int
-) -> None:
-    I_U, I_G = route
-    whole = forward_greedily(I_U, I_G, buffer)
-    if cut >= len(I_U):
-        return
-    rest = forward_greedily(I_U[cut:], I_G[cut:], buffer, float(whole.queue[cut]))
-    assert rest.forwarded.tolist() == whole.forwarded[cut:].tolist()
-    assert rest.queue.tolist() == whole.queue[cut:].tolist()
 
 
 @given(routes(), BUFFERS)
@@ -151,12 +125,6 @@ def test_what_no_relay_has_is_refused(I_U: Real, I_G: Real, buffer: float) -> No
         forward_greedily(I_U, I_G, buffer)
     with pytest.raises(InputError, match=r"expected"):
         best_shares(I_U, I_G, buffer)
-
-
-@pytest.mark.parametrize("held", [-1.0, 2.5, math.nan, math.inf])
-def test_a_queue_that_cannot_be_is_refused(held: float) -> None:
-    with pytest.raises(InputError, match=r"held .*: expected|held .*; expected"):
-        forward_greedily(np.ones(2), np.ones(2), 2.0, held)
 
 
 def test_shares_are_shares() -> None:

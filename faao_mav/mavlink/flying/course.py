@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.mavlink.messages import GlobalPositionInt
 from faao_mav.optimizer.solution import Solution
 
 
@@ -17,12 +16,6 @@ class Setpoint(NamedTuple):
     position: Real
     velocity: Real
     acceleration: Real
-
-    @classmethod
-    def of(cls, w: Real, told: GlobalPositionInt) -> "Setpoint":
-        """Return where an aircraft at `w` (2,), m, is that has `told` its height and velocity."""
-        velocity = np.array([told.vy, told.vx, -told.vz]) / 100
-        return cls(np.append(w, told.relative_alt / 1000), velocity, np.zeros(3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +56,7 @@ class Course:
             ramp = top / acceleration
             push = acceleration * along
             pieces += [(ramp, push), (length / top - ramp, 0 * push), (ramp, -push)]
-        return cls.by(0.0, corners[0], np.zeros(3), pieces)
+        return cls._of(0.0, corners[0], np.zeros(3), pieces)
 
     @classmethod
     def of(cls, solution: Solution) -> "Course":
@@ -87,11 +80,7 @@ class Course:
         return cls(np.array(t), np.array(p), np.array([rest, *v, rest]), np.array(pushes))
 
     @classmethod
-    def by(cls, t: float, p: Real, v: Real, pieces: Sequence[tuple[float, Real]]) -> "Course":
-        """Return the flight from `p`, m, and `v`, m/s, at `t`, s, by `pieces`, which end at rest.
-
-        Each lasts so many seconds and has an acceleration, m/s²; all vectors are (3,).
-        """
+    def _of(cls, t: float, p: Real, v: Real, pieces: Sequence[tuple[float, Real]]) -> "Course":
         rows = []
         for lasting, a in pieces:
             rows.append((t, p, v, a))
@@ -104,25 +93,6 @@ class Course:
         t = other.t - other.begin + self.end
         pairs = ((self.t, t), (self.p, other.p), (self.v, other.v), (self.a, other.a))
         return Course(*(np.concatenate([first[:-1], second]) for first, second in pairs))
-
-    def later(self, seconds: float) -> "Course":
-        """Return the same flight so many seconds later."""
-        return Course(self.t + seconds, self.p, self.v, self.a)
-
-    def until(self, other: "Course", t: float) -> "Course":
-        """Return this flight until `t`, s, and from there on `other`, on the same clock.
-
-        At `t` both have to be at the same place with the same velocity.
-        """
-        before, after = self.t < t, other.t > t
-        p, v, a = other.at(t)
-        pairs = ((self.t, t, other.t), (self.p, p, other.p), (self.v, v, other.v))
-        return Course(
-            *(
-                np.concatenate([first[before], np.array(at)[None], then[after]])
-                for first, at, then in (*pairs, (self.a, a, other.a))
-            )
-        )
 
     @property
     def begin(self) -> float:

@@ -17,7 +17,6 @@ from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission.item import Mission
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.flying.replan import Solver
     from faao_mav.optimizer.solution import Solution
 
 
@@ -26,8 +25,7 @@ class FlightReport:
     """How a flight was watched: `ending` is None where the vehicle does not hold the mission.
 
     `differences` are what it holds instead; `samples` is where it was. `relay_start` is when the
-    clock of a streamed plan read 0, s on the vehicle's, and `solution` what was streamed in the
-    end.
+    clock of a streamed plan read 0, s on the vehicle's.
     """
 
     vehicle: FoundVehicle
@@ -35,7 +33,6 @@ class FlightReport:
     ending: Ending | None
     samples: Samples
     relay_start: float | None = None
-    solution: "Solution | None" = None
 
 
 def fly(
@@ -46,7 +43,6 @@ def fly(
     lands: bool = True,
     stream: "Solution | None" = None,
     rate: float = POSITION_RATE,
-    solver: "Solver | None" = None,
     watching: Callable[[Watch], object] = lambda _: None,
     **options: Unpack[LinkOptions],
 ) -> FlightReport:
@@ -54,8 +50,7 @@ def fly(
 
     It is armed and started only with `arm`; `lands` tells whether the flight ends on the ground:
     see `Watch`. With `stream` it is armed and flies that solution by setpoints, `rate` a second,
-    instead of its mission: see `Stream`, and what that raises; with `solver` the rest is solved
-    again where the flight is off the plan. `rate` is also that of the positions
+    instead of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
     that it is asked for. `watching` is called after every step. `options` are those of
     `LinkOptions`. Raises `LinkError` if there is no such vehicle, none that is known here, or its
     mission cannot be read.
@@ -80,7 +75,7 @@ def fly(
         if stream is not None:
             from faao_mav.mavlink.flying.stream import Stream
 
-            watch: Watch = Stream(peer, stream, rate=rate, solver=solver)
+            watch: Watch = Stream(peer, stream, rate=rate)
         else:
             rows = held.items[MissionType.MISSION]
             watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate)
@@ -88,5 +83,4 @@ def fly(
             ending = session.link.watch(watch, lambda: watching(watch))
         except LinkError as error:
             ending = Ending("lost", str(error))
-    samples = watch.seen.samples
-    return FlightReport(vehicle, (), ending, samples, watch.relay_start, watch.solution)
+    return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start)

@@ -37,13 +37,12 @@ class Itinerary:
     The parts: "take-off", which a vehicle that `takes_off` does by itself; "out" around the fence
     to where the relay flight begins, and a rest there; "relay"; "back" around the fence, until the
     way home is straight; "over". `relay_start` is when the plan's clock reads 0, None before that.
-    `solution` is the one that is flown, and `course` the flight of the present part. Raises
-    `InfeasibleError` where the flight would leave the plan's fence.
+    Raises `InfeasibleError` where the flight would leave the plan's fence.
     """
 
     def __init__(self, solution: Solution, *, takes_off: bool) -> None:
         plan = solution.plan
-        self.solution, self._plan, self._takes_off = solution, plan, takes_off
+        self._plan, self._takes_off = plan, takes_off
         self.relay = Course.of(solution)
         self._first = self.relay.p[0]
         self._corners, back = (
@@ -62,7 +61,7 @@ class Itinerary:
             )
         self.part: Part = "take-off"
         self.relay_start: float | None = None
-        self.course, self._begun = self._back, math.inf
+        self._course, self._begun = self._back, math.inf
         self._settled: float | None = None
 
     def setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
@@ -83,24 +82,17 @@ class Itinerary:
                 self._begin("out", climb.then(way), t)
             case "take-off":
                 return None
-            case "out" if since >= self.course.end and self._rests(t, place, velocity):
+            case "out" if since >= self._course.end and self._rests(t, place, velocity):
                 self._begin("relay", self.relay, t)
                 self.relay_start = self._begun
-            case "relay" if since >= max(self.course.end, self._plan.flight.duration):
+            case "relay" if since >= max(self._course.end, self._plan.flight.duration):
                 self._begin("back", self._back, t)
-        if self.part == "back" and t - self._begun >= self.course.end:
+        if self.part == "back" and t - self._begun >= self._course.end:
             self.part = "over"
-        return self.course.at(t - self._begun)
-
-    def divert(self, course: Course, solution: Solution | None = None) -> None:
-        """Fly the rest of the relay flight by `course`, on the plan's clock; `solution` tells why.
-
-        It has to end where and as the planned flight does.
-        """
-        self.course, self.solution = course, solution or self.solution
+        return self._course.at(t - self._begun)
 
     def _begin(self, part: Part, course: Course, t: float) -> None:
-        self.part, self.course, self._begun = part, course, t - course.begin
+        self.part, self._course, self._begun = part, course, t - course.begin
 
     def _way(self, *places: Real) -> Course:
         plan = self._plan
@@ -118,4 +110,4 @@ class Itinerary:
         elif self._settled is None:
             self._settled = t
         rested = self._settled is not None and t >= self._settled + _REST
-        return rested or t >= self._begun + self.course.end + _UNSETTLED
+        return rested or t >= self._begun + self._course.end + _UNSETTLED

@@ -10,7 +10,6 @@ from faao_mav.errors import InputError
 from faao_mav.mavlink.flying.course import Setpoint
 from faao_mav.mavlink.flying.itinerary import Itinerary
 from faao_mav.mavlink.flying.own_frame import OwnFrame
-from faao_mav.mavlink.flying.replan import Replan, Solver
 from faao_mav.mavlink.flying.round_trips import RoundTrips
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.messages import (
@@ -29,7 +28,6 @@ from faao_mav.mavlink.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
 from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
-from faao_mav.validate.flown import Line
 from faao_mav.validate.lean import beyond_lean
 from faao_mav.vehicle.px4 import PX4
 from faao_mav.vehicle.vehicle import vehicle_of
@@ -53,10 +51,6 @@ _ARM_AGAIN = 2.0
 _OFF_GROUND = 0.3
 """Metres above home from which on a take-off is under way, though its answer is lost; chosen."""
 
-_BACK = 1.5
-"""Seconds for which the mode has to be the one for setpoints again until an aircraft counts as
-handed back: two heartbeats, for one may be a late packet. Chosen."""
-
 _MODE_AGAIN, _TOLD_BY = 0.5, 3.0
 """Seconds between two messages about the mode that was asked for last; and after which, without
 one, it counts as the pilot who changed it: six of them. Chosen."""
@@ -79,23 +73,16 @@ class Stream(Watch):
     where to be: see `Itinerary`, of which `flight` is one; in the end what `mission.on_finish`
     says. While nothing is heard of it nothing is sent, and it does what its parameters say. A mode
     that was not asked for ends the setpoints for good, but for a failsafe in which the vehicle
-    still wants them, as PX4's CURRENT_MODE tells, and for a relay flight that has a `solver`:
-    whoever then sets the mode back hands it back, if no other ground station was heard. With
-    `solver` the rest is solved again where the flight is off its plan: see `Replan`.
+    still wants them, as PX4's CURRENT_MODE tells.
 
     Raises `InputError` for a vehicle that is not flown by setpoints, and what `Itinerary` raises.
     """
 
+    streams = True
     _start_command = MavCommand.TAKEOFF
 
     def __init__(
-        self,
-        peer: Peer,
-        solution: Solution,
-        *,
-        rate: float = 10.0,
-        patience: float = 60.0,
-        solver: Solver | None = None,
+        self, peer: Peer, solution: Solution, *, rate: float = 10.0, patience: float = 60.0
     ) -> None:
         plan = solution.plan
         finish = plan.mission.on_finish
@@ -107,13 +94,11 @@ class Stream(Watch):
         self._rules = setpoint_rules(self._family)
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if lands else "hold"]
+        self._solution = solution
         self._height, self._period = plan.flight.altitude, 1 / rate
         self._held = 0.0 if self._rules.carries_on else self._period / 2
         self._round_trips = RoundTrips()
         self.flight = Itinerary(solution, takes_off=not self._rules.takes_off_by_setpoints)
-        self._replan = None if solver is None else Replan(self.flight, solver)
-        self._handed_back = False
-        self._back_since: float | None = float("inf")
         self._frame = OwnFrame(self._family, plan.origin)
         self._unsure: float | None = None
         self._last_heard = float("inf")
@@ -122,11 +107,6 @@ class Stream(Watch):
         self._timeouts: dict[str, float] = {}
         self._ground: Setpoint | None = None
         self._first_sent, self._last_sent = float("inf"), float("-inf")
-
-    @property
-    def solution(self) -> Solution:
-        """What is flown by setpoints."""
-        return self.flight.solution
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         if envelope.sender == self._peer.address:
@@ -180,7 +160,7 @@ class Stream(Watch):
             self._end("refused", f"nothing was started: {text}, not within {_AT_HOME:.0f} m")
             return ()
         self.seen.told.append(f"without setpoints {self._rules.without(self._timeouts)}")
-        lean = beyond_lean(self.solution, vehicle_of(self.solution.plan))
+        lean = beyond_lean(self._solution, vehicle_of(self._solution.plan))
         if lean is not None:
             self.seen.told.append(str(lean))
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
@@ -205,13 +185,6 @@ class Stream(Watch):
                 return self._say(lambda: self._arming(True), now)
             case "engaging" if mode != self._mode_before:
                 self._step_aside()
-            case "aside" if mode != self._guided:
-                self._back_since = None
-            case "aside" if self._back_since is None:
-                self._back_since = now
-            case "aside" if now - (self._back_since or 0.0) >= _BACK and self._may_go_on():
-                self.phase, self._handed_back = "flying", True
-                self.seen.told.append("handed back: it holds until there is a new course")
             case "flying":
                 self._see_who_flies(mode, now)
             case "arming" | "starting" if mode != self._guided:
@@ -275,11 +248,6 @@ class Stream(Watch):
         self.phase, self._command = "flying", None
         self.seen.told.append("taking off")
 
-    def _may_go_on(self) -> bool:
-        """Tell whether an aircraft that somebody else has flown may be flown on."""
-        relay = self.flight.part == "relay" and self._armed
-        return self._replan is not None and relay and not self.seen.stations
-
     # ---- where it is to be
 
     def _on_position(self, position: GlobalPositionInt, now: float) -> Sequence[Message]:
@@ -318,11 +286,9 @@ class Stream(Watch):
         asked = self.phase == "ending" and self._command is not None
         if (self.phase == "flying" and self._unsure is None) or (asked and self._is_guided):
             part = self.flight.part
-            now = Setpoint.of(place[:2], position)
-            if not self._on_course(t, now):
-                return None
+            velocity = np.array([position.vy, position.vx, -position.vz]) / 100
             due = t + self._held + self._round_trips.lasting
-            setpoint = self.flight.setpoint(due, place, now.velocity)
+            setpoint = self.flight.setpoint(due, place, velocity)
             if self.flight.part != part:
                 self.seen.told.append(_PARTS[self.flight.part])
                 self.relay_start = self.flight.relay_start
@@ -332,31 +298,3 @@ class Stream(Watch):
                 self._ground = Setpoint(place, np.zeros(3), np.zeros(3))
             return self._ground
         return None
-
-    def _on_course(self, t: float, now: Setpoint) -> bool:
-        """See to it that the course leads on from `now` where it may; tell whether it does."""
-        replan, start = self._replan, self.relay_start
-        if replan is None or start is None or self.flight.part != "relay":
-            return True
-        begin = replan.begin if self._handed_back and not replan.asking else replan.step
-        begin(self._flown, t - start, now, self._round_trips.clock_speed)
-        self.seen.told += replan.told
-        replan.told.clear()
-        if not self._handed_back or replan.asking:
-            return True
-        self._handed_back = False
-        if replan.failed:
-            self._step_aside()
-        return not replan.failed
-
-    def _step_aside(self) -> None:
-        super()._step_aside()
-        self._handed_back, self._back_since = False, float("inf")
-        if self._replan is not None:
-            self._replan.forget()
-
-    def _flown(self) -> Line:
-        """Return where it was, on the plan's clock."""
-        assert self.relay_start is not None
-        t, w = self.seen.samples.record().line(self.flight.solution)
-        return Line(t - self.relay_start, w)

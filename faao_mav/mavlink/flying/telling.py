@@ -2,13 +2,11 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
-from faao_mav.mavlink.flying.course import Setpoint
 from faao_mav.mavlink.flying.fly import FlightReport
 from faao_mav.mavlink.flying.radio import RadioFeed, UdpRadio
-from faao_mav.mavlink.flying.replan import Foresight, Solver
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.comparison import on_the_plans_clock
@@ -41,26 +39,14 @@ class Telling:
         feed: "Feed | None",
         say: Callable[[dict[str, Any]], object],
     ) -> None:
-        self._solution, self._flown, self._feed = solution, solution, feed
-        self._say = say
+        self._solution, self._feed, self._say = solution, feed, say
         self._start: float | None = None
         self._told, self._next, self._last = 0, 0.0, -_PERIOD
         self._line = None if solution is None else _predicted_line(solution, track)
-        self._foresight: Foresight | None = None
-
-    def foresee(self, solver: Solver) -> None:
-        """Tell what a new course would deliver where a mission's flight is off its plan."""
-        if self._solution is not None:
-            self._foresight = Foresight(self._solution, solver)
 
     def __call__(self, watch: Watch) -> None:
         """Say what has happened since the last call, and once a second how the flight stands."""
         seen = watch.seen
-        if watch.solution is not None and watch.solution is not self._flown:
-            self._flown = watch.solution
-            self._line = _predicted_line(watch.solution, None)
-            if self._feed is not None:
-                self._feed.follow(watch.solution)
         for text in seen.told[self._told :]:
             self._say({"note": text})
         self._told = len(seen.told)
@@ -73,40 +59,27 @@ class Telling:
         stands = None
         if watch.phase not in ("checking", "engaging", "arming", "starting", "waiting"):
             stands = self._standing(watch)
-        if stands is not None and self._foresight is not None:
-            self._foresee(self._foresight, watch, stands)
-        self._say(_as_dict(watch, stands, self._flown))
+        self._say(_as_dict(watch, stands, self._solution))
 
     def debriefing(self, report: FlightReport) -> Debriefing | None:
         """Return what became of the plan; None without one, or without its flight."""
         if self._solution is None or self._line is None or not report.samples.t:
             return None
         record = report.samples.record()
-        flown = report.solution or self._solution
-        found = record.debriefing(flown, self._line, report.relay_start)
-        return None if found is None else replace(found, solution=self._solution)
+        return record.debriefing(self._solution, self._line, report.relay_start)
 
     def _standing(self, watch: Watch) -> Standing | None:
         """Return how the flight stands; None before it has left w_I, and when it is over."""
-        if self._flown is None or self._line is None:
+        if self._solution is None or self._line is None:
             return None
-        flight = watch.seen.samples.record().line(self._flown)
+        flight = watch.seen.samples.record().line(self._solution)
         start = watch.relay_start
-        if start is None and watch.solution is None:
-            self._start = start = plan_start(self._flown, self._line, flight)
+        if start is None and not watch.streams:
+            self._start = start = plan_start(self._solution, self._line, flight)
         if start is None:
             return None
-        stands = standing(self._flown, self._line, Line(flight.t - start, flight.w))
+        stands = standing(self._solution, self._line, Line(flight.t - start, flight.w))
         return None if stands.over else stands
-
-    def _foresee(self, foresight: Foresight, watch: Watch, stands: Standing) -> None:
-        if self._flown is None or self._start is None or watch.seen.position is None:
-            return
-        flight, position = watch.seen.samples.record().line(self._flown), watch.seen.position
-        now = Setpoint.of(flight.w[-1], position)
-        told = foresight.step(Line(flight.t - self._start, flight.w), now, stands, 1.0)
-        if told is not None:
-            watch.seen.told.append(told)
 
 
 class Feed:
@@ -117,10 +90,6 @@ class Feed:
         self._feed, self._radio = RadioFeed(solution), UdpRadio(to)
         self._seen = 0
         self.slots_per_second = 1 / solution.plan.flight.time_step
-
-    def follow(self, solution: Solution) -> None:
-        """Go on with the slots of `solution`, whose clock is the same."""
-        self._solution, self._feed = solution, RadioFeed(solution)
 
     def __call__(self, watch: Watch, start: float | None) -> None:
         """Send what is new; the plan's clock read 0 at `start`, s on the vehicle's."""

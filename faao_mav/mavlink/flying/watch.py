@@ -1,7 +1,7 @@
 """Watching a mission from the ground to its end, and starting it where that is asked for."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.mavlink.machine import Machine, Progress
@@ -19,9 +19,6 @@ from faao_mav.mavlink.modes import modes_of
 from faao_mav.mavlink.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, MissionType
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.wire_items import home_items
-
-if TYPE_CHECKING:
-    from faao_mav.optimizer.solution import Solution
 
 Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "waiting", "flying", "holding", "ending", "aside"
@@ -73,6 +70,9 @@ class Watch(Machine[Ending]):
     vehicle that is not known.
     """
 
+    streams = False
+    """Whether it is not the mission that is flown, but a plan by setpoints."""
+
     _start_command = MavCommand.START
 
     def __init__(
@@ -106,11 +106,6 @@ class Watch(Machine[Ending]):
         self._mode_before = -1
         self._command: Callable[[], Message] | None = None
         self._sent, self._next_try = 0, 0.0
-
-    @property
-    def solution(self) -> "Solution | None":
-        """What is flown by setpoints; None where it is the mission that is flown."""
-        return None
 
     @property
     def progress(self) -> Progress:

@@ -140,7 +140,7 @@ def _optima(
         rewards = ScaledRewards(stage, w)
     else:
         rewards = QueueRewards(stage, w)
-        kept = (*kept, _queue(rewards, relay, kin.time_step))
+        kept = (*kept, Queue(rewards, relay.half, relay.buffer / kin.time_step))
     first = objectives(rewards.base, kin, relay)
     search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy, race=race)
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
@@ -168,10 +168,6 @@ def _optima(
             LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
         )
     return optima
-
-
-def _queue(rewards: ScaledRewards, relay: RelayQueue, time_step: float) -> Queue:
-    return Queue(rewards, relay.half, relay.buffer / time_step, relay.held / time_step)
 
 
 def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:

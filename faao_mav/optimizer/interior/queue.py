@@ -1,12 +1,11 @@
 """The relay's queue: what it delivers of two rates, instead of the smaller of their means.
 
-    maximise  sum_n f_n    with  q_0 = held,  q_{n+1} = q_n + r_n - f_n,  f_n <= q_n,  q_n <= buffer
+    maximise  sum_n f_n    with  q_0 = 0,  q_{n+1} = q_n + r_n - f_n,  f_n <= q_n,  q_n <= buffer
     and  r_n <= x_n I_U(w_n),  f_n <= (1 - x_n) I_G(w_n),  0 <= x_n <= 1
 
 for half duplex, and with r_n <= I_U(w_n), f_n <= I_G(w_n) for full duplex: see `radio.relay`. That
 r and f are at least 0 need not be said: received less than nothing can be taken off an earlier
-slot. In slot 0 nothing can be forwarded but what is held, and what the last slot receives is worth
-nothing.
+slot. In slot 0 nothing can be forwarded, and what the last slot receives is worth nothing.
 
 Method. q_n, the multiplier p_n of its equation and x_n are unknowns of the Newton system. r_n and
 f_n are eliminated slot by slot: with z the multipliers of the first three inequalities, which are
@@ -70,15 +69,11 @@ class QueueRewards(ScaledRewards):
 
 @dataclass(frozen=True)
 class Queue(Constraint):
-    """The queue of a relay that shares its band if `half`.
-
-    `buffer`, and what is `held` when the flight begins, are in the unit of the rates.
-    """
+    """The queue of a relay that shares its band if `half`; `buffer` is in the unit of the rates."""
 
     rewards: ScaledRewards
     half: bool = False
     buffer: float = math.inf
-    held: float = 0.0
 
     @property
     def unknowns(self) -> int:
@@ -99,7 +94,7 @@ class Queue(Constraint):
             Entry(q, p, np.ones(slots - 1), ahead=1),
             Entry(q, q, begins),
             Entry(p, p, ends),
-            # q_0 is fixed, which takes its place in the equation of q_1
+            # q_0 = 0 is fixed, which takes its place in the equation of q_1
         )
 
     def begin(self, flight: ScaledFlight, start: Start) -> "QueueState":  # noqa: ARG002
@@ -107,29 +102,28 @@ class Queue(Constraint):
         scaled = self.rewards.in_units(self.rewards.values)
         I_U, I_G = scaled.value
         x = self._shares(start)
-        most, held = self.buffer / self.rewards.unit, self.held / self.rewards.unit
+        most = self.buffer / self.rewards.unit
         relayed = [
-            forward_greedily(arriving, leaving, float(room[0]), float(there[0]))
-            for arriving, leaving, room, there in zip(
-                x * I_U, (1 - x if self.half else x) * I_G, most, held, strict=True
+            forward_greedily(arriving, leaving, float(room[0]))
+            for arriving, leaving, room in zip(
+                x * I_U, (1 - x if self.half else x) * I_G, most, strict=True
             )
         ]
         r, f, q = (
             np.stack([getattr(each, part) for each in relayed])
             for part in ("received", "forwarded", "queue")
         )
-        later, inner, outer = np.ones((3, *I_U.shape))
-        later[:, 0], outer[:, -1] = 0, 0
-        inner[:, 0] = self.held > 0
+        inner, outer = np.ones((2, *I_U.shape))
+        inner[:, 0], outer[:, -1] = 0, 0
         on = [outer, inner, inner]
         if self.half:
             on += [np.ones(I_U.shape)] * 2
         if math.isfinite(self.buffer):
-            on.append(later)
+            on.append(inner)
         ones = np.stack(on)
         state = QueueState(
             ones, ones, ones, ones, self, start.own, most,
-            scaled.value, scaled.gradient, scaled.hessian, r, f, q, 0.5 * outer, x, later,
+            scaled.value, scaled.gradient, scaled.hessian, r, f, q, 0.5 * outer, x,
         )  # fmt: skip
         functions = state.functions()
         s = np.where(state.on > 0, functions + 2 * start.mu, 1.0)
@@ -143,7 +137,7 @@ class Queue(Constraint):
             return np.ones(rates.shape[1:])
         if start.margin >= 1:  # cold
             return np.full(rates.shape[1:], 0.5)
-        best = [best_shares(I_U, I_G, self.buffer, self.held) for I_U, I_G in rates.swapaxes(0, 1)]
+        best = [best_shares(I_U, I_G, self.buffer) for I_U, I_G in rates.swapaxes(0, 1)]
         return np.clip(best, _LEAST_SHARE, 1 - _LEAST_SHARE)
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:  # noqa: ARG002
@@ -159,7 +153,6 @@ class QueueState(Slacks):
     larger than its function. `values` (2, flights, n), `gradients` (2, 2, flights, n) and
     `hessians` (3, 2, flights, n) are those of both rates in the unit of the rewards, and r, f, q
     and `most` (flights, 1), the buffer, too. p is the worth of what is received, x the shares.
-    `later` is 0 in slot 0, whose q is given, and else 1.
     """
 
     constraint: Queue
@@ -173,7 +166,6 @@ class QueueState(Slacks):
     q: Real
     p: Real
     x: Real
-    later: Real
 
     @property
     def shares(self) -> Real:
@@ -231,12 +223,12 @@ class QueueState(Slacks):
 
     def forces(self) -> Forces:
         """Return the forces of the multipliers, and the gradients by r, f, q and x."""
-        z, p, inner = self.z, self.p, self.on[1]
+        z, p, (_, inner, _) = self.z, self.p, self.on[:3]
         on_q = p + z[2]
         on_q[..., 1:] -= p[..., :-1]
         if math.isfinite(self.constraint.buffer):
             on_q -= z[-1]
-        own = [p - z[0], inner * (1 - p - z[1] - z[2]), self.later * on_q]
+        own = [p - z[0], inner * (1 - p - z[1] - z[2]), inner * on_q]
         if self.constraint.half:
             own.append(z[0] * self.values[0] - z[1] * self.values[1] + z[3] - z[4])
         return Forces(w=(self.slot.gradients * z[:2]).sum(axis=1), own=np.stack(own, axis=-1))
@@ -246,23 +238,23 @@ class QueueState(Slacks):
         slot, (I_U, I_G) = self.slot, self.values
         g_U, g_G = slot.gradients[:, 0], slot.gradients[:, 1]
         x, (q, p) = self.own.start, (self.own.stop - 2, self.own.stop - 1)
-        on_q, outer, later = self.later * slot.series, self.on[0], self.later
+        on_q, outer = slot.series, self.on[0]
         if math.isfinite(self.constraint.buffer):
             on_q = on_q + slot.k[-1]
         entries = [
             Entry(q, q, on_q),
-            Entry(p, q, -slot.by_G * outer * later),
+            Entry(p, q, -slot.by_G * outer * self.on[1]),
             Entry(p, p, -slot.loose_r - slot.loose_f * outer),
         ]
         for axis in (0, 1):
             entries += [
-                Entry(q, W.start + axis, -later * slot.series * g_G[axis]),
+                Entry(q, W.start + axis, -slot.series * g_G[axis]),
                 Entry(p, W.start + axis, outer * (slot.by_G * g_G[axis] - g_U[axis])),
             ]
         if self.constraint.half:
             entries += [
                 Entry(x, x, slot.series * I_G * I_G + slot.k[3] + slot.k[4]),
-                Entry(q, x, later * slot.series * I_G),
+                Entry(q, x, slot.series * I_G),
                 Entry(p, x, -outer * (I_U + slot.by_G * I_G)),
             ]
             crossed = self._crossed()
@@ -300,7 +292,7 @@ class QueueState(Slacks):
         if self.constraint.half:
             ds[3], ds[4] = dx - m[3], -dx - m[4]
         if math.isfinite(self.constraint.buffer):
-            ds[-1] = -dq - m[-1]
+            ds[-1] = -inner * dq - m[-1]
         z[0], z[1], z[2] = p, slot.by_G * left + exchanged, slot.by_q * left - exchanged
         z[3:] = t[3:] - slot.k[3:] * ds[3:]
         dr = outer * (risen[0] - m[0] - ds[0])
@@ -315,9 +307,9 @@ class QueueState(Slacks):
             dr = dr + self._missed()
         else:
             _, z, dr, df = self._eliminated(none, target, 0.0, 0.0, none, 0.0, 0.0)
-        outer, later = self.on[0], self.later
+        outer, inner = self.on[:2]
         on_q = z[2] - z[-1] if math.isfinite(self.constraint.buffer) else z[2]
-        own = [later * on_q, outer * (dr - df)]
+        own = [inner * on_q, outer * (dr - df)]
         if self.constraint.half:
             own.insert(0, z[3] - z[4] - self.values[1] * z[1])
         return Forces(w=self.slot.gradients[:, 1] * z[1], own=np.stack(own, axis=-1))
@@ -333,7 +325,7 @@ class QueueState(Slacks):
         """
         own = move.unknowns[..., self.own].transpose(2, 0, 1)
         dx = own[0] if self.constraint.half else np.zeros_like(own[0])
-        dq, p = self.later * own[-2], self.on[0] * own[-1]
+        dq, p = self.on[1] * own[-2], self.on[0] * own[-1]
         risen = (self.slot.gradients * move.w[:, None]).sum(axis=0)
         if self.constraint.half:
             risen += np.stack([dx, -dx]) * self.values
