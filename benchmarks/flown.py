@@ -1,12 +1,11 @@
 """Missions that real autopilots flew in their simulators, beside their plans.
 
     FAAO_AUTOPILOTS=FOLDER python benchmarks/flown.py [ardupilot | px4 | plane] [PLAN ...]
-        [--wind SPEED,FROM] [--stream] [--limits] [--random FIRST,COUNT]
+        [--wind SPEED,FROM] [--stream] [--random FIRST,COUNT]
 
 With a wind, m/s and degrees, plans are made for it, and flown in it; else in calm air. With
 --stream copters fly the plans by setpoints, and what is predicted is of the mission still. With
---limits missions for calm air are flown in the strongest wind that the summary says they keep, and
-in `BEYOND` more. With --random plans, for copters each with its wind, are drawn from these seeds.
+--random plans, for copters each with its wind, are drawn from these seeds.
 
 One row for each plan: rms position error at equal times (m), how much later than planned the flight
 is over (s), the delivered rate over the planned one; each as predicted and as flown.
@@ -35,7 +34,6 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.client import upload
 from faao_mav.mavlink.flying.fly import fly
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan import Wind
 from faao_mav.schedule.prediction import Prediction, price_flight
 from missions import PLANS, plan_of, random_changes
 
@@ -45,9 +43,6 @@ RUNNERS = {
     "plane": ("fly_arducopter.py", ["--speedup", "20", "--vehicle", "plane", "--tail", "5"]),
 }
 """The runner of each autopilot, with its options: little air drag for PX4's aircraft."""
-
-BEYOND = 2.0
-"""m/s more than the wind that a mission is said to keep."""
 
 FLOWN: dict[str, dict[str, Any]] = {
     name: PLANS[name]
@@ -124,13 +119,11 @@ PLANES: dict[str, tuple[dict[str, Any], float]] = {
 """Plans for planes, as changes of `missions/plane_relay.yaml`, and the elevation of home, m."""
 
 
-def flown(
-    autopilots: Path, autopilot: str, result: Result, folder: Path, wind: Wind | None = None
-) -> Prediction:
+def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Prediction:
     """Fly the mission of `result` and return what it delivers; again if the simulator fails.
 
     `autopilots` is the folder with the runners; mission and track are written to `folder`. It is
-    flown in `wind`, else in the plan's.
+    flown in the plan's wind.
     """
     script, options = RUNNERS[autopilot]
     files = result.write(folder / "mission.waypoints")
@@ -140,7 +133,7 @@ def flown(
     told = result.solution.plan.vehicle.parameters
     own.write_text("".join(f"{name} {value}\n" for name, value in told.items()))
     command += ["--param-file", str(own)] if told else []
-    command += in_wind(autopilots / script, wind or result.solution.plan.site.wind)
+    command += in_wind(autopilots / script, result.solution.plan.site.wind)
     track = folder / "track.csv"
     for _ in range(4):
         run = subprocess.run(
@@ -238,23 +231,6 @@ def row(
     return "   ".join(cells)
 
 
-def at_limits(name: str, autopilots: Path, autopilot: str) -> str:
-    """Fly a mission made for calm air in the wind that it is said to keep, and in more."""
-    result = plan_mission(plan_of(FLOWN[name], autopilot, "recommend"))
-    assert result.check is not None
-    assert result.check.wind_limit is not None
-    limit = result.check.wind_limit
-    cells = [f"{autopilot:<10}{name:<28}{limit.speed:5.2f} m/s from {limit.from_degrees:3.0f}"]
-    for speed in (limit.speed, limit.speed + BEYOND):
-        with tempfile.TemporaryDirectory() as folder:
-            wind = Wind(speed, limit.from_degrees)
-            found = flown(autopilots, autopilot, result, Path(folder), wind)
-        late = found.duration - result.solution.plan.flight.duration
-        share = 100 * found.delivered_rate / result.solution.delivered_rate
-        cells.append(f"{late:+6.2f} s {share:7.2f} %")
-    return "   ".join(cells)
-
-
 def drawn(seed: int) -> dict[str, Any]:
     """Return the plan that `seed` draws, as changes of the sample, with 3 to 8 m/s of wind."""
     random = Random(seed + 1000)
@@ -308,9 +284,6 @@ def main() -> None:
         plans = PLANES if autopilot == "plane" else FLOWN
         for name in [each for each in plans if each in chosen] or names or plans:
             stream = "--stream" in chosen
-            if "--limits" in chosen:
-                print(at_limits(name, autopilots, autopilot), flush=True)
-                continue
             print(row(name, autopilots, autopilot, wind, stream=stream), flush=True)
 
 

@@ -198,9 +198,6 @@ class Result:
             if conversion and flown
             else None,
             "wind": asdict(plan.site.wind),
-            "wind_limit": asdict(self.check.wind_limit)
-            if self.check and self.check.wind_limit
-            else None,
             "energy": self.check.energy.as_dict() if self.check and self.check.energy else None,
             "fence": asdict(self.fence) if self.fence else None,
             "validation": [asdict(finding) for finding in self.findings],

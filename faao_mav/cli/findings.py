@@ -47,7 +47,6 @@ def as_dict(checked: CheckedFile) -> dict[str, Any]:
         "parameters": vehicle.source if vehicle.parameters else None,
         "predicted": predicted,
         "link": link,
-        "wind_limit": asdict(check.wind_limit) if check.wind_limit else None,
         "energy": check.energy.as_dict() if check.energy else None,
         "errors": len(check.of(Level.ERROR)),
         "warnings": len(check.of(Level.WARNING)),

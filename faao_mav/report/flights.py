@@ -8,16 +8,14 @@ from faao_mav.plan import Plan
 from faao_mav.report.findings import counted
 from faao_mav.report.lines import Line, apart, carried, of_plan
 from faao_mav.validate.check import Check
-from faao_mav.validate.demands import LinkCheck
 from faao_mav.validate.flown import Debriefing
-from faao_mav.validate.wind_limit import LEAST_RATE, MOST_LATE, MOST_WIND, WindLimit
 from faao_mav.workflow import FenceSummary, Result
 
 
 def flight_lines(result: Result) -> Iterator[Line]:
     """Yield how the mission of `result` will fly: beside its plan, in wind, energy and fence."""
     yield from _mission(result)
-    yield from _wind(result.solution.plan, result.check)
+    yield from _wind(result.solution.plan)
     yield from _energy(result.check)
     yield from _fenced(result.fence)
 
@@ -32,8 +30,6 @@ def check_lines(check: Check) -> Iterator[Line]:
         if any(check.wind):
             lasting = f"{lasting} in {math.hypot(*check.wind):.3g} m/s of wind"
         yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
-    if check.wind_limit is not None:
-        yield "wind", _of_limit(check.wind_limit, check.link)
     yield from _energy(check)
     if link := check.link:
         share = partial(of_plan, bandwidth_mhz=link.bandwidth_mhz)
@@ -99,15 +95,13 @@ def _mission(result: Result) -> Iterator[Line]:
         yield "", doubt
 
 
-def _wind(plan: Plan, check: Check | None) -> Iterator[Line]:
-    """Yield the plan's wind, if it has one, and which winds its mission keeps."""
+def _wind(plan: Plan) -> Iterator[Line]:
+    """Yield the plan's wind, if it has one."""
     wind, told = plan.site.wind, []
     if any(plan.wind):
         told.append(f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees")
     if wind.gust > wind.speed:
         told.append(f"gusts of {wind.gust:g} m/s")
-    if check is not None and check.wind_limit is not None:
-        told.append(_of_limit(check.wind_limit, check.link))
     if told:
         yield "wind", "; ".join(told)
 
@@ -125,22 +119,6 @@ def _energy(check: Check | None) -> Iterator[Line]:
         left = f"{100 * energy.left:.0f} %" if energy.left > 0 else "nothing"
         told += f"; {left} of {battery.capacity_wh:g} Wh is left (reserve {battery.reserve:g} %)"
     yield "energy", told
-
-
-def _of_limit(limit: WindLimit, link: LinkCheck | None) -> str:
-    rate = f"{100 * LEAST_RATE:g} % of the rate and " if link is not None else ""
-    kept = f"keeps {rate}its time within {MOST_LATE:g} s"
-    if any(limit.beside):
-        return (
-            f"{kept} while the wind is within {limit.speed:g} m/s of the planned one; the worst "
-            f"change is wind from {limit.from_degrees:g} degrees"
-        )
-    if limit.speed == 0:
-        return f"{kept} in no wind from {limit.from_degrees:g} degrees"
-    if limit.speed >= MOST_WIND:
-        return f"{kept} in {MOST_WIND:g} m/s from any direction"
-    worst = f"the worst is {limit.from_degrees:g} degrees"
-    return f"{kept} up to {limit.speed:g} m/s from any direction; {worst}"
 
 
 def _fenced(fence: FenceSummary | None) -> Iterator[Line]:

@@ -8,7 +8,6 @@ from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
 from faao_mav.validate.energy import EnergyUse, energy_use
-from faao_mav.validate.wind_limit import WindLimit, wind_limit
 from faao_mav.vehicle import Track, Vehicle
 
 if TYPE_CHECKING:
@@ -21,8 +20,8 @@ class Check:
 
     `track` is the predicted flight; where there is none `unpredicted` says why. `link` is what the
     flight makes of a plan, None without a plan or a track. `findings` are the worst first. `wind`,
-    m/s, is what `track` is predicted in, `wind_limit` the strongest wind that the mission keeps,
-    `energy` what the flight takes, None where no plan tells its power.
+    m/s, is what `track` is predicted in, `energy` what the flight takes, None where no plan tells
+    its power.
     """
 
     mission: Mission
@@ -32,7 +31,6 @@ class Check:
     link: LinkCheck | None = None
     findings: tuple[Finding, ...] = ()
     wind: Vector = (0.0, 0.0)
-    wind_limit: WindLimit | None = None
     energy: EnergyUse | None = None
 
     def of(self, level: Level) -> tuple[Finding, ...]:
@@ -64,13 +62,10 @@ def check(
     >>> [finding.rule for finding in found.of(Level.ERROR)]
     ['px4-starts-with-land']
     """
-    own = solution.plan.wind if solution is not None else (0.0, 0.0)
-    wind = own if wind is None else wind
+    if wind is None:
+        wind = solution.plan.wind if solution is not None else (0.0, 0.0)
     track, unpredicted = _track(mission, vehicle, wind)
-    made_for = track if wind == own else _track(mission, vehicle, own)[0]
-    limit = link = energy = None
-    if made_for is not None:
-        limit = wind_limit(mission, vehicle, made_for, solution=solution, lead=lead)
+    link = energy = None
     if solution is not None and track is not None:
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
 
@@ -86,7 +81,7 @@ def check(
         airborne=airborne,
         energy=energy,
     )
-    return Check(mission, vehicle, track, unpredicted, link, findings, wind, limit, energy)
+    return Check(mission, vehicle, track, unpredicted, link, findings, wind, energy)
 
 
 def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:

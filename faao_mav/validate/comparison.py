@@ -10,8 +10,8 @@ from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.initial_route import begins_at_speed, set_out
-from faao_mav.schedule.prediction import Prediction, price_flight, rates_along
-from faao_mav.schedule.schedule import lateness, passing, positions_at
+from faao_mav.schedule.prediction import Prediction, price_flight
+from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LinkCheck, Stretch
 from faao_mav.vector import lengths
@@ -21,11 +21,6 @@ _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 """Seconds by which the aircraft may set out before the plan, of which the best fit is taken.
 
 The step of 0.1 s is that of predicted flights."""
-
-_EVERY = 8
-"""The step of the slots whose rates are computed where a share of the planned rate is asked for.
-
-Measured on the sample plans, in the winds tried for their limits: the share is 3e-4 off at most."""
 
 _LEAST = 1e-6
 """The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
@@ -62,41 +57,6 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
         altitude_error=float(np.abs(during - plan.flight.altitude).max()),
         worst=_worst(solution, flown),
     )
-
-
-def keeps_plan(
-    solution: Solution, track: Track, lead: float | None, *, share: float, late: float
-) -> bool:
-    """Tell whether `track` ends within `late` s of the plan and has a `share` of its rate.
-
-    That is the share of `LinkCheck.share`; `lead` is as in `compare_with_plan`.
-    """
-    t, w = on_the_plans_clock(solution, track, lead=lead)
-    tolerance = solution.plan.mission.path_tolerance
-    if not abs(lateness(solution.t, solution.w, t, w, tolerance)) <= late:
-        return False
-    I_U, I_G = _nearly(solution, positions_at(solution.t, t, w))
-    flown = min(float(I_U.mean()), float(I_G.mean()))
-    delivered = solution.relay(I_U, I_G, solution.shares).rate >= share * solution.delivered_rate
-    return delivered and (solution.plan.radio.causal or flown >= share * solution.rates.R_avg)
-
-
-def _nearly(solution: Solution, w: Real) -> tuple[Real, Real]:
-    """Return `rates_along`, where fading is averaged over from some slots: see `_EVERY`.
-
-    Between them the loss is interpolated. A known draw is another one in each slot.
-    """
-    n = len(w)
-    if solution.H_rB.ndim < 4:
-        return rates_along(solution, w)
-    some = np.unique(np.append(np.arange(0, n, _EVERY), n - 1))
-    I_U, I_G = (
-        planned + np.interp(np.arange(n), some, flown - planned[some])
-        for planned, flown in zip(
-            (solution.I_U, solution.I_G), rates_along(solution, w, only=some), strict=True
-        )
-    )
-    return I_U, I_G
 
 
 def on_the_plans_clock(

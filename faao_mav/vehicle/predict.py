@@ -44,7 +44,6 @@ def predict(
     *,
     step: float = 0.1,
     wind: Vector = (0.0, 0.0),
-    longest: float = math.inf,
 ) -> Track:
     """Return the predicted flight of `mission` by `vehicle`, sampled every `step` seconds.
 
@@ -56,7 +55,7 @@ def predict(
 
     Raises `InputError` for places that cannot be flown to (NaN, altitudes above sea level
     without a home), parameters that are useless, or a flight that takes more than
-    `longest` s or 1.5 hours, of a plane six.
+    1.5 hours, of a plane six.
     """
     start = _start(mission)
     if start is None:
@@ -65,9 +64,7 @@ def predict(
         none = np.empty(0, dtype=int)
         return Track(np.empty(0), empty, empty, none, reached, frame or LocalFrame(0.0, 0.0))
     frame = frame or LocalFrame(*start)
-    walk = _Walk(
-        mission, vehicle, frame, step, np.append(frame.to_local(*start), 0.0), wind, longest
-    )
+    walk = _Walk(mission, vehicle, frame, step, np.append(frame.to_local(*start), 0.0), wind)
     for index, item in _in_order(mission):
         walk.take(index, item)
         if walk.over:
@@ -138,7 +135,6 @@ class _Walk:
     step: float
     home: Real
     wind: Vector
-    longest: float
     stretch: list[_Stop] = field(default_factory=list)
     parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
     clock: float = 0.0
@@ -151,8 +147,7 @@ class _Walk:
         self.speed = self.model.cruise_speed
         self.place = self.goal = self.home
         self.reached = np.full(len(self.mission.items), np.nan)
-        most = LONGEST_COPTER if self.vehicle.type.hovers else LONGEST
-        self.longest = min(self.longest, most)
+        self.longest = LONGEST_COPTER if self.vehicle.type.hovers else LONGEST
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
