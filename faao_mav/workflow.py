@@ -51,11 +51,14 @@ _DRAWING_STEP = 1.0
 class FenceSummary:
     """A fence of so many `areas`, and how near flights come to its edge, m; below 0 outside.
 
-    `margin` is what the plan is to keep, `planned_clearance` what it keeps, `predicted_clearance`
-    what the whole predicted flight keeps, None without one.
+    `zones` say of each whether it is one to stay in or out of, with its name; `notes` what of the
+    fence's file was passed over. `margin` is what the plan is to keep, `planned_clearance` what it
+    keeps, `predicted_clearance` what the whole predicted flight keeps, None without one.
     """
 
     areas: int
+    zones: tuple[str, ...]
+    notes: tuple[str, ...]
     margin: float
     planned_clearance: float
     predicted_clearance: float | None
@@ -102,6 +105,8 @@ class Result:
         track = self.check.track if self.check is not None else None
         return FenceSummary(
             areas=len(plan.zones),
+            zones=tuple(zone.name for zone in plan.zones),
+            notes=plan.geofence.notes,
             margin=plan.fence.margin,
             planned_clearance=area.clearance(self.solution.w),
             predicted_clearance=area.clearance(track.position[:, :2]) if track else None,

@@ -114,9 +114,11 @@ def test_how_near_the_fence_the_flight_comes(fenced: Result) -> None:
     assert (told["areas"], told["margin"]) == (2, 3)
     assert told["planned_clearance"] >= 3
     assert told["planned_clearance"] > told["predicted_clearance"] > 1
-    (line,) = [text for label, text in result_lines(fenced) if label == "fence"]
+    lines = list(result_lines(fenced))
+    first = next(k for k, (label, _) in enumerate(lines) if label == "fence")
+    assert lines[first][1] == ", ".join(told["zones"]) == "inclusion polygon, exclusion polygon"
     kept = f"{told['planned_clearance']:.1f} m (margin 3 m)"
-    assert line.startswith(f"2 areas; the plan keeps {kept}")
+    assert lines[first + 1][1].startswith(f"the plan keeps {kept}")
 
 
 def test_a_fence_is_removed_with_its_mission(

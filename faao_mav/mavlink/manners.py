@@ -40,8 +40,6 @@ class Manners:
     INVALID_SEQUENCE and goes on waiting. `reminder` is the item, counted from the end (-1: the
     last one), to send again when the last acknowledgement is missing, None if none is safe.
 
-    `unset_is_zero`: a value that is not set is sent as 0, because NaN is refused.
-
     In downloads: `any_request_order` tells that it answers each request by itself, so that several
     can be under way, and `final_acks` how many acknowledgements it is sent at the end.
 
@@ -52,7 +50,6 @@ class Manners:
     patience: float = math.inf
     ignores_other_items: bool = False
     reminder: int | None = None
-    unset_is_zero: bool = False
     any_request_order: bool = False
     final_acks: int = 1
     meanings: Mapping[MavResult, str] = field(default_factory=dict)
@@ -77,7 +74,6 @@ _MANNERS: dict[AutopilotFamily, Manners] = {
         request_period=1.0,
         patience=8.0,
         reminder=-2,
-        unset_is_zero=True,
         any_request_order=True,
         meanings={
             MavResult.ERROR: (

@@ -11,10 +11,10 @@ from dataclasses import replace
 from typing import Final
 
 from faao_mav.errors import InputError
-from faao_mav.mavlink.manners import autopilot_name, manners_of
+from faao_mav.mavlink.manners import autopilot_name
 from faao_mav.mavlink.messages import WireItem
 from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mission.command import Frame
+from faao_mav.mission.command import FLOWN_TO, Frame
 from faao_mav.mission.fence import RallyPoint, check_place
 from faao_mav.mission.fence_items import fence_items, fence_of, rally_items
 from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
@@ -46,8 +46,9 @@ def wire_items(
 ) -> tuple[WireItem, ...]:
     """Return what `vehicle` is sent for one of the lists of `mission`.
 
-    What is not set (NaN) is 0 for ArduPilot, which refuses NaN and takes 0, 0 for "here". PX4
-    would fly to 0, 0. Raises `InputError` for that, and for numbers that the wire does not carry.
+    Parameters that are not set (NaN) are 0 for an autopilot that refuses NaN. Raises `InputError`
+    for a place to fly to that is not set, for a rally point without an altitude, and for numbers
+    that the wire does not carry.
     """
     if mission_type is MissionType.FENCE:
         items = fence_items(mission.fence)
@@ -104,18 +105,18 @@ def _check(item: WireItem, name: str) -> None:
 
 
 def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:
-    values = (*item.params, item.x, item.y, item.z)
-    if not any(map(math.isnan, values)):
-        return item
-    if manners_of(vehicle).unset_is_zero:
-        one, two, three, four, x, y, z = (0.0 if math.isnan(value) else value for value in values)
-        return replace(item, params=(one, two, three, four), x=x, y=y, z=z)
-    if item.frame in GLOBAL_FRAMES and (math.isnan(item.x) or math.isnan(item.y)):
+    """Return `item` as `vehicle` is sent it; see `wire_items`."""
+    unset = [
+        name
+        for name, value in (("latitude", item.x), ("longitude", item.y), ("altitude", item.z))
+        if math.isnan(value)
+    ]
+    if unset and item.command in FLOWN_TO and item.frame in GLOBAL_FRAMES:
         raise InputError(
-            f"item {index}: latitude or longitude is not set; {autopilot_name(vehicle)} would "
-            "fly to 0, 0: give the place"
+            f"item {index}: {' and '.join(unset)} not set, which {autopilot_name(vehicle)} would "
+            "take for 0: give the place"
         )
-    return item
+    return item if vehicle is None else vehicle.dialect.sent(item)
 
 
 def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireItem:

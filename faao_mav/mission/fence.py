@@ -1,7 +1,7 @@
 """Geofences and rally points: what travels beside a mission."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from faao_mav.errors import InputError
@@ -11,14 +11,17 @@ LatLon: TypeAlias = tuple[float, float]
 
 
 def check_place(place: LatLon, what: str, altitude: float = 0.0) -> None:
-    """Raise `InputError`, which names `what`, for coordinates that are no place on Earth."""
+    """Raise `InputError`, which names `what`, for coordinates that are no place on Earth.
+
+    An `altitude` of NaN is one that is not known.
+    """
     latitude, longitude = place
     if not (abs(latitude) <= 90 and abs(longitude) <= 180):
         raise InputError(
             f"{what}: {latitude}, {longitude}; expected a latitude within 90 degrees and a "
             "longitude within 180"
         )
-    if not math.isfinite(altitude):
+    if math.isinf(altitude):
         raise InputError(f"{what}: altitude {altitude}; expected finite metres")
 
 
@@ -26,12 +29,14 @@ def check_place(place: LatLon, what: str, altitude: float = 0.0) -> None:
 class Circle:
     """All places within `radius` metres of `center`; to stay in (`inclusion`) or out of.
 
-    Raises `InputError` for a center that is no place on Earth or a radius that is not above 0.
+    `name` as in `Polygon`. Raises `InputError` for a center that is no place on Earth or a radius
+    that is not above 0.
     """
 
     center: LatLon
     radius: float
     inclusion: bool
+    name: str = ""
 
     def __post_init__(self) -> None:
         check_place(self.center, "fence circle")
@@ -43,11 +48,13 @@ class Circle:
 class Polygon:
     """The inside of `vertices`, at least three; to stay in (`inclusion`) or out of.
 
-    Raises `InputError` for fewer vertices or one that is no place on Earth.
+    `name` is what a drawing calls it, which no autopilot is told. Raises `InputError` for fewer
+    vertices or one that is no place on Earth.
     """
 
     vertices: tuple[LatLon, ...]
     inclusion: bool
+    name: str = ""
 
     def __post_init__(self) -> None:
         if len(self.vertices) < 3:
@@ -58,7 +65,7 @@ class Polygon:
 
 @dataclass(frozen=True, slots=True)
 class RallyPoint:
-    """A place to return to instead of home: degrees, metres above home.
+    """A place to return to instead of home: degrees, metres above home (NaN: not known).
 
     Raises `InputError` for coordinates that are no place on Earth.
     """
@@ -75,8 +82,8 @@ class RallyPoint:
 class Fence:
     """Where the aircraft may be: inside every inclusion, outside every exclusion.
 
-    `breach_return` is where ArduPilot flies after a breach, or None. A fence without areas is
-    false.
+    `breach_return` is where ArduPilot flies after a breach, or None. `notes` tell what of a drawing
+    was passed over. A fence without areas is false.
 
     >>> bool(Fence(circles=(Circle((47.4, 8.5), 300.0, inclusion=True),))), bool(Fence())
     (True, False)
@@ -85,6 +92,7 @@ class Fence:
     polygons: tuple[Polygon, ...] = ()
     circles: tuple[Circle, ...] = ()
     breach_return: RallyPoint | None = None
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __bool__(self) -> bool:
         return bool(self.polygons or self.circles)

@@ -1,7 +1,7 @@
 """The fence in the plane: its areas, and where they let the aircraft be."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.errors import quote
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.mission.shortest_way import shortest_way
 
 if TYPE_CHECKING:
-    from shapely import Polygon
+    import shapely
     from shapely.geometry.base import BaseGeometry
 
 _SEGMENTS = 64
@@ -62,23 +63,36 @@ def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
     """Return the parts of `fence` in `frame`: polygons, then circles."""
     import shapely
 
-    areas, kind = [], {True: "inclusion", False: "exclusion"}
-    for n, polygon in enumerate(fence.polygons, start=1):
+    areas = []
+    for name, polygon in zip(_names(fence.polygons, "polygon"), fence.polygons, strict=True):
         outline = shapely.Polygon(frame.to_local(*np.transpose(polygon.vertices)))
         crosses = not shapely.is_valid(outline)
         if crosses and len(polygon.vertices) > _MOST_CROSSING:
             shape = shapely.Polygon() if polygon.inclusion else outline.convex_hull
         else:
             shape = _enclosed(outline) if crosses else outline
-        name = f"{kind[polygon.inclusion]} polygon {n}"
         areas.append(Area(name, polygon.inclusion, shape, crosses))
-    for n, circle in enumerate(fence.circles, start=1):
+    for name, circle in zip(_names(fence.circles, "circle"), fence.circles, strict=True):
         east, north = map(float, frame.to_local(*circle.center))
         radius = circle.radius * (1.0 if circle.inclusion else OUTSIDE)
         shape = shapely.Point(east, north).buffer(radius, quad_segs=_SEGMENTS)
-        name, disc = f"{kind[circle.inclusion]} circle {n}", (east, north, circle.radius)
+        disc = (east, north, circle.radius)
         areas.append(Area(name, circle.inclusion, shape, disc=disc))
     return tuple(areas)
+
+
+def _names(zones: Sequence[Polygon | Circle], shape: str) -> Iterator[str]:
+    """Yield what to call each of `zones`: by its name, or by its number among those of its kind."""
+    unnamed = [zone.inclusion for zone in zones if not zone.name]
+    seen = {True: 0, False: 0}
+    for zone in zones:
+        kind = "inclusion" if zone.inclusion else "exclusion"
+        if zone.name:
+            yield f"{kind} {quote(zone.name)}"
+            continue
+        seen[zone.inclusion] += 1
+        alone = unnamed.count(zone.inclusion) == 1
+        yield f"{kind} {shape}" if alone else f"{kind} {shape} {seen[zone.inclusion]}"
 
 
 def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | None":
@@ -95,7 +109,7 @@ def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | 
     return _polygonal(joined)
 
 
-def _enclosed(outline: "Polygon") -> "BaseGeometry":
+def _enclosed(outline: "shapely.Polygon") -> "BaseGeometry":
     """Return what an odd number of turns of `outline` encloses.
 
     Its edges cut the plane into faces, each enclosed or not as one of its points is. For 100

@@ -1,5 +1,6 @@
 """Fences and rally points as items: of the mission protocol, and as ground stations save them."""
 
+import math
 from collections.abc import Sequence
 
 from faao_mav.errors import InputError
@@ -13,7 +14,8 @@ def fence_items(fence: Fence) -> tuple[MissionItem, ...]:
     items = []
     if fence.breach_return is not None:
         point = fence.breach_return
-        place = (point.latitude, point.longitude, point.altitude)
+        up = 0.0 if math.isnan(point.altitude) else point.altitude  # no autopilot keeps it
+        place = (point.latitude, point.longitude, up)
         items.append(_place_item(FENCE_RETURN_POINT, Frame.GLOBAL_RELATIVE_ALT, 0.0, *place))
     for polygon in fence.polygons:
         command, count = POLYGON[polygon.inclusion], float(len(polygon.vertices))
@@ -25,7 +27,13 @@ def fence_items(fence: Fence) -> tuple[MissionItem, ...]:
 
 
 def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
-    """Return rally points as items."""
+    """Return rally points as items; raise `InputError` for one whose altitude is not known."""
+    for number, point in enumerate(points, start=1):
+        if math.isnan(point.altitude):
+            raise InputError(
+                f"rally point {number}: its altitude is not set, and 0 m would be the ground; "
+                "give metres above home"
+            )
     frame = Frame.GLOBAL_RELATIVE_ALT
     return tuple(
         _place_item(RALLY_POINT, frame, 0.0, point.latitude, point.longitude, point.altitude)

@@ -17,7 +17,8 @@ Params: TypeAlias = tuple[float, float, float, float]
 class Home:
     """Where relative altitudes count from: WGS84 degrees, metres above mean sea level.
 
-    Raises `InputError` for coordinates that are no place on Earth.
+    The altitude is NaN where it is not known. Raises `InputError` for coordinates that are no place
+    on Earth.
     """
 
     latitude: float
@@ -77,10 +78,11 @@ class Mission:
 
 
 def home_item(home: Home | None) -> MissionItem:
-    """Return the row 0 that stands for `home`; zeros for none."""
+    """Return the row 0 that stands for `home`: zeros for none, and for an unknown altitude."""
     known = home or Home(0.0, 0.0, 0.0)
+    altitude = 0.0 if math.isnan(known.altitude) else known.altitude
     return MissionItem(
-        Command.NAV_WAYPOINT, Frame.GLOBAL, x=known.latitude, y=known.longitude, z=known.altitude
+        Command.NAV_WAYPOINT, Frame.GLOBAL, x=known.latitude, y=known.longitude, z=altitude
     )
 
 

@@ -11,6 +11,9 @@ from faao_mav.validate.check import Check
 from faao_mav.validate.flown import Debriefing
 from faao_mav.workflow import FenceSummary, Result
 
+_MOST_ZONES = 12
+"""Zones of a fence that are named; chosen to fit a few lines."""
+
 
 def flight_lines(result: Result) -> Iterator[Line]:
     """Yield how the mission of `result` will fly: beside its plan, in wind, energy and fence."""
@@ -127,4 +130,7 @@ def _fenced(fence: FenceSummary | None) -> Iterator[Line]:
     kept = f"the plan keeps {fence.planned_clearance:.1f} m (margin {fence.margin:g} m)"
     if fence.predicted_clearance is not None:
         kept += f", the predicted flight {fence.predicted_clearance:.1f} m"
-    yield "fence", f"{counted(fence.areas, 'area')}; {kept} from the edge"
+    more = f" and {fence.areas - _MOST_ZONES} more" if fence.areas > _MOST_ZONES else ""
+    yield "fence", f"{', '.join(fence.zones[:_MOST_ZONES])}{more}"
+    yield from (("", note) for note in fence.notes)
+    yield "", f"{kept} from the edge"

@@ -144,9 +144,10 @@ class ValidationContext:
     def stored(self, item: MissionItem) -> MissionItem | None:
         """Return what the vehicle gives back for `item`, None if it refuses it."""
         dialect = self.vehicle.type.dialect
-        if not fits_message(item) or dialect.refusal(item):
+        sent = dialect.sent(item)
+        if not fits_message(item) or dialect.refusal(sent):
             return None
-        return dialect.stored(item)
+        return dialect.stored(sent)
 
     def jump_target(self, index: int) -> int | None:
         """Return the index that the DO_JUMP at `index` goes to, None if there is no such item."""

@@ -1,5 +1,6 @@
 """Rules about items and their order that hold for every autopilot."""
 
+import math
 from collections.abc import Iterator
 
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, TAKEOFFS, Command
@@ -35,6 +36,37 @@ def _no_home(context: ValidationContext) -> Iterator[Issue]:
             "way back are not checked",
             "set the planned home in the ground station, or fill row 0 of the file",
         )
+
+
+_LAND = (-430.0, 8849.0)
+"""The lowest and the highest land on Earth, m above sea level: the Dead Sea's shore, Everest."""
+
+
+@RULES.warning("home-height", "geography")
+def _home_height(context: ValidationContext) -> Iterator[Issue]:
+    """The height of home is not known, or that of no place on land."""
+    home = context.mission.home
+    if home is None or _LAND[0] <= home.altitude <= _LAND[1]:
+        return
+    action = "set the height of the planned home, metres above sea level"
+    if math.isnan(home.altitude):
+        told = "the file has no height of home: heights above sea level are not checked"
+        yield Issue(None, told, action)
+    else:
+        told = f"home is {home.altitude:,.0f} m above sea level, where no land is"
+        yield Issue(None, told, f"{action}, not feet or millimetres")
+
+
+@RULES.warning("rally-height", _COMMON)
+def _rally_height(context: ValidationContext) -> Iterator[Issue]:
+    """A place to return to has no height."""
+    action, back = "give its height, metres above home", context.mission.fence.breach_return
+    for n, point in enumerate(context.mission.rally, start=1):
+        if math.isnan(point.altitude):
+            yield Issue(None, f"rally point {n} has no altitude: `upload` refuses it", action)
+    if back is not None and math.isnan(back.altitude):
+        told = "the return point after a breach has no altitude: the vehicle's parameters set it"
+        yield Issue(None, told, action)
 
 
 @RULES.warning("unreachable", "measured on ArduCopter and ArduPlane 4.7 and PX4 1.16.1")

@@ -21,12 +21,24 @@ _SIZES = "ArduPilot: 15 bytes an item; PX4: 1000 items on most boards; measured"
 def _refused(context: ValidationContext) -> Iterator[Issue]:
     """The autopilot refuses the item, and the mission with it."""
     for index, item in enumerate(context.items):
-        reason = context.vehicle.type.dialect.refusal(item)
+        dialect = context.vehicle.type.dialect
+        reason = dialect.refusal(dialect.sent(item))
         if reason is not None:
             message, _, action = reason.partition("; ")
             if not action:
                 action = _replacement(item.command, item.frame)
             yield Issue(index, message, action)
+
+
+@RULES.warning("not-set", _PARSERS)
+def _not_set(context: ValidationContext) -> Iterator[Issue]:
+    """A parameter that is not set is sent as 0, because the autopilot refuses NaN."""
+    dialect = context.vehicle.type.dialect
+    for index, item in enumerate(context.items):
+        reason = dialect.refusal(item)
+        if reason is not None and dialect.refusal(dialect.sent(item)) is None:
+            message, _, action = reason.partition("; ")
+            yield Issue(index, f"{message}: `upload` sends 0, other stations may fail", action)
 
 
 @RULES.error("number-too-large", "MAVLink: MISSION_ITEM_INT has numbers of single precision")

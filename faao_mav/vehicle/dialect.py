@@ -13,6 +13,7 @@ import numpy as np
 from faao_mav.mission.command import (
     CIRCLE,
     FENCE_RETURN_POINT,
+    FLOWN_TO,
     POLYGON,
     RALLY_POINT,
     Command,
@@ -57,6 +58,7 @@ class Dialect:
             the smallest boards in common use.
         atomic: a refused upload leaves the old mission as it was.
         splines: NAV_SPLINE_WAYPOINT is flown.
+        unset_is_zero: it refuses most parameters that are not set (NaN), and is sent 0 instead.
         zero_means_here: latitude and longitude 0, 0 stand for the place where the vehicle is.
         placed_in_mission_frame: items in frame 2 (MISSION) have a place too, above sea level.
         refusal: why an item is refused on upload, None if it is taken.
@@ -79,6 +81,7 @@ class Dialect:
     rally_rows: int
     atomic: bool
     splines: bool
+    unset_is_zero: bool
     zero_means_here: bool
     placed_in_mission_frame: bool
     refusal: Callable[[MissionItem], str | None]
@@ -89,6 +92,19 @@ class Dialect:
     endings: frozenset[int] = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
     flies_on: Callable[[ParameterValues], bool] = lambda _: False
     known: frozenset[int] | None = None
+
+    def sent(self, item: MissionItem) -> MissionItem:
+        """Return `item` as it is sent: what is not set as 0 where NaN is refused.
+
+        The altitude of a place to fly to stays: 0 m would be another place.
+        """
+        if not self.unset_is_zero:
+            return item
+        one, two, three, four, up = (
+            0.0 if math.isnan(value) else value for value in (*item.params, item.z)
+        )
+        up = item.z if item.command in FLOWN_TO else up
+        return replace(item, params=(one, two, three, four), z=up)
 
     def is_known(self, command: int) -> bool:
         """Tell whether it is known what the autopilot keeps of `command`."""

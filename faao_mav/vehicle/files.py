@@ -1,16 +1,11 @@
 """What the files of missions and parameters say of a vehicle, and what they are to say."""
 
-import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.formats import MissionFile, PlanTarget
-from faao_mav.mission.item import MissionItem
 from faao_mav.plan.autopilots import Autopilot
 from faao_mav.vehicle.vehicle import Vehicle, families, family, vehicle_type_by_numbers
-
-_NOT_SET = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, (math.nan, 0.0, 0.0, 0.0))
 
 
 def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:
@@ -21,8 +16,10 @@ def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:
     """
     if vehicle is None:
         return None
-    takes_null = vehicle.type.dialect.refusal(_NOT_SET) is None
-    return PlanTarget(vehicle.type.family.mav_autopilot, vehicle.type.mav_types[0], takes_null)
+    own = vehicle.type
+    return PlanTarget(
+        own.family.mav_autopilot, own.mav_types[0], takes_null=not own.dialect.unset_is_zero
+    )
 
 
 def vehicle_in(file: MissionFile) -> Vehicle | None:

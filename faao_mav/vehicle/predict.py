@@ -148,6 +148,8 @@ class _Walk:
         self.place = self.goal = self.home
         self.reached = np.full(len(self.mission.items), np.nan)
         self.longest = LONGEST_COPTER if self.vehicle.type.hovers else LONGEST
+        home = self.mission.home
+        self._elevation = 0.0 if home is None or math.isnan(home.altitude) else home.altitude
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
@@ -200,7 +202,7 @@ class _Walk:
             radii=np.array([stop.radius for stop in stops]),
             delays=np.array([stop.delay for stop in stops]),
             longest=self.longest - self.clock,
-            elevation=self.mission.home.altitude if self.mission.home is not None else 0.0,
+            elevation=self._elevation,
             wind=self.wind,
             entry=None if self.vehicle.type.hovers or not self.parts else self.parts[-1][2][-1],
         )
@@ -346,12 +348,13 @@ class _Walk:
             raise InputError(f"mission item {index + 1}: altitude {item.z}; expected metres")
         height = item.z
         if item.frame in {int(frame) for frame in ABOVE_SEA | {Frame.MISSION}}:
-            if self.mission.home is None:
+            home = self.mission.home
+            if home is None or math.isnan(home.altitude):
                 raise InputError(
-                    f"mission item {index + 1}: an altitude above sea level needs the mission's "
-                    "home, which the file does not have"
+                    f"mission item {index + 1}: an altitude above sea level needs that of the "
+                    "mission's home, which the file does not have"
                 )
-            height -= self.mission.home.altitude
+            height -= home.altitude
         return np.array([place[0], place[1], height])
 
     def _check_clock(self, lasting: float) -> None:

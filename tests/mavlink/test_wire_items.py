@@ -67,13 +67,16 @@ def test_jumps_count_with_the_home_row_where_there_is_one() -> None:
 
 def test_what_is_not_set() -> None:
     yaw = MissionItem(16, 3, (0.0, 0.0, 0.0, math.nan), -35.0, 149.0, 20.0)
-    nowhere = dataclasses.replace(yaw, x=math.nan)
+    nowhere = dataclasses.replace(yaw, x=math.nan, z=math.nan)
     (row,) = wire_items(Mission((yaw,)), MISSION, vehicle_of("px4"))
     assert math.isnan(row.params[3])
-    assert wire_items(Mission((nowhere,)), MISSION, vehicle_of("ardupilot"))[1].params == (0.0,) * 4
-    assert wire_items(Mission((nowhere,)), MISSION, vehicle_of("ardupilot"))[1].x == 0
-    with pytest.raises(InputError, match=r"item 0: latitude or longitude is not set; PX4 would"):
-        wire_items(Mission((nowhere,)), MISSION, vehicle_of("px4"))
+    assert wire_items(Mission((yaw,)), MISSION, vehicle_of("ardupilot"))[1].params == (0.0,) * 4
+    for autopilot in ("ardupilot", "px4"):
+        with pytest.raises(InputError, match=r"latitude and altitude not set.* take for 0"):
+            wire_items(Mission((nowhere,)), MISSION, vehicle_of(autopilot))
+    low = RallyPoint(-35.0, 149.0, math.nan)
+    with pytest.raises(InputError, match="rally point 1: its altitude is not set"):
+        wire_items(Mission((), rally=(low,)), MissionType.RALLY, vehicle_of("px4"))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,8 @@
-"""Fences from KML and GeoJSON."""
+"""Fences from KML, KMZ and GeoJSON: whether a zone is one to stay in or out of above all."""
 
+import io
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -9,29 +11,40 @@ import pytest
 from hypothesis import given
 
 from faao_mav.errors import MissionFileError
+from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import areas_of, free_area
+from faao_mav.mission.formats.drawn_zones import DrawnZone, fence_of
 from faao_mav.mission.formats.fence_file import read_fence
-from faao_mav.mission.formats.geojson import read_geojson_fence
-from faao_mav.mission.formats.kml_fence import read_kml_fence
+from faao_mav.mission.formats.geojson import geojson_zones
+from faao_mav.mission.formats.kml_zones import kml_zones
 
 SQUARE = [[8.0, 47.0], [8.1, 47.0], [8.1, 47.1], [8.0, 47.0]]
 HOLE = [[8.05, 47.01], [8.06, 47.01], [8.06, 47.02], [8.05, 47.01]]
+CORNERS = [(latitude, longitude) for longitude, latitude in SQUARE]
 
 KML = """<?xml version="1.0" encoding="UTF-8"?>
-<kml xmlns="http://www.opengis.net/kml/2.2"><Document>
-<Placemark><name>field</name><Polygon>
+<kml xmlns="http://www.opengis.net/kml/2.2"><Document><name>fence.kml</name>
+<Placemark><name>field</name><gx:balloonVisibility>1</gx:balloonVisibility><Polygon>
 <outerBoundaryIs><LinearRing><coordinates>8,47,0 8.1,47,0 8.1,47.1,0 8,47,0</coordinates></LinearRing>
 </outerBoundaryIs><innerBoundaryIs><LinearRing><coordinates>
 8.05,47.01 8.06,47.01 8.06,47.02 8.05,47.01</coordinates></LinearRing></innerBoundaryIs></Polygon>
 </Placemark><Folder><name>No-fly zones</name><Placemark><name>school</name><MultiGeometry><Polygon>
 <outerBoundaryIs><LinearRing><coordinates>8,47 8.1,47 8.1,47.1</coordinates></LinearRing>
 </outerBoundaryIs></Polygon></MultiGeometry></Placemark></Folder>
+<Placemark><ExtendedData><SchemaData><SimpleData name="kind">NFZ</SimpleData></SchemaData>
+</ExtendedData><Polygon><outerBoundaryIs><LinearRing><coordinates>8,47 8.1,47 8.1,47.1</coordinates>
+</LinearRing></outerBoundaryIs></Polygon></Placemark>
 <Placemark><name>mast</name><Point><coordinates>8,47</coordinates></Point></Placemark>
 </Document></kml>"""  # noqa: E501
 
 
 def geojson(value: Any) -> Fence:
-    return read_geojson_fence(json.dumps(value), "x.geojson")
+    return fence_of(geojson_zones(json.dumps(value)))
+
+
+def kml(content: bytes) -> Fence:
+    return fence_of(kml_zones(content, 100_000))
 
 
 def feature(kind: str, coordinates: Any, properties: Any) -> dict[str, Any]:
@@ -39,25 +52,150 @@ def feature(kind: str, coordinates: Any, properties: Any) -> dict[str, Any]:
     return {"type": "Feature", "geometry": geometry, "properties": properties}
 
 
+def collection(*features: dict[str, Any], **more: Any) -> dict[str, Any]:
+    return {"type": "FeatureCollection", "features": list(features)} | more
+
+
+def named(properties: dict[str, Any]) -> bool:
+    (polygon,) = geojson(feature("Polygon", [SQUARE], properties)).polygons
+    return polygon.inclusion
+
+
+OUT = [
+    {"Name": "No-fly zone 1"},
+    {"NAME": "R-12", "TYPE": "PROHIBITED"},
+    {"name": "Poly 2", "Type": "Exclusive", "Action": "Avoid"},
+    {"name": "P12", "Inclusion": False},
+    {"name": "field", "EXCLUSION": "true"},
+    {"title": "NoFlyZone"},
+    {"name": "keep_out 3"},
+    {"name": "NFZ"},
+    {"name": "restricted field"},
+    {"name": "exclusion fence"},
+    {"name": "hospital", "no_fly": True},
+    {"name": "park", "note": "flights not allowed"},
+]
+IN = [
+    {"name": "field"},
+    {"Name": "Poly 1", "Type": "Inclusive"},
+    {"name": "Unrestricted area"},
+    {"name": "exclusive use airspace"},
+    {"name": "P12", "INCLUSION": True},
+    {"name": "Operations Area"},
+    {"name": "no-fly zone of others", "inclusion": "True"},
+]
+NEITHER = [
+    {},
+    None,
+    {"name": "School"},
+    {"name": "Sperrgebiet"},
+    {"name": "not restricted"},
+    {"name": "un-restricted"},
+    {"name": "airfield"},
+    {"name": "R-12", "restricted": False},
+    {"name": "inclusion 3", "type": "no-fly"},
+]
+
+
+@pytest.mark.parametrize("properties", OUT)
+def test_a_zone_to_stay_out_of(properties: dict[str, Any]) -> None:
+    assert named(properties) is False
+
+
+@pytest.mark.parametrize("properties", IN)
+def test_a_zone_to_stay_in(properties: dict[str, Any]) -> None:
+    assert named(properties) is True
+
+
+@pytest.mark.parametrize("properties", NEITHER)
+def test_a_zone_of_which_nothing_tells_is_an_error_that_says_how_to_tell(properties: Any) -> None:
+    with pytest.raises(MissionFileError, match=r"geometry: .*property inclusion: true"):
+        named(properties)
+
+
+@given(properties=st.sampled_from(OUT), upper=st.booleans(), field=st.booleans())
+def test_no_case_and_no_layer_makes_a_no_fly_zone_one_to_stay_in(
+    properties: dict[str, Any], upper: bool, field: bool
+) -> None:
+    told = {
+        (key.upper() if upper else key.lower()): (
+            value.upper() if upper and isinstance(value, str) and " " in value else value
+        )
+        for key, value in properties.items()
+    }
+    layer = {"name": "my field"} if field else {}
+    (polygon,) = geojson(collection(feature("Polygon", [SQUARE], told), **layer)).polygons
+    assert polygon.inclusion is False
+
+
+def test_what_a_zone_is_in_tells_where_it_does_not_and_must_not_contradict() -> None:
+    school = feature("Polygon", [SQUARE], {"name": "school"})
+    (polygon,) = geojson(collection(school, name="no-fly zones")).polygons
+    assert (polygon.inclusion, polygon.name) == (False, "school")
+    field = feature("Polygon", [SQUARE], {"name": "field"})
+    with pytest.raises(MissionFileError, match="'field' is to stay in, what it is in"):
+        geojson(collection(field, name="no-fly zones"))
+
+
 def test_polygons_of_kml_with_holes_and_exclusions() -> None:
-    field, hole, school = read_kml_fence(KML, "x.kml").polygons
+    field, hole, school, kind = kml(KML.encode()).polygons
     assert field.vertices == ((47.0, 8.0), (47.0, 8.1), (47.1, 8.1))
-    assert (field.inclusion, hole.inclusion, school.inclusion) == (True, False, False)
+    inclusion = [each.inclusion for each in (field, hole, school, kind)]
+    assert inclusion == [True, False, False, False]
     assert hole.vertices[0] == (47.01, 8.05)
+    assert [each.name for each in (field, hole, school)] == ["field", "hole of field", "school"]
 
 
-def test_polygons_of_geojson_with_holes_and_exclusions() -> None:
-    found = geojson({
-        "type": "FeatureCollection",
-        "features": [
-            feature("Polygon", [SQUARE, HOLE], {"name": "field"}),
-            feature("MultiPolygon", [[HOLE], [SQUARE]], {"inclusion": False}),
-            feature("Polygon", [HOLE], {"name": "keep out"}),
-            feature("Point", [8, 47], None),
-        ],
-    })  # fmt: skip
-    assert [polygon.inclusion for polygon in found.polygons] == [True, False, False, False, False]
-    assert found.polygons[0].vertices == ((47.0, 8.0), (47.0, 8.1), (47.1, 8.1))
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "iso-8859-1", "windows-1252"])
+def test_kml_in_any_declared_encoding(encoding: str) -> None:
+    text = KML.replace("UTF-8", encoding.removesuffix("-sig")).replace("school", "école")
+    assert kml(text.encode(encoding)).polygons[2].name == "école"
+
+
+def test_kml_in_an_archive() -> None:
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("files/picture.png", b"")
+        file.writestr("doc.kml", KML)
+    assert kml(archive.getvalue()) == kml(KML.encode())
+    for content, told in ((archive.getvalue()[:60], "not a KMZ archive"), (b"PK\3\4", "not a KMZ")):
+        with pytest.raises(MissionFileError, match=told):
+            kml(content)
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("doc.kml", " " * 10_000_000)
+    with pytest.raises(MissionFileError, match="larger than 100,000 bytes"):
+        kml(archive.getvalue())
+
+
+def test_the_parts_of_an_inclusion_are_one_area() -> None:
+    west = [[179.9975, -17.002], [180.0, -17.002], [180.0, -16.997], [179.9975, -16.997]]
+    east = [[-180.0, -17.002], [-179.9975, -17.002], [-179.9975, -16.997], [-180.0, -16.997]]
+    (joined,) = geojson(feature("MultiPolygon", [[west], [east]], {"name": "field"})).polygons
+    areas = areas_of(Fence((joined,)), LocalFrame(-17.0, 180.0))
+    area = free_area(areas, any_inclusion=False)
+    assert area is not None
+    west_edge, _, east_edge, _ = area.bounds
+    assert (west_edge, east_edge) == pytest.approx((-266.2, 266.2), abs=0.5)
+    over_hole = [[SQUARE, HOLE], [HOLE]]
+    assert len(geojson(feature("MultiPolygon", over_hole, {"name": "field"})).polygons) == 1
+    apart = [[SQUARE], [[[9.0, 47.0], [9.1, 47.0], [9.1, 47.1]]]]
+    assert len(geojson(feature("MultiPolygon", apart, {"name": "no-fly"})).polygons) == 2
+
+
+def test_an_empty_part_is_named_and_passed_over() -> None:
+    found = geojson(collection(
+        feature("Polygon", [SQUARE], {"name": "field"}),
+        feature("MultiPolygon", [[]], {}),
+        feature("MultiPolygon", [[HOLE], []], {"name": "no-fly"}),
+        feature("Polygon", [], {"name": "school"}),
+        feature("Point", [8, 47], None),
+    ))  # fmt: skip
+    assert [polygon.inclusion for polygon in found.polygons] == [True, False]
+    assert [note.partition(":")[0] for note in found.notes] == [
+        "features[1].geometry",
+        "features[2].geometry 'no-fly'",
+        "features[3].geometry 'school'",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -66,14 +204,22 @@ def test_polygons_of_geojson_with_holes_and_exclusions() -> None:
         ({"type": "Feature", "geometry": {"type": "Curve"}}, "geometry.type: 'Curve'"),
         ({"type": "Polygon", "coordinates": 5}, "coordinates: 5; expected a list"),
         ({"type": "Polygon", "coordinates": [[[47.0, 500.0]]]}, r"\[0\]\[0\]"),
-        ({"type": "Polygon", "coordinates": [[[1, 2], [3, 4]]]}, "2 vertices; expected at least 3"),
+        (feature("Polygon", [[[1, 2], [3, 4]]], {"name": "field"}), "2 vertices; expected at"),
         ({"type": "Polygon", "coordinates": [["a"]]}, "expected .longitude, latitude."),
-        (feature("Polygon", [SQUARE], {"inclusion": "no"}), "expected true or false"),
+        (feature("Polygon", [SQUARE], {"inclusion": "perhaps"}), "expected true or false"),
         (feature("Polygon", [SQUARE, HOLE], {"inclusion": False}), "an exclusion with a hole"),
+        (
+            feature(
+                "MultiPolygon",
+                [[[[0, 0], [1, 1], [1, 0], [0, 1]]], [SQUARE]],
+                {"name": "field"},
+            ),
+            "a part crosses or touches itself",
+        ),
     ],
 )
 def test_what_is_no_fence_is_refused_with_its_place(value: Any, told: str) -> None:
-    with pytest.raises(MissionFileError, match=f"x.geojson: .*{told}"):
+    with pytest.raises(MissionFileError, match=told):
         geojson(value)
 
 
@@ -89,8 +235,14 @@ def test_what_is_no_fence_is_refused_with_its_place(value: Any, told: str) -> No
     ],
 )
 def test_broken_kml_is_refused(text: str, told: str) -> None:
-    with pytest.raises(MissionFileError, match=f"x.kml: .*{told}"):
-        read_kml_fence(text, "x.kml")
+    with pytest.raises(MissionFileError, match=told):
+        kml(text.encode())
+
+
+def test_a_document_type_is_refused_in_any_encoding() -> None:
+    text = '<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE a [<!ENTITY b "c">]><kml>&b;</kml>'
+    with pytest.raises(MissionFileError, match="document type or entities"):
+        kml(text.encode("utf-16"))
 
 
 @given(value=st.recursive(
@@ -105,16 +257,32 @@ def test_any_json_is_a_fence_or_an_error(value: Any) -> None:
     try:
         geojson(value)
     except MissionFileError as error:
-        assert str(error).startswith("x.geojson: ")
+        assert str(error)
+
+
+@given(words=st.lists(st.text(max_size=12), max_size=3), told=st.sampled_from(["no-fly", "field"]))
+def test_any_other_words_leave_a_no_fly_zone_one(words: list[str], told: str) -> None:
+    zone = DrawnZone("it", "", {str(n): w for n, w in enumerate(words)}, (told,), [[CORNERS]])
+    try:
+        (polygon,) = fence_of([zone]).polygons
+    except MissionFileError:
+        return
+    assert polygon.inclusion is (told == "field")
 
 
 def test_files_by_their_ending(tmp_path: Path) -> None:
     (tmp_path / "a.kml").write_text(KML)
-    (tmp_path / "b.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": [SQUARE]}))
+    (tmp_path / "b.GeoJSON").write_text(json.dumps(feature("Polygon", [SQUARE], {"name": "field"})))
     (tmp_path / "c.geojson").write_text('{"type": "FeatureCollection", "features": []}')
-    assert len(read_fence(tmp_path / "a.kml").polygons) == 3
-    assert len(read_fence(tmp_path / "b.geojson").polygons) == 1
+    (tmp_path / "f.geojson").write_text(json.dumps(feature("Polygon", [SQUARE], {})))
+    assert len(read_fence(tmp_path / "a.kml").polygons) == 4
+    assert len(read_fence(tmp_path / "b.GeoJSON").polygons) == 1
     assert len(read_fence(Path("tests/data/missions/fence_and_rally.plan")).circles) == 1
-    for name, told in (("c.geojson", "holds no fence"), ("d.shp", "'.shp'"), ("e.kml", "read")):
-        with pytest.raises(MissionFileError, match=told):
+    for name, told in (
+        ("c.geojson", "holds no fence"),
+        ("d.shp", "'.shp'"),
+        ("e.kml", "read"),
+        ("f.geojson", "nothing tells"),
+    ):
+        with pytest.raises(MissionFileError, match=f"{name}: .*{told}"):
             read_fence(tmp_path / name)

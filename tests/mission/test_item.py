@@ -40,7 +40,7 @@ def test_yaw_may_be_not_set() -> None:
     assert math.isnan(MissionItem(16, 3, (0.0, 0.0, 0.0, math.nan)).params[3])
 
 
-@pytest.mark.parametrize("home", [(91.0, 0.0, 0.0), (0.0, 180.1, 0.0), (0.0, 0.0, math.nan)])
+@pytest.mark.parametrize("home", [(91.0, 0.0, 0.0), (0.0, 180.1, 0.0), (0.0, 0.0, math.inf)])
 def test_an_impossible_home_is_refused(home: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match="home"):
         Home(*home)

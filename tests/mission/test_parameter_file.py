@@ -91,6 +91,9 @@ def test_qgroundcontrols_own_file(tmp_path: Path) -> None:
     parameters = read(text, tmp_path)
     assert parameters == {"COM_RC_IN_MODE": 1, "MPC_ACC_HOR": 3.0}
     assert [type(value) for value in parameters.values()] == [int, float]
+    assert read(text.replace("\t", "   "), tmp_path) == parameters
+    with pytest.raises(ParameterFileError, match="decimal point, no comma"):
+        read("MPC_ACC_HOR 3,5\n", tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,22 @@ from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
 
 PX4, ARDUPILOT = PlanTarget(12, 2), PlanTarget(3, 2, takes_null=False)
 
+
+def test_a_height_that_is_null_is_not_known() -> None:
+    low = RallyPoint(47.0, 8.5, math.nan)
+    mission = Mission((), Home(47.0, 8.0, math.nan), Fence(breach_return=low), (low,))
+    text = write_qgc_plan(mission)
+    assert json.loads(text)["mission"]["plannedHomePosition"] == [47.0, 8.0, None]
+    read = read_qgc_plan(text, "x.plan").mission
+    assert read.home is not None
+    assert (read.home.latitude, read.rally[0].longitude) == (47.0, 8.5)
+    assert all(map(math.isnan, (read.home.altitude, read.rally[0].altitude)))
+    assert read.fence.breach_return is not None
+    assert math.isnan(read.fence.breach_return.altitude)
+    with pytest.raises(MissionFileError, match=r"rallyPoints.points\[0\]: rally point: nan"):
+        read_qgc_plan(text.replace("47.0,\n                8.5,", "null, 8.5,"), "x.plan")
+
+
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 settable = numbers | st.just(math.nan)
 latitudes, longitudes = st.floats(-90, 90), st.floats(-180, 180)

@@ -13,13 +13,16 @@ from judged import (
     at,
     check,
     do,
+    fence,
     flown,
     having,
     mission,
+    rally,
     speed,
 )
 
 from faao_mav.mission.command import Command
+from faao_mav.mission.item import Home
 
 NAN = math.nan
 JUMP, START = Command.DO_JUMP, Command.DO_LAND_START
@@ -29,6 +32,30 @@ CONTINUES = having(COPTER, MIS_OPTIONS=4)
 CASES = [
     ("empty", Given(mission()), None, Given(mission(TAKEOFF))),
     ("no-home", Given(mission(TAKEOFF, home=None)), None, Given(mission(TAKEOFF))),
+    (
+        "home-height",
+        Given(mission(TAKEOFF, home=Home(47.0, 8.0, NAN))),
+        None,
+        Given(mission(TAKEOFF, home=Home(31.5, 35.5, -420.0))),
+    ),
+    (
+        "home-height",
+        Given(mission(TAKEOFF, home=Home(47.0, 8.0, 29_064.96))),
+        None,
+        Given(mission(TAKEOFF, home=Home(28.0, 86.9, 8_800.0))),
+    ),
+    (
+        "rally-height",
+        Given(mission(TAKEOFF, rally=(rally(9, 9, NAN),))),
+        None,
+        Given(mission(TAKEOFF, rally=(rally(9, 9, 30),))),
+    ),
+    (
+        "rally-height",
+        Given(mission(TAKEOFF, fence=fence(breach_return=rally(9, 9, NAN)))),
+        None,
+        Given(mission(TAKEOFF, fence=fence(breach_return=rally(9, 9, 30)))),
+    ),
     ("unreachable", Given(flown(at(0, 9, 9), RTL, at(0, 9, 9))), 4, Given(flown(at(0, 9, 9)))),
     (
         "unreachable",

@@ -43,11 +43,12 @@ CASES = [
         Given(flown(at(0, 9, 9, frame=5)), PX4),
     ),
     (
-        "refused-on-upload",
+        "not-set",
         Given(flown(at(0, 9, 9, 0, NAN))),
         2,
         Given(flown(at(0, 9, 9, 0, 0, 0, NAN))),
     ),
+    ("not-set", Given(flown(do(2001, 0, NAN))), 2, Given(flown(do(2001, 0, NAN)), PX4)),
     ("refused-on-upload", Given(flown(spline(0, 9)), PLANE), 2, Given(flown(spline(0, 9)))),
     ("refused-on-upload", Given(flown(spline(0, 9)), PX4), 2, Given(flown(at(0, 9, 9)), PX4)),
     ("refused-on-upload", Given(flown(at(0, 9, 83_000))), 2, Given(flown(at(0, 9, 82_999)))),

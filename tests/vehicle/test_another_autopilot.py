@@ -95,6 +95,7 @@ COPTER = VehicleType(
         rally_rows=1,
         atomic=True,
         splines=False,
+        unset_is_zero=False,
         zero_means_here=False,
         placed_in_mission_frame=False,
         refusal=lambda item: "no splines" if item.command == Command.NAV_SPLINE_WAYPOINT else None,

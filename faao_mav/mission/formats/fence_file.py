@@ -1,15 +1,15 @@
-"""Fences from files: QGroundControl's `.plan`, KML and GeoJSON."""
+"""Fences from files: QGroundControl's `.plan`, KML, KMZ and GeoJSON."""
 
 from pathlib import Path
 
-from faao_mav.errors import MissionFileError
-from faao_mav.files import read_text
+from faao_mav.errors import InputError, MissionFileError
+from faao_mav.files import read_bytes, read_text
 from faao_mav.mission.fence import Fence
 
-FENCE_SUFFIXES = (".plan", ".kml", ".geojson", ".json")
+FENCE_SUFFIXES = (".plan", ".kml", ".kmz", ".geojson", ".json")
 """What the name of a file with a fence may end in."""
 
-_MAX_BYTES = 4_000_000
+MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
 
 _MAX_CORNERS = 2_000
@@ -19,27 +19,21 @@ _MAX_CORNERS = 2_000
 def read_fence(path: Path) -> Fence:
     """Return the fence in the file `path`, whose format its name's ending tells.
 
-    Of KML and GeoJSON it is the polygons: those to stay in unless they, or what they are in, say
-    otherwise; their holes are exclusions. Raises `MissionFileError` if the ending is unknown or
-    the file cannot be read, is too large or holds no fence.
+    Of a drawing (KML, KMZ, GeoJSON) it is the polygons, each to stay in or out of as its words
+    tell: see `drawn_zones`. Raises `MissionFileError` if the ending is unknown or the file cannot
+    be read, is too large, holds no fence, or leaves open what a polygon means.
     """
     suffix = path.suffix.lower()
     if suffix not in FENCE_SUFFIXES:
         shown = repr(path.suffix) if path.suffix else "no ending"
-        raise MissionFileError(f"{path}: {shown}; expected a .plan, .kml or .geojson file")
-    text = read_text(path, _MAX_BYTES, "a fence", MissionFileError)
+        raise MissionFileError(f"{path}: {shown}; expected a .plan, .kml, .kmz or .geojson file")
     if suffix == ".plan":
         from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
 
+        text = read_text(path, MAX_BYTES, "a fence", MissionFileError)
         fence = read_qgc_plan(text, str(path)).mission.fence
-    elif suffix == ".kml":
-        from faao_mav.mission.formats.kml_fence import read_kml_fence
-
-        fence = read_kml_fence(text, str(path))
     else:
-        from faao_mav.mission.formats.geojson import read_geojson_fence
-
-        fence = read_geojson_fence(text, str(path))
+        fence = _drawing(path, suffix)
     if not fence:
         raise MissionFileError(f"{path}: holds no fence; expected polygons")
     corners = sum(len(polygon.vertices) for polygon in fence.polygons) + len(fence.circles)
@@ -48,3 +42,20 @@ def read_fence(path: Path) -> Fence:
             f"{path}: {corners:,} corners; at most {_MAX_CORNERS:,} are accepted: simplify it"
         )
     return fence
+
+
+def _drawing(path: Path, suffix: str) -> Fence:
+    from faao_mav.mission.formats.drawn_zones import fence_of
+
+    if suffix in (".kml", ".kmz"):
+        from faao_mav.mission.formats.kml_zones import kml_zones
+
+        zones = kml_zones(read_bytes(path, MAX_BYTES, "a fence", MissionFileError), MAX_BYTES)
+    else:
+        from faao_mav.mission.formats.geojson import geojson_zones
+
+        zones = geojson_zones(read_text(path, MAX_BYTES, "a fence", MissionFileError))
+    try:
+        return fence_of(zones)
+    except InputError as error:
+        raise MissionFileError(f"{path}: {error}") from None

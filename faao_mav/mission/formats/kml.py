@@ -132,7 +132,9 @@ def _waypoints(mission: Mission) -> Iterator[tuple[int, MissionItem, Spot]]:
 
 
 def _altitude(item: MissionItem, home: Home | None) -> float:
-    return item.z + home.altitude if home and item.frame in ABOVE_HOME else item.z
+    if home is None or math.isnan(home.altitude) or item.frame not in ABOVE_HOME:
+        return item.z
+    return item.z + home.altitude
 
 
 def _mode(mission: Mission) -> AltitudeMode:

@@ -15,7 +15,12 @@ _SHOWN_ITEMS = 5
 def wpl_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
     """Return what of `mission` a QGC WPL file does not hold, one line each."""
     del target
-    return [*_rally(mission, "QGC WPL"), *_not_set(mission), *_home(mission)]
+    return [
+        *_rally(mission, "QGC WPL"),
+        *_not_set(mission),
+        *_home(mission),
+        *_height_of_home(mission),
+    ]
 
 
 def plan_losses(mission: Mission, target: PlanTarget | None) -> list[str]:
@@ -33,8 +38,9 @@ def kml_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
         "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back",
     ]
     frames = {item.frame for item in mission.items}
-    if mission.home is None and frames & ABOVE_HOME:
-        found.append("no home is known: heights above home are drawn above the ground")
+    known = mission.home is not None and not math.isnan(mission.home.altitude)
+    if not known and frames & ABOVE_HOME:
+        found.append("no height of home is known: heights above home are drawn above the ground")
     if frames & ABOVE_TERRAIN:
         found.append("heights above terrain are drawn above Google Earth's own")
     if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
@@ -65,6 +71,11 @@ def _not_set(mission: Mission) -> list[str]:
 
 def _home(mission: Mission) -> list[str]:
     return [] if mission.home else ["no home is known: the file says 0, 0, 0, which means none"]
+
+
+def _height_of_home(mission: Mission) -> list[str]:
+    unknown = mission.home is not None and math.isnan(mission.home.altitude)
+    return ["the altitude of home is not known: the file says 0 m"] if unknown else []
 
 
 def _values(item: MissionItem) -> tuple[float, ...]:

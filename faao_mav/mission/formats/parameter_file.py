@@ -1,8 +1,9 @@
 """Files of autopilot parameters: `.param`, `.parm` and QGroundControl's `.params`.
 
-Most ground stations write `NAME,VALUE` or `NAME VALUE`. QGroundControl writes five
-tab-separated fields: system, component, name, value and MAV_PARAM_TYPE. In both, lines that start
-with `#` are comments. As read by Mission Planner, pymavlink (MAVProxy) and QGroundControl.
+Most ground stations write `NAME,VALUE` or `NAME VALUE`. QGroundControl writes five fields between
+tabs, which people align by spaces: system, component, name, value and MAV_PARAM_TYPE. In both,
+lines that start with `#` are comments. As read by Mission Planner, pymavlink (MAVProxy) and
+QGroundControl.
 """
 
 import math
@@ -38,6 +39,7 @@ _READ_ONLY = "@READONLY"
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"0x[0-9a-f]{1,8}", re.ASCII | re.IGNORECASE)
+_COMMA = re.compile(r"\d,\d")
 _WHOLE = re.compile(r"\d{1,3}", re.ASCII)
 
 
@@ -121,9 +123,9 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
     content = line.partition("#")[0].strip()
     if not content:
         return
-    fields = content.split("\t")
+    fields = re.split(r"[ \t]*,[ \t]*|[ \t]+", content)
     if len(fields) == 5:
-        _, component, name, text, kind = (field.strip() for field in fields)
+        _, component, name, text, kind = fields
         if not _WHOLE.fullmatch(component):
             raise ParameterFileError(f"{where}: component {quote(component)}; expected a number")
         if not _WHOLE.fullmatch(kind) or int(kind) not in _TYPES:
@@ -132,13 +134,13 @@ def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
             _check_name(name, where)
             yield name, _number(text, where, whole=int(kind) in _INTEGERS)
         return
-    fields = re.split(r"[ \t]*,[ \t]*|[ \t]+", content)
     if fields[-1] == _READ_ONLY:
         fields.pop()
     if len(fields) != 2:
+        comma = "; numbers have a decimal point, no comma" if _COMMA.search(content) else ""
         raise ParameterFileError(
-            f"{where}: {quote(content)}; expected NAME,VALUE or NAME VALUE, or five fields "
-            "between tabs: system, component, name, value, type"
+            f"{where}: {quote(content)}; expected NAME,VALUE or NAME VALUE, or five fields: "
+            f"system, component, name, value, type{comma}"
         )
     _check_name(fields[0], where)
     yield fields[0], _number(fields[1], where, whole=False)

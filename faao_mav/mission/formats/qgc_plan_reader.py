@@ -52,7 +52,8 @@ Whole: TypeAlias = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 
 Byte: TypeAlias = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=255)]
 Command16: TypeAlias = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=65_535)]
 Pair: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2)]
-Triple: TypeAlias = Annotated[list[float], Field(min_length=3, max_length=3)]
+Triple: TypeAlias = Annotated[list[float | None], Field(min_length=3, max_length=3)]
+"""Latitude, longitude, and an altitude that may be null, not known."""
 
 
 class _Object(BaseModel):
@@ -140,12 +141,13 @@ class _File(_Object):
 def read_qgc_plan(text: str, source: str) -> MissionFile:
     """Return what `text`, the content of a `.plan` file, describes.
 
-    A null parameter is NaN, not set. Surveys and corridor scans become the simple items that the
-    file holds for them; the targets of DO_JUMP, written as a `doJumpId`, become the place of that
-    item in the mission, counted from 1. A planned home of zeros, and none, mean no home; a plan
-    without a `geoFence` or `rallyPoints` has none. Keys that are not known are passed over.
-    `source` is the file's name, for messages. Raises `MissionFileError` for anything else; it
-    names key, value and what is expected.
+    A null parameter is NaN, not set; a null altitude of home or of a rally point is one that is not
+    known. Surveys and corridor scans become the simple items that the file holds for them; the
+    targets of DO_JUMP, written as a `doJumpId`, become the place of that item in the mission,
+    counted from 1. A planned home of zeros, and none, mean no home; a plan without a `geoFence` or
+    `rallyPoints` has none. Keys that are not known are passed over. `source` is the file's name,
+    for messages. Raises `MissionFileError` for anything else; it names key, value and what is
+    expected.
     """
     try:
         file = _File.model_validate(parse_json(text))
@@ -206,9 +208,9 @@ def _each(place: str, make: Callable[..., Made], parts: Iterable[list[Any]]) -> 
 
 
 def _made(place: str, make: Callable[..., Made], part: Iterable[Any]) -> Made:
-    """Return `make(*part)`, with its `InputError` as a complaint about this place."""
+    """Return `make(*part)`, null as NaN, with its `InputError` as a complaint about this place."""
     try:
-        return make(*part)
+        return make(*(math.nan if value is None else value for value in part))
     except InputError as error:
         raise MissionFileError(f"{place}: {error}") from None
 

@@ -44,11 +44,11 @@ def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
                 _item(number, item, mission, not_set)
                 for number, item in enumerate(mission.items, start=1)
             ],
-            "plannedHomePosition": [home.latitude, home.longitude, home.altitude],
+            "plannedHomePosition": _place(home),
             "vehicleType": target.vehicle_type if target else 0,
             "version": 2,
         },
-        "rallyPoints": {"points": list(map(_rally_point, mission.rally)), "version": 2},
+        "rallyPoints": {"points": list(map(_place, mission.rally)), "version": 2},
         "version": 1,
     }
     return json.dumps(plan, indent=4, allow_nan=False) + "\n"
@@ -114,9 +114,10 @@ def _fence(fence: Fence) -> dict[str, Any]:
         "version": 2,
     }
     if fence.breach_return is not None:
-        result["breachReturn"] = _rally_point(fence.breach_return)
+        result["breachReturn"] = _place(fence.breach_return)
     return result
 
 
-def _rally_point(point: RallyPoint) -> list[float]:
-    return [point.latitude, point.longitude, point.altitude]
+def _place(point: Home | RallyPoint) -> list[float | None]:
+    known = not math.isnan(point.altitude)
+    return [point.latitude, point.longitude, point.altitude if known else None]

@@ -232,7 +232,8 @@ class _Line:
         value = float(text) if _NUMBER.fullmatch(text) else math.nan
         if not (math.isfinite(value) and abs(value) <= limit):
             span = f" from {-limit:g} to {limit:g} degrees" if limit < math.inf else ""
-            raise self.error(field, f"expected a finite number{span}")
+            point = " with a decimal point, not a comma" if "," in text else ""
+            raise self.error(field, f"expected a finite number{point}{span}")
         return value
 
     def param(self, field: str) -> float:

@@ -222,6 +222,7 @@ def _dialect(
         rally_rows=10,
         atomic=False,
         splines=splines,
+        unset_is_zero=True,
         zero_means_here=True,
         placed_in_mission_frame=True,
         refusal=lambda item: _refusal(item, known, name),

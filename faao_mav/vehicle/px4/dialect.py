@@ -136,6 +136,7 @@ DIALECT = Dialect(
     rally_rows=8,
     atomic=True,
     splines=False,
+    unset_is_zero=False,
     zero_means_here=False,
     placed_in_mission_frame=False,
     refusal=_refusal,
