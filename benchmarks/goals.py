@@ -32,7 +32,7 @@ from faao_mav.optimizer.search.starts import straight_flight, with_stops
 from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.search.ways import along, shortest_by
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan import changed_plan, read_plan
+from faao_mav.plan import read_plan
 from faao_mav.plan.fields import dbm
 from faao_mav.plan.keys import ALIASES, POWER
 from faao_mav.power import JOULES_PER_WH
@@ -103,11 +103,11 @@ def less(found: Solution) -> Problem:
     assert found.least is not None
     if goal == "duration":
         step = plan.flight.time_step
-        return build_problem(changed_plan(plan, {"flight.duration": plan.flight.duration - step}))
+        return build_problem(plan.changed({"flight.duration": plan.flight.duration - step}))
     if goal == "power":
         powers = zip(ALIASES[POWER], plan.powers, strict=True)
         changes = {key: round(dbm(power) - LESS_DB, 6) for key, power in powers}
-        return build_problem(changed_plan(plan, changes))
+        return build_problem(plan.changed(changes))
     share = ENERGY_SHARE * found.least.limit * JOULES_PER_WH if goal == "energy" else 0.0
     return replace(build_problem(plan), energy=found.energy_limit - share)
 
@@ -168,7 +168,7 @@ def main() -> None:
     print(f"{'goal':28}    answer  flights  CPU  needed  less: plan  random   bound", flush=True)
     for name in options.cases:
         sample, changes = CASES[name]
-        plan = changed_plan(read_plan(MISSIONS / f"{sample}.yaml"), changes)
+        plan = read_plan(MISSIONS / f"{sample}.yaml").changed(changes)
         started = time.process_time()
         found = optimize(plan)
         taken = time.process_time() - started

@@ -25,7 +25,7 @@ from faao_mav.optimizer.pricing import (
 )
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
-from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan import Plan
 from faao_mav.plan.autopilots import autopilots
 from faao_mav.plan.fields import dbm
 from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
@@ -311,7 +311,7 @@ def plan_mission(
     """
     started = time.perf_counter()
     if method is not None:
-        plan = parse_plan(plan.text, plan.source, method=method)
+        plan = plan.changed({"optimizer.method": method})
     result = optimize_plan(plan, observe=observe)
     solution = result.solution
     if observe is not None:

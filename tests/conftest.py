@@ -3,6 +3,7 @@
 import os
 import socket
 from collections.abc import Callable
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ pin_kernels()
 from faao_mav.optimizer.search import bound  # noqa: E402
 from faao_mav.optimizer.search.map_bound import map_bound  # noqa: E402
 from faao_mav.plan import Plan, parse_plan  # noqa: E402
+from faao_mav.plan.model import PlanContents  # noqa: E402
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml  # noqa: E402
 
 # Hypothesis tries numbers that it reads in the project's modules loaded so far. Which are loaded
@@ -72,6 +74,11 @@ def edited(text: str, changes: dict[str, Any]) -> str:
             section = section.setdefault(key, {})
         section[last] = value
     return dump_yaml(data)
+
+
+def contents(plan: Plan) -> dict[str, Any]:
+    """Return what `plan` holds by section, without its text and the name of its file."""
+    return {each.name: getattr(plan, each.name) for each in fields(PlanContents)}
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:

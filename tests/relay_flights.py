@@ -11,16 +11,7 @@ from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Mission
 from faao_mav.plan import (
-    BaseStation,
-    Flight,
-    GroundUser,
-    MissionOptions,
-    Optimizer,
-    Origin,
     Plan,
-    Radio,
-    Site,
-    VehicleOptions,
 )
 from faao_mav.schedule import Conversion, convert
 from faao_mav.schedule.assemble import assemble
@@ -45,37 +36,37 @@ def plan_with(
     recommend: bool = False,
 ) -> Plan:
     """Return a plan; the radio and the flight's ends play no part in a mission."""
-    return Plan(
-        site=Site(Origin(*origin)),
-        vehicle=VehicleOptions(
-            max_speed=max_speed,
-            max_acceleration=1.5,
-            autopilot=autopilot,
-            parameters=parameters if parameters else {},
-        ),
-        flight=Flight(
-            start=(0.0, 350.0),
-            end=(350.0, 0.0),
-            altitude=100.0,
-            duration=120.0,
-            start_velocity=None,
-            end_velocity=None,
-        ),
-        radio=Radio(
-            base_station=BaseStation(position=(0.0, 0.0)),
-            ground_user=GroundUser(position=(300.0, 300.0)),
-            fading="none",
-            fading_samples=1,
-        ),
-        optimizer=Optimizer(starts=("straight",)),
-        mission=MissionOptions(
-            takeoff=takeoff,
-            on_finish=on_finish,
-            path_tolerance=path_tolerance,
-            max_items=max_items,
-            parameters="recommend" if recommend else "keep",
-        ),
-    )
+    latitude, longitude, elevation = origin
+    return Plan.from_dict({
+        "site": {"origin": {"latitude": latitude, "longitude": longitude, "elevation": elevation}},
+        "vehicle": {
+            "max_speed": max_speed,
+            "max_acceleration": 1.5,
+            "autopilot": autopilot,
+            "parameters": dict(parameters or {}),
+        },
+        "flight": {
+            "start": [0, 350],
+            "end": [350, 0],
+            "altitude": 100,
+            "duration": 120,
+            "start_velocity": "free",
+            "end_velocity": "free",
+        },
+        "radio": {
+            "base_station": {"position": [0, 0]},
+            "ground_user": {"position": [300, 300]},
+            "fading": "none",
+        },
+        "optimizer": {"starts": ["straight"]},
+        "mission": {
+            "takeoff": takeoff,
+            "on_finish": on_finish,
+            "path_tolerance": path_tolerance,
+            "max_items": max_items,
+            "parameters": "recommend" if recommend else "keep",
+        },
+    })  # fmt: skip
 
 
 def dash(begin: float, end: float, top: float, acceleration: float, t: Real) -> Real:

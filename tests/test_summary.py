@@ -62,7 +62,7 @@ def test_it_says_what_was_found(result: Result) -> None:
 
 def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) -> None:
     plan = result.solution.plan
-    wanted = replace(plan, optimizer=replace(plan.optimizer, rate="mutual_information"))
+    wanted = plan.changed({"optimizer.rate": "mutual_information"})
     for gain, doubted in ((0.05, False), (0.0005, True)):
         solution = replace(result.solution, plan=wanted, gain=gain)
         text = summary(replace(result, solution=solution))

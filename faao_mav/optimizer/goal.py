@@ -21,7 +21,7 @@ from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.most_data import WithinEnergy
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Least, Observer, Solution, staged
-from faao_mav.plan import Plan, changed_plan
+from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import MIN_DBM, dbm
 from faao_mav.plan.keys import ALIASES, POWER
@@ -122,7 +122,7 @@ class _Search(ABC):
         told = ", ".join(f"{key} {value:g}" for key, value in changes.items())
         self.optimizations += 1
         return direct(
-            build_problem(changed_plan(self.plan, changes)),
+            build_problem(self.plan.changed(changes)),
             observe=staged(self.observe, told),
             known=None if known is None else known.trajectory,
         )

@@ -34,7 +34,7 @@ from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.solution import Least, Observer, Progress, Solution, staged
-from faao_mav.plan import Plan, changed_plan
+from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.power import JOULES_PER_WH
 
@@ -215,7 +215,7 @@ class WithinEnergy:
     def _problem(self, slots: int, energy: float) -> tuple[Problem, str]:
         """Return the problem of so many `slots` within `energy`, and its name."""
         duration = round(slots * self.plan.flight.time_step, 9)
-        problem = build_problem(changed_plan(self.plan, {"flight.duration": duration}))
+        problem = build_problem(self.plan.changed({"flight.duration": duration}))
         limit = "" if energy == math.inf else f" within {energy / JOULES_PER_WH:.4g} Wh"
         return replace(problem, energy=energy), f"{duration:g} s{limit}"
 
@@ -276,7 +276,7 @@ def thriftiest_straight(plan: Plan) -> tuple[float, float]:
     slots = np.linspace(fewest_slots(plan), plan.flight.slots, _STRAIGHT).astype(int)
     for n in np.unique(slots).tolist():
         duration = round(n * plan.flight.time_step, 9)
-        problem = build_problem(changed_plan(plan, {"flight.duration": duration}))
+        problem = build_problem(plan.changed({"flight.duration": duration}))
         limit = replace(problem, energy=0.0).energy_limit(problem.kinematics)
         assert limit is not None
         with suppress(InfeasibleError):

@@ -234,7 +234,7 @@ def counted_as_cutoff(problem: Problem) -> Problem:
     plan = problem.plan
     return replace(
         problem,
-        plan=replace(plan, optimizer=replace(plan.optimizer, rate="cutoff")),
+        plan=plan.changed({"optimizer.rate": "cutoff"}),
         bs_uav=replace(problem.bs_uav, measure="cutoff"),
         uav_user=replace(problem.uav_user, measure="cutoff"),
     )

@@ -115,9 +115,8 @@ def _field(problem: Problem) -> RateField:
         base_station=replace(radio.base_station, position=(0.0, 0.0)),
         ground_user=replace(radio.ground_user, position=(0.0, 0.0)),
     )
-    shared = replace(plan, radio=anywhere)
     key = (anywhere, plan.optimizer, plan.flight.altitude, plan.flight.slots, step)
-    return RateField(problem.links, _tables(_Keyed(key, shared)))
+    return RateField(problem.links, _tables(_Keyed(key, plan)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,5 +138,5 @@ def _tables(shared: _Keyed) -> tuple[RateModel, ...]:
     step = shared.key[-1]
     assert isinstance(step, int)
     scheme = design(shared.plan)
-    links = build_problem(shared.plan).links
+    links = [replace(link, station=np.zeros(2)) for link in build_problem(shared.plan).links]
     return rate_models(links, scheme, [_REACH**step] * len(links))

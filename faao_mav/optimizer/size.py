@@ -8,8 +8,8 @@ real coordinates of P^H H^H H P, and algebra on matrices of 2 N_t² rows. How of
 follows from the slots and the draws of the fading.
 """
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from typing import Any, TypeVar
 
 from faao_mav.errors import PlanError
@@ -171,41 +171,39 @@ def _draws(radio: Radio) -> int:
 def _that_would_do(plan: Plan) -> Iterator[str]:
     """Yield for each key the largest value with which `plan` is accepted, the others being kept."""
     radio, flight = plan.radio, plan.flight
-    base, relay, user = radio.base_station, radio.relay, radio.ground_user
+    antennas = {
+        f"radio.{name}.antennas": getattr(radio, name).antennas
+        for name in ("base_station", "relay", "ground_user")
+    }
 
-    def largest(values: Iterable[_Value], changed: Callable[[_Value], Plan]) -> _Value | None:
+    def largest(
+        values: Iterable[_Value], changes: Callable[[_Value], dict[str, Any]]
+    ) -> _Value | None:
         for value in values:
-            if not _too_large(changed(value)):
-                return value
+            with contextlib.suppress(PlanError):  # other keys may not allow it
+                if not _too_large(plan.changed(changes(value))):
+                    return value
         return None
 
-    def with_antennas(most: int) -> Plan:
-        return with_radio(
-            base_station=replace(base, antennas=min(base.antennas, most)),
-            relay=replace(relay, antennas=min(relay.antennas, most)),
-            ground_user=replace(user, antennas=min(user.antennas, most)),
-        )
-
-    def with_radio(**changes: Any) -> Plan:
-        return replace(plan, radio=replace(radio, **changes))
-
     smaller = reversed(MODULATIONS[: MODULATIONS.index(radio.modulation)])
-    alphabet = largest(smaller, lambda name: with_radio(modulation=name))
+    alphabet = largest(smaller, lambda name: {"radio.modulation": name})
     if alphabet is not None:
         yield f"radio.modulation: {alphabet}"
-    most = max(base.antennas, relay.antennas, user.antennas)
-    antennas = largest(range(most - 1, 0, -1), with_antennas)
-    if antennas is not None:
-        yield f"at most {antennas} antennas"
+    fewer = largest(
+        range(max(antennas.values()) - 1, 0, -1),
+        lambda most: {key: min(own, most) for key, own in antennas.items()},
+    )
+    if fewer is not None:
+        yield f"at most {fewer} antennas"
     if _averages(radio):
-        fewer = (radio.fading_samples * k // 10 for k in range(9, 0, -1))
+        tenths = (radio.fading_samples * k // 10 for k in range(9, 0, -1))
         draws = largest(
-            (n for n in fewer if n >= _FEWEST_DRAWS), lambda n: with_radio(fading_samples=n)
+            (n for n in tenths if n >= _FEWEST_DRAWS), lambda n: {"radio.fading_samples": n}
         )
         if draws is not None:
             yield f"radio.fading_samples: {draws}"
     longer = (flight.time_step * k for k in (2, 5, 10))
-    step = largest(longer, lambda step: replace(plan, flight=replace(flight, time_step=step)))
+    step = largest(longer, lambda step: {"flight.time_step": step})
     if step is not None:
         yield f"flight.time_step: {step:g}"
 

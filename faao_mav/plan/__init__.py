@@ -6,11 +6,10 @@
 
 from faao_mav.plan.fields import Vector as Vector
 from faao_mav.plan.keys import reference as reference
-from faao_mav.plan.model import Plan as Plan
 from faao_mav.plan.radio import BaseStation as BaseStation
 from faao_mav.plan.radio import GroundUser as GroundUser
 from faao_mav.plan.radio import Radio as Radio
-from faao_mav.plan.reader import changed_plan as changed_plan
+from faao_mav.plan.reader import Plan as Plan
 from faao_mav.plan.reader import parse_plan as parse_plan
 from faao_mav.plan.reader import read_plan as read_plan
 from faao_mav.plan.sections import Flight as Flight

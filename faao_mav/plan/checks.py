@@ -11,7 +11,7 @@ from faao_mav.plan.autopilots import VEHICLES
 from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import Vector, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
-from faao_mav.plan.model import Plan
+from faao_mav.plan.model import PlanContents
 from faao_mav.plan.sections import Flight
 from faao_mav.power import RotaryWing
 from faao_mav.vector import chord
@@ -26,7 +26,7 @@ _SLACK = 1e-6
 """Metres that the reach may be short: a plan at the very limit is not refused for rounding."""
 
 
-def problems(plan: Plan) -> Iterator[str]:
+def problems(plan: PlanContents) -> Iterator[str]:
     """Yield what is wrong with `plan`, key first; each may rest on those before it being right."""
     yield from _vehicle(plan)
     yield from _speeds(plan)
@@ -39,7 +39,7 @@ def problems(plan: Plan) -> Iterator[str]:
     yield from _study(plan)
 
 
-def _vehicle(plan: Plan) -> Iterator[str]:
+def _vehicle(plan: PlanContents) -> Iterator[str]:
     vehicle = plan.vehicle
     known = VEHICLES.get((vehicle.autopilot, vehicle.type))
     if known is None or not known.planned:
@@ -59,7 +59,7 @@ def _vehicle(plan: Plan) -> Iterator[str]:
         )
 
 
-def _speeds(plan: Plan) -> Iterator[str]:
+def _speeds(plan: PlanContents) -> Iterator[str]:
     vehicle, flight = plan.vehicle, plan.flight
     least, most = vehicle.min_speed, plan.max_ground_speed
     if least > vehicle.max_speed:
@@ -89,17 +89,17 @@ def _speeds(plan: Plan) -> Iterator[str]:
             yield f"{told}min_speed asks for at least {least:g} m/s: give free or a velocity"
 
 
-def _wind(plan: Plan) -> str:
+def _wind(plan: PlanContents) -> str:
     wind = plan.site.wind
     gusts = f", gusts of {wind.gust:g} m/s" if wind.gust > wind.speed else ""
     return f"{wind.speed:g} m/s from {wind.from_degrees:g} degrees{gusts}"
 
 
-def _in_wind(plan: Plan) -> str:
+def _in_wind(plan: PlanContents) -> str:
     return "" if plan.max_airspeed == math.inf else f" in a wind of {_wind(plan)}"
 
 
-def _relay(plan: Plan) -> Iterator[str]:
+def _relay(plan: PlanContents) -> Iterator[str]:
     if plan.radio.relay.buffer_mbytes is not None and plan.radio.bandwidth_mhz is None:
         yield (
             f"radio.relay.buffer_mbytes: {plan.radio.relay.buffer_mbytes:g}: how long it takes to "
@@ -126,7 +126,7 @@ def _steps(flight: Flight) -> Iterator[str]:
         yield f"{given}{flight.slots} step(s) {step}give at least {FEWEST_SLOTS} steps"
 
 
-def _distance(plan: Plan) -> Iterator[str]:
+def _distance(plan: PlanContents) -> Iterator[str]:
     flight, vehicle = plan.flight, plan.vehicle
     distance = math.dist(flight.start, flight.end)
     if reach(flight.slots - 1, plan) >= distance - _SLACK:
@@ -141,7 +141,7 @@ def _distance(plan: Plan) -> Iterator[str]:
     )
 
 
-def _goal(plan: Plan) -> Iterator[str]:
+def _goal(plan: PlanContents) -> Iterator[str]:
     goal = plan.goal
     amounts = [name for name in ("deliver_mbytes", "rate") if getattr(goal, name) is not None]
     if goal.minimise is None and amounts:
@@ -172,7 +172,7 @@ def _goal(plan: Plan) -> Iterator[str]:
         )
 
 
-def _power(plan: Plan) -> Iterator[str]:
+def _power(plan: PlanContents) -> Iterator[str]:
     power, copter = plan.vehicle.power, plan.vehicle.type == "copter"
     if power is None:
         if plan.vehicle.battery is not None:
@@ -196,12 +196,12 @@ def _power(plan: Plan) -> Iterator[str]:
         )
 
 
-def _airspeed(plan: Plan) -> str:
+def _airspeed(plan: PlanContents) -> str:
     most = plan.max_airspeed
     return "" if most == math.inf else f" and at most {most:.4g} m/s through the air"
 
 
-def _study(plan: Plan) -> Iterator[str]:
+def _study(plan: PlanContents) -> Iterator[str]:
     varied = plan.study.vary if plan.study else ()
     for key in varied:
         if problem := unknown_key(key):
@@ -210,7 +210,7 @@ def _study(plan: Plan) -> Iterator[str]:
         yield f"study.vary: {both} vary the same value; leave one out"
 
 
-def reach(steps: int, plan: Plan) -> float:
+def reach(steps: int, plan: PlanContents) -> float:
     """Return the farthest w(N+1) - w(0) along the line from start to end, m.
 
     Under (11)-(13f) the component of v(n) along any direction is at most
@@ -237,14 +237,14 @@ def reach(steps: int, plan: Plan) -> float:
     return min(farthest, dt * steps * chord(plan.wind, plan.max_airspeed, direction)[1])
 
 
-def fewest_slots(plan: Plan) -> int:
+def fewest_slots(plan: PlanContents) -> int:
     """Return the least number of slots in which `plan`, whose own are enough, can be flown."""
     shortest = shortest_duration(plan)
     assert shortest is not None  # the plan's own duration is no shorter
     return max(round(shortest / plan.flight.time_step), FEWEST_SLOTS)
 
 
-def shortest_duration(plan: Plan) -> float | None:
+def shortest_duration(plan: PlanContents) -> float | None:
     """Return the least T = (N + 2) dt whose reach covers the distance, s; None past `MAX_SLOTS`."""
     flight = plan.flight
     distance = math.dist(flight.start, flight.end)

@@ -11,7 +11,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Vector
-from faao_mav.plan.model import Plan, PlanFile
+from faao_mav.plan.model import PlanContents, PlanFile
 from faao_mav.plan.zones import CircleZone, FenceOptions, PolygonZone
 
 _SHORTER_WAY = 2e-3
@@ -94,7 +94,7 @@ def _degrees(frame: LocalFrame, places: Sequence[Vector]) -> tuple[LatLon, ...]:
     return tuple(zip(latitude.tolist(), longitude.tolist(), strict=True))
 
 
-def fence_problems(plan: Plan) -> Iterator[str]:
+def fence_problems(plan: PlanContents) -> Iterator[str]:
     """Yield why no flight of `plan` can keep `fence.margin` from the edge of the fence."""
     area = plan.keep_in
     if plan.fence is None or area is None:
@@ -117,7 +117,7 @@ def fence_problems(plan: Plan) -> Iterator[str]:
     yield from _way_problems(plan, kept)
 
 
-def _way_problems(plan: Plan, kept: FreeArea) -> Iterator[str]:
+def _way_problems(plan: PlanContents, kept: FreeArea) -> Iterator[str]:
     """Yield why the way from start to end cannot be flown."""
     flight, margin = plan.flight, plan.fence.margin if plan.fence else 0.0
     way = kept.shortest_way(np.array(flight.start), np.array(flight.end))
@@ -137,7 +137,7 @@ def _way_problems(plan: Plan, kept: FreeArea) -> Iterator[str]:
         )
 
 
-def trouble(plan: Plan, place: Vector) -> str:
+def trouble(plan: PlanContents, place: Vector) -> str:
     """Return where a `place`, m, is that lies outside the fence of `plan` or near its edge."""
     import shapely
 

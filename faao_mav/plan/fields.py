@@ -239,9 +239,9 @@ Noise: TypeAlias = Annotated[
 ]
 Gain: TypeAlias = Annotated[
     Number,
-    Field(ge=-200, le=200),
+    Field(ge=-200, le=0),
     AfterValidator(linear),
-    Written("a gain from -200 to 200 dB", _db),
+    Written("a gain from -200 to 0 dB (1e-5, linear, is -50)", _db),
 ]
 AutopilotName: TypeAlias = Annotated[
     Autopilot, _one_of(autopilots), Written(lambda: listed(autopilots()))

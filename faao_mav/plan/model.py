@@ -1,8 +1,8 @@
 """The plan itself: all its sections, and what follows from them.
 
-`Plan` is what the rest of the program sees: validated, SI and linear units, frozen. The same
-declarations say what `plan.yaml` may hold: each field is a key, with what it means, its unit and
-its limits. `fields` says how, `keys.reference` lists them all.
+Validated, in SI and linear units, frozen. The same declarations say what `plan.yaml` may hold: each
+field is a key, with what it means, its unit and its limits. `fields` says how, `keys.reference`
+lists them all.
 """
 
 import math
@@ -60,14 +60,12 @@ class PlanFile(Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan(PlanFile):
-    """A validated plan; `text` is the YAML that it was read from, `source` the name of its file.
+class PlanContents(PlanFile):
+    """What a plan holds, and what follows from it; `reader.Plan` has its text besides.
 
     `geofence` has the zones of `fence` and of its file, in degrees.
     """
 
-    text: str = ""
-    source: str = "plan"
     geofence: Fence = field(default_factory=Fence)
 
     @property

@@ -2,25 +2,72 @@
 
 import difflib
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from dataclasses import InitVar, dataclass, fields
 from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from faao_mav.errors import PlanError, place_of, quote
+from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.files import read_text
 from faao_mav.plan.checks import problems
 from faao_mav.plan.fence import geofence, written_out
 from faao_mav.plan.keys import PlanKey, reference
-from faao_mav.plan.model import Plan, PlanFile
+from faao_mav.plan.model import PlanContents, PlanFile
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
 from faao_mav.plan.zones import CHOICES
 
 _MAX_LINES = 6
 """Lines of a message; chosen to fit a small terminal."""
+
+
+_READ = object()
+"""What tells a plan that has been read and checked from one that was put together otherwise."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan(PlanContents):
+    """A validated plan, in SI units: `text` is its YAML, `source` the name of its file.
+
+    Plans are made by `read_plan`, `parse_plan` and `Plan.from_dict`, and varied by `changed`, which
+    check them and keep text and values the same. `dataclasses.replace` raises `InputError`.
+
+    >>> plan = read_plan("missions/copter_relay.yaml")
+    >>> lower = plan.changed({"flight.altitude": 60, "optimizer.method": "direct"})
+    >>> lower.flight.altitude, "altitude: 60" in lower.text, plan.flight.altitude
+    (60.0, True, 100.0)
+    """
+
+    text: str
+    source: str
+    made_by: InitVar[object] = None
+
+    def __post_init__(self, made_by: object) -> None:
+        if made_by is not _READ:
+            raise InputError(
+                "a plan is not put together or replaced field by field: use "
+                'plan.changed({"flight.altitude": 60}) or Plan.from_dict({...}), which check it'
+            )
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], source: str = "plan") -> "Plan":
+        """Return the plan of the keys and values `data`, nested as in `plan.yaml`, in its units.
+
+        Tuples and NumPy's numbers and arrays count as lists and numbers. `source` names it in
+        messages; files that it names lie beside it. Raises `PlanError` as `read_plan` does.
+        """
+        return parse_plan(dump_yaml(_plain(data, source)), source)
+
+    def changed(self, changes: Mapping[str, Any]) -> "Plan":
+        """Return the plan with the values at dotted keys of its file replaced, in its units.
+
+        None is the default of a key that has one. Raises `PlanError` as `read_plan` does.
+        """
+        data = changed(load_yaml(self.text, self.source), changes)
+        return Plan.from_dict(data, self.source)
 
 
 def read_plan(path: str | Path, *, method: str | None = None) -> Plan:
@@ -55,16 +102,26 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
         # a copy of the text, as beside a result, has to stand without the file
         data["fence"] = written_out(fence, contents.fence.margin)
         text = dump_yaml(data)
-    plan = Plan(**held, text=text, source=source, geofence=fence)
+    plan = Plan(**held, text=text, source=source, geofence=fence, made_by=_READ)
     for problem in problems(plan):
         raise PlanError(f"{source}: {problem}")
     return plan
 
 
-def changed_plan(plan: Plan, changes: Mapping[str, Any]) -> Plan:
-    """Return `plan` with the values at dotted keys of its file replaced. Raises `PlanError`."""
-    data = changed(load_yaml(plan.text, plan.source), changes)
-    return parse_plan(dump_yaml(data), plan.source)
+def _plain(value: Any, source: str) -> Any:
+    """Return `value` as YAML has it: mappings, lists, numbers, text, true, false and null."""
+    match value:
+        case Mapping():
+            return {str(key): _plain(inside, source) for key, inside in value.items()}
+        case np.ndarray() | np.generic():
+            return _plain(value.tolist(), source)
+        case list() | tuple():
+            return [_plain(inside, source) for inside in value]
+        case None | bool() | int() | float() | str():
+            return value
+        case Path():
+            return str(value)
+    raise PlanError(f"{source}: {quote(value)} is not accepted; give numbers, text or lists")
 
 
 def changed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -152,7 +152,7 @@ def convert(solution: Solution) -> Conversion:
     outside, tolerance = _outside(best.schedule, area), plan.mission.path_tolerance
     while outside > 0 and tolerance > _FINEST_TOLERANCE:
         tolerance /= 2
-        finer = replace(plan, mission=replace(plan.mission, path_tolerance=tolerance))
+        finer = plan.changed({"mission.path_tolerance": tolerance})
         try:
             tried = _convert(solution, finer)
         except InfeasibleError:  # too many items

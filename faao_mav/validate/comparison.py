@@ -48,6 +48,7 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
         predicted_delivered=flown.delivered_rate,
         causal=plan.radio.causal,
         bandwidth_mhz=plan.radio.bandwidth_mhz,
+        radio=plan.radio,
         planned_duration=plan.flight.duration,
         predicted_duration=flown.duration,
         rms_position_error=flown.rms_position_error,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from faao_mav.plan.radio_values import doubtful_values
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.demands import LinkCheck
 from faao_mav.validate.rule import Issue, Rules
@@ -30,7 +31,34 @@ ALTITUDE_ERROR = 2.0
 """The error of the altitude that is reported, m: from 100 m up it changes the rate by a tenth of a
 decibel."""
 
+NOTHING = 1e-3
+"""The delivered rate, bit/s/Hz, below which a flight delivers next to nothing. Chosen: 20 kbit/s in
+20 MHz."""
+
 _SOURCE = "the plan, and the rate along the predicted flight"
+
+
+@RULES.error(
+    "link-nothing",
+    _SOURCE,
+    summary=f"the plan delivers less than {NOTHING:g} bit/s/Hz",
+)
+def _nothing(context: ValidationContext) -> Iterator[Issue]:
+    link = context.link
+    if link is not None and link.planned_delivered < NOTHING:
+        yield Issue(
+            None,
+            f"the plan delivers {link.planned_delivered:.2g} bit/s/Hz, next to nothing",
+            "check powers, noise and gain in radio (dBm, dB), or fly nearer to the stations",
+        )
+
+
+@RULES.warning("radio-values", "thermal noise k T B; powers and noises that radios have")
+def _radio_values(context: ValidationContext) -> Iterator[Issue]:
+    """A power or a noise of the plan that no radio has."""
+    if context.link is not None and context.link.radio is not None:
+        for message, action in doubtful_values(context.link.radio):
+            yield Issue(None, message, action)
 
 
 @RULES.error(

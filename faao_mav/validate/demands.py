@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from faao_mav.errors import InputError
+from faao_mav.plan import Radio
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,8 @@ class LinkCheck:
     `max_position_error` m between planned and predicted position at equal times; `path_error` m
     between planned and predicted path, `path_tolerance` m what the plan allows of it;
     `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
-    None if none does; `bandwidth_mhz` is None where the plan has none.
+    None if none does; `bandwidth_mhz` is None where the plan has none. `radio` is what the plan
+    says of both links.
     """
 
     planned_rate: float
@@ -67,6 +69,7 @@ class LinkCheck:
     worst: Stretch | None = None
     causal: bool = True
     bandwidth_mhz: float | None = None
+    radio: Radio | None = None
 
     @property
     def predicted_mbytes(self) -> float | None:

@@ -1,6 +1,5 @@
 """Algorithm 1, whole."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -167,7 +166,7 @@ def test_what_is_too_large_is_refused_before_it_is_tried(paper_plan: MakePlan) -
 
 
 def test_no_flight_is_infeasible(paper_plan: MakePlan) -> None:
-    plan = paper_plan()
-    flight = replace(plan.flight, start_velocity=(20.0, 0.0), duration=2.0, end=(0.0, 50.0))
+    flight = {"start_velocity": [20, 0], "duration": 2, "end": [0, 50]}
+    plan = paper_plan({f"flight.{key}": value for key, value in flight.items()})
     with pytest.raises(InfeasibleError):
-        optimize(replace(plan, flight=flight))
+        optimize(plan)

@@ -230,7 +230,7 @@ def test_saturated_links_get_a_short_route_at_once() -> None:
 
 
 def replace_method(plan: Plan) -> Plan:
-    return replace(plan, optimizer=replace(plan.optimizer, method="direct"))
+    return plan.changed({"optimizer.method": "direct"})
 
 
 def test_same_seed_same_bytes(faint_plan: MakePlan) -> None:

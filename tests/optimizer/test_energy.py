@@ -25,7 +25,7 @@ from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan import Plan, changed_plan, parse_plan
+from faao_mav.plan import Plan, parse_plan
 from faao_mav.report.summary import result_lines
 from faao_mav.workflow import Result
 
@@ -41,8 +41,7 @@ radio:
   ground_user: {position: [80, 60], noise_dbm: -80}
 optimizer: {starts: [bs-user], max_iterations: 25}
 """)
-PLANE = changed_plan(
-    COPTER,
+PLANE = COPTER.changed(
     {
         "vehicle": {
             "type": "plane",
@@ -81,7 +80,7 @@ def integrated(plan: Plan, flight: Trajectory) -> float:
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("plan", "wind"), [(COPTER, 0), (COPTER, 5), (PLANE, 0)])
 def test_the_energy_is_that_of_direct_integration(plan: Plan, wind: float, seed: int) -> None:
-    plan = changed_plan(plan, {"site.wind": {"speed": wind, "from": 250}})
+    plan = plan.changed({"site.wind": {"speed": wind, "from": 250}})
     problem = build_problem(plan)
     flight = random_flight(problem.kinematics, seed)
     assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
@@ -166,7 +165,7 @@ def slsqp(kin: Kinematics, field: Any, limit: EnergyLimit, start: Trajectory) ->
 
 @pytest.mark.parametrize("share", [0.97, 0.94])
 def test_no_worse_than_slsqp(share: float) -> None:
-    plan = changed_plan(COPTER, {"flight.duration": 20, "radio.causal": False})
+    plan = COPTER.changed({"flight.duration": 20, "radio.causal": False})
     kin, field, limit, free = limited(plan, share)
     every = (*constraints_of(kin), limit)
     starts = sparing_starts(kin, {"straight": straight_flight(kin), "free": free}, every)
@@ -185,7 +184,7 @@ def test_no_worse_than_slsqp(share: float) -> None:
 
 
 def within(energy_wh: float) -> Solution:
-    return optimize(changed_plan(COPTER, {"goal": {"maximise": "data", "energy_wh": energy_wh}}))
+    return optimize(COPTER.changed({"goal": {"maximise": "data", "energy_wh": energy_wh}}))
 
 
 def used(found: Solution) -> float:
@@ -213,7 +212,7 @@ def test_the_best_duration_is_that_of_trying_all() -> None:
     found = within(0.9)
     tried = []
     for slots in range(len(found.w) - 1, len(found.w) + 2):
-        problem = build_problem(changed_plan(COPTER, {"flight.duration": slots}))
+        problem = build_problem(COPTER.changed({"flight.duration": slots}))
         with suppress(InfeasibleError):
             each = direct(replace(problem, energy=0.9 * 3600))
             tried.append(slots * each.delivered_rate)
@@ -225,7 +224,7 @@ def test_the_least_energy_is_below_that_of_other_ways() -> None:
     most = direct(build_problem(COPTER))
     asked = 0.6 * (COPTER.megabytes(most.delivered_rate) or 0.0)
     found, quickest = (
-        optimize(changed_plan(COPTER, {"goal": {"deliver_mbytes": asked, "minimise": quantity}}))
+        optimize(COPTER.changed({"goal": {"deliver_mbytes": asked, "minimise": quantity}}))
         for quantity in ("energy", "duration")
     )
     assert found.delivered_rate >= found.plan.needed_rate
@@ -253,7 +252,7 @@ def test_where_no_less_energy_will_do_every_share_is_refused(
         raise InfeasibleError("none")
 
     monkeypatch.setattr(WithinEnergy, "best", none)
-    found = optimize(changed_plan(COPTER, {"goal": {"rate": 0.1, "minimise": "energy"}}))
+    found = optimize(COPTER.changed({"goal": {"rate": 0.1, "minimise": "energy"}}))
     assert len(tried) > 1
     assert max(tried) == pytest.approx((1 - ENERGY_SHARE) * used(found) * 3600)
 

@@ -14,7 +14,7 @@ from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.multistart import stretched
-from faao_mav.plan import Plan, changed_plan, parse_plan
+from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.fields import dbm
 from faao_mav.report.summary import result_lines
 from faao_mav.workflow import Result
@@ -34,7 +34,7 @@ optimizer: {starts: [straight, bs-user]}
 
 
 def delivered(changes: dict[str, Any]) -> float:
-    return direct(build_problem(changed_plan(BASE, changes))).delivered_rate
+    return direct(build_problem(BASE.changed(changes))).delivered_rate
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_the_least_duration_is_that_of_trying_all(
     amounts = {n: rate * per_slot[n] for n, rate in by_duration.items()}
     low, high = min(amounts.values()), max(amounts.values())
     asked = low + share * (high - low) - 1e-3  # ends differ by the tolerance
-    found = optimize(changed_plan(BASE, {"goal": {amount: asked, "minimise": "duration"}}))
+    found = optimize(BASE.changed({"goal": {amount: asked, "minimise": "duration"}}))
     least = min(n for n, reached in amounts.items() if reached >= asked)
     assert found.plan.flight.duration == least
     assert found.least is not None
@@ -87,7 +87,7 @@ def test_the_least_duration_is_that_of_trying_all(
 
 def test_the_least_power_is_just_enough() -> None:
     share, full = 0.6, delivered({})
-    found = optimize(changed_plan(BASE, {"goal": {"rate": share * full, "minimise": "power"}}))
+    found = optimize(BASE.changed({"goal": {"rate": share * full, "minimise": "power"}}))
     base, relay = found.plan.radio.base_station.power, found.plan.radio.relay.power
     assert relay / base == pytest.approx(10**1.9, rel=1e-9)  # both by the same dB
     assert found.delivered_rate >= share * full
@@ -131,7 +131,7 @@ def test_a_flight_that_takes_longer_keeps_the_limits(seed: int, more: int, free:
 )  # fmt: skip
 def test_a_goal_out_of_reach_says_what_is_possible(goal: dict[str, Any], told: str) -> None:
     with pytest.raises(InfeasibleError) as caught:
-        optimize(changed_plan(BASE, {"goal": goal}))
+        optimize(BASE.changed({"goal": goal}))
     assert told in str(caught.value)
     assert f"at most {_most(BASE, 'rate' in goal)}" in str(caught.value)
 

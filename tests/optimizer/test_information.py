@@ -67,7 +67,7 @@ def test_it_is_never_below_the_plan_for_the_cutoff_rate(
         return
     assert solution.gain is not None
     assert solution.gain > -1e-4
-    before = optimize(replace(plan, optimizer=replace(plan.optimizer, rate="cutoff")))
+    before = optimize(plan.changed({"optimizer.rate": "cutoff"}))
     assert before.gain is None
     assert solution.rates.R_avg > before.rates.R_avg  # of the same flight it would be above too
     problem = build_problem(plan)

@@ -291,7 +291,7 @@ def test_both_methods_solve_plans_with_it(
     }
     powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
     for plan in (small_plan(changes | powers), paper_plan(changes | powers)):
-        plan = replace(plan, optimizer=replace(plan.optimizer, max_iterations=15))
+        plan = plan.changed({"optimizer.max_iterations": 15})
         solution = optimize(plan)
         residuals = solution.residuals()
         assert residuals.pop("minimum speed") < 1e-6

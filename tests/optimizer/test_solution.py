@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MakePlan
+from conftest import MakePlan, contents
 
 from faao_mav.errors import InputError
 from faao_mav.optimizer import archive
@@ -41,7 +41,7 @@ def test_loaded_is_what_was_saved(solution: Solution, tmp_path: Path) -> None:
     loaded = load_solution(tmp_path / "result.npz")
     assert loaded.rates == solution.rates
     assert loaded.w.tobytes() == solution.w.tobytes()
-    assert replace(loaded.plan, source="plan") == solution.plan
+    assert contents(loaded.plan) == contents(solution.plan)
     assert max(loaded.residuals().values()) < 1e-6
     save_solution(loaded, tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "result.npz").read_bytes()
@@ -202,7 +202,7 @@ def test_a_solution_knows_how_much_it_could_gain(small_plan: MakePlan, least: fl
         }
     )
     best = optimize(plan)
-    early = optimize(replace(plan, optimizer=replace(plan.optimizer, max_iterations=1)))
+    early = optimize(plan.changed({"optimizer.max_iterations": 1}))
     assert best.kkt_residual() < 0.1 * early.kkt_residual()
     assert best.kkt_residual() < 2e-4
 

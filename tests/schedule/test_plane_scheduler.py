@@ -1,7 +1,5 @@
 """Missions for aeroplanes: curves that they fly although they aim far ahead."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from relay_flights import Trajectory, converted, plan_with
@@ -26,8 +24,8 @@ RATIO = density_ratio(684.0) ** -0.5
 
 def plane_plan(**changes: float) -> Plan:
     plan = plan_with(max_speed=16.0, path_tolerance=5.0)
-    vehicle = replace(plan.vehicle, type="plane", min_speed=12.0, parameters=changes)
-    return replace(plan, vehicle=vehicle)
+    vehicle = {"type": "plane", "min_speed": 12.0, "parameters": changes}
+    return plan.changed({f"vehicle.{key}": value for key, value in vehicle.items()})
 
 
 def bends() -> Trajectory:
