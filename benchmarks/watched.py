@@ -42,7 +42,7 @@ def watched(autopilots: Path, autopilot: str, result: Result, folder: Path) -> s
     logs = [path for path in folder.rglob("*") if path.suffix in {".BIN", ".ulg"}]
     logs.sort(key=lambda path: path.stat().st_size)
     begun = time.process_time()
-    own = debriefed(read_log(logs[-1]), result, logs[-1].name)
+    _, own = debriefed(read_log(logs[-1]), result, logs[-1].name)
     share = 100 * own.flown.delivered_rate / result.solution.delivered_rate
     cells.append(f"{own.flown.rms_position_error:5.2f} {share:7.2f} %")
     apart = max(abs(here / there - 1) for here, there in zip(rates(own), rates(seen), strict=True))

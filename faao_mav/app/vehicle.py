@@ -110,11 +110,12 @@ def debriefed(result: Result, log: Path, name: str) -> tuple[str, list[list[floa
     from faao_mav.report import debrief
 
     try:
-        record = read_log(log)
+        records = read_log(log)
     except FaaoError as error:
         raise type(error)(str(error).replace(str(log), name)) from None
-    found = debrief.debriefed(record, result, name)
-    said = joined([*debriefing_lines(found), *debrief.remarks_on(record, found, result)])
+    record, found = debrief.debriefed(records, result, name)
+    remarks = debrief.remarks_on(records, record, found, result)
+    said = joined([*debriefing_lines(found), *remarks])
     relay = (record.t >= found.start) & (record.t <= found.start + found.flown.duration)
     places = np.stack([record.latitude, record.longitude], axis=1)[relay]
     return said, thinned(places).round(8).tolist()

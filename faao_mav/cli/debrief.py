@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
-from faao_mav.cli.shared import AsJson, File, Radio, exit_status, note, option
+from faao_mav.cli.shared import AsJson, File, Radio, System, exit_status, note, option
 from faao_mav.errors import InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
@@ -17,6 +17,7 @@ def debrief(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg.")],
     plan_file: PlanFile = None,
     solution_file: SolutionFile = None,
+    system: System = None,
     report: Annotated[File, option("PAGE.html", "One page with all three tracks.")] = None,
     radio: Radio = None,
     as_json: AsJson = False,
@@ -26,6 +27,7 @@ def debrief(
     Finds the relay flight in the log of an ArduPilot (.bin), a PX4 (.ulg, with pyulog) or a ground
     station (.tlog), and tells how late it was, how far from plan and path, and what each hop
     carried along the real track with the planned precoders, beside what was planned and predicted.
+    Of several vehicles in a .tlog it is the one whose flight is the plan's, or that of --system.
     --radio replays the flight to radios, at the pace at which it was flown.
 
     Exit status: 0 told; 1 the plan's flight is not in the log; 2 unusable arguments or input.
@@ -47,12 +49,12 @@ def debrief(
     from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 
     to = None if radio is None else UdpRadio(radio)
-    record = read_log(log)
+    records = read_log(log, system)
     solution = planned(plan_file, solution_file)
     assert solution is not None
     result = with_mission(Result(solution))
-    found = debriefed(record, result, str(log))
-    remarks = list(remarks_on(record, found, result))
+    record, found = debriefed(records, result, str(log))
+    remarks = list(remarks_on(records, record, found, result))
     if report is not None:
         from faao_mav.report.page import render_report
 
@@ -63,6 +65,7 @@ def debrief(
         told = debriefing_as_dict(found) | {
             "wind": None if wind is None else wind.tolist(),
             "parameters": other_parameters(record, result),
+            "system": record.system,
         }
         typer.echo(json.dumps(told, allow_nan=False))
     else:

@@ -1,7 +1,7 @@
 """What became of a plan in a flight, watched or from a log, in lines for people."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from faao_mav.errors import FaaoError
 from faao_mav.mavlink.flying.fly import FlightReport
@@ -25,26 +25,35 @@ def flight_lines(report: FlightReport, found: Debriefing | None) -> Iterator[Lin
         yield report.ending.kind, report.ending.text
 
 
-def debriefed(record: FlightRecord, result: Result, source: str) -> Debriefing:
-    """Return what became of the plan of `result` in the flight `record` of the log `source`.
+def debriefed(
+    records: Sequence[FlightRecord], result: Result, source: str
+) -> tuple[FlightRecord, Debriefing]:
+    """Return the flight in the log `source` that is the plan's of `result`, and what became of it.
 
-    Raises `FaaoError` where the plan's flight is not in it.
+    Of several `records` it is the nearest to the plan. Raises `FaaoError` where none is.
     """
     line = flown.planned_line(result.solution)
     if result.conversion is not None:
         track = result.conversion.schedule.track()
         line = flown.Line(track["predicted_t"], track["predicted_w"])
-    found = record.debriefing(result.solution, line)
-    if found is None:
+    debriefings = ((record, record.debriefing(result.solution, line)) for record in records)
+    found = [(record, each) for record, each in debriefings if each is not None]
+    if not found:
+        longest = max(record.t[-1] - record.t[0] for record in records)
         raise FaaoError(
             f"{source}: the plan's flight is not in it: no departure from flight.start like the "
-            f"predicted one in {record.t[-1] - record.t[0]:.0f} s of flight"
+            f"predicted one in {longest:.0f} s of flight"
         )
-    return found
+    return min(found, key=lambda pair: pair[1].flown.rms_position_error)
 
 
-def remarks_on(record: FlightRecord, found: Debriefing, result: Result) -> Iterator[Line]:
-    """Yield what the log says of wind and parameters."""
+def remarks_on(
+    records: Sequence[FlightRecord], record: FlightRecord, found: Debriefing, result: Result
+) -> Iterator[Line]:
+    """Yield what the log says of vehicles, wind and parameters."""
+    if len(records) > 1:
+        others = ", ".join(str(each.system) for each in records if each is not record)
+        yield "vehicle", f"system {record.system}, by its flight; also in the log: {others}"
     wind = record.mean_wind(found.start, found.solution.plan.flight.duration)
     if wind is None:
         yield "wind", "not estimated by the autopilot"

@@ -31,6 +31,9 @@ _BEFORE = 1.0
 _COARSE, _FINE = 0.4, 0.02
 """Steps in which the time of departure is searched, s. Chosen."""
 
+_BLOCK = 1_000_000
+"""Positions that are compared at once, so that memory does not grow with the flight. Chosen."""
+
 _METRES_PER_SECOND = 0.5
 """How many metres off the planned path weigh as much as a second before or after its time, where
 the path comes by a place more than once, or rests there: as for the end of a flight."""
@@ -116,7 +119,8 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     if last < first:
         return None
     coarse = np.arange(first, last + _COARSE, _COARSE)
-    near = coarse[np.argmin(apart(coarse))]
+    blocks = np.array_split(coarse, 1 + len(coarse) * len(t) // _BLOCK)
+    near = coarse[np.argmin(np.concatenate([apart(block) for block in blocks]))]
     fine = np.clip(near + np.arange(-2 * _COARSE, 2 * _COARSE, _FINE), first, last)
     errors = apart(fine)
     best = int(np.argmin(errors))
@@ -152,16 +156,12 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
 
 
 def debriefing(
-    solution: Solution, predicted: Line, flight: Line, height: Real, start: float | None = None
-) -> Debriefing | None:
-    """Return what became of the plan in `flight`, at `height` (k,) m; None: it is not in there.
+    solution: Solution, predicted: Line, flight: Line, height: Real, start: float
+) -> Debriefing:
+    """Return what became of the plan in `flight`, at `height` (k,) m.
 
-    `start` is when the plan's clock read 0, s on the flight's; None: that is searched.
+    `start` is when the plan's clock read 0, s on the flight's.
     """
-    if start is None:
-        start = plan_start(solution, predicted, flight)
-    if start is None:
-        return None
     t = flight.t - start
     during = np.interp(solution.t, t, height)
     return Debriefing(

@@ -1,18 +1,21 @@
 """The readers of files, as fuzzers see them."""
 
+import os
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 
 import mutate
 from conftest import MISSIONS, SMALL
+from flight_logs import kept, ulog
 from harness import Target
-from ulog import kept, ulog
 
 from faao_mav import optimize, parse_plan
-from faao_mav.errors import MissionFileError
+from faao_mav.errors import InputError, MissionFileError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mavlink.flying.logs import read_log
+from faao_mav.mavlink.flying.log_flights import flights
+from faao_mav.mavlink.flying.log_messages import messages
+from faao_mav.mavlink.flying.record import FlightRecord
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.formats import losses_in, read_mission_file, render_mission
 from faao_mav.mission.formats.fence_file import read_fence
@@ -94,7 +97,7 @@ def targets(directory: Path) -> dict[str, Target]:
 
     add("rows", ROWS, rows, (directory / ROWS).read_bytes())
     for ending, content in _logs().items():
-        add(ending, f"flight.{ending}", read_log, content)
+        add(ending, f"flight.{ending}", _log, content)
     found["vary"] = Target("vary", _vary, _VALUES, mutate.text)
     return found
 
@@ -118,7 +121,7 @@ def _logs() -> dict[str, bytes]:
     return {
         "bin": (logs / "arducopter.bin").read_bytes()[:6000],
         "tlog": (logs / "px4.tlog").read_bytes()[:1000],
-        "ulg": ulog(kept(read_log(logs / "px4.tlog"), slice(0, 60))),
+        "ulg": ulog(kept(_log(logs / "px4.tlog")[0], slice(0, 60))),
     }
 
 
@@ -136,6 +139,16 @@ def _fence(path: Path) -> object:
     fence = read_fence(path)
     home = fence.polygons[0].vertices[0] if fence.polygons else (47.4, 8.5)
     return FreeArea.of(areas_of(fence, LocalFrame(*home)), any_inclusion=True)
+
+
+def _log(path: Path) -> list[FlightRecord]:
+    """Read a log as `read_log` does, but in this process, which says what it uses."""
+    with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        try:
+            said = list(messages(path))
+        except Exception as error:
+            raise InputError(f"{path}: not a log: {type(error).__name__}") from None
+    return flights(path, said)
 
 
 def _vary(content: bytes) -> object:

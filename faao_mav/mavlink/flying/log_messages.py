@@ -1,189 +1,136 @@
-"""The messages in the logs of flights, whatever else is in the files.
+"""What the log of a flight says of it, read by the libraries of those who made the formats.
 
-What is no message is passed over. `InputError` is raised where there is more of that than in a log,
-or where there are more messages than of any flight: time stays in proportion, memory below 500 MB.
+Run as a program this writes the messages of one log as lines of JSON, and where it fails the reason
+to standard error. `faao_mav.mavlink.flying.logs` runs it: the libraries take minutes and gigabytes
+for files that are no logs. It imports nothing of this package, so that it starts at once.
 
 Sources: ArduPilot, "Log messages"; MAVLink, "File formats"; PX4, "ULog file format".
 """
 
-import io
-import re
-import struct
-from collections.abc import Callable, Collection, Iterator, Sequence
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, TextIO, TypeAlias
 
-from faao_mav.errors import InputError
-from faao_mav.mavlink.framing import length_of, message_id
+Said: TypeAlias = tuple[int, int, str, dict[str, float | str]]
+"""System and component of MAVLink that said it, 0 in a vehicle's own log; name; values by field."""
 
-_BLOCK, _LONGEST = 1_000_000, 300
-"""Bytes that are read at once, chosen; and more than any message of a `.bin` or a `.tlog` has."""
-
-_MOST_NOISE = 10_000_000
-"""Bytes that are no message, of which a log has no more; chosen: passed over in a few seconds."""
-
-_MOST_DAMAGED = 10_000
-"""Messages with a wrong checksum, of which a log has no more: who writes it checks them; chosen."""
+_FIELDS = {
+    "POS": ("TimeUS", "Lat", "Lng", "Alt", "RelHomeAlt", "RelAlt", "RelOriginAlt"),
+    **dict.fromkeys(("XKF2", "NKF2", "EKF2"), ("C", "VWE", "VWN")),
+    "PARM": ("Name", "Value"),
+    "GLOBAL_POSITION_INT": ("time_boot_ms", "lat", "lon", "alt", "relative_alt"),
+    "WIND": ("direction", "speed"),
+    "WIND_COV": ("wind_x", "wind_y"),
+    "PARAM_VALUE": ("param_id", "param_value"),
+    "home_position": ("timestamp", "alt", "valid_alt"),
+    "vehicle_global_position": ("timestamp", "lat", "lon", "alt"),
+    **dict.fromkeys(
+        ("wind", "wind_estimate", "estimator_wind"),
+        ("timestamp", "windspeed_east", "windspeed_north"),
+    ),
+}
+"""The messages that are read, and their fields, of which older firmware lacks some."""
 
 _MOST_MESSAGES = 1_000_000
 """Messages about the flight, of which a log has no more; chosen: nine hours, thrice at 10 Hz."""
 
-_MOST_ULOG = 100_000_000
-"""Bytes about the flight in a `.ulg`, which has no more; chosen: `_MOST_MESSAGES` of positions."""
-
-_FMT = 0x80
-_FORMAT = struct.Struct("<3xBB4s16s64s")
-"""FMT, which describes the messages of a `.bin`: number, length, name, format, columns."""
-
-_TIMED = 11
-"""Bytes of a message of a `.bin` that has a time and nothing else; all but FMT have one."""
-
-_LETTERS = {
-    **{letter: (letter, 1.0) for letter in "bBhHiIfdqQ"},
-    "a": ("64s", 1.0),
-    "n": ("4s", 1.0),
-    "N": ("16s", 1.0),
-    "Z": ("64s", 1.0),
-    "M": ("B", 1.0),
-    "c": ("h", 0.01),
-    "C": ("H", 0.01),
-    "e": ("i", 0.01),
-    "E": ("I", 0.01),
-    "L": ("i", 1e-7),
-    "g": ("e", 1.0),
-}
-"""Letters of a format: what each is for `struct`, and the unit of its numbers."""
-
-_ULOG_HEADER, _ULOG_KINDS = 16, b"ABCDFILMOPQRS"
-"""Bytes before the first message of a `.ulg`; the kinds of messages that there are."""
+_SECONDS, _BYTES = 60, 2_000_000_000
+"""Processor time and memory of the program, where the system limits them; chosen: four times and
+twice what 10^9 bytes of a `.bin` take."""
 
 
-def bin_messages(path: Path, names: Collection[str]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield name and values by column of each message of these `names` in an ArduPilot's `.bin`."""
-    lengths, readers, count = {_FMT: _FORMAT.size}, dict[int, _Reader](), 0
+def messages(path: Path) -> Iterator[Said]:
+    """Yield the messages in a `.bin`, `.tlog` or `.ulg` that say where the vehicle was, and how.
 
-    def length(data: bytes, at: int) -> int:
-        return lengths.get(data[at + 2], 0) if data.startswith(b"\xa3\x95", at) else 0
-
-    with path.open("rb") as file:
-        for packet in _packets(path, file, re.compile(rb"\xa3\x95"), length):
-            if packet[2] == _FMT:
-                number, size, *texts = _FORMAT.unpack(packet)
-                name, letters, columns = map(_text, texts)
-                if number != _FMT and size >= _TIMED:
-                    lengths[number] = size
-                    readers.pop(number, None)
-                    if name in names:
-                        readers[number] = _Reader(name, letters, columns.split(","), size)
-            elif (reader := readers.get(packet[2])) is not None:
-                count = _one_more(path, count)
-                yield reader.name, reader.read(packet)
-
-
-class _Reader:
-    """Reads messages of one format in a `.bin`."""
-
-    def __init__(self, name: str, letters: str, columns: Sequence[str], size: int) -> None:
-        self.name, self._columns = name, columns
-        kinds, self._units = zip(*(_LETTERS[letter] for letter in letters), strict=True)
-        self._struct = struct.Struct("<3x" + "".join(kinds))
-        if self._struct.size != size or len(columns) != len(letters):
-            raise ValueError(f"{name!r} has {size} bytes, its format {letters!r} has others")
-
-    def read(self, packet: bytes) -> dict[str, Any]:
-        values = zip(self._columns, self._struct.unpack(packet), self._units, strict=True)
-        return {
-            column: _text(value) if isinstance(value, bytes) else value * unit
-            for column, value, unit in values
-        }
-
-
-def tlog_messages(path: Path, names: Collection[str]) -> Iterator[Any]:
-    """Yield the messages of these `names` in a `.tlog`, as pymavlink has them."""
-    from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-    numbers = {getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in names}
-    reader, count, damaged = dialect.MAVLink(None), 0, 0
-
-    def length(data: bytes, at: int) -> int:
-        packet = length_of(data[at + 8 : at + 11])  # after the time
-        return packet and 8 + packet
-
-    with path.open("rb") as file:
-        for packet in _packets(path, file, re.compile(rb"(?s).{8}[\xfd\xfe]"), length):
-            if message_id(packet[8:]) in numbers:
-                try:
-                    message = reader.decode(bytearray(packet[8:]))
-                except dialect.MAVError:
-                    damaged += 1
-                    if damaged > _MOST_DAMAGED:
-                        raise _no_log(path, f"{_MOST_DAMAGED:,} damaged messages") from None
-                else:
-                    count = _one_more(path, count)
-                    yield message
-
-
-def sound_ulog(path: Path, topics: Collection[str]) -> io.BytesIO:
-    """Return what a `.ulg` has of `topics` and parameters, up to where it ends or is damaged."""
-    kept, numbers, count = io.BytesIO(), set[bytes](), 0
-    names = {topic.encode() for topic in topics}
-    with path.open("rb") as file:
-        kept.write(file.read(_ULOG_HEADER))
-        while len(head := file.read(3)) == 3:
-            size, kind = head[0] + 256 * head[1], head[2:]
-            content = file.read(size)
-            if kind not in _ULOG_KINDS or len(content) < size:
-                break
-            if kind == b"A" and content[3:] in names:
-                numbers.add(content[1:3])
-            about = content[1:3] if kind == b"A" else content[:2]
-            if kind in b"FP" or (kind in b"AD" and about in numbers):
-                kept.write(head + content)
-                count = _one_more(path, count)
-                if kept.tell() > _MOST_ULOG:
-                    raise _no_log(path, f"{_MOST_ULOG:,} bytes of positions, winds and parameters")
-    kept.seek(0)
-    return kept
-
-
-def _one_more(path: Path, count: int) -> int:
-    if count == _MOST_MESSAGES:
-        raise _no_log(path, f"{count:,} positions, winds and parameters")
-    return count + 1
-
-
-def _packets(
-    path: Path, file: BinaryIO, start: re.Pattern[bytes], length: Callable[[bytes, int], int]
-) -> Iterator[bytes]:
-    """Yield the messages in `file`.
-
-    `length(data, at)` is how long the one is that begins there, 0 where none does; `start` is how
-    one looks.
+    Those of a `.ulg` come in the order of their times, others as they were written. Raises whatever
+    the libraries raise.
     """
-    data, at, noise = b"", 0, 0
-    while True:
-        block = file.read(_BLOCK)
-        data, at = data[at:] + block, 0
-        last = len(data) - _LONGEST  # what begins before that is there whole
-        while at < (last if block else last + _LONGEST - 10):
-            if size := length(data, at):
-                if at + size > len(data):
-                    return
-                yield data[at : at + size]
-                at += size
-                continue
-            found = start.search(data, at + 1)
-            place = found.start() if found else max(at + 1, len(data) - 10)
-            noise, at = noise + place - at, place
-            if noise > _MOST_NOISE:
-                raise _no_log(path, f"{_MOST_NOISE:,} bytes that are no messages")
-        if not block:
-            return
+    read = {".bin": _dataflash, ".tlog": _telemetry, ".ulg": _ulog}[path.suffix.lower()]
+    yield from read(path)
 
 
-def _no_log(path: Path, what: str) -> InputError:
-    return InputError(f"{path}: more than {what}; expected the log of a flight")
+def _dataflash(path: Path) -> Iterator[Said]:
+    from pymavlink.DFReader import DFReader_binary
+
+    with closing(DFReader_binary(str(path))) as log:
+        while (message := log.recv_match(type=[*_FIELDS])) is not None:
+            yield 0, 0, *_chosen(message)
 
 
-def _text(value: bytes) -> str:
-    return value.split(b"\0")[0].decode("ascii", errors="replace")
+def _telemetry(path: Path) -> Iterator[Said]:
+    from pymavlink import mavutil
+
+    try:
+        log = mavutil.mavmmaplog(str(path))  # ten times as fast as the other
+    except AttributeError:  # a log that ends in the first message of its kind
+        log = mavutil.mavlogfile(str(path))
+    with closing(log):
+        while (message := log.recv_match(type=[*_FIELDS])) is not None:
+            yield message.get_srcSystem(), message.get_srcComponent(), *_chosen(message)
+
+
+def _chosen(message: Any) -> tuple[str, dict[str, float | str]]:
+    """Return the name and the fields of a message of pymavlink."""
+    name = message.get_type()
+    values = ((field, getattr(message, field, None)) for field in _FIELDS[name])
+    return name, {field: value for field, value in values if isinstance(value, (int, float, str))}
+
+
+def _ulog(path: Path) -> Iterator[Said]:
+    from pyulog import ULog
+
+    with path.open("rb") as file:
+        log = ULog(file, [*_FIELDS])
+    for name, value in log.initial_parameters.items():
+        yield 0, 0, "PARM", {"Name": name, "Value": value}
+    rows: list[tuple[float, str, dict[str, float | str]]] = []
+    for topic in log.data_list:
+        if topic.multi_id == 0:
+            fields = [field for field in _FIELDS[topic.name] if field in topic.data]
+            for values in zip(*(topic.data[field].tolist() for field in fields), strict=True):
+                row = dict(zip(fields, values, strict=True))
+                rows.append((row["timestamp"], topic.name, row))
+    for _, name, row in sorted(rows, key=itemgetter(0)):
+        yield 0, 0, name, row
+
+
+def write(path: Path, out: TextIO) -> None:
+    """Write the messages of a log to `out`, one in a line of JSON."""
+    for count, said in enumerate(messages(path)):
+        if count == _MOST_MESSAGES:
+            raise ValueError(f"more than {_MOST_MESSAGES:,} positions, winds and parameters")
+        print(json.dumps(said), file=out)
+
+
+def _main(path: Path) -> int:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    with os.fdopen(os.dup(1), "w") as out, os.fdopen(os.dup(2), "w") as failed:
+        for number in (1, 2):  # for the libraries' own remarks, a line for each byte of zeros
+            os.dup2(nowhere, number)
+        try:
+            _limit()
+            write(path, out)
+        except Exception as error:  # what libraries make of files that are something else
+            print(f"{type(error).__name__}: {error}", file=failed)
+            return 1
+    return 0
+
+
+def _limit() -> None:
+    """Limit the processor time and memory of this process."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    for kind, most in ((resource.RLIMIT_CPU, _SECONDS), (resource.RLIMIT_DATA, _BYTES)):
+        with suppress(ValueError):  # the user's own limit is lower
+            resource.setrlimit(kind, (most, most))
+
+
+if __name__ == "__main__":
+    sys.exit(_main(Path(sys.argv[1])))

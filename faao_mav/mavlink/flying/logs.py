@@ -1,139 +1,93 @@
 """Flights from the logs of autopilots and ground stations."""
 
-import math
-from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TypeAlias
+from tempfile import TemporaryFile
 
-import numpy as np
-
-from faao_mav.errors import InputError
-from faao_mav.mavlink.flying.log_messages import bin_messages, sound_ulog, tlog_messages
+from faao_mav.errors import InputError, shortened
+from faao_mav.mavlink.flying import log_messages
+from faao_mav.mavlink.flying.log_flights import flights
+from faao_mav.mavlink.flying.log_messages import Said
 from faao_mav.mavlink.flying.record import FlightRecord
 
-_REBOOT, _BETWEEN = 2.0, 1000.0
-"""Seconds by which a vehicle's clock goes back when it has booted again, less is a late packet; and
-the seconds that are put between two boots. Chosen: no flight goes on across them."""
-
-_LEAST = 10
-"""Positions that a flight has at least; chosen."""
+_ENDINGS = (".bin", ".tlog", ".ulg")
 
 _LARGEST = 2**30
 """Bytes of a log that is read; chosen: hours of a `.bin`."""
 
-_Fix: TypeAlias = tuple[float, float, float, float]
-"""Time, s; latitude and longitude, degrees; height above home, m."""
+_BEGINNING = 8000
+"""Bytes at the beginning of a text log in which its first format stands; chosen."""
 
-_Wind: TypeAlias = tuple[float, float, float]
-"""Time, s; wind towards east and north, m/s."""
+_LONGEST_REASON = 200
+"""Characters that are shown of a reason why a log was not read; chosen."""
+
+_PATIENCE = 60.0
+"""Seconds after which reading a log is given up; chosen: a `.bin` of 10^9 bytes takes a quarter."""
+
+_READERS = {"MAVLINK20": "1", "MAVLINK_DIALECT": "ardupilotmega", "OPENBLAS_NUM_THREADS": "1"}
+"""The environment of the process that reads: the MAVLink that pymavlink is to read, no threads."""
 
 
-def read_log(path: Path) -> FlightRecord:
-    """Return the flight in a log: ArduPilot's `.bin`, `.tlog` of a ground station, PX4's `.ulg`.
+def read_log(path: Path, system: int | None = None) -> list[FlightRecord]:
+    """Return the flights in a log: ArduPilot's `.bin`, `.tlog` of a ground station, PX4's `.ulg`.
 
-    Positions are the autopilot's own estimate (POS, GLOBAL_POSITION_INT, vehicle_global_position).
-    A log that ends in the middle is read as far as it goes. In a `.tlog` the first vehicle that
-    tells its position counts. Raises `InputError` for anything else.
+    There are several where several vehicles tell their positions in a `.tlog`, unless `system`
+    names one. A log that ends in the middle is read as far as it goes. It is read in a process of
+    its own, which runs no code of the current directory. Raises `InputError` for anything else.
     """
-    readers: dict[str, Callable[[Path], FlightRecord]]
-    readers = {".bin": _read_bin, ".tlog": _read_tlog, ".ulg": _read_ulg}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(f"{path}: give a flight log: {', '.join(readers)}")
+    _check(path)
+    if system is not None and path.suffix.lower() != ".tlog":
+        raise InputError(f"--system {system}: {path} is the log of one vehicle; that is for .tlog")
+    return flights(path, _told(path), system)
+
+
+def _check(path: Path) -> None:
+    """Raise `InputError` for what is no log, as its name, size and first bytes tell."""
+    ending = path.suffix.lower()
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
     if not 0 < path.stat().st_size <= _LARGEST:
         raise InputError(f"{path}: empty, or larger than {_LARGEST:,} bytes; expected a flight log")
     try:
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # the readers' own remarks
-            record = reader(path)
-    except InputError:
-        raise
+        with path.open("rb") as file:
+            if b"FMT," in file.read(_BEGINNING):
+                what = "ArduPilot's log as text; give the .bin that it was made from"
+                raise InputError(f"{path}: {what}")
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # what readers make of files that are something else
-        kind = type(error).__name__
-        raise InputError(f"{path}: not a {path.suffix} log: {kind}: {error}") from error
-    if len(record.t) < _LEAST:
-        raise InputError(f"{path}: {len(record.t)} positions; expected the log of a flight")
-    return record
+    if ending not in _ENDINGS:
+        raise InputError(f"{path}: give a flight log: {', '.join(_ENDINGS)}")
+    if ending == ".ulg" and find_spec("pyulog") is None:
+        raise InputError(f"{path}: PX4's logs are read by pyulog: pip install 'faao-mav[debrief]'")
 
 
-def _read_bin(path: Path) -> FlightRecord:
-    fixes: list[_Fix] = []
-    winds: list[_Wind] = []
-    parameters = {}
-    for name, said in bin_messages(path, ("POS", "XKF2", "NKF2", "PARM")):
-        if name == "POS":
-            height = said.get("RelHomeAlt", math.nan)
-            fixes.append((said["TimeUS"] / 1e6, said["Lat"], said["Lng"], height))
-        elif name == "PARM":
-            parameters[said["Name"]] = float(said["Value"])
-        elif said.get("C", 0) == 0:  # the first of the estimators
-            winds.append((said["TimeUS"] / 1e6, said["VWE"], said["VWN"]))
-    return _record(fixes, winds, parameters)
-
-
-def _read_tlog(path: Path) -> FlightRecord:
-    fixes: list[_Fix] = []
-    winds: list[_Wind] = []
-    parameters = {}
-    system = None
-    names = ("GLOBAL_POSITION_INT", "WIND", "WIND_COV", "PARAM_VALUE")
-    for message in tlog_messages(path, names):
-        kind = message.get_type()
-        if kind == "GLOBAL_POSITION_INT" and system in (None, message.get_srcSystem()):
-            system = message.get_srcSystem()
-            place = message.lat / 1e7, message.lon / 1e7, message.relative_alt / 1e3
-            fixes.append((message.time_boot_ms / 1e3, *place))
-        elif system != message.get_srcSystem():
-            continue
-        elif kind == "PARAM_VALUE":
-            parameters[message.param_id] = float(message.param_value)
-        elif fixes and kind == "WIND_COV":  # where the wind blows to
-            winds.append((fixes[-1][0], message.wind_y, message.wind_x))
-        elif fixes:  # where it comes from, degrees
-            angle, speed = math.radians(message.direction), message.speed
-            winds.append((fixes[-1][0], -speed * math.sin(angle), -speed * math.cos(angle)))
-    return _record(fixes, winds, parameters)
-
-
-def _read_ulg(path: Path) -> FlightRecord:
-    try:
-        from pyulog import ULog
-    except ImportError:
-        raise InputError(
-            f"{path}: PX4's logs are read by pyulog: pip install 'faao-mav[debrief]'"
-        ) from None
-    names = ["vehicle_global_position", "home_position", "wind"]
-    log = ULog(sound_ulog(path, names), names)
-    topics = {each.name: each.data for each in log.data_list if each.multi_id == 0}
-    if "vehicle_global_position" not in topics:
-        raise InputError(f"{path}: no vehicle_global_position in this log")
-    place = topics["vehicle_global_position"]
-    t = place["timestamp"] / 1e6
-    ground = float(place["alt"][0])
-    if "home_position" in topics:
-        ground = float(topics["home_position"]["alt"][-1])
-    fixes = zip(t, place["lat"], place["lon"], place["alt"] - ground, strict=True)
-    winds: list[_Wind] = []
-    if (wind := topics.get("wind")) is not None:
-        columns = (wind["timestamp"] / 1e6, wind["windspeed_east"], wind["windspeed_north"])
-        winds = list(zip(*columns, strict=True))
-    parameters = {str(name): float(value) for name, value in log.initial_parameters.items()}
-    return _record(list(fixes), winds, parameters)
-
-
-def _record(fixes: list[_Fix], winds: list[_Wind], parameters: dict[str, float]) -> FlightRecord:
-    """Return the record, of several boots one after the other."""
-    table = np.array(fixes, dtype=float).reshape(-1, 4)
-    table = table[np.isfinite(table).all(axis=1) & table[:, 1:3].any(axis=1)]
-    steps = np.diff(table[:, 0], prepend=table[:1, 0])
-    booted = steps < -_REBOOT
-    table[:, 0] += np.cumsum(np.where(booted, _BETWEEN - steps, 0.0))
-    newest = np.maximum.accumulate(np.concatenate([[-np.inf], table[:-1, 0]]))
-    t, latitude, longitude, height = table[table[:, 0] > newest].T
-    estimated = None if booted.any() else np.array(winds, dtype=float).reshape(-1, 3)
-    return FlightRecord(t, latitude, longitude, height, estimated, parameters)
+def _told(path: Path) -> Iterator[Said]:
+    """Yield what the program `log_messages` says of a log, in the time that it has."""
+    command = [sys.executable, "-P", log_messages.__file__, str(path)]
+    with TemporaryFile() as out:
+        try:
+            ended = subprocess.run(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=subprocess.PIPE,
+                env=os.environ | _READERS,
+                timeout=_PATIENCE,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            what = f"not read within {_PATIENCE:g} s"
+            raise InputError(f"{path}: {what}; expected the log of a flight") from None
+        if ended.returncode:
+            reason = ended.stderr.decode(errors="replace").strip()
+            reason = reason or f"its reader ended with status {ended.returncode}"
+            raise InputError(
+                f"{path}: not a {path.suffix} log: {shortened(reason, _LONGEST_REASON)}"
+            )
+        out.seek(0)
+        yield from map(json.loads, out)

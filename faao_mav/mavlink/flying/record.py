@@ -8,7 +8,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
-from faao_mav.validate.flown import Debriefing, Line, debriefing
+from faao_mav.validate.flown import Debriefing, Line, debriefing, plan_start
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,7 +18,8 @@ class FlightRecord:
     `t` (k,), s, is the vehicle's clock, which increases; `latitude` and `longitude` (k,) are
     degrees, `height` (k,) metres above home. `wind` (m, 3) is the wind as it was estimated: times,
     s, and m/s towards east and north, None where that is not known. `parameters` are those that the
-    log names.
+    log names. `home` (k,) is the altitude of home, m, which may be set again, None where it stayed.
+    `system` is the number by which it told that over MAVLink.
     """
 
     t: Real
@@ -27,6 +28,8 @@ class FlightRecord:
     height: Real
     wind: Real | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    home: Real | None = None
+    system: int | None = None
 
     def mean_wind(self, start: float, duration: float) -> Real | None:
         """Return the mean (2,) of the wind in that time, None where nothing was estimated.
@@ -45,8 +48,24 @@ class FlightRecord:
         frame = LocalFrame(origin.latitude, origin.longitude)
         return Line(self.t, np.asarray(frame.to_local(self.latitude, self.longitude)))
 
+    def height_above_home_at(self, time: float) -> Real:
+        """Return the heights (k,), m, above home as it was at `time`, s."""
+        if self.home is None:
+            return self.height
+        last = max(0, int(np.searchsorted(self.t, time, "right")) - 1)
+        return np.asarray(self.height + (self.home - self.home[last]))
+
     def debriefing(
         self, solution: Solution, predicted: Line, start: float | None = None
     ) -> Debriefing | None:
-        """Return what became of the plan: see `faao_mav.validate.flown.debriefing`."""
-        return debriefing(solution, predicted, self.line(solution), self.height, start)
+        """Return what became of the plan; None: it is not in there.
+
+        `start` is when the plan's clock read 0, s on the vehicle's; None: that is searched.
+        """
+        flight = self.line(solution)
+        if start is None:
+            start = plan_start(solution, predicted, flight)
+        if start is None:
+            return None
+        height = self.height_above_home_at(start)
+        return debriefing(solution, predicted, flight, height, start)
