@@ -30,6 +30,8 @@ class Command(IntEnum):
     DO_SET_ROI_LOCATION = 195
     DO_SET_ROI_NONE = 197
     DO_SET_ROI = 201
+    JUMP_TAG = 600
+    DO_JUMP_TAG = 601
 
 
 FLOWN_TO = frozenset(command for command in Command if command.name.startswith("NAV_")) - {

@@ -146,6 +146,11 @@ def deviation(
     )
 
 
+_WAY_WEIGHT = 4.0
+"""Metres by which the way may be longer or shorter for a pass one metre nearer to the end: corners
+are cut, winds bend ways. Chosen."""
+
+
 def lateness(
     planned_t: Real, planned_w: Real, flown_t: Real, flown_w: Real, tolerance: float
 ) -> float:
@@ -159,9 +164,12 @@ def lateness(
     >>> lateness(t, w, t + 0.5, w, 2.0)
     0.5
     """
-    end, due = planned_w[-1], float(planned_t[-1])
-    flown = _end_time(flown_t, flown_w, end, tolerance, due)
-    return flown - _end_time(planned_t, planned_w, end, tolerance, due)
+    begin, planned = float(planned_t[0]), _way_flown(planned_w)
+    flown = _way_flown(flown_w)
+    flown -= np.interp(begin, flown_t, flown)
+    end, length = planned_w[-1], float(planned[-1])
+    over = _end_time(flown_t, flown_w, end, tolerance, np.abs(flown - length))
+    return max(over, begin) - _end_time(planned_t, planned_w, end, tolerance, length - planned)
 
 
 def positions_at(times: Real, t: Real, w: Real) -> Real:
@@ -184,15 +192,21 @@ def passing(t: Real, w: Real, place: Real, about: float) -> float:
     return float(t[k] + share[k] * (t[k + 1] - t[k]))
 
 
-def _end_time(t: Real, w: Real, end: Real, tolerance: float, due: float) -> float:
+def _way_flown(w: Real) -> Real:
+    """Return the length of the way along `w` (k, 2) until each of its places, (k,) m."""
+    return np.concatenate([[0.0], np.cumsum(lengths(np.diff(w, axis=0)))])
+
+
+def _end_time(t: Real, w: Real, end: Real, tolerance: float, way_off: Real) -> float:
     """Return when a flight at `w` (k, 2) m at `t` (k,) s comes within `tolerance` m of `end`.
 
     That is for good; one that goes on past `end` does so when it last comes near before it is
-    closest. A flight may pass `end` more than once: the pass that counts is close to it and to the
-    time `due`, s, a metre weighing as much as two seconds.
+    closest. A flight may pass `end` more than once, on its way or round after round: the pass that
+    counts is close to it, after as long a way as planned, from which `way_off` (k,) m differ. A
+    metre of `_WAY_WEIGHT` off weighs as much as one from `end`. However late, it is the same way.
     """
     apart = lengths(w - end)
-    arrived = int(np.argmin(apart + np.abs(t - due) / 2))
+    arrived = int(np.argmin(apart + way_off / _WAY_WEIGHT))
     outside = np.flatnonzero(apart[:arrived] > tolerance)
     if len(outside) == 0:
         return float(t[0])

@@ -9,13 +9,15 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Command, Frame
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.mission.jumps import JUMPS, jump_target
 from faao_mav.validate.demands import Limits, LinkCheck
 from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.fence_map import FenceMap, fence_map
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
 from faao_mav.vehicle import Track, Vehicle
+from faao_mav.vehicle.orbit import Orbit
 
 NAV_LAST = 95
 """Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""
@@ -111,11 +113,47 @@ class ValidationContext:
 
     @cached_property
     def legs(self) -> tuple[Straight, ...]:
-        """The straights that the items order: from home, between the places, back, by DO_JUMP.
+        """The straights that the items order: from home, between the places, back, by jumps.
 
-        A return to launch ends at home, unless there are rally points to go to instead.
+        They lead to circles and away from them at their nearest places. A return to launch ends at
+        home, or at the rally point that the vehicle chooses.
         """
         return tuple(self._legs())
+
+    @cached_property
+    def orbits(self) -> dict[int, Orbit]:
+        """How the vehicle circles, by the index of the item."""
+        own = self.vehicle.type
+        found = {k: self._orbit(own.dialect.sent(item)) for k, item in self.each(*FLOWN_TO)}
+        return {k: orbit for k, orbit in found.items() if orbit is not None}
+
+    def _orbit(self, item: MissionItem) -> Orbit | None:
+        return self.vehicle.type.orbits(self.vehicle, item)
+
+    def _circles(self) -> Iterator[tuple[int, Real]]:
+        """Yield the outlines (k, 2), m, of circles by the index of their item.
+
+        What cannot hover circles where a return ends, and where a mission without an end does.
+        """
+        for place in self.places:
+            if place.index in self.orbits:
+                yield place.index, self.orbits[place.index].outline(place.ground)
+        waiting = self._orbit(MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL))
+        if waiting is None or not self.legs:
+            return
+        last = self.legs[-1]
+        returns = self.items[last.index].command == Command.NAV_RETURN_TO_LAUNCH
+        ends = self.items[last.index].command in LANDINGS or last.jump
+        if returns or not (ends or last.end.index in self.orbits):
+            yield last.index, waiting.outline(last.end.ground)
+
+    def _edge(self, place: PlacedItem, towards: PlacedItem) -> PlacedItem:
+        """Return where a straight from `towards` meets the circle at `place`; it, without one."""
+        orbit = self.orbits.get(place.index)
+        if orbit is None:
+            return place
+        east, north = orbit.edge(place.ground, towards.ground).tolist()
+        return replace(place, east=east, north=north)
 
     def _legs(self) -> Iterator[Straight]:
         by_index = {place.index: place for place in self.places}
@@ -125,21 +163,36 @@ class ValidationContext:
             place = by_index.get(k)
             if place is not None:
                 if here is not None:
-                    yield Straight(
-                        k, here, place, speed, item.command == Command.NAV_SPLINE_WAYPOINT
-                    )
+                    spline = item.command == Command.NAV_SPLINE_WAYPOINT
+                    yield self._straight(k, here, place, speed, spline=spline)
                 here = place
             elif here is None:
                 continue
             elif item.command == Command.NAV_RETURN_TO_LAUNCH:
-                if self.home is not None and not self.mission.rally:
-                    yield Straight(k, here, replace(self.home, up=math.nan), speed)
-            elif item.command == Command.DO_JUMP:
+                if self.home is not None:
+                    yield self._straight(k, here, self._returns_to(here, self.home), speed)
+            elif item.command in JUMPS:
                 target = self.jump_target(k)
                 reached = range(len(self.items))[target:] if target is not None else ()
                 after = next((by_index[j] for j in reached if j in by_index), None)
                 if after is not None:
-                    yield Straight(k, here, after, speed, jump=True)
+                    yield self._straight(k, here, after, speed, jump=True)
+
+    def _straight(
+        self, index: int, start: PlacedItem, end: PlacedItem, speed: float, **how: bool
+    ) -> Straight:
+        return Straight(index, self._edge(start, end), self._edge(end, start), speed, **how)
+
+    def _returns_to(self, here: PlacedItem, home: PlacedItem) -> PlacedItem:
+        """Return where a return from `here` ends, at a height that nothing tells."""
+        assert self.frame is not None
+        rally = [self.frame.to_local(p.latitude, p.longitude) for p in self.mission.rally]
+        rule = self.vehicle.type.rally(self.vehicle)
+        chosen = rule.chosen(here.ground, home.ground, rally)
+        if chosen is None:
+            return replace(home, up=math.nan)
+        east, north = rally[chosen].tolist()
+        return PlacedItem(home.index, east, north, math.nan)
 
     def stored(self, item: MissionItem) -> MissionItem | None:
         """Return what the vehicle gives back for `item`, None if it refuses it."""
@@ -150,11 +203,8 @@ class ValidationContext:
         return dialect.stored(sent)
 
     def jump_target(self, index: int) -> int | None:
-        """Return the index that the DO_JUMP at `index` goes to, None if there is no such item."""
-        number = self.items[index].params[0]
-        if math.isnan(number) or not 1 <= int(number) <= len(self.items):
-            return None
-        return int(number) - 1
+        """Return the index that the jump at `index` goes to, None if there is no such item."""
+        return jump_target(self.items, index)
 
     @cached_property
     def speeds(self) -> tuple[float, ...]:
@@ -175,7 +225,8 @@ class ValidationContext:
         """The fence in the local frame, None without one."""
         any_inclusion = self.vehicle.type.fence_needs_one_inclusion(self.vehicle)
         flown = (self.track_positions, self.track.item if self.track is not None else None)
-        return fence_map(self.mission.fence, self.frame, any_inclusion, self.legs, *flown)
+        circles = dict(self._circles())
+        return fence_map(self.mission.fence, self.frame, any_inclusion, self.legs, circles, *flown)
 
     @cached_property
     def track_positions(self) -> Real | None:

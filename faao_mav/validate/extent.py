@@ -207,14 +207,21 @@ def _reserve(context: ValidationContext) -> Iterator[Issue]:
 
 
 def least_duration(context: ValidationContext) -> float:
-    """Return what the legs at the commanded speeds and the holds take, s, without any ramps.
+    """Return what legs and circles at the commanded speeds and the holds take, s, without ramps.
 
-    A DO_JUMP is not followed.
+    Jumps are not followed; circles without end are left out.
     """
     climb = context.vehicle.value("climb_speed")
     flying = sum(_leg_duration(leg, climb) for leg in context.legs if not leg.jump)
-    waiting = sum(item.params[0] for _, item in context.each(*_DELAYS) if item.params[0] > 0)
-    return flying + waiting
+    waiting = sum(
+        item.params[0]
+        for k, item in context.each(*_DELAYS)
+        if item.params[0] > 0 and k not in context.orbits
+    )
+    circling = sum(
+        orbit.lasting(context.speeds[k]) for k, orbit in context.orbits.items() if not orbit.endless
+    )
+    return flying + waiting + circling
 
 
 def _leg_duration(leg: Straight, climb: float) -> float:

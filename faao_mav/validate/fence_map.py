@@ -46,7 +46,9 @@ class Broken:
 
 @dataclass(frozen=True)
 class FenceMap:
-    """A fence in the plane, with the mission's way: `straights` and the predicted flight.
+    """A fence in the plane, with the mission's way: `straights`, circles, the predicted flight.
+
+    `circles` are outlines (k, 2), m, by the index of the item that is circled at.
 
     The flight is at `positions` (n, 3), m, on the way to the items at the indices `heading_for`
     (n,); both are None where it is not predicted. `free` is where the inclusions let the aircraft
@@ -59,8 +61,16 @@ class FenceMap:
     free: "BaseGeometry | None"
     any_inclusion: bool
     straights: tuple[Straight, ...]
+    circles: dict[int, Real]
     positions: Real | None
     heading_for: Integers | None
+
+    @cached_property
+    def rings(self) -> NDArray[np.object_]:
+        """The circles, in order, as geometries."""
+        import shapely
+
+        return np.array([shapely.LineString(each) for each in self.circles.values()], dtype=object)
 
     @cached_property
     def legs(self) -> NDArray[np.object_]:
@@ -95,6 +105,11 @@ class FenceMap:
         """Which parts of the predicted flight leave the fence."""
         return self.broken(self.flight)
 
+    @cached_property
+    def broken_rings(self) -> Broken:
+        """Which circles leave the fence."""
+        return self.broken(self.rings)
+
     def broken(self, paths: Any) -> Broken:
         """Return which of `paths` (n,), geometries of the local frame, leave the fence."""
         import shapely
@@ -114,14 +129,16 @@ class FenceMap:
 
     @cached_property
     def nearest(self) -> tuple[float, int] | None:
-        """The least margin of legs and flight, m, and the index of its item.
+        """The least margin of legs, circles and flight, m, and the index of its item.
 
         None if there are no legs, or if anything leaves the fence.
         """
-        if not len(self.legs) or self.broken_legs.any.any() or self.broken_flight.any.any():
+        paths = (self.broken_legs, self.broken_rings, self.broken_flight)
+        if not len(self.legs) or any(path.any.any() for path in paths):
             return None
-        margins = self._margins(np.concatenate([self.legs, self.flight]))
-        items = [*(leg.index for leg in self.straights), *self.flight_items.tolist()]
+        margins = self._margins(np.concatenate([self.legs, self.rings, self.flight]))
+        ordered = [*(leg.index for leg in self.straights), *self.circles]
+        items = [*ordered, *self.flight_items.tolist()]
         nearest = int(np.argmin(margins))
         return float(margins[nearest]), items[nearest]
 
@@ -142,6 +159,7 @@ def fence_map(
     frame: LocalFrame | None,
     any_inclusion: bool,
     straights: tuple[Straight, ...],
+    circles: dict[int, Real],
     positions: Real | None,
     heading_for: Integers | None,
 ) -> FenceMap | None:
@@ -158,4 +176,4 @@ def fence_map(
     free = free_area(areas, any_inclusion=any_inclusion)
     shapely.prepare([area.shape for area in areas])
     shapely.prepare(free)
-    return FenceMap(frame, areas, free, any_inclusion, straights, positions, heading_for)
+    return FenceMap(frame, areas, free, any_inclusion, straights, circles, positions, heading_for)

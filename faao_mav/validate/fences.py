@@ -102,11 +102,27 @@ def _legs(context: ValidationContext) -> Iterator[Issue]:
             inside = shapely.intersection(shape, fence.legs[k]).length
             length = inside if part is not None and not part.inclusion else leg.length - inside
             parts.append(f"{max(length, 0.0):.1f} m of it {_what(part)}")
-        jump = " by DO_JUMP" if leg.jump else ""
+        jump = " by a jump" if leg.jump else ""
         yield Issue(
             leg.index,
             f"the leg from {start}{jump} is {leg.length:.0f} m long, {' and '.join(parts)}",
             "go around with another waypoint, or change the fence",
+        )
+
+
+@RULES.error("fence-circle", _GEOMETRY)
+def _circles(context: ValidationContext) -> Iterator[Issue]:
+    """A circle that an item is flown in leaves the fence."""
+    fence = context.fence
+    if fence is None or not fence.circles:
+        return
+    for k in np.flatnonzero(fence.broken_rings.any).tolist():
+        index = list(fence.circles)[k]
+        parts = " and ".join(map(_what, fence.broken_rings.parts(k)))
+        yield Issue(
+            index,
+            f"the circle that is flown there is partly {parts}",
+            "give a smaller radius or another centre, or change the fence",
         )
 
 
@@ -119,6 +135,7 @@ def _flight(context: ValidationContext) -> Iterator[Issue]:
     told = set()
     if context.legs:
         told = {context.legs[k].index for k in np.flatnonzero(fence.broken_legs.any)}
+        told |= {list(fence.circles)[k] for k in np.flatnonzero(fence.broken_rings.any)}
     broken = fence.broken_flight
     for index in sorted(set(fence.flight_items[broken.any].tolist()) - told):
         first = int(np.flatnonzero(broken.any & (fence.flight_items == index))[0])

@@ -4,9 +4,11 @@ import math
 from collections.abc import Iterator
 
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, TAKEOFFS, Command
+from faao_mav.mission.jumps import JUMPS
 from faao_mav.validate.context import NAV_LAST, ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME
+from faao_mav.vehicle.dialect import name_of
 
 RULES = Rules()
 
@@ -78,7 +80,7 @@ def _unreachable(context: ValidationContext) -> Iterator[Issue]:
     # A landing sequence, or the target of a jump, is there on purpose.
     if any(item.command in (Command.DO_LAND_START, _RETURN_PATH_START) for item in after):
         return
-    targets = [context.jump_target(index) or 0 for index, _ in context.each(Command.DO_JUMP)]
+    targets = [context.jump_target(index) or 0 for index, _ in context.each(*JUMPS)]
     if rest and max(targets, default=0) <= end:
         span = f"items {number(rest[0])} to {number(rest[-1])} are" if rest[1:] else "this item is"
         yield Issue(
@@ -140,9 +142,17 @@ def _mixed_heights(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.error("jump-target", _COMMON)
 def _jump_target(context: ValidationContext) -> Iterator[Issue]:
-    """A DO_JUMP goes to an item that does not exist."""
-    for index, item in context.each(Command.DO_JUMP):
-        if context.jump_target(index) is None:
+    """A jump goes to an item that does not exist."""
+    for index, item in context.each(*JUMPS):
+        if context.jump_target(index) is not None:
+            continue
+        if item.command == Command.DO_JUMP_TAG:
+            yield Issue(
+                index,
+                f"DO_JUMP_TAG goes to tag {item.params[0]:g}, which no JUMP_TAG has",
+                "add the JUMP_TAG, or correct the number",
+            )
+        else:
             yield Issue(
                 index,
                 f"DO_JUMP goes to item {item.params[0]:g}; there are items 1 to "
@@ -153,14 +163,14 @@ def _jump_target(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.warning("jump-forever", _COMMON)
 def _jump_forever(context: ValidationContext) -> Iterator[Issue]:
-    """A DO_JUMP repeats without end."""
-    for index, item in context.each(Command.DO_JUMP):
+    """A jump repeats without end."""
+    for index, item in context.each(*JUMPS):
         target = context.jump_target(index)
         if target is not None and target <= index and item.params[1] < 0:
             yield Issue(
                 index,
-                f"DO_JUMP to item {number(target)} has the repeat count {item.params[1]:g}: it "
-                "never ends and what follows is never flown",
+                f"{name_of(item.command)} to item {number(target)} has the repeat count "
+                f"{item.params[1]:g}: it never ends and what follows is never flown",
                 "give the number of repeats in param2, or be ready to take over",
             )
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
+from faao_mav.mission.jumps import JUMPS
 from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.vehicle.dialect import name_of
@@ -95,13 +96,13 @@ def _too_many(context: ValidationContext, sure: int, most: float, limit: str) ->
     "many-jumps", "ArduPilot 4.7 AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS: 15, on large boards 100"
 )
 def _many_jumps(context: ValidationContext) -> Iterator[Issue]:
-    """More DO_JUMPs than the autopilot counts the repeats of."""
+    """More jumps than the autopilot counts the repeats of."""
     limit = context.vehicle.type.dialect.jumps
-    jumps = [index for index, _ in context.each(Command.DO_JUMP)]
+    jumps = [index for index, _ in context.each(*JUMPS)]
     if limit is not None and len(jumps) > limit.sure:
         yield Issue(
             jumps[limit.sure],
-            f"this is DO_JUMP number {limit.sure + 1} of {len(jumps)}; boards keep count of "
+            f"this is jump number {limit.sure + 1} of {len(jumps)}; boards keep count of "
             f"{limit.sure}, large ones of {limit.most}, and do not jump at the others",
             "write the repeated items out",
         )

@@ -3,6 +3,10 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from faao_mav.arrays import Real
+
 HOME = -1
 """The index of home, which is no item."""
 
@@ -21,6 +25,11 @@ class PlacedItem:
     up: float
 
     @property
+    def ground(self) -> Real:
+        """East and north, (2,) m."""
+        return np.array([self.east, self.north])
+
+    @property
     def from_origin(self) -> float:
         """Metres over ground from the origin of the frame, which is home if there is one."""
         return math.hypot(self.east, self.north)
@@ -31,7 +40,7 @@ class Straight:
     """A straight from one place to the next, ordered by the item at `index`.
 
     `speed` is what is commanded, m/s; `spline`: the aircraft curves to its end; `jump`: the item
-    is a DO_JUMP.
+    is a jump.
     """
 
     index: int

@@ -15,8 +15,11 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.mission.jumps import JUMPS, jump_target
 from faao_mav.plan import Vector
+from faao_mav.vehicle.dialect import name_of
 from faao_mav.vehicle.flight_path import LONGEST, FlightPath, Track
+from faao_mav.vehicle.orbit import Orbit
 from faao_mav.vehicle.vehicle import Vehicle
 
 LONGEST_COPTER = 5_400.0
@@ -28,7 +31,7 @@ _MOST_STEPS = 2000
 work at most, whatever a file or a peer asks for."""
 
 _REPEATS = 20
-"""How often a DO_JUMP that never ends is followed. Chosen."""
+"""How often a jump that never ends is followed. Chosen."""
 
 _SAME_PLACE = 0.01
 """The distance, m, below which two places are one."""
@@ -49,9 +52,9 @@ def predict(
 
     The air moves at `wind`, east and north, m/s, steadily and everywhere. The flight begins on the
     ground at home, or, without a home, below the first place of the mission, about which `frame`
-    then is too. DO_JUMPs are followed, those without end twenty times. An item that never ends
-    (loiter unlimited, a mission without an end) ends the track on arrival. A mission without places
-    gives an empty track.
+    then is too. Jumps are followed, those without end twenty times. Items that are circled at have
+    their circles; one that never ends, or a mission without an end, ends the track on arrival, or
+    after one circle. A mission without places gives an empty track.
 
     Raises `InputError` for places that cannot be flown to (NaN, altitudes above sea level
     without a home), parameters that are useless, or a flight that takes more than
@@ -87,22 +90,23 @@ def _start(mission: Mission) -> tuple[float, float] | None:
 
 
 def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
-    """Yield the items that are flown, jumps followed; targets count from 1."""
+    """Yield the items that are flown, jumps followed."""
     left: dict[int, int] = {}
     index = steps = 0
     while index < len(mission.items) and steps < _MOST_STEPS:
         item, steps = mission.items[index], steps + 1
-        if item.command == Command.DO_JUMP:
-            target, repeats = item.params[0], item.params[1]
-            if not (math.isfinite(target) and math.isfinite(repeats)):
+        if item.command in JUMPS:
+            to, repeats = item.params[0], item.params[1]
+            if not (math.isfinite(to) and math.isfinite(repeats)):
                 raise InputError(
-                    f"mission item {index + 1}: DO_JUMP to {target:g}, {repeats:g} times; "
-                    "expected numbers"
+                    f"mission item {index + 1}: {name_of(item.command)} to {to:g}, {repeats:g} "
+                    "times; expected numbers"
                 )
             more = left.setdefault(index, _REPEATS if repeats < 0 else int(repeats))
-            if more > 0 and 1 <= int(target) <= len(mission.items):
+            target = jump_target(mission.items, index)
+            if more > 0 and target is not None:
                 left[index] -= 1
-                index = int(target) - 1
+                index = target
                 continue
         yield index, item
         index += 1
@@ -154,7 +158,10 @@ class _Walk:
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
         hold = item.params[0] if math.isfinite(item.params[0]) else 0.0
+        orbit = self.vehicle.type.orbits(self.vehicle, self.vehicle.type.dialect.sent(item))
         match item.command:
+            case _ if orbit is not None:
+                self._circle(index, self._spot(index, item), orbit)
             case Command.NAV_TAKEOFF | Command.NAV_VTOL_TAKEOFF:
                 self._take_off(index, item)
             case Command.NAV_WAYPOINT | Command.NAV_SPLINE_WAYPOINT:
@@ -260,6 +267,36 @@ class _Walk:
             stop = _Stop(goal, index, self.speed, hold, spline=spline, radius=radius)
             self.stretch.append(stop)
 
+    def _circle(self, index: int, center: Real, orbit: Orbit) -> None:
+        """Fly to the nearest place of a circle about `center` (3,), then round it.
+
+        Speeds on it are those in calm air.
+        """
+        here = self.stretch[-1].point if self.stretch else self.place
+        edge = orbit.edge(center[:2], here[:2])
+        self._towards(index, np.array([*edge, here[2] if orbit.climbs else center[2]]), 0.0)
+        self.fly()
+        rise, speed = float(center[2] - self.place[2]), orbit.speed(self.speed)
+        rate = self.vertical.climb_speed if rise > 0 else self.vertical.descent_speed
+        lasting = orbit.lasting(self.speed, abs(rise) / rate)
+        if lasting >= _SHORTEST:
+            self._check_clock(lasting)
+            t = np.linspace(0.0, lasting, max(2, math.ceil(lasting / self.step) + 1))
+            sense = -1.0 if orbit.clockwise else 1.0  # angles count from east to north
+            angle = math.atan2(*(edge - center[:2])[::-1]) + sense * speed / orbit.radius * t
+            out = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            along = sense * speed * np.stack([-out[:, 1], out[:, 0]], axis=1)
+            up = self.place[2] + np.clip(np.sign(rise) * rate * t, min(rise, 0), max(rise, 0))
+            climbing = np.where(t < abs(rise) / rate, np.sign(rise) * rate, 0.0)
+            position = np.column_stack([center[:2] + orbit.radius * out, up])
+            if self.vehicle.type.hovers:
+                along[[0, -1]] = 0.0
+            self._add(t, position, np.column_stack([along, climbing]), np.full(len(t), index))
+            self.clock += lasting
+            self.place = self.goal = position[-1]
+        self.reached[index] = self.clock
+        self.over = self.over or orbit.endless
+
     def _delay(self, index: int, seconds: float) -> None:
         last = self._last_stop(index)
         last.delay += seconds
@@ -280,7 +317,12 @@ class _Walk:
 
     def _return(self, index: int) -> None:
         self.fly()
+        rally = [self.frame.to_local(p.latitude, p.longitude) for p in self.mission.rally]
+        chosen = self.vehicle.type.rally(self.vehicle).chosen(self.place[:2], self.home[:2], rally)
+        goal = self.home[:2] if chosen is None else rally[chosen]
         level = self.vertical.returns_at(float(self.place[2]))
+        if chosen is not None and not math.isnan(height := self.mission.rally[chosen].altitude):
+            level = max(level, height) if self.vertical.lands_on_return else height
         if self.vehicle.type.hovers and level > self.place[2] + _SAME_PLACE:
             up = np.array([self.place[0], self.place[1], level])
             self._go(index, up, self.vertical.climb(level - float(self.place[2])))
@@ -289,7 +331,7 @@ class _Walk:
         if not self.vertical.lands_on_return:  # until it is at its height, on the way or over home
             speed = self.flying.value("climb_speed" if rise > 0 else "descent_speed")
             circling = abs(rise) / speed
-        self._towards(index, np.array([self.home[0], self.home[1], level]), circling)
+        self._towards(index, np.array([goal[0], goal[1], level]), circling)
         if self.vertical.lands_on_return:
             self._descend(index)
         self.over = True

@@ -9,6 +9,7 @@ from faao_mav.arrays import Flags, Real
 from faao_mav.power import GRAVITY
 from faao_mav.vehicle.dialect import Dialect
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
+from faao_mav.vehicle.orbit import Orbits, RallyRule, no_orbit
 from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
 
 OVERSPEED = 1.1
@@ -169,6 +170,8 @@ class VehicleType:
         speed_rates: how fast its airspeed changes; infinitely if that is its acceleration's.
         leg_durations: how long straight legs of given lengths, m, take, of which those are marked
             that follow one without a stop; None if only a flight tells.
+        orbits: how it circles at an item.
+        rally: where a return goes when there are rally points.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
             radians; None if no such law is known.
     """
@@ -199,6 +202,8 @@ class VehicleType:
     speed_rates: Callable[[ParameterValues], SpeedRates] = lambda _: SpeedRates()
     leg_durations: Callable[[ParameterValues, Real, Flags], LegDurations] | None = None
     corner_speed: Callable[[ParameterValues, float], float] | None = None
+    orbits: Orbits = no_orbit
+    rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
 
     @property
     def caveat(self) -> str:

@@ -63,17 +63,6 @@ def test_the_duration_is_by_how_much_the_flight_is_late(solution: Solution, late
     assert found.by_position.R_avg >= found.rates.R_avg - 1e-3
 
 
-def test_passing_w_F_on_the_way_is_not_the_end(solution: Solution) -> None:
-    """A loop back to w_F: it counts from when the flight stays there."""
-    t, w = held(solution)
-    away = np.clip(np.minimum(t - solution.t[-1] - 5, solution.t[-1] + 15 - t), 0, None)
-    looped = w + np.outer(away, [6.0, 0.0])
-    assert price_flight(solution, t, looped).duration == pytest.approx(30, abs=0.05)
-    early = w.copy()
-    early[(t > 2) & (t < 4)] = solution.w[-1] + [1.0, 0.0]
-    assert price_flight(solution, t, early).duration == pytest.approx(30, abs=0.05)
-
-
 def test_a_flight_that_goes_on_beyond_w_F_is_not_late(solution: Solution) -> None:
     t, w = held(solution)
     beyond = w + np.outer(np.maximum(t - solution.t[-1], 0.0), [8.0, 0.0])

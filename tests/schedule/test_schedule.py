@@ -171,8 +171,8 @@ def test_a_vehicle_that_is_slow_to_speed_up_is_later_than_one_with_good_paramete
 
 
 def test_a_speed_that_no_mission_commands_is_refused_by_its_key() -> None:
-    plan = plan_with(max_speed=1e-6, recommend=True)
-    with pytest.raises(InputError, match=r"vehicle\.max_speed: 1e-06 m/s; missions command 0\.1"):
+    plan = plan_with(recommend=True).changed({"vehicle.max_speed": 0.05, "flight.end": [0, 350]})
+    with pytest.raises(InputError, match=r"vehicle\.max_speed: 0\.05 m/s; missions command 0\.1"):
         check_vehicle(plan)
 
 

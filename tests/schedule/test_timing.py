@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import Clock, Schedule
+from faao_mav.schedule.schedule import Clock, Schedule, lateness
 from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD, fit
 from faao_mav.vehicle import Flown
 from faao_mav.vehicle.ardupilot.copter import ArduCopter
@@ -140,6 +140,20 @@ def test_setting_out_before_the_plan_is_found() -> None:
     assert found.speeds == pytest.approx(SPEEDS, abs=0.1)
     assert found.waits == pytest.approx(WAITS, abs=0.2)
     assert fitted(plan_of(begin, ahead=9.0), begin).route.lead <= MOST_LEAD
+
+
+@given(st.floats(0.3, 30.0))
+def test_a_flight_is_not_over_where_it_passes_its_end_on_the_way(slowness: float) -> None:
+    """There and back through the end, and round after round: at any speed it is the same way."""
+    t = np.linspace(0.0, 240.0, 241)
+    there_and_back = np.interp(t, [0, 160, 240], [-500.0, 700.0, 0.0])
+    angle = 2 * np.pi * 3 * t / 240
+    for w in (
+        np.column_stack([there_and_back, 0 * t]),
+        50 * np.column_stack([np.cos(angle), np.sin(angle)]),
+    ):
+        late = lateness(t, w, slowness * t, w, 2.0)
+        assert late == pytest.approx((slowness - 1) * 240, rel=0.02, abs=0.5)
 
 
 def test_how_late_a_flight_is_over() -> None:

@@ -11,7 +11,11 @@ from hypothesis import given
 from judged import (
     COPTER,
     FRAME,
+    LAND,
+    PLANE,
     PX4,
+    PX4_PLANE,
+    TAKEOFF,
     Given,
     at,
     circle,
@@ -29,6 +33,7 @@ from shapely.geometry.base import BaseGeometry
 from faao_mav.mission.command import Command
 from faao_mav.mission.fence_area import areas_of, free_area
 from faao_mav.validate.context import ValidationContext
+from faao_mav.vehicle import Vehicle
 
 metres = st.floats(-500, 500)
 places = st.tuples(metres, metres)
@@ -103,7 +108,30 @@ def test_legs_by_jumps_count() -> None:
     back = do(Command.DO_JUMP, 2, 1)
     found = Given(flown(*around, back, fence=fence(circle(-22, -30, 10)))).by("fence-leg")
     assert [finding.item for finding in found] == [7]
-    assert "by DO_JUMP" in found[0].message
+    assert "by a jump" in found[0].message
+
+
+@pytest.mark.parametrize("command", [17, 18, 19, 31])
+@pytest.mark.parametrize("vehicle", [PLANE, PX4_PLANE])
+def test_circles_of_planes_count(vehicle: Vehicle, command: int) -> None:
+    radius = (0, 150, 0) if command == 31 else (0, 0, 150)
+    circling = at(600, 0, 60, *radius, command=command)
+    zone = fence(circle(600, 140, 30))
+    found = Given(mission(TAKEOFF, circling, fence=zone), vehicle).by("fence-circle")
+    assert [finding.item for finding in found] == [2]
+    center = fence(circle(600, 0, 60))  # round what is not to be flown over
+    assert not Given(mission(TAKEOFF, circling, fence=center), vehicle).by("fence-circle")
+    assert not Given(mission(TAKEOFF, circling, fence=center), vehicle).by("fence-leg")
+
+
+def test_a_plane_circles_where_it_returns_and_where_it_ends() -> None:
+    zone = fence(circle(0, 60, 10))
+    around = having(PLANE, WP_LOITER_RAD=60)
+    assert Given(flown(at(900, 0, 60), fence=zone), around).by("fence-circle")
+    assert not Given(flown(at(900, 0, 60), fence=zone), COPTER).by("fence-circle")
+    there = fence(circle(900, 60, 10))
+    assert Given(mission(TAKEOFF, at(900, 0, 60), fence=there), around).by("fence-circle")
+    assert not Given(mission(TAKEOFF, at(900, 0, 60), LAND, fence=there), around).by("fence-circle")
 
 
 def test_one_inclusion_is_enough_for_px4_only() -> None:

@@ -69,8 +69,36 @@ def test_legs_follow_items_jumps_and_the_way_home() -> None:
     ]
     assert [round(leg.length) for leg in legs] == [0, 100, 100, 100, 141]
     assert legs[0].rise == 30
-    to_a_rally_point = ValidationContext(flown(at(0, 9, 9), rally=(rally(0, 50),)), COPTER).legs
-    assert [leg.index for leg in to_a_rally_point] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "places", "expected"),
+    [
+        (COPTER, [(0, 250)], (0, 250)),  # of rally points and home the nearest
+        (COPTER, [(0, 250), (0, 190)], (0, 190)),
+        (COPTER, [(0, 450)], (0, 0)),
+        (COPTER, [(0, 510)], (0, 0)),  # beyond RALLY_LIMIT_KM, 0.3
+        (having(COPTER, RALLY_LIMIT_KM=0, RALLY_INCL_HOME=0), [(0, 1500)], (0, 1500)),
+        (having(COPTER, RALLY_INCL_HOME=0), [(0, 480)], (0, 480)),
+        (PLANE, [(0, 900)], (0, 900)),  # home is not among a plane's by default
+        (PX4, [(0, 250)], (0, 250)),
+        (having(PX4, RTL_TYPE=1), [(0, 900)], (0, 900)),
+        (having(PX4, RTL_TYPE=2), [(0, 250)], (0, 0)),
+    ],
+)
+def test_a_return_goes_where_the_vehicle_chooses(
+    vehicle: Vehicle, places: list[tuple[float, float]], expected: tuple[float, float]
+) -> None:
+    points = tuple(rally(*place) for place in places)
+    back = ValidationContext(flown(at(0, 200, 30), rally=points), vehicle).legs[-1].end
+    assert (back.east, back.north) == pytest.approx(expected, abs=0.1)
+
+
+def test_legs_lead_to_the_edge_of_circles() -> None:
+    turns = at(0, 200, 30, 1, 0, 50, command=Command.NAV_LOITER_TURNS)
+    to, away = ValidationContext(mission(TAKEOFF, turns, at(200, 200, 30)), COPTER).legs[1:]
+    assert (to.end.east, to.end.north) == pytest.approx((0, 150), abs=0.1)
+    assert (away.start.east, away.start.north) == pytest.approx((50, 200), abs=0.1)
 
 
 @pytest.mark.parametrize(

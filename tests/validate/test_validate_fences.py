@@ -81,6 +81,12 @@ CASES = [
         ),
     ),
     (
+        "fence-circle",
+        Given(flown(at(0, 100, 30, 2, 0, 50, command=18), fence=fence(circle(50, 100, 9)))),
+        2,
+        Given(flown(at(0, 100, 30, 2, 0, 50, command=18), fence=fence(circle(0, 100, 40)))),
+    ),
+    (
         "fence-flight",
         Given(
             flown(at(0, 100, 30), fence=fence(circle(40, 50, 30))),

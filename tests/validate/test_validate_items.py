@@ -106,6 +106,18 @@ CASES = [
     ("jump-target", Given(flown(do(JUMP, 0, 1))), 2, Given(flown(do(JUMP, 1, 1)))),
     ("jump-target", Given(flown(do(JUMP, NAN, 1)), PX4), 2, Given(flown(do(JUMP, 1, 1)), PX4)),
     (
+        "jump-target",
+        Given(flown(do(600, 7), do(601, 9, 1))),
+        3,
+        Given(flown(do(600, 7), do(601, 7))),
+    ),
+    (
+        "jump-forever",
+        Given(flown(do(600, 7), at(0, 9, 9), do(601, 7, -1))),
+        4,
+        Given(flown(do(600, 7), at(0, 9, 9), do(601, 7, 3))),
+    ),
+    (
         "jump-forever",
         Given(flown(at(0, 9, 9), do(JUMP, 2, -1))),
         3,

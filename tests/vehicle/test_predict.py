@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
+from faao_mav.mission.fence import RallyPoint
+from faao_mav.mission.jumps import JUMPS
 from faao_mav.vehicle import Track, Vehicle
 from faao_mav.vehicle.predict import predict
 
@@ -73,7 +76,7 @@ def check(mission: Mission, track: Track) -> None:
         known = track.reached[np.isfinite(track.reached)]
         assert (known >= 0).all()
         assert (known <= track.t[-1] + 0.2).all()
-    if any(item.command == Command.DO_JUMP for item in mission.items):
+    if any(item.command in JUMPS for item in mission.items):
         return
     assert (np.diff(track.item) >= 0).all()
     assert (np.diff(track.reached[np.isfinite(track.reached)]) >= -1e-9).all()
@@ -173,6 +176,55 @@ def test_a_mission_without_an_end_ends_at_its_last_waypoint() -> None:
     assert track.position[-1] == pytest.approx([60, 40, 30], abs=ARRIVED)
 
 
+def turns(number: float, radius: float, **changes: Any) -> MissionItem:
+    item = at(Command.NAV_LOITER_TURNS, 0, 200)
+    return replace(item, params=(number, 0.0, radius, 0.0), **changes)
+
+
+def test_circles_of_a_copter_are_flown_as_fast_as_its_rate_and_acceleration_allow() -> None:
+    one, five = (flown(TAKEOFF, turns(number, 10)) for number in (1, 5))
+    around = 2 * math.pi / min(math.radians(20), math.sqrt(2.5 / 20))
+    assert five.t[-1] - one.t[-1] == pytest.approx(4 * around, rel=1e-3)
+    quick = Vehicle(parameters={"CIRCLE_RATE": 5})
+    slow = [flown(TAKEOFF, turns(number, 10), vehicle=quick).t[-1] for number in (1, 2)]
+    assert slow[1] - slow[0] == pytest.approx(72, rel=1e-3)
+    circling = five.position[five.item == 1][-200:]
+    away = np.hypot(circling[:, 0], circling[:, 1] - 200)
+    assert away == pytest.approx(10, abs=0.1)
+
+
+@pytest.mark.parametrize(("radius", "sense"), [(40, -1), (-40, 1), (0, -1)])
+def test_positive_radii_turn_right(radius: float, sense: int) -> None:
+    for vehicle in (COPTER, Vehicle("ardupilot", "plane")):
+        track = flown(TAKEOFF, turns(1, radius), vehicle=vehicle)
+        x, y, _ = track.position[track.item == 1].T
+        angle = np.unwrap(np.arctan2(y - 200, x))[-100:]
+        assert np.sign(angle[-1] - angle[0]) == sense
+
+
+def test_circles_of_a_plane() -> None:
+    plane = Vehicle("ardupilot", "plane")
+    one, three = (flown(TAKEOFF, turns(number, 150), RTL, vehicle=plane) for number in (1, 3))
+    assert when(three, 1) - when(one, 1) == pytest.approx(2 * 2 * math.pi * 150 / 12, rel=0.01)
+    waiting = replace(at(Command.NAV_LOITER_TIME, 0, 500), params=(60.0, 0.0, 0.0, 0.0))
+    track = flown(TAKEOFF, waiting, vehicle=plane)
+    far = np.hypot(track.position[:, 0], track.position[:, 1] - 500)
+    assert far[-300:] == pytest.approx(60, abs=0.5)
+    climbing = replace(at(Command.NAV_LOITER_TO_ALT, 0, 500), z=230.0)
+    up = flown(TAKEOFF, climbing, vehicle=plane)
+    assert up.position[-1, 2] == pytest.approx(230)
+    assert up.t[-1] > 200 / 5
+
+
+def test_a_return_ends_at_the_nearest_rally_point() -> None:
+    place = FRAME.to_geodetic([250.0, 0.0])
+    rally = (RallyPoint(float(place[0]), float(place[1]), 25.0),)
+    mission = Mission((TAKEOFF, waypoint(200, 0), RTL), HOME, rally=rally)
+    assert predict(mission, COPTER).position[-1] == pytest.approx([250, 0, 0], abs=0.1)
+    near_home = replace(mission, items=(TAKEOFF, waypoint(20, 0), RTL))
+    assert predict(near_home, COPTER).position[-1] == pytest.approx([0, 0, 0], abs=0.1)
+
+
 def visits(track: Track, east: float, north: float) -> int:
     """How often the track comes within 5 m."""
     near = np.hypot(*(track.position[:, :2] - [east, north]).T) < 5
@@ -185,6 +237,15 @@ def test_jumps_are_followed(repeats: int, expected: int) -> None:
     track = flown(*items)
     assert visits(track, 60, 60) == expected
     assert track.position[-1] == pytest.approx([0, 0, 0], abs=0.1)
+
+
+@pytest.mark.parametrize(("repeats", "expected"), [(0, 1), (2, 3), (-1, 21)])
+def test_jumps_to_a_tag_are_followed(repeats: int, expected: int) -> None:
+    tag, jump = do(Command.JUMP_TAG, 7), do(Command.DO_JUMP_TAG, 7, repeats)
+    track = flown(TAKEOFF, tag, waypoint(60, 0), waypoint(0, 0), jump)
+    assert visits(track, 60, 0) == expected
+    nowhere = flown(TAKEOFF, waypoint(60, 0), waypoint(0, 0), do(Command.DO_JUMP_TAG, 9, 2))
+    assert visits(nowhere, 60, 0) == 1
 
 
 def test_jumps_to_nowhere_are_passed_over() -> None:

@@ -1,7 +1,9 @@
 """ArduPilot: what ArduCopter and ArduPlane share."""
 
+import math
 from collections.abc import Callable, Mapping
 
+from faao_mav.vehicle.orbit import RallyRule
 from faao_mav.vehicle.parameter import Parameter, ParameterValues
 from faao_mav.vehicle.vehicle_type import AutopilotFamily, FenceAction, FenceResponse
 
@@ -75,7 +77,20 @@ SHARED = (
 FENCE_TYPE, whose bits are 1 ceiling, 2 circle, 4 areas, 8 floor."""
 
 
-def rally_limit(default: float) -> Parameter:
-    """Return how far the autopilot looks for a rally point, m; 0: any distance."""
+def rally_parameters(limit: float, home: float) -> tuple[Parameter, ...]:
+    """Return what decides between home and rally points, with these defaults.
+
+    `rally_limit` is how far the autopilot looks for a rally point, m, 0: any distance;
+    `rally_home` whether home is one of the places to choose from.
+    """
     names = {"RALLY_LIMIT_KM": 1000.0}
-    return Parameter("rally_limit", "m", default, names, source=SOURCE)
+    return (
+        Parameter("rally_limit", "m", limit, names, source=SOURCE),
+        switch("rally_home", home, "RALLY_INCL_HOME"),
+    )
+
+
+def rally_rule(vehicle: ParameterValues) -> RallyRule:
+    """Return where a return goes (ArduPilot 4.7, AP_Rally)."""
+    limit = vehicle.value("rally_limit")
+    return RallyRule(limit if limit > 0 else math.inf, vehicle.value("rally_home") != 0)

@@ -8,6 +8,7 @@ its library motion_planning, read at several revisions about 1.16; controller ga
 documented defaults. Flights: PX4 1.16 in simulation.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import cos
@@ -16,6 +17,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
+from faao_mav.vehicle.orbit import RallyRule, plane_orbit
 from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
 from faao_mav.vehicle.px4.dialect import DIALECT
 from faao_mav.vehicle.px4.flight_model import Px4 as Px4
@@ -156,6 +158,16 @@ def _max_airspeed(vehicle: ParameterValues) -> float:
     return round(HELD * lean_acceleration(vehicle.value("lean_angle")) / DRAG, 2)
 
 
+def _rally(vehicle: ParameterValues) -> RallyRule:
+    """Return where a return goes, by RTL_TYPE (PX4 1.16).
+
+    0 and 3 take the nearest of home and rally points, 1 a rally point before home, others (by a
+    mission's landing, or back along it) none.
+    """
+    kind = int(vehicle.value("return_type"))
+    return RallyRule(math.inf if kind in (0, 1, 3) else -1.0, home=kind != 1)
+
+
 PX4_COPTER = VehicleType(
     family=PX4,
     kind="copter",
@@ -176,6 +188,7 @@ PX4_COPTER = VehicleType(
     ceilings=_ceilings,
     max_airspeed=_max_airspeed,
     corner_speed=_corner_speed,
+    rally=_rally,
 )
 """A multicopter with PX4 1.16."""
 
@@ -191,5 +204,7 @@ PX4_PLANE = VehicleType(
     home_outside_fence=_HOME_OUTSIDE_FENCE,
     at_fence=_at_fence,
     unmodelled="there is no model of how PX4 flies planes",
+    orbits=plane_orbit,
+    rally=_rally,
 )
 """A plane with PX4 1.16: its missions can be validated, not made."""

@@ -41,6 +41,7 @@ _SHARED = (
     _parameter("fence_distance", "m", 0.0, "GF_MAX_HOR_DIST"),
     _parameter("fence_height", "m", 0.0, "GF_MAX_VER_DIST"),
     _parameter("return_height", "m", 60.0, "RTL_RETURN_ALT", 0.0),
+    _parameter("return_type", "", 0, "RTL_TYPE"),
 )
 """Mission checks, fence and return."""
 
@@ -98,6 +99,7 @@ PLANE_TABLE = table(
     _parameter("descent_speed", "m/s", 5.0, "FW_T_SINK_MAX", 0.1),
     _parameter("landing_angle", "rad", radians(5), "FW_LND_ANG", 0.0, radians(85), radians(1)),
     _parameter("acceptance_radius", "m", 10.0, "NAV_ACC_RAD", 0.05),
+    _parameter("loiter_radius", "m", 80.0, "NAV_LOITER_RAD"),
     *_SHARED,
 )
 """A PX4 plane's parameters."""

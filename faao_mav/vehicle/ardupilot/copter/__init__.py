@@ -1,15 +1,25 @@
 """ArduCopter: what it is, and how it flies a mission."""
 
+import math
 from collections.abc import Iterator, Mapping
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
+from faao_mav.mission.command import Command
+from faao_mav.mission.item import MissionItem
+from faao_mav.vehicle.ardupilot import (
+    ARDUPILOT,
+    HOME_OUTSIDE_FENCE,
+    at_fence,
+    needs_one_inclusion,
+    rally_rule,
+)
 from faao_mav.vehicle.ardupilot.copter.durations import StraightDurations
 from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter as ArduCopter
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs as ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.vehicle.flight_path import VerticalProfile
+from faao_mav.vehicle.orbit import Orbit
 from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
 from faao_mav.vehicle.vehicle_type import HELD, Ceiling, VehicleType
 
@@ -74,6 +84,28 @@ def _leg_durations(vehicle: ParameterValues, lengths: Real, joined: Flags) -> St
     return StraightDurations(lengths, joined, ArduCopterLegs.from_vehicle(vehicle).bounds)
 
 
+def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
+    """Return how a NAV_LOITER_TURNS is flown (AC_Circle), turning by half of the acceleration.
+
+    Negative radii turn left, and without one a negative CIRCLE_RATE does.
+    """
+    if item.command != Command.NAV_LOITER_TURNS:
+        return None
+    given, rate = item.params[2], vehicle.value("circle_rate")
+    told = math.isfinite(given) and given != 0
+    radius = abs(given) if told else vehicle.value("circle_radius")
+    turns = item.params[0] if math.isfinite(item.params[0]) else 0.0
+    if radius <= 0 or rate == 0:
+        return None
+    most = math.sqrt(vehicle.value("acceleration") / (2 * radius))
+    return Orbit(
+        radius,
+        given > 0 if told else rate > 0,
+        turns=max(turns, 0.0),
+        turn_rate=min(abs(rate), most),
+    )
+
+
 ARDUCOPTER = VehicleType(
     family=ARDUPILOT,
     kind="copter",
@@ -96,5 +128,7 @@ ARDUCOPTER = VehicleType(
     max_airspeed=_max_airspeed,
     models_wind=True,
     leg_durations=_leg_durations,
+    orbits=_orbit,
+    rally=rally_rule,
 )
 """ArduCopter 4.1 and later; measured on 4.7."""

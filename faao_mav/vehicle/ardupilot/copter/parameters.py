@@ -6,7 +6,7 @@ from math import radians
 from typing import Self
 
 from faao_mav.power import GRAVITY
-from faao_mav.vehicle.ardupilot import DEGREE, SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.ardupilot import DEGREE, SHARED, SOURCE, rally_parameters, switch
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, ParameterValues, table
 from faao_mav.vehicle.vehicle_type import lean_acceleration
 
@@ -60,7 +60,9 @@ TABLE = table(
     *SHARED,
     switch("fence_options", 0, "FENCE_OPTIONS"),
     switch("fence_type", 7, "FENCE_TYPE"),
-    rally_limit(300.0),
+    _parameter("circle_radius", "m", 10.0, "CIRCLE_RADIUS_M", "CIRCLE_RADIUS", least=0.0),
+    Parameter("circle_rate", "rad/s", radians(20), {"CIRCLE_RATE": radians(1)}, source=SOURCE),
+    *rally_parameters(limit=300.0, home=1),
 )
 """ArduCopter's parameters. A `corner_acceleration` of 0 stands for twice `acceleration`."""
 

@@ -1,12 +1,19 @@
 """ArduPlane: what it is, and how it flies a mission."""
 
-from faao_mav.vehicle.ardupilot import ARDUPILOT, HOME_OUTSIDE_FENCE, at_fence, needs_one_inclusion
+from faao_mav.vehicle.ardupilot import (
+    ARDUPILOT,
+    HOME_OUTSIDE_FENCE,
+    at_fence,
+    needs_one_inclusion,
+    rally_rule,
+)
 from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane as ArduPlane
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlaneLegs
 from faao_mav.vehicle.ardupilot.plane.motion import SIDESLIP
 from faao_mav.vehicle.ardupilot.plane.parameters import TABLE, ArduPlaneLimits, true_over_commanded
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
+from faao_mav.vehicle.orbit import plane_orbit
 from faao_mav.vehicle.parameter import ParameterValues
 from faao_mav.vehicle.vehicle_type import Ceiling, SpeedRates, VehicleType, lean_acceleration
 
@@ -65,6 +72,8 @@ ARDUPLANE = VehicleType(
     models_wind=True,
     true_over_commanded=_true_over_commanded,
     speed_rates=_speed_rates,
+    orbits=plane_orbit,
+    rally=rally_rule,
 )
 """ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are
 recommended."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import pi, radians
 
 from faao_mav.power import GRAVITY
-from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_limit, switch
+from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_parameters, switch
 from faao_mav.vehicle.atmosphere import density_ratio
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, table
 from faao_mav.vehicle.vehicle_type import SpeedRates
@@ -58,7 +58,7 @@ TABLE = table(
     switch("fence_options", 1, "FENCE_OPTIONS"),
     switch("fence_type", 4, "FENCE_TYPE"),
     switch("return_lands", 0, "RTL_AUTOLAND"),
-    rally_limit(5000.0),
+    *rally_parameters(limit=5000.0, home=0),
 )
 """ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate
 with an idling engine; `turn_power` is per unit of load factor squared beyond 1; a `climb_pitch`
