@@ -23,10 +23,12 @@ def convert(
 
     The fence of a .waypoints or .txt file is a second file, M.fence.waypoints of M.waypoints.
 
-    Without --autopilot a .plan is for whom the mission that is read says it is for.
+    Without --autopilot a .plan is for whom the mission that is read, or the parameters beside it,
+    say it is for.
 
     Exit status: 0 done; 2 unusable arguments or input.
     """
+    from faao_mav.cli.vehicle import told_vehicle
     from faao_mav.mission.formats import (
         check_readable,
         check_suffix,
@@ -35,7 +37,7 @@ def convert(
         write_mission,
     )
     from faao_mav.vehicle import Vehicle, kind_by_number
-    from faao_mav.vehicle.files import plan_target, vehicle_in
+    from faao_mav.vehicle.files import plan_target
 
     check_known(autopilot, None)
     check_readable(mission_file)
@@ -44,7 +46,8 @@ def convert(
     check_apart({"--out": out}, {"MISSION": mission_file})
     read = read_mission_file(mission_file)
     kind = kind_by_number(read.vehicle_type) or "copter"
-    vehicle = Vehicle(autopilot, kind) if autopilot else vehicle_in(read)
+    told = told_vehicle(mission_file, read, None, None, (autopilot, None, None))
+    vehicle = Vehicle(autopilot, kind) if autopilot else told[0] if told is not None else None
     target = plan_target(vehicle)
     lost = losses_in(read.mission, out, target)
     written = write_mission(read.mission, out, target)

@@ -30,7 +30,10 @@ def choose_vehicle(
     """
     autopilot, kind, parameters = asked
     given = read_parameters(parameters) if parameters is not None else None
-    base, chosen_by = _told(mission_file, file, plan, given, asked)
+    base, chosen_by = told_vehicle(mission_file, file, plan, given, asked) or (
+        Vehicle(),
+        "by default; --autopilot and --type say otherwise",
+    )
     if autopilot is not None or kind is not None:
         chosen_by = "as asked"
     whose = autopilot or base.autopilot
@@ -53,14 +56,18 @@ def choose_vehicle(
     return Vehicle(whose, kind or base.kind, values, source), chosen_by
 
 
-def _told(
+def told_vehicle(
     mission_file: Path,
     file: "MissionFile",
     plan: "Plan | None",
     given: dict[str, float] | None,
     asked: tuple[Autopilot | None, Kind | None, Path | None],
-) -> tuple[Vehicle, str]:
-    """Return what plan, mission and parameters say of the vehicle, and which of them it was."""
+) -> tuple[Vehicle, str] | None:
+    """Return what plan, mission and parameters say of the vehicle, and which of them it was.
+
+    None where nothing tells. Arguments and errors are those of `choose_vehicle`; `given` is what
+    the file of parameters that was asked for holds.
+    """
     if plan is not None:
         return vehicle_of(plan), "as the plan says"
     named = vehicle_in(file)
@@ -83,6 +90,4 @@ def _told(
                 f"{mission_file}: remove the other, or give --autopilot"
             )
         theirs = found[0] if len(found) == 1 else None
-    if theirs is not None:
-        return Vehicle(theirs), "as its parameters say"
-    return Vehicle(), "by default; --autopilot and --type say otherwise"
+    return None if theirs is None else (Vehicle(theirs), "as its parameters say")

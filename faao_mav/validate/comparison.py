@@ -14,13 +14,16 @@ from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LinkCheck, Stretch
-from faao_mav.vector import lengths
+from faao_mav.vector import distances_to_path, lengths
 from faao_mav.vehicle import Track
 
 _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 """Seconds by which the aircraft may set out before the plan, of which the best fit is taken.
 
 The step of 0.1 s is that of predicted flights."""
+
+_EVERY = 10
+"""Of so many samples of a flight one is looked at for how near it comes to the plan. Chosen."""
 
 _LEAST = 1e-6
 """The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
@@ -57,6 +60,7 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
         path_tolerance=plan.mission.path_tolerance,
         altitude_error=float(np.abs(during - plan.flight.altitude).max()),
         worst=_worst(solution, flown),
+        away=float(distances_to_path(w[::_EVERY], solution.w).min()),
     )
 
 

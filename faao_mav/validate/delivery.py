@@ -61,6 +61,23 @@ def _radio_values(context: ValidationContext) -> Iterator[Issue]:
             yield Issue(None, message, action)
 
 
+@RULES.error("link-elsewhere", _SOURCE)
+def _elsewhere(context: ValidationContext) -> Iterator[Issue]:
+    """The mission is flown at another place than the plan."""
+    link = context.link
+    if link is not None and link.elsewhere:
+        yield Issue(
+            None,
+            f"the mission comes no nearer than {link.away / 1000:,.1f} km to the plan's route",
+            "give the plan that the mission was made for, or make the mission anew",
+        )
+
+
+def _there(context: ValidationContext) -> LinkCheck | None:
+    """Return how the mission carries out the plan; None without one, or at another place."""
+    return context.link if context.link is not None and not context.link.elsewhere else None
+
+
 @RULES.error(
     "link-rate-lost",
     _SOURCE,
@@ -68,8 +85,9 @@ def _radio_values(context: ValidationContext) -> Iterator[Issue]:
     "planned",
 )
 def _lost(context: ValidationContext) -> Iterator[Issue]:
-    if context.link is not None and context.link.share < LEAST_SHARE:
-        yield _rate_issue(context.link)
+    link = _there(context)
+    if link is not None and link.share < LEAST_SHARE:
+        yield _rate_issue(link)
 
 
 @RULES.warning(
@@ -79,8 +97,9 @@ def _lost(context: ValidationContext) -> Iterator[Issue]:
     "planned",
 )
 def _reduced(context: ValidationContext) -> Iterator[Issue]:
-    if context.link is not None and LEAST_SHARE <= context.link.share < GOOD_SHARE:
-        yield _rate_issue(context.link)
+    link = _there(context)
+    if link is not None and LEAST_SHARE <= link.share < GOOD_SHARE:
+        yield _rate_issue(link)
 
 
 def _rate_issue(link: LinkCheck) -> Issue:
@@ -103,7 +122,7 @@ def _rate_issue(link: LinkCheck) -> Issue:
 @RULES.warning("link-path", _SOURCE)
 def _path(context: ValidationContext) -> Iterator[Issue]:
     """The predicted path leaves the planned one by more than the plan's path_tolerance."""
-    link = context.link
+    link = _there(context)
     if link is not None and link.path_error > link.path_tolerance + PATH_ALLOWANCE:
         yield Issue(
             None,
@@ -121,7 +140,7 @@ def _path(context: ValidationContext) -> Iterator[Issue]:
     f"{LATE:g} s: what the plan has at its end is not done in its time",
 )
 def _late(context: ValidationContext) -> Iterator[Issue]:
-    link = context.link
+    link = _there(context)
     if link is not None:
         late = link.predicted_duration - link.planned_duration
         if late > max(LATE, LATE_SHARE * link.planned_duration):
@@ -141,7 +160,7 @@ def _late(context: ValidationContext) -> Iterator[Issue]:
     "the time",
 )
 def _apart(context: ValidationContext) -> Iterator[Issue]:
-    link = context.link
+    link = _there(context)
     if link is not None and link.rms_position_error > APART:
         yield Issue(
             None,
@@ -159,7 +178,7 @@ def _apart(context: ValidationContext) -> Iterator[Issue]:
     "altitude",
 )
 def _altitude(context: ValidationContext) -> Iterator[Issue]:
-    link = context.link
+    link = _there(context)
     if link is not None and link.altitude_error > ALTITUDE_ERROR:
         yield Issue(
             None,
@@ -172,7 +191,7 @@ def _altitude(context: ValidationContext) -> Iterator[Issue]:
 @RULES.note("link-timing", _SOURCE)
 def _timing(context: ValidationContext) -> Iterator[Issue]:
     """Where the aircraft is predicted to be, beside where the plan has it at the same time."""
-    link = context.link
+    link = _there(context)
     if link is not None:
         late = link.predicted_duration - link.planned_duration
         yield Issue(

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from faao_mav.errors import InputError
 from faao_mav.plan import Radio
 
+ELSEWHERE = 2_000.0
+"""Metres that a mission comes no nearer to the planned path if it is of another place. Chosen."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -52,7 +55,7 @@ class LinkCheck:
     between planned and predicted path, `path_tolerance` m what the plan allows of it;
     `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
     None if none does; `bandwidth_mhz` is None where the plan has none. `radio` is what the plan
-    says of both links.
+    says of both links, `away` the least distance, m, between the two paths.
     """
 
     planned_rate: float
@@ -70,6 +73,12 @@ class LinkCheck:
     causal: bool = True
     bandwidth_mhz: float | None = None
     radio: Radio | None = None
+    away: float = 0.0
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether the mission flies at another place than the plan."""
+        return self.away > ELSEWHERE
 
     @property
     def predicted_mbytes(self) -> float | None:

@@ -1,5 +1,6 @@
 """How high, how far and how long the mission goes."""
 
+import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -64,6 +65,27 @@ def _too_low(context: ValidationContext, place: PlacedItem, how: str) -> Issue:
         return Issue(place.index, how, "raise the item, unless the ground there is lower than home")
     sea = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: "
     return Issue(place.index, sea + how, "use frame 3, height above home, or raise the item")
+
+
+_SWAPPED = 1.0
+"""Degrees from home within which a place lies if its exchanged coordinates are the slip. Chosen."""
+
+_FARTHEST = {True: 100.0, False: 1_000.0}
+"""Kilometres from home that no copter, and no plane, flies to. Chosen: twice what they do in the
+hours that flights are predicted."""
+
+
+@RULES.error("too-far", "common sense", summary="farther from home than any vehicle of its kind")
+def _too_far(context: ValidationContext) -> Iterator[Issue]:
+    for place in context.places:
+        away = place.from_origin / 1000
+        if context.home is None or away <= _FARTHEST[context.vehicle.type.hovers]:
+            continue
+        item, home = context.items[place.index], context.mission.home
+        assert home is not None
+        swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < _SWAPPED
+        slip = "latitude and longitude look exchanged: correct them" if swapped else "correct it"
+        yield Issue(place.index, f"its place is {away:,.0f} km from home", slip)
 
 
 @RULES.error("too-high", "common sense", summary=f"higher than {HIGHEST / 1000:g} km above home")
@@ -154,7 +176,7 @@ def _far(context: ValidationContext) -> Iterator[Issue]:
         return
     for place in context.places:
         distance = place.from_origin
-        if distance > FAR:
+        if FAR < distance <= 1000 * _FARTHEST[context.vehicle.type.hovers]:
             yield Issue(
                 place.index,
                 f"{distance / 1000:.1f} km from home",
@@ -165,7 +187,11 @@ def _far(context: ValidationContext) -> Iterator[Issue]:
 @RULES.warning("long-leg", "common sense", summary=f"a leg of more than {FAR / 1000:g} km")
 def _long(context: ValidationContext) -> Iterator[Issue]:
     for leg in context.legs:
-        if leg.length > FAR and leg.start.index != HOME and leg.end.index != HOME:
+        near = (
+            max(leg.start.from_origin, leg.end.from_origin)
+            <= 1000 * _FARTHEST[context.vehicle.type.hovers]
+        )
+        if leg.length > FAR and near and leg.start.index != HOME and leg.end.index != HOME:
             yield Issue(
                 leg.index,
                 f"{leg.length / 1000:.1f} km from item {number(leg.start.index)} to item "

@@ -4,6 +4,7 @@ A flight is at `w` (k, 2), m in the plan's frame, at `t` (k,), s on a clock of i
 predicted to be, or the plan itself where nothing was predicted, is told on the plan's clock.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -99,17 +100,28 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     """Return when, s on the clock of `flight`, the plan's clock reads 0; None: not in this flight.
 
     That is where the departure from w_I is most like the predicted one, at equal times, from a
-    second before it until 20 m away (or half as far as the plan goes). What the flight does later
-    does not move the clock: who pauses on the way is late from there on.
+    second before it until 20 m away (or half as far as the plan goes); or, if that is nearer, like
+    the plan's own, which setpoints follow. What the flight does later does not move the clock: who
+    pauses on the way is late from there on.
+    """
+    lines = (predicted, planned_line(solution))
+    found = filter(None, (_departure(solution, line, flight) for line in lines))
+    return min(found, default=(0.0, None))[1]
+
+
+def _departure(solution: Solution, line: Line, flight: Line) -> tuple[float, float] | None:
+    """Return the departure of `flight` that is most like that of `line`, as `plan_start` has it.
+
+    How far it is from it, as a share of the way looked at, and when the clock of `line` read 0.
     """
     begin = set_out(solution.t, solution.w, solution.plan) - float(solution.t[0]) - MOST_LEAD
-    begin = max(begin - _BEFORE, float(predicted.t[0]))
-    after = predicted.t > begin
-    away = lengths(predicted.w[after] - solution.w[0])
+    begin = max(begin - _BEFORE, float(line.t[0]))
+    after = line.t > begin
+    away = lengths(line.w[after] - solution.w[0])
     reach = min(_REACH, float(away.max()) / 2)
-    end = float(predicted.t[after][np.argmax(away >= reach)])
+    end = float(line.t[after][np.argmax(away >= reach)])
     t = np.linspace(begin, end, max(2, round((end - begin) / 0.2)))
-    w = positions_at(t, *predicted)
+    w = positions_at(t, *line)
 
     def apart(starts: Real) -> Real:
         at = positions_at((starts[:, None] + t).ravel(), *flight).reshape(len(starts), *w.shape)
@@ -124,7 +136,8 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     fine = np.clip(near + np.arange(-2 * _COARSE, 2 * _COARSE, _FINE), first, last)
     errors = apart(fine)
     best = int(np.argmin(errors))
-    return float(fine[best]) if errors[best] <= (_ALIKE * reach) ** 2 else None
+    off = math.sqrt(errors[best]) / reach
+    return (off, float(fine[best])) if off <= _ALIKE else None
 
 
 def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:

@@ -71,6 +71,18 @@ def test_the_departure_is_found_whatever_comes_later(
     assert exact == pytest.approx(begun, abs=0.05)
 
 
+def test_a_flight_by_setpoints_is_on_the_clock_of_the_plan_and_not_of_its_mission() -> None:
+    solution = solved()
+    line = planned_line(solution)
+    mission = Line(line.t, np.stack([np.interp(line.t - 0.4, line.t, x) for x in line.w.T], axis=1))
+    for followed in (line, mission):
+        flight = flown(solution, 200.0)
+        w = np.stack([np.interp(flight.t - 200.0, followed.t, x) for x in followed.w.T], axis=1)
+        near = (flight.t > 195.0) & (flight.t < 230.0)
+        found = plan_start(solution, mission, Line(flight.t[near], w[near]))
+        assert found == pytest.approx(200.0, abs=0.05)
+
+
 def test_what_is_not_the_flight_is_not_taken_for_it() -> None:
     solution, line = solved(), planned_line(solved())
     flight = flown(solution, 200.0)

@@ -2,8 +2,22 @@
 
 import numpy as np
 import pytest
-from judged import COPTER, LAND, PX4, Given, at, check, flown, having, mission, track
+from judged import (
+    COPTER,
+    LAND,
+    PLANE,
+    PX4,
+    Given,
+    at,
+    check,
+    flown,
+    having,
+    mission,
+    raw,
+    track,
+)
 
+from faao_mav.mission.item import Home
 from faao_mav.plan.energy import Battery
 from faao_mav.validate import Limits
 from faao_mav.validate.energy import EnergyUse
@@ -77,6 +91,13 @@ CASES = [
         1,
         Given(flown(), track=flight((0, 0, 0), (0, 100.9, 9)), limits=Limits(max_distance=100)),
     ),
+    ("too-far", Given(flown(at(0, 100_100, 30))), 2, Given(flown(at(0, 99_900, 30)))),
+    (
+        "too-far",
+        Given(flown(at(0, 1_100_000, 30)), PLANE),
+        2,
+        Given(flown(at(0, 500_000, 30)), PLANE),
+    ),
     ("far-from-home", Given(flown(at(0, 10_001, 30))), 2, Given(flown(at(0, 9_999, 30)))),
     (
         "long-leg",
@@ -110,3 +131,9 @@ def test_the_rule_speaks_and_is_silent(
     rule: str, trips: Given, item: int | None, passes: Given
 ) -> None:
     check(rule, trips, item, passes)
+
+
+def test_exchanged_coordinates_are_named() -> None:
+    home = Home(47.4, 8.5, 400.0)
+    (found,) = Given(mission(raw(8.5012, 47.4003, 30), home=home)).by("too-far")
+    assert found.action == "latitude and longitude look exchanged: correct them"

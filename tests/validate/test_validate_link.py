@@ -28,6 +28,12 @@ CASES = [
         None,
         Given(flown(), link=replace(LINK, planned_delivered=2e-3, predicted_delivered=2e-3)),
     ),
+    (
+        "link-elsewhere",
+        Given(flown(), link=replace(LINK, path_error=7e6, away=7e6)),
+        None,
+        Given(flown(), link=replace(LINK, path_error=7e3, away=1e3)),
+    ),
     ("radio-values", noisy(91), None, noisy(-91)),
     ("radio-values", noisy(-174), None, noisy(-140)),
     ("radio-values", noisy(-110, bandwidth_mhz=20), None, noisy(-101, bandwidth_mhz=20)),
@@ -101,3 +107,8 @@ def test_a_doubtful_value_names_the_likely_slip() -> None:
     assert list(told.values()) == ["did you mean -91?"]
     density = dict(doubtful_values(radio(**{"ground_user.noise_dbm": -174, "bandwidth_mhz": 20})))
     assert list(density.values()) == ["if it is a density (dBm/Hz), give -101.0 for the band"]
+
+
+def test_of_a_plan_of_another_place_nothing_else_is_said() -> None:
+    far = replace(LINK, path_error=7e6, away=7e6, rms_position_error=7e6, predicted_delivered=0.0)
+    assert [each.rule for each in Given(flown(), link=far).findings()] == ["link-elsewhere"]
