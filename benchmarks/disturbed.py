@@ -58,6 +58,7 @@ class Disturbance:
 
     case: str
     transport: Transport | None = None
+    listens: bool = True
     silent_until: float = 0.0
 
     def opened(self, text: str) -> "Disturbance | FaultyTransport":
@@ -65,15 +66,15 @@ class Disturbance:
         self.transport = open_transport(text)
         return FaultyTransport(self, FAULTS[self.case]) if self.case in FAULTS else self
 
-    def read(self, timeout: float) -> list[bytes]:
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
         assert self.transport is not None
         arrived = self.transport.read(timeout)
         return [] if time.monotonic() < self.silent_until else arrived
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, to: str | None = None) -> None:
         assert self.transport is not None
         if time.monotonic() >= self.silent_until:
-            self.transport.write(data)
+            self.transport.write(data, to)
 
     def close(self) -> None:
         assert self.transport is not None

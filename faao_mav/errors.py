@@ -45,6 +45,10 @@ class LinkError(FaaoError):
     """A vehicle cannot be reached, or did not do what was asked."""
 
 
+class HangUp(KeyboardInterrupt):
+    """The terminal has gone, and with it whoever could interrupt a second time."""
+
+
 def quote(value: object) -> str:
     """Return `value` as a message shows it, in one line, cut short.
 

@@ -70,7 +70,8 @@ def autopilot(
 
     In GUIDED and Offboard it follows setpoints.
 
-    It ends with Ctrl-C. Exit status: 0 ended; 1 it cannot listen there; 2 unusable arguments.
+    It ends with Ctrl-C. Exit status: 0 ended; 1 the other end of tcp: is not there; 2 unusable
+    arguments, or it cannot listen there.
     """
     from faao_mav.mavlink.faults import Faults
     from faao_mav.mavlink.mock import MockAutopilot, behaviour_of

@@ -10,6 +10,7 @@ from faao_mav.cli.shared import (
     VEHICLE,
     Component,
     Log,
+    OwnSystem,
     SigningKey,
     System,
     Wait,
@@ -25,11 +26,14 @@ def download(
     out: Annotated[Path, option("MISSION", "Write the mission.")],
     system: System = None,
     component: Component = None,
+    own_system: OwnSystem = None,
     log: Log = None,
     timeout: Wait = 10.0,
     signing_key: SigningKey = None,
 ) -> None:
     """Download the mission, fence and rally points of a vehicle.
+
+    A fence or rally points that do not come are told, and the rest is written.
 
     Exit status: 0 done; 1 there is no such vehicle, or a list did not come whole; 2 unusable
     arguments.
@@ -44,25 +48,30 @@ def download(
     check_suffix(out)
     check_writable(out)
     with transfer_progress(shown=sys.stderr.isatty()) as observe:
-        found, mission = holdings(
+        held = holdings(
             source,
             system=system,
             component=component,
+            own_system=own_system,
             log=log,
             signing_key=signing_key,
             wait=timeout,
             observe=observe,
             note=note,
         )
+    found, mission = held.vehicle, held.mission
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
     written = write_mission(mission, out, target)
     for line in losses_in(mission, out, target):
         note(f"{out}: {line}")
-    fence = len(mission.fence.polygons) + len(mission.fence.circles)
+    areas = len(mission.fence.polygons) + len(mission.fence.circles)
+    told = {"fence": f"{areas} fence areas", "rally points": f"{len(mission.rally)} rally points"}
+    told |= {part: f"{part} not read" for part in mission.unread}
     typer.echo(f"vehicle      {found}")
-    typer.echo(
-        f"mission      {len(mission.items)} items, {fence} fence areas, "
-        f"{len(mission.rally)} rally points"
-    )
+    typer.echo(f"mission      {len(mission.items)} items, {', '.join(told.values())}")
     for path in written:
         typer.echo(f"written      {path}")
+    for problem in held.problems:
+        note(problem)
+    if held.problems:
+        raise typer.Exit(1)

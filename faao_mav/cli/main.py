@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,6 +25,7 @@ from faao_mav.cli.shared import note
 from faao_mav.cli.study import study
 from faao_mav.cli.upload import upload
 from faao_mav.cli.validate import validate
+from faao_mav.errors import HangUp
 
 _ALLOCATIONS = 50_000
 """Allocations between two collections of garbage, 700 in Python by default.
@@ -115,16 +117,26 @@ def pin_kernels(processors: Path = Path("/proc/cpuinfo")) -> None:
             os.environ["OPENBLAS_CORETYPE"] = _KERNELS
 
 
+def _hang_up(*_: object) -> None:
+    raise HangUp
+
+
 def run() -> None:
     """Entry point of `faao-mission`.
 
     A character that standard output cannot show is shown as its code. Where nothing can be
-    written there, the exit status is 2, or 1 where the reader has gone. SIGTERM, and SIGHUP unless
-    it is ignored, interrupt as the keyboard does: a transfer is cancelled.
+    written there, the exit status is 2, or 1 where the reader has gone. SIGTERM interrupts as the
+    keyboard does: a transfer is cancelled. So does SIGHUP, unless it is ignored, but a mission that
+    is under way is left alone: the terminal has gone.
     """
-    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+    handlers: dict[str, Callable[..., object]] = {
+        "SIGTERM": signal.default_int_handler,
+        "SIGHUP": _hang_up,
+    }
+    for name, handler in handlers.items():
+        number = getattr(signal, name, signal.SIGTERM)
         if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
+            signal.signal(number, handler)
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # small matrices: more threads wait and spin
     pin_kernels()
     gc.set_threshold(_ALLOCATIONS)

@@ -37,6 +37,9 @@ AllowArmed: TypeAlias = Annotated[
 Component: TypeAlias = Annotated[
     int | None, option("N", "The autopilot's component number.", min=1, max=255)
 ]
+OwnSystem: TypeAlias = Annotated[
+    int | None, option("N", "The system number to speak as; without: 246.", min=1, max=255)
+]
 Radio: TypeAlias = Annotated[
     str | None, option("udp:HOST:PORT", "Tell radios the precoders of each slot, in JSON lines.")
 ]

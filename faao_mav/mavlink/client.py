@@ -9,12 +9,19 @@ from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from faao_mav.errors import InputError, LinkError
-from faao_mav.mavlink.discover import AskAlive, AskHome, Discovery, FoundVehicle, choose
+from faao_mav.mavlink.discover import (
+    SETTLE,
+    AskAlive,
+    AskHome,
+    Discovery,
+    FoundVehicle,
+    choose,
+)
 from faao_mav.mavlink.link import Observe, WireLink
 from faao_mav.mavlink.machine import Machine, Script
-from faao_mav.mavlink.protocol import MavResult, MissionType
+from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.signing import Verdict, read_signing, remember
-from faao_mav.mavlink.transfer.exchange import Peer
+from faao_mav.mavlink.transfer.exchange import Outcome, Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.mavlink.transfer.session import (
     Job,
@@ -25,8 +32,10 @@ from faao_mav.mavlink.transfer.session import (
     upload_parts,
     what_is_left,
 )
+from faao_mav.mavlink.transport import parse_connection
 from faao_mav.mavlink.wire_items import mission_of, wire_items
 from faao_mav.mission.item import Mission
+from faao_mav.vehicle.ardupilot import ARDUPILOT
 
 T = TypeVar("T")
 
@@ -51,20 +60,35 @@ class LinkOptions(TypedDict, total=False):
     """How to talk to a vehicle: what `upload`, `download` and `clear` have in common.
 
     `system` and `component` choose among several autopilots; the vehicle is found by its heartbeat
-    within `wait` seconds (10). `log` is a `.tlog` file to write, `signing_key` a file with the key
-    for signed packets, beside which the time of the last one is kept. `observe` is told what is
-    going on, how much of it is done, and of how much; `note`, in words, what goes wrong beside it:
-    a log that ends early. Without `note` that is a Python warning.
+    within `wait` seconds (10). `own_system` is the number to speak as, for a vehicle that takes
+    orders of a certain one only (`GROUND_STATION` has the usual one). `log` is a `.tlog` file to
+    write, `signing_key` a file with the key for signed packets, beside which the time of the last
+    one is kept. `observe` is told what is going on, how much of it is done, and of how much;
+    `note`, in words, what goes wrong beside it: a log that ends early, packets that do not count.
+    Without `note` that is a Python warning.
     """
 
     system: int | None
     component: int | None
+    own_system: int | None
     log: Path | None
     signing_key: Path | None
     wait: float
     timeouts: Timeouts | None
     observe: Observe | None
     note: Callable[[str], object] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Holdings:
+    """What a vehicle holds, as far as it could be read; `problems` say why a list is missing.
+
+    A missing fence or missing rally points are among `Mission.unread`.
+    """
+
+    vehicle: FoundVehicle
+    mission: Mission
+    problems: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,27 +135,33 @@ def upload(
 
 
 def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
-    """Return the mission, fence and rally points of the vehicle at `connection`: see `holdings`."""
-    return holdings(connection, **options)[1]
+    """Return the mission, fence and rally points of the vehicle at `connection`.
+
+    See `holdings`; raises `LinkError` where one of them does not come whole, too.
+    """
+    found = holdings(connection, **options)
+    if found.problems:
+        raise LinkError(f"{connection}: {found.problems[0]}")
+    return found.mission
 
 
-def holdings(connection: str, **options: Unpack[LinkOptions]) -> tuple[FoundVehicle, Mission]:
+def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     """Return the vehicle at `connection`, and the mission, fence and rally points that it holds.
 
     Home is ArduPilot's item 0, or what PX4 says when asked. `options` are those of `LinkOptions`.
-    Raises `LinkError` if there is no such vehicle or a list does not come whole; a vehicle that
-    has no fence or rally points at all is one that has none stored.
+    Raises `LinkError` if there is no such vehicle or its mission does not come whole; a vehicle
+    that has no fence or rally points at all is one that has none stored.
     """
-    with Session(connection, options) as session:
+    with Session(connection, options, knocks=True) as session:
         peer = session.peer
         lists = session.run(Script(download_lists(tuple(MissionType), peer, session.timeouts)))
-        for part, outcome in lists.missing.items():
-            absent = part is not MissionType.MISSION and outcome.result in _ABSENT
-            if not absent:
-                reason = "the vehicle stopped answering"
-                if outcome.result is not None:
-                    reason = f"refused: {peer.manners.meaning(outcome.result)}"
-                raise LinkError(f"{connection}: {part.title}: not read: {reason}")
+        missing = {
+            part: session.not_read(part, outcome)
+            for part, outcome in lists.missing.items()
+            if not (part is not MissionType.MISSION and session.has_none(outcome))
+        }
+        if MissionType.MISSION in missing:
+            raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
         try:
             mission = mission_of(lists.items, peer.vehicle)
             if mission.home is None:
@@ -141,7 +171,8 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> tuple[FoundVehi
             raise LinkError(
                 f"{connection}: what the vehicle holds is no mission: {error}"
             ) from None
-    return session.found, mission
+    mission = replace(mission, unread=tuple(part.title for part in missing))
+    return Holdings(session.found, mission, tuple(missing.values()))
 
 
 def clear(
@@ -163,9 +194,12 @@ def clear(
 
 
 class Session:
-    """A link on which the vehicle has been found; to be used in a `with` statement."""
+    """A link to the one vehicle that has been found; to be used in a `with` statement.
 
-    def __init__(self, connection: str, options: LinkOptions) -> None:
+    With `knocks` one is woken up that waits for a heartbeat on a serial line: see `Discovery`.
+    """
+
+    def __init__(self, connection: str, options: LinkOptions, *, knocks: bool = False) -> None:
         if unknown := set(options) - set(LinkOptions.__annotations__):
             known = ", ".join(LinkOptions.__annotations__)
             raise TypeError(f"there is no option {min(unknown)!r}; expected some of {known}")
@@ -174,15 +208,31 @@ class Session:
         self.timeouts = options.get("timeouts") or Timeouts()
         self.started = time.monotonic()
         self._signing = None if self._key_file is None else read_signing(self._key_file)
-        self.link = WireLink(connection, signing=self._signing, log=options.get("log"))
+        own = options.get("own_system") or GROUND_STATION.system
+        self.link = WireLink(
+            connection,
+            signing=self._signing,
+            log=options.get("log"),
+            address=Address(own, GROUND_STATION.component),
+            note=self._note,
+        )
         try:
             names = options.get("system"), options.get("component")
             wait = options.get("wait", 10.0)
-            found = self.run(Discovery(*names, patience=wait, boot=self.timeouts.boot))
+            discovery = Discovery(
+                *names,
+                patience=wait,
+                settle=SETTLE if self.link.listens else None,
+                boot=self.timeouts.boot,
+                knocks=knocks and parse_connection(connection).kind == "serial",
+            )
+            found = self.run(discovery)
             if self._signing is not None and not found:
                 self._check_heard(connection)
-            self.found = choose(found, connection, *names, wait)
-            if self._signing is not None:
+            others = discovery.others.values()
+            self.found = choose(found, connection, *names, wait, others)
+            self.link.bind(self.found.address, self.found.origin)
+            if self._signing is not None or self.link.speaks_old(self.found.address):
                 self._check_alive(connection)
         except BaseException:
             self.close()
@@ -204,19 +254,51 @@ class Session:
             self._note(self.link.log.failure)
 
     def _check_alive(self, connection: str) -> None:
-        """Raise `LinkError` where nobody answers what no recording can."""
+        """Raise `LinkError` where nobody answers what no recording can, nor who cannot read it."""
         number, patience = secrets.randbits(62), self.timeouts.silence
-        if not self.run(AskAlive(self.found.address, number, patience)):
-            raise LinkError(
-                f"{connection}: {self.found}: no answer to a question that was never asked before "
-                "(TIMESYNC): is the vehicle there, or a recording of it?"
+        if self.run(AskAlive(self.found.address, number, patience)):
+            return
+        why = (
+            "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "
+            "or a recording of it?"
+        )
+        if self.link.speaks_old(self.found.address):
+            why = (
+                "it speaks MAVLink 1 only, and does not answer MAVLink 2: set its port to MAVLink "
+                "2 (ArduPilot: SERIALn_PROTOCOL 2; PX4: MAV_PROTO_VER 2)"
             )
+        raise LinkError(f"{connection}: {self.found}: {why}")
 
     def _check_heard(self, connection: str) -> None:
         """Raise `LinkError` where packets come that this key does not vouch for."""
         for verdict, text in _PASSED_OVER.items():
             if verdict in self.link.heard:
                 raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
+
+    def has_none(self, outcome: Outcome) -> bool:
+        """Tell whether the vehicle has no such list at all, by what came of reading it.
+
+        Over MAVLink 1 ArduPilot says so of lists that it has.
+        """
+        return outcome.result in _ABSENT and not self.link.speaks_old(self.found.address)
+
+    def not_read(self, part: MissionType, outcome: Outcome) -> str:
+        """Return in words why a list was not read."""
+        why = "the vehicle stopped answering"
+        if outcome.result is not None:
+            why = f"refused: {self.peer.manners.meaning(outcome.result)}"
+        elif part is MissionType.MISSION:
+            why += self.why_silent()
+        return f"{part.title}: not read: {why}"
+
+    def why_silent(self) -> str:
+        """Return why the vehicle may never answer, in words; "" where nothing hints at it."""
+        if self._signing is None and "signed" in self.link.heard:
+            return "; it signs its packets, and may want them signed: --signing-key"
+        if self.found.family == ARDUPILOT:
+            only = "only MAV_GCS_SYSID (SYSID_ENFORCE, MAV_OPTIONS)"
+            return f"; where it takes orders of {only}, give that number: --own-system"
+        return ""
 
     def run(self, machine: Machine[T]) -> T:
         """Run `machine` to its end and return the outcome."""
@@ -231,7 +313,7 @@ def _change(
     options: LinkOptions,
 ) -> UploadReport:
     """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
-    with Session(connection, options) as session:
+    with Session(connection, options, knocks=True) as session:
         if session.found.armed and not allow_armed:
             raise LinkError(
                 f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
@@ -243,13 +325,12 @@ def _change(
         except LinkError as error:
             raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
         seconds = time.monotonic() - session.started
-        lacks_key = options.get("signing_key") is None and "signed" in session.link.heard
-        problems = _problems(reports, session.peer, mission, lacks_key)
+        problems = _problems(reports, session.peer, mission, session.why_silent())
     return UploadReport(session.found, reports, seconds, problems)
 
 
 def _problems(
-    reports: Sequence[PartReport], peer: Peer, mission: Mission, lacks_key: bool
+    reports: Sequence[PartReport], peer: Peer, mission: Mission, why_silent: str
 ) -> tuple[str, ...]:
     limit = 0 if peer.vehicle is None else peer.vehicle.dialect.items.sure
 
@@ -261,10 +342,8 @@ def _problems(
         return f"item {item} (command {mission.items[item].command})"
 
     failed = [report for report in reports if not report.verified]
-    problems = [
+    return tuple(
         explain(report, peer, limit, describe if report.part is MissionType.MISSION else str)
+        + (why_silent if report.verdict == "silent" and report.item is None else "")
         for report in failed
-    ]
-    if lacks_key and any(report.verdict == "silent" for report in failed):
-        problems.append("the vehicle signs its packets, and may want them signed: --signing-key")
-    return tuple(problems)
+    )

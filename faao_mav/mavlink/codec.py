@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from faao_mav.mavlink import messages
-from faao_mav.mavlink.framing import Framer, is_signed, payload_of, sender_of
+from faao_mav.mavlink.framing import Framer, is_signed, payload_of, sender_of, version_of
 from faao_mav.mavlink.messages import (
     Envelope,
     Message,
@@ -49,7 +49,8 @@ class Codec:
 
     With `signing` packets are signed, and those passed over that are not, or that are old. `heard`
     has what the messages known here were, whether or not they were passed over: without `signing`,
-    "signed" and "unsigned" are about whether there is a signature.
+    "signed" and "unsigned" are about whether there is a signature. `versions` has the latest
+    MAVLink that each sender has spoken, 1 or 2.
     """
 
     def __init__(self, address: Address, signing: Signing | None = None) -> None:
@@ -57,6 +58,7 @@ class Codec:
 
         self.address, self._signing = address, signing
         self.heard: set[Verdict] = set()
+        self.versions: dict[Address, int] = {}
         self._dialect: Any = development
         self._reader: Any = development.MAVLink(None)
         self._mav: Any = development.MAVLink(None, address.system, address.component)
@@ -72,17 +74,19 @@ class Codec:
         self._mav.seq = (self._mav.seq + 1) % 256
         return packet
 
-    def parse(self, data: bytes) -> list[Packet]:
-        """Return the packets in `data`; what is damaged or cut off is passed over."""
-        found = [self._parse_one(packet) for packet in Framer().feed(data)]
+    def parse(self, data: bytes, origin: str = "") -> list[Packet]:
+        """Return the packets in `data`, from `origin`; damaged or cut off ones are passed over."""
+        found = [self._parse_one(packet, origin) for packet in Framer().feed(data)]
         return [packet for packet in found if packet is not None]
 
-    def _parse_one(self, raw: bytes) -> Packet | None:
+    def _parse_one(self, raw: bytes, origin: str) -> Packet | None:
         try:
             message = self._reader.decode(bytearray(raw))
         except self._dialect.MAVError:
             return None
-        verdict, envelope = self._judge(raw), self._envelope(message, sender_of(raw))
+        sender = sender_of(raw)
+        verdict, envelope = self._judge(raw), self._envelope(message, sender, origin)
+        self.versions[sender] = max(version_of(raw), self.versions.get(sender, 1))
         if envelope is not None:
             self.heard.add(verdict)
         if self._signing is not None and verdict != "signed":
@@ -112,7 +116,7 @@ class Codec:
         payload = known + beyond.to_bytes(4, "little")
         return bytes(packet._pack(self._mav, packet.crc_extra, payload))
 
-    def _envelope(self, packet: Any, sender: Address) -> Envelope | None:
+    def _envelope(self, packet: Any, sender: Address, origin: str) -> Envelope | None:
         name = packet.get_type()
         kind = _KINDS.get(name) or _LEGACY.get(name)
         if kind is None:
@@ -133,7 +137,7 @@ class Codec:
                         return None
                 case plain:
                     values[plain] = _text_or_number(getattr(packet, plain))
-        return Envelope(sender, kind(**values))
+        return Envelope(sender, kind(**values), origin)
 
 
 def _item_values(item: WireItem, *, exact: bool) -> dict[str, Any]:

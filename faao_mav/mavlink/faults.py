@@ -7,7 +7,7 @@ from itertools import count
 from random import Random
 
 from faao_mav.mavlink.framing import message_id
-from faao_mav.mavlink.transport import Transport
+from faao_mav.mavlink.transport import Origin, Transport
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,47 +98,51 @@ class FaultyTransport:
 
     def __init__(self, inner: Transport, faults: Faults) -> None:
         self._inner = inner
+        self.listens = inner.listens
         self._channels = {way: Channel(faults, way) for way in ("in", "out")}
-        self._queues: dict[str, list[tuple[float, int, bytes]]] = {"in": [], "out": []}
+        self._queues: dict[str, list[tuple[float, int, bytes, Origin | None]]] = {
+            "in": [],
+            "out": [],
+        }
         self._order = count()
         self._started = time.monotonic()
 
-    def read(self, timeout: float) -> list[bytes]:
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         """Return what has arrived by now, or within `timeout` seconds."""
         self._flush()
         end = self._now() + timeout
         waiting = [queue[0][0] for queue in self._queues.values() if queue]
-        for data in self._inner.read(min([end, *waiting]) - self._now()):
-            self._push("in", data)
+        for data, origin in self._inner.read(min([end, *waiting]) - self._now()):
+            self._push("in", data, origin)
         self._flush()
-        return self._due("in")
+        return [(data, origin or "") for data, origin in self._due("in")]
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, to: Origin | None = None) -> None:
         """Send `data` as the faults allow: late, damaged, twice or not at all."""
-        self._push("out", data)
+        self._push("out", data, to)
         self._flush()
 
     def close(self) -> None:
         """Close the transport beneath; what was sent is under way, and arrives early."""
         try:
-            for _, _, data in sorted(self._queues["out"]):
-                self._inner.write(data)
+            for _, _, data, to in sorted(self._queues["out"]):
+                self._inner.write(data, to)
         finally:
             self._inner.close()
 
     def _now(self) -> float:
         return time.monotonic() - self._started
 
-    def _push(self, way: str, data: bytes) -> None:
+    def _push(self, way: str, data: bytes, where: Origin | None) -> None:
         for when, arriving in self._channels[way].carry(data, self._now()):
-            heapq.heappush(self._queues[way], (when, next(self._order), arriving))
+            heapq.heappush(self._queues[way], (when, next(self._order), arriving, where))
 
-    def _due(self, way: str) -> list[bytes]:
+    def _due(self, way: str) -> list[tuple[bytes, Origin | None]]:
         queue, now, due = self._queues[way], self._now(), []
         while queue and queue[0][0] <= now:
-            due.append(heapq.heappop(queue)[2])
+            due.append(heapq.heappop(queue)[2:])
         return due
 
     def _flush(self) -> None:
-        for data in self._due("out"):
-            self._inner.write(data)
+        for data, to in self._due("out"):
+            self._inner.write(data, to)

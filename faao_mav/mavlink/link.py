@@ -3,15 +3,16 @@
 import os
 import struct
 import time
+from collections import deque
 from collections.abc import Callable, Sequence, Set
 from io import FileIO
 from pathlib import Path
 from typing import TypeAlias, TypeVar
 
-from faao_mav.errors import InputError, LinkError
+from faao_mav.errors import HangUp, InputError, LinkError
 from faao_mav.files import check_writable
-from faao_mav.mavlink.codec import Codec
-from faao_mav.mavlink.framing import message_id
+from faao_mav.mavlink.codec import Codec, Packet
+from faao_mav.mavlink.framing import message_id, sender_of
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import Heartbeat, Message
 from faao_mav.mavlink.protocol import (
@@ -22,7 +23,7 @@ from faao_mav.mavlink.protocol import (
     MavState,
 )
 from faao_mav.mavlink.signing import Signing, Verdict
-from faao_mav.mavlink.transport import Transport, open_transport
+from faao_mav.mavlink.transport import Origin, Transport, open_transport
 
 T = TypeVar("T")
 
@@ -30,7 +31,15 @@ Observe: TypeAlias = Callable[[str, int, int], object]
 """Told what is going on, how much of it is done, and of how much."""
 
 _BEAT = 1.0
-"""Seconds between two heartbeats: what the MAVLink guide asks for."""
+"""Seconds between two heartbeats, what the MAVLink guide asks for, and between two looks at how
+far a machine is."""
+
+_ECHOED = 64
+"""Packets of this end that are known again if they come back. Chosen: seconds of the quickest
+exchange; few, for another station of the same number sends the same heartbeat once in 256."""
+
+_SHOWN = 3
+"""Other origins of the vehicle's packets that are told, at most; chosen."""
 
 _SETUP_SIGNING = 256
 """The number of the message SETUP_SIGNING."""
@@ -83,9 +92,12 @@ def _open_for_owner(path: str, flags: int) -> int:
 
 
 class WireLink:
-    """A ground station's end of a link: runs machines, and says once a second that it is there.
+    """One end of a link: runs machines on a transport.
 
-    `log` is the exchange in a file, if there is to be one. Use the link in a `with` statement.
+    What a machine answers goes where it was asked from. What it says by itself goes to everybody,
+    and once the link is `bound` to a vehicle everything goes to that alone. `log` is the exchange
+    in a file, if there is to be one; `note` is told what is odd. Use the link in a `with`
+    statement.
     """
 
     def __init__(
@@ -95,11 +107,14 @@ class WireLink:
         signing: Signing | None = None,
         log: Path | None = None,
         address: Address = GROUND_STATION,
+        note: Callable[[str], object] = lambda _: None,
     ) -> None:
-        self.address = address
+        self.address, self._note = address, note
         self._codec = Codec(address, signing)
         self.log = None if log is None else Tlog(log)
-        self._next_beat = 0.0
+        self._vehicle: tuple[Address, Origin] | None = None
+        self._sent: deque[bytes] = deque(maxlen=_ECHOED)
+        self._others: set[Origin] = set()
         self._transport = open_transport(connection) if isinstance(connection, str) else connection
 
     def __enter__(self) -> "WireLink":
@@ -115,9 +130,27 @@ class WireLink:
             self.log.close()
 
     @property
+    def listens(self) -> bool:
+        """Whether anybody may send here: several vehicles, of one number perhaps."""
+        return self._transport.listens
+
+    @property
     def heard(self) -> Set[Verdict]:
         """What signatures the packets of others had, as `Codec.heard`."""
         return self._codec.heard
+
+    def speaks_old(self, sender: Address) -> bool:
+        """Tell whether all that was heard of `sender` is MAVLink 1."""
+        return self._codec.versions.get(sender) == 1
+
+    def bind(self, vehicle: Address, origin: Origin) -> None:
+        """Talk to `vehicle` at `origin` alone from now on.
+
+        What comes from elsewhere under its number is another vehicle's, or its own after its
+        address has changed, which cannot be told apart: it is noted, and does not count. Nor do
+        heartbeats from there that are not an autopilot's.
+        """
+        self._vehicle = vehicle, origin
 
     def run(self, machine: Machine[T], observe: Observe | None = None) -> T:
         """Run `machine` to its end and return the outcome.
@@ -136,27 +169,35 @@ class WireLink:
             raise LinkError(f"interrupted {text}: cancelled") from None
 
     def _run(self, machine: Machine[T], observe: Observe | None) -> T:
-        self._beat(time.monotonic())
         self.begin(machine)
         while (outcome := machine.outcome) is None:
-            self.step(machine, self._next_beat)
-            self._beat(time.monotonic())
+            self.step(machine, time.monotonic() + _BEAT)
             if observe is not None:
                 observe(*machine.progress)
         return outcome
 
-    def watch(self, machine: Machine[T], observe: Callable[[], object]) -> T:
+    def watch(self, machine: Machine[T], observe: Callable[[], object], *, beats: bool) -> T:
         """Run `machine` to its end and return the outcome; `observe` is called after every step.
 
-        Interrupted from the keyboard the machine is told to cancel, and is run on until it ends.
+        With `beats` this end says once a second that it is a ground station. Interrupted from the
+        keyboard the machine is told to cancel, and is run on until it ends; likewise `hang_up`
+        when the terminal has gone, or `observe` cannot tell anybody anything any more.
         """
-        self._beat(time.monotonic())
+        next_beat = time.monotonic()
         self.begin(machine)
         while (outcome := machine.outcome) is None:
             try:
-                self.step(machine, self._next_beat)
-                self._beat(time.monotonic())
-                observe()
+                if beats and time.monotonic() >= next_beat:
+                    next_beat = time.monotonic() + _BEAT
+                    self._send([_BEING_THERE])
+                self.step(machine, time.monotonic() + _BEAT if not beats else next_beat)
+                try:
+                    observe()
+                except OSError:
+                    raise HangUp from None
+            except HangUp:
+                observe = _tell_nobody
+                self._send(machine.hang_up(time.monotonic()))
             except KeyboardInterrupt:
                 self._send(machine.cancel(time.monotonic()))
         return outcome
@@ -169,23 +210,47 @@ class WireLink:
         """Feed `machine` with what arrives first: packets, its deadline or the time `until`."""
         due = machine.deadline
         until = until if due is None else min(due, until)
-        for data in self._transport.read(until - time.monotonic()):
-            for packet in self._codec.parse(data):
+        for data, origin in self._transport.read(until - time.monotonic()):
+            if data in self._sent:
+                continue  # an echo
+            for packet in self._codec.parse(data, origin):
+                if not self._counts(packet, origin):
+                    continue
                 if self.log is not None:
                     self.log.write(packet.raw, received=True)
                 if packet.envelope is not None and machine.outcome is None:
-                    self._send(machine.on(packet.envelope, time.monotonic()))
+                    self._send(machine.on(packet.envelope, time.monotonic()), origin)
         if machine.outcome is None:
             self._send(machine.tick(time.monotonic()))
 
-    def _beat(self, now: float) -> None:
-        if now >= self._next_beat:
-            self._next_beat = now + _BEAT
-            self._send([Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)])
+    def _counts(self, packet: Packet, origin: Origin) -> bool:
+        """Tell whether `packet` is not what only looks like the vehicle's: see `bind`."""
+        if self._vehicle is None or sender_of(packet.raw) != self._vehicle[0]:
+            return True
+        vehicle, own = self._vehicle
+        if origin != own:
+            if origin not in self._others and len(self._others) < _SHOWN:
+                self._others.add(origin)
+                self._note(
+                    f"packets of {vehicle} come from {origin} too, not only from {own}: they do "
+                    "not count. If the vehicle's address has changed, begin again"
+                )
+            return False
+        message = None if packet.envelope is None else packet.envelope.message
+        return not isinstance(message, Heartbeat) or message.of_autopilot
 
-    def _send(self, messages: Sequence[Message]) -> None:
+    def _send(self, messages: Sequence[Message], to: Origin | None = None) -> None:
         for message in messages:
             packet = self._codec.pack(message)
             if self.log is not None:
                 self.log.write(packet, received=False)
-            self._transport.write(packet)
+            self._sent.append(packet)
+            self._transport.write(packet, to if self._vehicle is None else self._vehicle[1])
+
+
+_BEING_THERE = Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)
+"""What a ground station says once a second."""
+
+
+def _tell_nobody() -> None:
+    """Do without those who were told."""

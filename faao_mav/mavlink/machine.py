@@ -52,6 +52,10 @@ class Machine(ABC, Generic[T]):
         """Give up."""
         return ()
 
+    def hang_up(self, now: float) -> Sequence[Message]:
+        """End where nobody can be told any more: give up."""
+        return self.cancel(now)
+
     @abstractmethod
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Answer what arrived before the outcome."""

@@ -8,7 +8,7 @@ wire, so that what was sent and what was found can be compared without rounding.
 from dataclasses import dataclass
 from typing import dataclass_transform
 
-from faao_mav.mavlink.protocol import ARMED, PREARM_CHECK, Address
+from faao_mav.mavlink.protocol import AIRFRAMES, ARMED, NO_AUTOPILOT, PREARM_CHECK, Address
 from faao_mav.mission.item import Params
 
 
@@ -196,8 +196,13 @@ class Heartbeat(Message):
 
     @property
     def armed(self) -> bool:
-        """Whether the motors may turn."""
+        """Whether the motors may turn, if it is an autopilot's."""
         return bool(self.base_mode & ARMED)
+
+    @property
+    def of_autopilot(self) -> bool:
+        """Whether it is an aircraft's autopilot that says this, by its own account."""
+        return self.type in AIRFRAMES and self.autopilot != NO_AUTOPILOT
 
 
 class Timesync(Message):
@@ -311,7 +316,8 @@ class HomePosition(Spot):
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """A message and who sent it."""
+    """A message, who sent it, and where it came from: the `Origin` of a transport."""
 
     sender: Address
     message: Message
+    origin: str = ""

@@ -5,7 +5,7 @@ from dataclasses import astuple, dataclass, field, replace
 from types import MappingProxyType
 
 from faao_mav.mavlink.messages import Heartbeat
-from faao_mav.vehicle import VehicleType
+from faao_mav.vehicle import AutopilotFamily, VehicleType
 from faao_mav.vehicle.ardupilot import ARDUPILOT
 from faao_mav.vehicle.px4 import PX4
 from faao_mav.vehicle.vehicle_type import FenceAction
@@ -32,6 +32,18 @@ def px4_mode(main: int, sub: int) -> int:
     if not (0 <= main < 256 and 0 <= sub < 256):
         return 0
     return main << 16 | sub << 24
+
+
+def mode_command(family: AutopilotFamily, mode: int) -> tuple[float, float, float]:
+    """Return the first parameters of DO_SET_MODE for the custom `mode` of an autopilot.
+
+    The first says that it is a custom mode. PX4 is told main and sub mode apart.
+
+    >>> mode_command(PX4, px4_mode(4, 3)), mode_command(ARDUPILOT, 17)
+    ((1.0, 4.0, 3.0), (1.0, 17.0, 0.0))
+    """
+    main, sub = (mode >> 16 & 255, mode >> 24) if family == PX4 else (mode, 0)
+    return 1.0, float(main), float(sub)
 
 
 _HOLD = px4_mode(4, 3)

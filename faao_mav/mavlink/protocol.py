@@ -73,8 +73,15 @@ HOME_POSITION, CURRENT_MODE = 242, 436
 """The numbers of SYS_STATUS, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, MISSION_CURRENT,
 GPS_GLOBAL_ORIGIN, HOME_POSITION and CURRENT_MODE."""
 
-GROUND_STATION_TYPE = 6
-"""MAV_TYPE_GCS."""
+GROUND_STATION_TYPE, COMPANION_TYPE = 6, 18
+"""MAV_TYPE_GCS and MAV_TYPE_ONBOARD_CONTROLLER."""
+
+AIRFRAMES = frozenset({*range(5), *range(7, 18), *range(19, 26), 28, 29, 35, 43, 46, 47})
+"""MAV_TYPE of what an autopilot moves. All others are beside one: ground stations, companions,
+gimbals, cameras, ADS-B and remote identification, antenna trackers, parachutes, radios."""
+
+AUTOPILOT_COMPONENT = 1
+"""MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
 
 NO_AUTOPILOT = 8
 """MAV_AUTOPILOT_INVALID: what ground stations and other components say that they are."""
@@ -109,6 +116,9 @@ class Address:
     system: int
     component: int
 
+    def __str__(self) -> str:
+        return f"system {self.system}, component {self.component}"
+
     def takes(self, target: "Address") -> bool:
         """Tell whether a message to `target` is for this address."""
         return target.system in (0, self.system) and target.component in (0, self.component)
@@ -117,5 +127,6 @@ class Address:
 NOBODY = Address(0, 0)
 """No sender has this address."""
 
-GROUND_STATION = Address(255, 190)
-"""MAV_COMP_ID_MISSIONPLANNER of the system that ground stations use by custom."""
+GROUND_STATION = Address(246, 190)
+"""This end: MAV_COMP_ID_MISSIONPLANNER of a system number of its own. Chosen: below those of ground
+stations, which are 255 by default and from 250 on by custom, and not MAVSDK's 245."""

@@ -11,7 +11,7 @@ import socket
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink.framing import Framer
@@ -33,19 +33,32 @@ _MOST_PEERS = 64
 _BURST = 256
 """Datagrams that are read at once, at most; chosen: who sends without end stops nothing else."""
 
+_WRITE_TIMEOUT = 5.0
+"""Seconds in which a serial port has to take a packet: chosen, above the 4.3 s in which a line of
+9600 baud empties the 4096 bytes that Linux keeps for it."""
+
+_UNUSABLE = frozenset({errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES})
+"""Errors of a connection that this machine can not make: the argument is to be another one."""
+
 _MAX_DATAGRAM = 65_535
 _DEFAULT_BAUD = 57_600
 """Bits per second: what telemetry radios are delivered with."""
 
 
-class Transport(Protocol):
-    """Packets in, packets out."""
+Origin: TypeAlias = str
+"""Where packets come from: HOST:PORT, or "" on a line that has one other end."""
 
-    def read(self, timeout: float) -> list[bytes]:
+
+class Transport(Protocol):
+    """Packets in, packets out; `listens`: anybody may send, from wherever."""
+
+    listens: bool
+
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         """Return the packets that arrive within `timeout` seconds, as soon as something does."""
 
-    def write(self, data: bytes) -> None:
-        """Send one packet."""
+    def write(self, data: bytes, to: Origin | None = None, /) -> None:
+        """Send one packet to `to`, or to everybody who was heard of late."""
 
     def close(self) -> None:
         """Let go of the connection."""
@@ -85,7 +98,8 @@ def parse_connection(text: str) -> Endpoint:
 def open_transport(text: str) -> Transport:
     """Return a transport for the connection string `text`.
 
-    Raises `InputError` for a string or device that is none, `LinkError` if it cannot be opened.
+    Raises `InputError` for a string or device that is none, or where this machine cannot listen,
+    `LinkError` if the other end cannot be reached.
     """
     endpoint = parse_connection(text)
     if endpoint.kind == "serial":
@@ -104,7 +118,8 @@ def open_transport(text: str) -> Transport:
             case _:
                 return _Tcp(host_port, listens=endpoint.kind == "tcpin")
     except OSError as error:
-        raise LinkError(f"connection {text!r}: {_reason(error)}") from None
+        kind = InputError if error.errno in _UNUSABLE else LinkError
+        raise kind(f"connection {text!r}: {_reason(error)}") from None
 
 
 def _reason(error: OSError) -> str:
@@ -124,10 +139,14 @@ def _reason(error: OSError) -> str:
 
 @dataclass(slots=True)
 class _Sender:
-    """Who sends datagrams from one address; `heard` is when, s."""
+    """Who sends from one address; `heard` is when, s."""
 
     heard: float = 0.0
     framer: Framer = field(default_factory=Framer)
+
+
+def _origin(address: tuple[str, int]) -> Origin:
+    return f"{address[0]}:{address[1]}"
 
 
 class _Udp:
@@ -136,6 +155,7 @@ class _Udp:
     def __init__(self, listen: tuple[str, int] | None, target: tuple[str, int] | None) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._target = target
+        self.listens = target is None
         self._senders: dict[tuple[str, int], _Sender] = {}
         try:
             self._socket.setblocking(False)
@@ -145,19 +165,20 @@ class _Udp:
             self._socket.close()
             raise
 
-    def read(self, timeout: float) -> list[bytes]:
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         if not select.select([self._socket], [], [], max(timeout, 0.0))[0]:
             return []
-        found: list[bytes] = []
+        found: list[tuple[bytes, Origin]] = []
         # A refused datagram is told as an error of the next call: the other side is not up yet.
         with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
             for _ in range(_BURST):
                 data, address = self._socket.recvfrom(_MAX_DATAGRAM)
-                found += self._sender(address).framer.feed_datagram(data)
+                packets = self._sender(address).framer.feed_datagram(data)
+                found += [(packet, _origin(address)) for packet in packets]
         return found
 
-    def write(self, data: bytes) -> None:
-        for target in self._heard() if self._target is None else [self._target]:
+    def write(self, data: bytes, to: Origin | None = None) -> None:
+        for target in self._targets(to):
             # Full buffers and absent receivers lose datagrams: that is what retries are for.
             with contextlib.suppress(OSError):
                 self._socket.sendto(data, target)
@@ -165,7 +186,12 @@ class _Udp:
     def close(self) -> None:
         self._socket.close()
 
-    def _heard(self) -> list[tuple[str, int]]:
+    def _targets(self, to: Origin | None) -> list[tuple[str, int]]:
+        if self._target is not None:
+            return [self._target]
+        if to is not None:
+            host, _, port = to.rpartition(":")
+            return [(host, int(port))]
         recent = time.monotonic() - _FORGET
         return [who for who, sender in self._senders.items() if sender.heard > recent]
 
@@ -184,34 +210,38 @@ class _Tcp:
 
     def __init__(self, address: tuple[str, int], *, listens: bool) -> None:
         self._name = f"tcp:{address[0]}:{address[1]}"
+        self.listens = listens
         self._listener = socket.create_server(address) if listens else None
-        self._peers: dict[socket.socket, Framer] = {}
+        self._peers: dict[socket.socket, tuple[Origin, Framer]] = {}
         if self._listener is not None:
             self._listener.setblocking(False)
         else:
             peer = socket.create_connection(address, timeout=_CONNECT_TIMEOUT)
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._peers[peer] = Framer()
+            self._peers[peer] = (_origin(address), Framer())
 
-    def read(self, timeout: float) -> list[bytes]:
-        found: list[bytes] = []
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
+        found: list[tuple[bytes, Origin]] = []
         for ready in select.select(self._sockets(), [], [], max(timeout, 0.0))[0]:
             if ready is self._listener:
                 with contextlib.suppress(OSError):
-                    self._welcome(ready.accept()[0])
+                    self._welcome(*ready.accept())
                 continue
             try:
                 data, error = ready.recv(_MAX_DATAGRAM), None
             except OSError as broken:
                 data, error = b"", broken
             if data:
-                found += self._peers[ready].feed(data)
+                origin, framer = self._peers[ready]
+                found += [(packet, origin) for packet in framer.feed(data)]
             else:
                 self._drop(ready, error)
         return found
 
-    def write(self, data: bytes) -> None:
-        for peer in list(self._peers):
+    def write(self, data: bytes, to: Origin | None = None) -> None:
+        for peer, (origin, _) in list(self._peers.items()):
+            if to not in (None, origin):
+                continue
             try:
                 peer.sendall(data)
             except OSError as error:
@@ -224,13 +254,13 @@ class _Tcp:
     def _sockets(self) -> list[socket.socket]:
         return [*self._peers] if self._listener is None else [self._listener, *self._peers]
 
-    def _welcome(self, peer: socket.socket) -> None:
+    def _welcome(self, peer: socket.socket, address: tuple[str, int]) -> None:
         """Take one more peer, if there is room; it is dropped when it does not read."""
         if len(self._peers) == _MOST_PEERS:
             peer.close()
             return
         peer.setblocking(False)
-        self._peers[peer] = Framer()
+        self._peers[peer] = (_origin(address), Framer())
 
     def _drop(self, peer: socket.socket, error: OSError | None) -> None:
         """Forget one of several peers; raise `LinkError` for the only one there can be."""
@@ -246,33 +276,44 @@ class _Tcp:
 class _Serial:
     """A serial port."""
 
+    listens = False
+
     def __init__(self, endpoint: Endpoint) -> None:
         import serial
 
         self._name = endpoint.host
         self._framer = Framer()
         self._error: type[Exception] = serial.SerialException
+        self._late: type[Exception] = serial.SerialTimeoutException
         if "/" in endpoint.host and not Path(endpoint.host).exists():
             raise InputError(
                 f"connection {endpoint.host!r}: there is no such device; is the vehicle plugged in?"
             )
         try:
-            self._port: Any = serial.Serial(endpoint.host, endpoint.port, timeout=0)
+            self._port: Any = serial.Serial(
+                endpoint.host, endpoint.port, timeout=0, write_timeout=_WRITE_TIMEOUT
+            )
         except (serial.SerialException, ValueError, OSError) as error:
             raise LinkError(f"connection {endpoint.host!r}: {error}") from None
 
-    def read(self, timeout: float) -> list[bytes]:
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         try:
             self._port.timeout = max(timeout, 0.0)
             data = bytes(self._port.read(1))
             data += bytes(self._port.read(self._port.in_waiting))
         except (self._error, OSError) as error:
             raise LinkError(f"{self._name}: {error}") from None
-        return self._framer.feed(data)
+        return [(packet, "") for packet in self._framer.feed(data)]
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, _: Origin | None = None) -> None:
         try:
             self._port.write(data)
+        except self._late:
+            self._port.reset_output_buffer()  # closing waits for what is in it
+            raise LinkError(
+                f"{self._name}: it has taken no bytes for {_WRITE_TIMEOUT:g} s; is the vehicle "
+                "switched on, and the cable or radio in order?"
+            ) from None
         except (self._error, OSError) as error:
             raise LinkError(f"{self._name}: {error}") from None
 

@@ -63,18 +63,24 @@ class MissionItem:
             )
 
 
+BESIDE = ("fence", "rally points")
+"""What a vehicle may hold beside its mission."""
+
+
 @dataclass(frozen=True, slots=True)
 class Mission:
     """What an autopilot is given: the items in order, without the home row, and the home.
 
     The target of a DO_JUMP (param1) counts the items from 1, as every file format does: home is 0.
-    A fence and rally points travel beside it: only some formats hold them.
+    A fence and rally points travel beside it: only some formats hold them. `unread` has those of
+    `BESIDE` that a vehicle may hold, but that could not be read from it.
     """
 
     items: tuple[MissionItem, ...]
     home: Home | None = None
     fence: Fence = field(default_factory=Fence)
     rally: tuple[RallyPoint, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 def home_item(home: Home | None) -> MissionItem:

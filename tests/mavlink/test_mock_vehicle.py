@@ -30,10 +30,13 @@ from faao_mav.mavlink.messages import (
     Statustext,
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.modes import mode_command, px4_mode
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence
+from faao_mav.vehicle.ardupilot import ARDUPILOT
+from faao_mav.vehicle.px4 import PX4
 
 T = TypeVar("T", bound=Message)
 
@@ -158,8 +161,23 @@ def test_it_does_not_fly_without_being_armed_and_told_to(kind: MockKind) -> None
 @BOTH
 def test_without_a_mission_there_is_nothing_to_fly(kind: MockKind) -> None:
     desk = desk_for(kind)
-    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 2
+    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == {"ardupilot": 4, "px4": 1}[kind]
     assert result(desk.tell(command(300))) == 2
+
+
+def test_a_mode_is_asked_for_as_each_autopilot_has_it() -> None:
+    """PX4 accepts what is no mode to it, and changes nothing: the mode itself has to tell."""
+    copter, px4 = desk_for("ardupilot"), desk_for("px4")
+    rest = px4.machine.mode
+    assert result(copter.tell(command(176, *mode_command(ARDUPILOT, 17)))) == 0
+    assert copter.machine.mode == 17
+    assert result(copter.tell(command(176, 0, 4))) == 2  # not a custom mode
+    assert copter.machine.mode == 17
+    for params in ((1, px4_mode(6, 0)), (0, 4, 4), (1, 300, 4)):
+        assert result(px4.tell(command(176, *params))) == 0
+        assert px4.machine.mode == rest
+    assert result(px4.tell(command(176, *mode_command(PX4, px4_mode(4, 6))))) == 0
+    assert px4.machine.mode == px4_mode(4, 6)
 
 
 def test_px4_takes_what_it_will_not_fly() -> None:
@@ -172,7 +190,7 @@ def test_px4_takes_what_it_will_not_fly() -> None:
         (*mission.items, MissionItem(112, 2, (5.0, 0.0, 0.0, 0.0))),
     ):
         desk = desk_for("px4", Mission(items, HOME))
-        assert result(desk.tell(command(176, 1, 4, 4))) == 2
+        assert result(desk.tell(command(176, 1, 4, 4))) == 1
     assert result(desk_for("px4", mission).tell(command(176, 1, 4, 4))) == 0
 
 

@@ -19,7 +19,6 @@ from stations import HOME, VEHICLE, a_mission, signing_key
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink import Timeouts, upload
 from faao_mav.mavlink.codec import Codec
-from faao_mav.mavlink.framing import message_id
 from faao_mav.mavlink.messages import Heartbeat, Statustext
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.protocol import GROUND_STATION
@@ -31,7 +30,6 @@ TEXT = Statustext(6, "hello")
 NOW = 1_800_000_000.0
 """A time after 2015, s since 1970."""
 
-HEARTBEAT = 0
 HASTY = Timeouts(response=0.1, retries=2, attempts=1, silence=0.5)
 
 
@@ -169,21 +167,21 @@ def test_a_signed_session(key_file: Path) -> None:
 
 
 class Recorder:
-    """A transport that keeps what arrived, after how many packets sent, heartbeats apart."""
+    """A transport that keeps what arrived, after how many packets sent."""
 
     def __init__(self, inner: Transport) -> None:
-        self._inner = inner
+        self._inner, self.listens = inner, inner.listens
         self._sent = 0
         self.tape: list[tuple[int, bytes]] = []
 
-    def read(self, timeout: float) -> list[bytes]:
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
         found = self._inner.read(timeout)
-        self.tape += [(self._sent, packet) for packet in found]
+        self.tape += [(self._sent, packet) for packet, _ in found]
         return found
 
-    def write(self, data: bytes) -> None:
-        self._sent += message_id(data) != HEARTBEAT
-        self._inner.write(data)
+    def write(self, data: bytes, to: str | None = None) -> None:
+        self._sent += 1
+        self._inner.write(data, to)
 
     def close(self) -> None:
         self._inner.close()
@@ -192,18 +190,20 @@ class Recorder:
 class Playback:
     """A transport on which a tape of `Recorder` answers."""
 
+    listens = False
+
     def __init__(self, tape: list[tuple[int, bytes]]) -> None:
         self._tape, self._sent = list(tape), 0
 
-    def read(self, timeout: float) -> list[bytes]:
-        due = [packet for after, packet in self._tape if after <= self._sent]
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
+        due = [(packet, "") for after, packet in self._tape if after <= self._sent]
         self._tape = self._tape[len(due) :]
         if not due:
             time.sleep(max(timeout, 0.0))
         return due
 
-    def write(self, data: bytes) -> None:
-        self._sent += message_id(data) != HEARTBEAT
+    def write(self, *_: object) -> None:
+        self._sent += 1
 
     def close(self) -> None:
         pass
@@ -263,11 +263,13 @@ def test_a_heartbeat_is_not_enough_to_be_alive(
     codec = Codec(VEHICLE, Signing(KEY))
 
     class Beating:
-        def read(self, timeout: float) -> list[bytes]:
-            time.sleep(min(max(timeout, 0.0), 0.05))
-            return [codec.pack(Heartbeat(2, 12, 0, 0, 3))]
+        listens = False
 
-        def write(self, data: bytes) -> None:
+        def read(self, timeout: float) -> list[tuple[bytes, str]]:
+            time.sleep(min(max(timeout, 0.0), 0.05))
+            return [(codec.pack(Heartbeat(2, 12, 0, 0, 3)), "")]
+
+        def write(self, *_: object) -> None:
             pass
 
         def close(self) -> None:

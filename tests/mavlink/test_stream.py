@@ -20,7 +20,7 @@ from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.flying.course import Course
 from faao_mav.mavlink.flying.stream import Stream
 from faao_mav.mavlink.local_frame import frame_of
-from faao_mav.mavlink.messages import CommandLong, Envelope, SetMode, SetPositionTargetLocalNed
+from faao_mav.mavlink.messages import CommandLong, Envelope, SetPositionTargetLocalNed
 from faao_mav.mavlink.modes import px4_mode
 from faao_mav.mavlink.protocol import GROUND_STATION, MavCommand
 from faao_mav.mavlink.transfer.exchange import Peer
@@ -214,7 +214,8 @@ def test_interrupted_it_holds(kind: str) -> None:
         modes.append(scene.mock.mode)
 
     assert scene.run(events=[(14.0, interrupt), (17.0, interrupt)]) == "left"
-    last = max(n for n, each in enumerate(scene.orders) if isinstance(each, SetMode))
+    asks = [getattr(each, "command", None) == MavCommand.SET_MODE for each in scene.orders]
+    last = max(n for n, asked in enumerate(asks) if asked)
     assert not any(isinstance(each, SetPositionTargetLocalNed) for each in scene.orders[last:])
     assert modes[0] == {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}[kind]
 

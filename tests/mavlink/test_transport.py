@@ -53,7 +53,7 @@ class Port:
         """Return what arrives until a twentieth of a second is quiet."""
         found = list[bytes]()
         while more := self.transport.read(0.05):
-            found += more
+            found += [packet for packet, _ in more]
         return found
 
     def close(self) -> None:

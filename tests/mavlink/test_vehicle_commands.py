@@ -160,11 +160,13 @@ def test_unusable_input_is_status_2(arguments: list[str], told: str, mission_fil
     assert "Traceback" not in result.output
 
 
-def test_a_port_in_use_is_status_1(port: int) -> None:
-    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
-        result = run("autopilot", "--listen", f"udpin:127.0.0.1:{port}")
-    assert result.exit_code == 1
-    assert "the port is in use" in result.stderr
+def test_a_port_in_use_is_an_unusable_argument(mission_file: Path, port: int) -> None:
+    taken = f"udpin:127.0.0.1:{port}"
+    with running(a_mock(), taken):
+        for arguments in (("autopilot", "--listen"), ("upload", mission_file, "--to")):
+            result = run(*arguments, taken)
+            assert result.exit_code == 2
+            assert "the port is in use" in result.stderr
 
 
 def test_the_mock_autopilot_as_a_command(

@@ -62,8 +62,8 @@ def fly(
         lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
         asked = tuple(part for part in MissionType if lists[part])
         held = session.run(Script(download_lists(asked, peer, session.timeouts)))
-        for part in held.missing:
-            raise LinkError(f"{connection}: {part.title}: what the vehicle holds cannot be read")
+        for part, outcome in held.missing.items():
+            raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
         wrong = tuple(
             each
             for part in asked
@@ -80,7 +80,9 @@ def fly(
             rows = held.items[MissionType.MISSION]
             watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate)
         try:
-            ending = session.link.watch(watch, lambda: watching(watch))
+            ending = session.link.watch(
+                watch, lambda: watching(watch), beats=arm or stream is not None
+            )
         except LinkError as error:
             ending = Ending("lost", str(error))
     return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias
 
+from faao_mav.mavlink.flying.disarm import Disarm
 from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.mavlink.machine import Machine, Progress
 from faao_mav.mavlink.messages import (
@@ -12,17 +13,17 @@ from faao_mav.mavlink.messages import (
     Heartbeat,
     Message,
     MissionCurrent,
-    SetMode,
     WireItem,
 )
-from faao_mav.mavlink.modes import modes_of
+from faao_mav.mavlink.modes import mode_command, modes_of
 from faao_mav.mavlink.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, MissionType
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.wire_items import home_items
 
 Phase: TypeAlias = Literal[
-    "checking", "engaging", "arming", "starting", "waiting", "flying", "holding", "ending", "aside"
-]
+    "checking", "engaging", "arming", "starting", "disarming", "waiting", "flying", "holding",
+    "ending", "aside",
+]  # fmt: skip
 
 ACCEPTED, IN_PROGRESS = 0, 5
 """MAV_RESULT."""
@@ -62,12 +63,12 @@ class Watch(Machine[Ending]):
     Nothing is sent but what asks for telemetry, until `arm` or `cancel` has a reason; and nothing
     ever again once the mode is one that was not asked for: then the pilot, or a failsafe, has the
     aircraft. `cancel` asks a flight that was started here to hold; a second time, and in any other
-    flight, it leaves.
+    flight, it leaves. `hang_up` leaves a mission to the autopilot.
 
     The phases: "checking", "engaging" (a `Stream` only), "arming" and "starting", with `arm`, or
-    "waiting" for others to start it; "flying" the mission; "ending", when that is over; "holding",
-    as `cancel` asked for; "aside", when the pilot has the aircraft. Raises `ValueError` for a
-    vehicle that is not known.
+    "waiting" for others to start it; "disarming", where it did not start; "flying" the mission;
+    "ending", when that is over; "holding", as `cancel` asked for; "aside", when the pilot has the
+    aircraft. Raises `ValueError` for a vehicle that is not known.
     """
 
     streams = False
@@ -89,6 +90,7 @@ class Watch(Machine[Ending]):
         if peer.vehicle is None:
             raise ValueError("watch: a vehicle that is known is needed")
         self._peer, self._modes = peer, modes_of(peer.vehicle)
+        self._family = peer.vehicle.family
         self._first = home_items(peer.vehicle, MissionType.MISSION)
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
@@ -105,7 +107,9 @@ class Watch(Machine[Ending]):
         self._disarmed_at: float | None = None
         self._mode_before = -1
         self._command: Callable[[], Message] | None = None
-        self._sent, self._next_try = 0, 0.0
+        self._sent, self._next_try, self._no = 0, 0.0, ""
+        self._unattended = False
+        self._disarming: Disarm | None = None
 
     @property
     def progress(self) -> Progress:
@@ -125,14 +129,34 @@ class Watch(Machine[Ending]):
             self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
             return self._say(self._hold, now)
         if self.phase == "arming":
-            self._end("left", "interrupted before the start; the vehicle is asked to disarm")
-            return [self._arming(False)]
+            return self._disarm(Ending("left", "interrupted before the start"), now)
+        if self._disarming is not None:
+            self._disarming.leave("interrupted again")
+            self.outcome = self._disarming.outcome
         self._end("left", f"no longer watched; the vehicle is in mode {self.seen.mode}")
+        return ()
+
+    def hang_up(self, now: float) -> Sequence[Message]:
+        """Leave a mission that is under way to the autopilot, cancel anything else.
+
+        A flight by setpoints is to hold: it needs this end. What is not confirmed is waited for.
+        """
+        self._unattended = True
+        waits = self.phase in ("holding", "ending") and self._command is not None
+        if waits or self._disarming is not None:
+            return ()
+        if self.solution is not None or self.phase in ("arming", "starting"):
+            return self.cancel(now)
+        self._end("left", f"the terminal has gone; the vehicle goes on in mode {self.seen.mode}")
         return ()
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self.seen.hear(envelope, now)
-        self.outcome = self.seen.ending
+        self._end_by(self.seen.ending)
+        if self.outcome is None and self._disarming is not None:
+            out = self._disarming.on(envelope, now)
+            self.outcome = self._disarming.outcome
+            return out
         if self.outcome is not None or envelope.sender != self._peer.address:
             return ()
         match envelope.message:
@@ -147,9 +171,14 @@ class Watch(Machine[Ending]):
     def _time_out(self, now: float) -> Sequence[Message]:
         self._due = now + _TICK
         questions = self.seen.tick(now)
-        self.outcome = self.seen.ending
+        self._end_by(self.seen.ending)
+        over = self.phase in ("holding", "ending", "aside") and self._command is None
+        if self._unattended and over:
+            self._end("left", f"the terminal has gone; the vehicle is in mode {self.seen.mode}")
         if self.outcome is not None:
             return ()
+        if self._disarming is not None:
+            return [*questions, *self._disarming.tick(now)]
         if self._disarmed_at is not None and now >= self._disarmed_at + _REBOOT:
             self._disarmed_at = None
             return self._on_disarmed()
@@ -202,6 +231,8 @@ class Watch(Machine[Ending]):
 
     def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
         awaited = {"arming": MavCommand.ARM, "starting": self._start_command}.get(self.phase)
+        if command == MavCommand.SET_MODE and result not in (ACCEPTED, IN_PROGRESS):
+            self._no = _answer(command, result)  # the mode itself tells whether it was taken
         if command != awaited or result == IN_PROGRESS:
             return ()
         return self._accepted(now) if result == ACCEPTED else self._denied(command, result, now)
@@ -213,9 +244,9 @@ class Watch(Machine[Ending]):
         self.phase = "starting"
         return self._say(self._starting, now)
 
-    def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:  # noqa: ARG002
+    def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:
         """End, now that arming or starting has been denied."""
-        return self._refused(f"answers {MavCommand(command).name} with MAV_RESULT {result}")
+        return self._refused(_answer(command, result), now)
 
     def _on_disarmed(self) -> Sequence[Message]:
         match self.phase:
@@ -229,7 +260,7 @@ class Watch(Machine[Ending]):
             case "aside":
                 self._end("taken over", "disarmed; it was not the mission that flew it last")
             case "arming" | "starting":
-                return self._refused("disarmed before the mission began")
+                self._end("refused", self._why("disarmed before the mission began"))
         return ()
 
     def _over(self) -> None:
@@ -287,11 +318,14 @@ class Watch(Machine[Ending]):
         return self._mode(self._modes.hold)
 
     def _mode(self, mode: int) -> Message:
-        return SetMode(self._peer.address.system, 1, mode)
+        again = max(0, self._sent - 1)
+        params = mode_command(self._family, mode)
+        return CommandLong(self._peer.address, MavCommand.SET_MODE, again, *params)
 
     def _say(self, command: Callable[[], Message], now: float) -> Sequence[Message]:
         """Send `command`, and repeat it until it is answered."""
         self._command, self._sent, self._next_try = command, 0, now
+        self._no = "does not answer"
         return self._repeat(now)
 
     def _repeat(self, now: float) -> Sequence[Message]:
@@ -299,21 +333,47 @@ class Watch(Machine[Ending]):
             return ()
         if self._sent == _TRIES and self.phase == "holding":
             self._command = None
-            self.seen.told.append("it does not confirm that it holds")
+            self.seen.told.append(f"it does not confirm that it holds: it {self._no}")
             return ()
         if self._sent >= _TRIES and self.phase != "ending":
-            return self._refused("does not answer")
+            return self._refused(self._no, now, unsure=self.phase == "arming")
         self._sent, self._next_try = self._sent + 1, now + _AGAIN
         return [self._command()]
 
-    def _refused(self, why: str) -> Sequence[Message]:
-        """End before the start; an aircraft that was armed here is asked to disarm again."""
+    # ---- when it does not start
+
+    def _refused(self, why: str, now: float, *, unsure: bool = False) -> Sequence[Message]:
+        """End before the start; an aircraft that is armed, or may be (`unsure`), disarms first."""
+        if unsure or self._armed or self.phase == "starting":
+            return self._disarm(Ending("refused", self._why(why)), now)
+        self._end("refused", self._why(why))
+        return ()
+
+    def _why(self, why: str) -> str:
         said = f": {'; '.join(dict.fromkeys(self.seen.said))}" if self.seen.said else ""
-        armed = self._armed or self.phase == "starting"
-        self._end("refused", f"the vehicle {why}{said}" + (", and disarms" if armed else ""))
-        self._sent = 0
-        return [self._arming(False)] if armed else ()
+        return f"the vehicle {why}{said}"
+
+    def _disarm(self, then: Ending, now: float) -> Sequence[Message]:
+        """Have it disarm, and end with `then`."""
+        self.phase = "disarming"
+        self.seen.told.append(f"{then.text}: it is asked to disarm")
+        beat = self.seen.heartbeat
+        mode = self._mode_before if beat is None else beat.custom_mode
+        self._disarming = Disarm(self._peer, then, self._armed, mode, self._modes)
+        return self._disarming.start(now)
+
+    def _end_by(self, ending: Ending | None) -> None:
+        """End as what was heard says, if anything does."""
+        if ending is not None and self._disarming is not None:
+            self._disarming.leave(ending.text)
+            self.outcome = self._disarming.outcome
+        elif ending is not None:
+            self._end(ending.kind, ending.text)
 
     def _end(self, kind: Kind, text: str) -> None:
         if self.outcome is None:
             self.outcome = Ending(kind, text)
+
+
+def _answer(command: int, result: int) -> str:
+    return f"answers {MavCommand(command).name} with MAV_RESULT {result}"

@@ -55,6 +55,7 @@ class ArduPilotFirmware(MockFirmware):
     parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
     misplaced = MavResult.UNSUPPORTED
     nonsense = MavResult.INVALID
+    mode_denied, no_mode = 4, 2  # failed; denied
 
     def check_beside(self, part: MissionType, item: WireItem) -> MavResult:
         """Return what it answers to `item` of a fence or of rally points that is on Earth."""

@@ -109,6 +109,7 @@ class MockFirmware(ABC):
         returns_by_mode: the types of vehicle that change their mode when a mission has them return.
         fence_texts: what it says when it leaves the fence.
         armed_inside_only: it does not arm where home lies outside the fence.
+        mode_denied, no_mode: the MAV_RESULT of a mode that it does not enter, and of no such mode.
     """
 
     family: ClassVar[AutopilotFamily]
@@ -121,6 +122,8 @@ class MockFirmware(ABC):
     returns_by_mode: ClassVar[frozenset[str]] = frozenset()
     fence_texts: ClassVar[tuple[Statustext, ...]]
     armed_inside_only: ClassVar[bool] = False
+    mode_denied: ClassVar[int]
+    no_mode: ClassVar[int]
 
     def __init__(
         self,
@@ -152,9 +155,10 @@ class MockFirmware(ABC):
     def tick(self, now: float) -> list[Message]:
         """Ask again, or give up."""
 
-    def requested_mode(self, command: CommandLong) -> int:
-        """Return the custom mode that DO_SET_MODE asks for."""
-        return max(whole(command.param2), 0)
+    def requested_mode(self, command: CommandLong) -> int | None:
+        """Return the custom mode that DO_SET_MODE asks for, None if it asks for none."""
+        number = whole(command.param2)
+        return number if is_custom(command) and number >= 0 else None
 
     def infeasible(self, mission: Mission) -> str | None:  # noqa: ARG002
         """Return why `mission` is not flown though it was taken, None if it is."""
@@ -207,6 +211,12 @@ def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> MavResult:
         if refusal(replace(item, params=(one, two, three, four), x=x, y=y, z=z)) is not None:
             return MavResult.UNSUPPORTED if tried == 0 else MavResult(_FIELDS[tried - 1])
     return MavResult.ACCEPTED
+
+
+def is_custom(command: CommandLong) -> bool:
+    """Tell whether DO_SET_MODE asks for a custom mode (MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)."""
+    flags = whole(command.param1)
+    return flags > 0 and flags % 2 == 1
 
 
 def whole(param: float) -> int:

@@ -307,11 +307,13 @@ class MockAutopilot(Machine[None]):
             self._begin_guided(now)
         return self._begin(now) if self._is_mission else ACCEPTED
 
-    def _set_mode(self, mode: int, now: float) -> int:
+    def _set_mode(self, mode: int | None, now: float) -> int:
+        if mode is None:
+            return self._firmware.no_mode
         if mode == self._modes.mission and self._problem() is not None:
-            return DENIED
+            return self._firmware.mode_denied
         if mode == self._modes.guided and not self._guided.accepts(now):
-            return DENIED
+            return self._firmware.mode_denied
         self._mode = self._wanted = mode
         if self._guided.flying and mode not in (self._modes.guided, self._modes.mission):
             self._guided.leave(mode, now)

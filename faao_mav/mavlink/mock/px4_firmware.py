@@ -16,7 +16,7 @@ from faao_mav.mavlink.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.mavlink.mock.firmware import MockFirmware, whole
+from faao_mav.mavlink.mock.firmware import MockFirmware, is_custom, whole
 from faao_mav.mavlink.modes import px4_mode
 from faao_mav.mavlink.protocol import (
     ALL_TYPES,
@@ -67,10 +67,12 @@ class Px4Firmware(MockFirmware):
     misplaced = MavResult.ERROR
     nonsense = MavResult.UNSUPPORTED
     silent_at_boot = True
+    mode_denied, no_mode = 1, 0  # temporarily rejected; accepted, but nothing changes
 
-    def requested_mode(self, command: CommandLong) -> int:
-        """Return the custom mode that DO_SET_MODE asks for: main and sub mode in one number."""
-        return px4_mode(whole(command.param2), whole(command.param3))
+    def requested_mode(self, command: CommandLong) -> int | None:
+        """Return the custom mode that DO_SET_MODE asks for: main and sub mode are two numbers."""
+        mode = px4_mode(whole(command.param2), whole(command.param3))
+        return mode if is_custom(command) and mode else None
 
     def infeasible(self, mission: Mission) -> str | None:
         """Return why PX4, which says so in an event only, refuses to start `mission`."""

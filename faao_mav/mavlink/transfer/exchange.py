@@ -38,8 +38,7 @@ _TEXTS = 5
 class Peer:
     """Both ends of a transfer, and what flies at the other: None if its autopilot is not known.
 
-    Unless it `may_be_armed`, nothing more is written once any heartbeat of that system says that it
-    is armed.
+    Unless it `may_be_armed`, nothing more is written once a heartbeat of it says that it is armed.
     """
 
     own: Address
@@ -129,14 +128,13 @@ class Exchange(AskingMachine[Outcome]):
         return [*super().tick(now), *self._stop_if_stalled(now)]
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        message, sender = envelope.message, envelope.sender
-        if isinstance(message, Heartbeat) and sender.system == self._peer.address.system:
+        message = envelope.message
+        if envelope.sender != self._peer.address:
+            return ()
+        if isinstance(message, Heartbeat):
             self._armed = self._armed or message.armed
             if message.armed and self.writes and not self._peer.may_be_armed:
                 return self._stop("armed")
-        if sender != self._peer.address:
-            return ()
-        if isinstance(message, Heartbeat):
             return self._on_heartbeat(message, now)
         if isinstance(message, Statustext):
             self._texts = [*self._texts[1 - _TEXTS :], message.text.strip()]
@@ -181,12 +179,13 @@ class Clear(Exchange):
     An ERROR is the end only if it is repeated: PX4 says nothing while busy, ArduPilot ERROR.
 
     >>> vehicle = Address(1, 1)
-    >>> clearing = Clear(Peer(Address(255, 190), vehicle, None), MissionType.RALLY)
+    >>> own = Address(246, 190)
+    >>> clearing = Clear(Peer(own, vehicle, None), MissionType.RALLY)
     >>> clearing.start(now=0.0)
     [MissionClearAll(target=Address(system=1, component=1), mission_type=<MissionType.RALLY: 2>)]
     >>> clearing.deadline  # when the question is put again, s
     1.5
-    >>> accepted = MissionAck(Address(255, 190), MissionType.RALLY, MavResult.ACCEPTED)
+    >>> accepted = MissionAck(own, MissionType.RALLY, MavResult.ACCEPTED)
     >>> clearing.on(Envelope(vehicle, accepted), now=0.1)
     []
     >>> clearing.outcome.status

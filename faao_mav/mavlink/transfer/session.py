@@ -90,7 +90,10 @@ def upload_parts(
 def download_lists(
     types: Sequence[MissionType], peer: Peer, timeouts: Timeouts | None = None
 ) -> Job["Lists"]:
-    """Download the lists of `types`; stop at the first that does not come, unless refused."""
+    """Download the lists of `types`, each that comes.
+
+    Where not even the first one comes, and it is not refused, the others are not asked for.
+    """
     items: dict[MissionType, tuple[WireItem, ...]] = {}
     missing: dict[MissionType, Outcome] = {}
     for part in types:
@@ -99,7 +102,7 @@ def download_lists(
             items[part] = outcome.items
             continue
         missing[part] = outcome
-        if outcome.status != "refused":
+        if _by_us(outcome) or (outcome.status != "refused" and not items):
             break
     return Lists(items, missing)
 

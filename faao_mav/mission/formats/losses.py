@@ -16,6 +16,7 @@ def wpl_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
     """Return what of `mission` a QGC WPL file does not hold, one line each."""
     del target
     return [
+        *unread_losses(mission),
         *_rally(mission, "QGC WPL"),
         *_not_set(mission),
         *_home(mission),
@@ -25,15 +26,19 @@ def wpl_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
 
 def plan_losses(mission: Mission, target: PlanTarget | None) -> list[str]:
     """Return what of `mission` a `.plan` file for `target` does not hold, one line each."""
+    clears = "QGroundControl clears it there when it uploads this plan"
+    unread = [f"{line}; {clears}" for line in unread_losses(mission)]
+    home = _home(mission)
     if target is None:
-        return ["no autopilot is known: the plan is for a generic one", *_home(mission)]
-    return [*([] if target.takes_null else _not_set(mission)), *_home(mission)]
+        return [*unread, "no autopilot is known: the plan is for a generic one", *home]
+    return [*unread, *([] if target.takes_null else _not_set(mission)), *home]
 
 
 def kml_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
     """Return what of `mission` a KML file does not hold or show, one line each."""
     del target
     found = [
+        *unread_losses(mission),
         *_rally(mission, "KML"),
         "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back",
     ]
@@ -46,6 +51,13 @@ def kml_losses(mission: Mission, target: PlanTarget | None = None) -> list[str]:
     if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
         found.append("spline waypoints are joined by straight lines")
     return found
+
+
+def unread_losses(mission: Mission) -> list[str]:
+    """Return what of a vehicle's mission was not read from it, one line each."""
+    return [
+        f"without the {part} that the vehicle may hold: not read from it" for part in mission.unread
+    ]
 
 
 def _rally(mission: Mission, name: str) -> list[str]:

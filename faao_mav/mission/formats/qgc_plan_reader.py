@@ -21,9 +21,10 @@ from pydantic import (
 from faao_mav.errors import InputError, MissionFileError, place_of, quote
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission.formats.losses import unread_losses
 from faao_mav.mission.formats.mission_file import MissionFile
 from faao_mav.mission.formats.strict_json import parse_json
-from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.item import BESIDE, Home, Mission, MissionItem
 
 _AGAIN = "open the file in a current QGroundControl and save it again"
 _HINTS = {
@@ -136,6 +137,7 @@ class _File(_Object):
     mission: _Mission
     geoFence: Annotated[_Fence | None, BeforeValidator(_or_none)] = None
     rallyPoints: Annotated[_Rally | None, BeforeValidator(_or_none)] = None
+    unread: object = None
 
 
 def read_qgc_plan(text: str, source: str) -> MissionFile:
@@ -156,7 +158,8 @@ def read_qgc_plan(text: str, source: str) -> MissionFile:
         raise MissionFileError(f"{source}: {_describe(error)}") from None
     except MissionFileError as error:
         raise MissionFileError(f"{source}: {error}") from None
-    return MissionFile(read, file.mission.firmwareType, file.mission.vehicleType)
+    warnings = tuple(f"{source}: {line}" for line in unread_losses(read))
+    return MissionFile(read, file.mission.firmwareType, file.mission.vehicleType, warnings)
 
 
 def _describe(error: ValidationError) -> str:
@@ -189,6 +192,7 @@ def _mission(file: _File) -> Mission:
         _made("mission.plannedHomePosition", Home, home) if home and any(home) else None,
         _fence(fence) if fence else Fence(),
         _each("rallyPoints.points", RallyPoint, rally.points if rally else []),
+        tuple(part for part in BESIDE if isinstance(file.unread, list) and part in file.unread),
     )
 
 

@@ -26,12 +26,13 @@ def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
     NaN is written as null, except for a target that refuses it: there it is 0 (`losses` tells).
     A mission without home has a planned home of zeros, because QGroundControl asks for one. The
     speeds by which QGroundControl estimates times are those of the mission's first
-    DO_CHANGE_SPEED. Raises `MissionFileError` for a DO_JUMP to no item of the mission.
+    DO_CHANGE_SPEED. What the mission has `unread` is told under a key of that name, which
+    QGroundControl passes over. Raises `MissionFileError` for a DO_JUMP to no item of the mission.
     """
     home = mission.home or Home(0.0, 0.0, 0.0)
     speed = _first_speed(mission)
     not_set = None if target is None or target.takes_null else 0
-    plan = {
+    plan: dict[str, Any] = {
         "fileType": "Plan",
         "geoFence": _fence(mission.fence),
         "groundStation": "QGroundControl",
@@ -51,6 +52,8 @@ def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
         "rallyPoints": {"points": list(map(_place, mission.rally)), "version": 2},
         "version": 1,
     }
+    if mission.unread:
+        plan["unread"] = list(mission.unread)
     return json.dumps(plan, indent=4, allow_nan=False) + "\n"
 
 
