@@ -158,7 +158,7 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
         missing = {
             part: session.not_read(part, outcome)
             for part, outcome in lists.missing.items()
-            if not (part is not MissionType.MISSION and session.has_none(outcome))
+            if part is MissionType.MISSION or outcome.result not in _ABSENT
         }
         if MissionType.MISSION in missing:
             raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
@@ -274,13 +274,6 @@ class Session:
         for verdict, text in _PASSED_OVER.items():
             if verdict in self.link.heard:
                 raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
-
-    def has_none(self, outcome: Outcome) -> bool:
-        """Tell whether the vehicle has no such list at all, by what came of reading it.
-
-        Over MAVLink 1 ArduPilot says so of lists that it has.
-        """
-        return outcome.result in _ABSENT and not self.link.speaks_old(self.found.address)
 
     def not_read(self, part: MissionType, outcome: Outcome) -> str:
         """Return in words why a list was not read."""

@@ -150,6 +150,9 @@ class Counted:
     def tick(self, now: float) -> Sequence[Message]:
         return self._note(self.machine.tick(now))
 
+    def hang_up(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.hang_up(now))
+
     def number(self) -> int:
         """Return how many items and requests for items those are."""
         kinds = (MissionItemInt, MissionRequestInt)

@@ -220,6 +220,21 @@ def test_interrupted_it_holds(kind: str) -> None:
     assert modes[0] == {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}[kind]
 
 
+@KINDS
+@pytest.mark.parametrize("time", [5.0, 14.0])
+def test_without_a_terminal_it_holds_and_then_is_left(kind: str, time: float) -> None:
+    scene = Scene(kind, solution=low())
+
+    def hang_up(now: float) -> None:
+        for message in scene.watch.hang_up(now):
+            scene.mock.on(Envelope(GROUND_STATION, message), now)
+
+    assert scene.run(events=[(time, hang_up)]) == "left"
+    assert scene.mock.armed
+    assert scene.mock.mode == {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}[kind]
+    assert scene.watch.outcome.text.startswith("the terminal has gone; the vehicle is in mode ")
+
+
 def test_a_lost_answer_to_the_take_off_does_not_end_it() -> None:
     scene = Scene("ardupilot", solution=low())
     receive = scene.mock.on

@@ -1,6 +1,6 @@
 """Watching a flight: every end has its name, and nothing is sent that was not asked for."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import pytest
 from mock_flights import fly
 from scenes import AnotherStation, Scene
 from simulate import Station
-from stations import FOREIGN, HOME, a_mission, rows_for
+from stations import FOREIGN, HOME, VEHICLE, a_mission, rows_for
 
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.messages import (
@@ -239,6 +239,183 @@ def test_a_vehicle_that_arms_without_a_word_is_asked_to_disarm(
     assert scene.run() == "refused"
     orders = [each for each in scene.orders if isinstance(each, CommandLong)]
     assert [(each.command, each.param1) for each in orders] == [(400, 1.0)] * 5 + [(400, 0.0)]
+
+
+def refuses_to_start(scene: Scene, deaf: Callable[[float], bool] = lambda _: False) -> None:
+    """Have the mock deny the start, and hear no order to disarm while it is `deaf`."""
+    on = scene.mock.on
+
+    def deny(envelope: Envelope, now: float) -> Sequence[Message]:
+        match envelope.message:
+            case CommandLong(command=MavCommand.START):
+                return [CommandAck(GROUND_STATION, MavCommand.START, 4)]
+            case CommandLong(command=MavCommand.ARM, param1=0.0) if deaf(now):
+                return ()
+        return on(envelope, now)
+
+    scene.mock.on = deny  # type: ignore[method-assign]
+
+
+def disarmings(scene: Scene) -> int:
+    orders = (each for each in scene.orders if isinstance(each, CommandLong))
+    return sum((each.command, each.param1) == (MavCommand.ARM, 0.0) for each in orders)
+
+
+@KINDS
+@pytest.mark.parametrize("loss", [0.0, 0.5])
+@pytest.mark.parametrize("until", [0.0, 40.0])
+def test_what_does_not_start_is_disarmed_whatever_is_lost(
+    kind: str, loss: float, until: float
+) -> None:
+    scene = Scene(kind, arm=True)
+    refuses_to_start(scene, lambda now: now < until)
+    assert scene.run(Faults(loss=loss, seed=5)) == "refused"
+    assert not scene.mock.armed
+    why = "does not answer" if loss and kind == "px4" else "answers START with MAV_RESULT 4"
+    assert scene.watch.outcome.text == f"the vehicle {why}; it is disarmed"
+    if not loss:
+        assert disarmings(scene) == (1 if until == 0 else pytest.approx((until - 2) / 1.5, abs=1))
+
+
+def test_a_late_answer_to_arming_is_none_to_disarming() -> None:
+    scene = Scene("ardupilot", arm=True)
+    refuses_to_start(scene, lambda now: now < 10.0)
+
+    def answer(now: float) -> None:
+        ack = CommandAck(GROUND_STATION, MavCommand.ARM, 0)
+        scene.client.on(Envelope(VEHICLE, ack), now)
+
+    assert scene.run(events=[(3.0, answer), (3.1, answer)]) == "refused"
+    assert not scene.mock.armed
+
+
+@KINDS
+def test_what_does_not_start_is_left_to_a_pilot_who_takes_it(kind: str) -> None:
+    scene = Scene(kind, arm=True)
+    refuses_to_start(scene, lambda _: True)
+    assert scene.run(events=[(6.0, scene.sets(LOITER))]) == "refused"
+    assert "it may still be armed: the pilot or a failsafe has it" in scene.watch.outcome.text
+    assert disarmings(scene) == 3
+
+
+def test_what_keeps_refusing_to_disarm_or_falls_silent_is_told() -> None:
+    scene = Scene("ardupilot", arm=True)
+    refuses_to_start(scene)
+    arm = scene.mock._arm
+    scene.mock._arm = lambda wanted, now: arm(True, now) if wanted else 4  # type: ignore
+    assert scene.run() == "refused"
+    assert scene.watch.outcome.text.endswith("it may still be armed: it answers MAV_RESULT 4")
+    assert disarmings(scene) == 5
+    scene = Scene("ardupilot", arm=True)
+    refuses_to_start(scene, lambda _: True)
+
+    def vanish(_: float) -> None:
+        scene.mock.tick = lambda *_: ()  # type: ignore[method-assign]
+        scene.mock.on = lambda *_: ()  # type: ignore[method-assign]
+
+    assert scene.run(events=[(4.0, vanish)]) == "refused"
+    assert scene.watch.outcome.text.endswith("may still be armed: nothing was heard for 60 s")
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_interrupted_while_it_arms_it_is_disarmed(again: bool) -> None:
+    scene, on = Scene("px4", arm=True), MockAutopilot.on
+
+    def quiet(envelope: Envelope, now: float) -> Sequence[Message]:
+        message = envelope.message
+        if again and isinstance(message, CommandLong) and message.param1 == 0.0:
+            return ()
+        arms = isinstance(message, CommandLong) and message.command == MavCommand.ARM
+        answers = on(scene.mock, envelope, now)
+        return () if arms else answers
+
+    def interrupt(now: float) -> None:
+        for message in scene.watch.cancel(now):
+            scene.mock.on(Envelope(GROUND_STATION, message), now)
+
+    scene.mock.on = quiet  # type: ignore[method-assign]
+    events = [(3.0, interrupt), *([(9.0, interrupt)] if again else [])]
+    assert scene.run(events=events) == "left"
+    assert scene.mock.armed == again
+    told = "interrupted before the start; it " + (
+        "may still be armed: interrupted again" if again else "is disarmed"
+    )
+    assert scene.watch.outcome.text == told
+
+
+def test_a_mission_that_changes_while_it_is_started_is_disarmed() -> None:
+    scene = Scene("px4", arm=True)
+    refuses_to_start(scene)
+    rows, on = scene.mock.lists.items(MissionType.MISSION), scene.mock.on
+
+    def change(envelope: Envelope, now: float) -> Sequence[Message]:
+        """Hold another mission as soon as it is armed, and say nothing to the start."""
+        message = envelope.message
+        if isinstance(message, CommandLong) and message.command == MavCommand.START:
+            scene.mock.lists.replace(MissionType.MISSION, rows[:-1])
+            return ()
+        return on(envelope, now)
+
+    scene.mock.on = change  # type: ignore[method-assign]
+    assert scene.run() == "changed"
+    assert not scene.mock.armed
+
+
+@KINDS
+def test_a_mission_outlives_the_terminal(kind: str) -> None:
+    """Nothing is sent: the flight is the autopilot's."""
+    scene, modes = Scene(kind, arm=True), list[int]()
+
+    def hang_up(now: float) -> None:
+        sent = len(scene.client.sent)
+        assert scene.client.hang_up(now) == ()
+        assert len(scene.client.sent) == sent
+
+    assert scene.run(events=[(20.0, hang_up)]) == "left"
+    assert "the terminal has gone; the vehicle goes on in mode" in scene.watch.outcome.text
+    mock, now = scene.mock, 20.0
+    while mock.armed and now < 300:
+        now += 0.1
+        mock.tick(now)
+        modes.append(mock.mode)
+    assert not mock.armed
+    assert {AUTO[kind]} <= set(modes) <= {AUTO[kind], 4 << 16 | 5 << 24}  # PX4's return
+    assert max(scene.watch.seen.samples.height) > 20
+
+
+@KINDS
+def test_a_terminal_that_goes_before_the_start_takes_the_start_along(kind: str) -> None:
+    scene = Scene(kind, arm=True, boot=20.0)
+    assert scene.run(events=[(5.0, scene.watch.hang_up)]) == "left"
+    assert scene.orders == []
+    scene = Scene(kind, arm=True)
+    refuses_to_start(scene)
+    on = scene.mock.on
+
+    def quiet(envelope: Envelope, now: float) -> Sequence[Message]:
+        message, answers = envelope.message, on(envelope, now)
+        arms = isinstance(message, CommandLong) and message.command == MavCommand.ARM
+        return () if arms else answers
+
+    def hang_up(now: float) -> None:
+        for message in scene.watch.hang_up(now):
+            scene.mock.on(Envelope(GROUND_STATION, message), now)
+
+    scene.mock.on = quiet  # type: ignore[method-assign]
+    assert scene.run(events=[(3.0, hang_up)]) == "left"
+    assert not scene.mock.armed
+
+
+def test_a_hold_that_was_asked_for_is_waited_for_without_a_terminal() -> None:
+    scene = Scene("ardupilot", arm=True)
+
+    def interrupt(now: float) -> None:
+        scene.watch.cancel(now)  # whose order is lost
+
+    events = [(12.0, interrupt), (12.1, scene.watch.hang_up)]
+    assert scene.run(events=events) == "left"
+    assert scene.mock.mode == HOLD["ardupilot"]
+    assert scene.watch.outcome.text == "the terminal has gone; the vehicle is in mode BRAKE"
 
 
 def test_what_is_armed_already_is_not_started() -> None:

@@ -152,12 +152,13 @@ class Watch(Machine[Ending]):
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self.seen.hear(envelope, now)
-        self._end_by(self.seen.ending)
-        if self.outcome is None and self._disarming is not None:
+        if self._disarming is not None:
             out = self._disarming.on(envelope, now)
             self.outcome = self._disarming.outcome
             return out
-        if self.outcome is not None or envelope.sender != self._peer.address:
+        if self.seen.ending is not None:
+            return self._end_early(self.seen.ending, now)
+        if envelope.sender != self._peer.address:
             return ()
         match envelope.message:
             case Heartbeat() as heartbeat:
@@ -171,14 +172,16 @@ class Watch(Machine[Ending]):
     def _time_out(self, now: float) -> Sequence[Message]:
         self._due = now + _TICK
         questions = self.seen.tick(now)
-        self._end_by(self.seen.ending)
+        if self._disarming is not None:
+            out = self._disarming.tick(now)
+            self.outcome = self._disarming.outcome
+            return [*questions, *out]
+        if self.seen.ending is not None:
+            return self._end_early(self.seen.ending, now)
         over = self.phase in ("holding", "ending", "aside") and self._command is None
         if self._unattended and over:
             self._end("left", f"the terminal has gone; the vehicle is in mode {self.seen.mode}")
-        if self.outcome is not None:
             return ()
-        if self._disarming is not None:
-            return [*questions, *self._disarming.tick(now)]
         if self._disarmed_at is not None and now >= self._disarmed_at + _REBOOT:
             self._disarmed_at = None
             return self._on_disarmed()
@@ -359,16 +362,16 @@ class Watch(Machine[Ending]):
         self.seen.told.append(f"{then.text}: it is asked to disarm")
         beat = self.seen.heartbeat
         mode = self._mode_before if beat is None else beat.custom_mode
-        self._disarming = Disarm(self._peer, then, self._armed, mode, self._modes)
+        modes = (mode, self._modes.mission, self._modes.guided)
+        self._disarming = Disarm(self._peer, then, self._armed, modes, self._patience)
         return self._disarming.start(now)
 
-    def _end_by(self, ending: Ending | None) -> None:
-        """End as what was heard says, if anything does."""
-        if ending is not None and self._disarming is not None:
-            self._disarming.leave(ending.text)
-            self.outcome = self._disarming.outcome
-        elif ending is not None:
-            self._end(ending.kind, ending.text)
+    def _end_early(self, ending: Ending, now: float) -> Sequence[Message]:
+        """End as what was heard says, disarmed where it was about to start another mission."""
+        if ending.kind == "changed" and self.phase in ("arming", "starting"):
+            return self._disarm(ending, now)
+        self._end(ending.kind, ending.text)
+        return ()
 
     def _end(self, kind: Kind, text: str) -> None:
         if self.outcome is None:
