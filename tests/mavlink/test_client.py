@@ -5,6 +5,7 @@ import select
 import socket
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -333,6 +334,27 @@ def test_a_serial_line() -> None:
         with running(mock_of("ardupilot", rate=0.0), Radio()) as mock:
             assert upload(a_mission(5), f"{os.ttyname(theirs)},57600", system=1).verified
         assert len(mock.mission().items) == 5
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_a_serial_device_that_takes_no_bytes_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pseudo terminal that nobody reads, and that is full."""
+    pty, os = pytest.importorskip("pty"), pytest.importorskip("os")
+    tty = pytest.importorskip("tty")
+    monkeypatch.setattr("faao_mav.mavlink.transport._WRITE_TIMEOUT", 0.2)
+    ours, theirs = pty.openpty()
+    try:
+        tty.setraw(theirs)
+        os.set_blocking(theirs, False)
+        with suppress(BlockingIOError):
+            while True:
+                os.write(theirs, bytes(4096))
+        started = time.monotonic()
+        with pytest.raises(LinkError, match=r"it has taken no bytes for 0\.2 s; is the vehicle"):
+            upload(a_mission(5), os.ttyname(theirs), system=1, wait=60.0)
+        assert time.monotonic() - started < 5
     finally:
         os.close(ours)
         os.close(theirs)

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from conftest import free_port
+from mock_flights import fly
 from served import running
 from stations import FENCE, HOME, VEHICLE, a_mission, mock_of, rows_for, vehicle_of
 from typer.testing import CliRunner
@@ -279,6 +280,45 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
     assert "interrupted while uploading mission at item 3 of" in errors
     assert f"cancelled. {holds}" in errors
     assert [ack.type for ack in cancelled] == [MavResult.OPERATION_CANCELLED]
+
+
+@pytest.mark.parametrize("gone", ["terminal", "reader"])
+def test_a_mission_goes_on_when_nobody_can_be_told_any_more(gone: str, tmp_path: Path) -> None:
+    """A lost SSH session: a hang-up, and output that nobody reads."""
+    path, orders = tmp_path / "m.waypoints", list[int]()
+    path.write_text(write_wpl(a_mission(9)))
+
+    class Told(MockAutopilot):
+        def _receive(self, envelope: Envelope, now: float) -> Any:
+            message = envelope.message
+            if isinstance(message, CommandLong) and message.command < MavCommand.SET_INTERVAL:
+                orders.append(message.command)
+            return super()._receive(envelope, now)
+
+    mock = Told(behaviour_of("ardupilot"), home=HOME, beat=0.1, fly=fly)
+    port = free_port()
+    to = f"udpout:127.0.0.1:{port}"
+    heard = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # nohup ignores it
+    command = heard + "from faao_mav.cli.main import run; run()"
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        assert upload(a_mission(9), to, system=1).verified
+        client = subprocess.Popen(
+            [sys.executable, "-c", command, "fly", path, "--to", to, "--system", "1", "--arm"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        assert client.stdout is not None
+        for line in client.stdout:
+            if "the mission is under way" in line:
+                break
+        if gone == "terminal":
+            client.send_signal(signal.SIGHUP)
+            assert "the terminal has gone" in client.stdout.read()
+        client.stdout.close()
+        assert client.wait(timeout=30) != 0
+        assert (mock.armed, mock.mode) == (True, 3)
+    assert orders == [MavCommand.ARM, MavCommand.START]
 
 
 def test_a_hang_up_is_ignored_where_it_was() -> None:

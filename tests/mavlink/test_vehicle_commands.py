@@ -10,19 +10,22 @@ import pytest
 import typer
 from conftest import free_port
 from served import running
-from stations import FENCE, HOME, a_mission, places, vehicle_of
+from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot, read_home
 from faao_mav.cli.download import download
 from faao_mav.cli.progress import transfer_progress
 from faao_mav.cli.upload import upload
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, LinkError
+from faao_mav.mavlink import Timeouts
+from faao_mav.mavlink.messages import Envelope, MissionRequestList
 from faao_mav.mavlink.mock import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.protocol import MavResult, MissionType
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
-from faao_mav.mission.formats import read_mission, write_wpl
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.formats import read_mission, read_mission_file, write_wpl
 
 app = typer.Typer(pretty_exceptions_enable=False)
 app.command()(upload)
@@ -205,6 +208,80 @@ def test_the_mock_autopilot_as_a_command(
     lines = result.stdout.splitlines()
     assert lines[0] == f"px4, system 1, at udpin:127.0.0.1:{port}; Ctrl-C ends"
     assert lines[1:] == ["mission: 6 rows", "fence: 4 rows", "ended"]
+
+
+class Reticent(MockAutopilot):
+    """It says nothing about what it holds beside its mission, or `part` of it."""
+
+    parts: tuple[MissionType, ...] = (MissionType.FENCE, MissionType.RALLY)
+
+    def _receive(self, envelope: Envelope, now: float) -> Any:
+        message = envelope.message
+        asked = isinstance(message, MissionRequestList) and message.mission_type in self.parts
+        return () if asked else super()._receive(envelope, now)
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command that soon gives up."""
+    quick = Timeouts(response=0.1, retries=1, attempts=1, silence=0.3)
+    monkeypatch.setattr("faao_mav.mavlink.client.Timeouts", lambda: quick)
+
+
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
+def test_what_can_be_read_is_written_and_what_cannot_is_told(
+    part: MissionType, port: int, tmp_path: Path
+) -> None:
+    mock = Reticent(behaviour_of("px4"), home=HOME, beat=0.1)
+    mock.parts = (part,)
+    held = a_mission(5, fence=FENCE, rally=RALLY)
+    for each in MissionType:
+        mock.lists.replace(each, wire_items(held, each, vehicle_of("px4")))
+    for name in ("m.plan", "m.waypoints"):
+        out = tmp_path / name
+        with running(mock, f"udpin:127.0.0.1:{port}"):
+            source = ("--from", f"udpout:127.0.0.1:{port}", "--system", 1)
+            result = run("download", *source, "--out", out)
+        assert result.exit_code == 1
+        assert f"{part.title} not read" in result.stdout
+        assert f"written      {out}" in result.stdout
+        assert f"{part.title}: not read: the vehicle stopped answering" in result.stderr
+        assert f"{out}: without the {part.title} that the vehicle may hold" in result.stderr
+        found = read_mission_file(out)
+        assert len(found.mission.items) == 5
+        expected = Fence() if part is MissionType.FENCE else FENCE
+        assert found.mission.fence == expected
+    assert "QGroundControl clears it there" not in result.stderr  # a text file has no such part
+    plan = read_mission_file(tmp_path / "m.plan")
+    assert plan.mission.rally == (() if part is MissionType.RALLY else RALLY)
+    (told,) = plan.warnings
+    assert told.endswith(
+        f"m.plan: without the {part.title} that the vehicle may hold: not read from it"
+    )
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_download_without_a_mission_writes_nothing(port: int, tmp_path: Path) -> None:
+    mock, out = Reticent(behaviour_of("px4"), home=HOME, beat=0.1), tmp_path / "m.plan"
+    mock.parts = (MissionType.MISSION,)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        source = ("--from", f"udpout:127.0.0.1:{port}", "--system", 1)
+        result = run("download", *source, "--out", out)
+    assert result.exit_code == 1
+    assert "mission: not read: the vehicle stopped answering" in result.stderr
+    assert not out.exists()
+
+
+@pytest.mark.usefixtures("hasty")
+def test_python_is_not_given_a_part_for_the_whole(port: int) -> None:
+    from faao_mav.mavlink import download as get
+
+    with (
+        running(Reticent(behaviour_of("px4"), home=HOME, beat=0.1), f"udpin:127.0.0.1:{port}"),
+        pytest.raises(LinkError, match="fence: not read"),
+    ):
+        get(f"udpout:127.0.0.1:{port}", system=1)
 
 
 def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]) -> None:
