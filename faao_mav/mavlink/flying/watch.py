@@ -145,7 +145,7 @@ class Watch(Machine[Ending]):
         waits = self.phase in ("holding", "ending") and self._command is not None
         if waits or self._disarming is not None:
             return ()
-        if self.solution is not None or self.phase in ("arming", "starting"):
+        if self.streams or self.phase in ("arming", "starting"):
             return self.cancel(now)
         self._end("left", f"the terminal has gone; the vehicle goes on in mode {self.seen.mode}")
         return ()
