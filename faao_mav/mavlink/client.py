@@ -231,7 +231,7 @@ class Session:
                 self._check_heard(connection)
             others = discovery.others.values()
             self.found = choose(found, connection, *names, wait, others)
-            self.link.bind(self.found.address, self.found.origin)
+            self.link.bind(self.found.address, *self.found.origins)
             if self._signing is not None or self.link.speaks_old(self.found.address):
                 self._check_alive(connection)
         except BaseException:

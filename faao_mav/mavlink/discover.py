@@ -60,8 +60,8 @@ class FoundVehicle:
     """An autopilot that was heard; `vehicle` is None if it is not known here, or not of this type.
 
     `family` is its autopilot, None if that is not known; `kind` its type, "copter" or "plane", or
-    its MAV_TYPE in words. It is `armed` if any of its heartbeats said so. `origin` is where it was
-    heard from.
+    its MAV_TYPE in words. It is `armed` if any of its heartbeats said so. `origins` are all places
+    that packets in its name came from, the first one first.
     """
 
     address: Address
@@ -70,7 +70,7 @@ class FoundVehicle:
     kind: str
     armed: bool
     ready: bool
-    origin: Origin = ""
+    origins: tuple[Origin, ...] = ("",)
 
     @property
     def autopilot(self) -> str:
@@ -88,8 +88,7 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
     Only what flies counts, by its MAV_TYPE: not what else is on board or on the link. Of a system
     that is component 1, for which it waits as long as it has `patience`, and any other only
-    without it. `system` and `component` leave out all others. What is heard from two origins is in
-    the outcome twice.
+    without it. `system` and `component` leave out all others.
 
     It ends `settle` seconds after the first, in which others are heard, once all are ready (at once
     where a `system` is given, unless told otherwise); after `patience` seconds without any; and
@@ -118,7 +117,8 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         usual = SETTLE if system is None else 0.0
         self._settle = usual if settle is None else settle
         self._patience, self._boot, self._knocks = patience, boot, knocks
-        self._found: dict[tuple[Address, Origin], FoundVehicle] = {}
+        self._found: dict[Address, FoundVehicle] = {}
+        self._origins: dict[Address, dict[Origin, None]] = {}
         self._begun = self._settled = 0.0
         self.others: dict[Address, str] = {}
 
@@ -130,9 +130,10 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message, sender = envelope.message, envelope.sender
         self._knocks = False
+        self._origins.setdefault(sender, {})[envelope.origin] = None
         if not isinstance(message, Heartbeat) or message.type == GROUND_STATION_TYPE:
             return ()
-        found = _found_vehicle(envelope, message)
+        found = _found_vehicle(sender, message)
         meant = self._system in (None, sender.system) and self._component in (
             None,
             sender.component,
@@ -143,9 +144,8 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
             return ()
         if not self._found:
             self._due = self._settled = now + self._settle
-        key = sender, envelope.origin
-        armed = found.armed or (key in self._found and self._found[key].armed)
-        self._found[key] = replace(found, armed=armed)
+        before = self._found.get(sender, found)
+        self._found[sender] = replace(found, armed=found.armed or before.armed)
         return self.tick(now)
 
     def _time_out(self, now: float) -> Sequence[Message]:
@@ -170,7 +170,10 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
     def _main(self) -> tuple[FoundVehicle, ...]:
         """Return those that were found, of each system component 1 alone where it has one."""
-        found = [self._found[key] for key in sorted(self._found)]
+        found = [
+            replace(self._found[address], origins=tuple(self._origins[address]))
+            for address in sorted(self._found)
+        ]
         systems = {each.address.system for each in found if _is_main(each)}
         return tuple(each for each in found if _is_main(each) or each.address.system not in systems)
 
@@ -274,12 +277,11 @@ def choose(
             )
         )
     for each in found:
-        origins = [other.origin for other in found if other.address == each.address]
-        if len(origins) > 1:
+        if len(each.origins) > 1:
             raise LinkError(
-                f"{connection}: {each.address} is heard from {' and '.join(origins[:_SHOWN])}: "
-                "more than one vehicle has this number, and which is meant is not known. Give each "
-                "its own, or connect to one alone"
+                f"{connection}: {each.address} is heard from "
+                f"{' and '.join(each.origins[:_SHOWN])}: more than one vehicle has this number, "
+                "and which is meant is not known. Give each its own, or connect to one alone"
             )
     if len(found) > 1:
         one_system = len({each.address.system for each in found}) == 1
@@ -302,12 +304,10 @@ def _listed(names: Sequence[str]) -> str:
     return "; ".join(names[:_SHOWN]) + more
 
 
-def _found_vehicle(envelope: Envelope, heartbeat: Heartbeat) -> FoundVehicle:
+def _found_vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:
     vehicle = vehicle_type_by_numbers(heartbeat.autopilot, heartbeat.type)
     family = next((f for f in families() if f.mav_autopilot == heartbeat.autopilot), None)
     kind = kind_by_number(heartbeat.type) or f"vehicle of MAV_TYPE {heartbeat.type}"
     # UNINIT is what simple vehicles say that do not tell their state.
     ready = heartbeat.system_status not in (MavState.BOOT, MavState.CALIBRATING)
-    return FoundVehicle(
-        envelope.sender, vehicle, family, kind, heartbeat.armed, ready, envelope.origin
-    )
+    return FoundVehicle(sender, vehicle, family, kind, heartbeat.armed, ready)

@@ -114,7 +114,8 @@ class WireLink:
         self.log = None if log is None else Tlog(log)
         self._vehicle: tuple[Address, Origin] | None = None
         self._sent: deque[bytes] = deque(maxlen=_ECHOED)
-        self._others: set[Origin] = set()
+        self.strangers: set[Origin] = set()
+        """Where packets in the name of the vehicle come from that is bound elsewhere."""
         self._transport = open_transport(connection) if isinstance(connection, str) else connection
 
     def __enter__(self) -> "WireLink":
@@ -229,8 +230,8 @@ class WireLink:
             return True
         vehicle, own = self._vehicle
         if origin != own:
-            if origin not in self._others and len(self._others) < _SHOWN:
-                self._others.add(origin)
+            if origin not in self.strangers and len(self.strangers) < _SHOWN:
+                self.strangers.add(origin)
                 self._note(
                     f"packets of {vehicle} come from {origin} too, not only from {own}: they do "
                     "not count. If the vehicle's address has changed, begin again"

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from mock_flights import fly as flies
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
+from scenes import Scene
 from served import running
 from stations import HOME, VEHICLE, a_mission
 
@@ -24,6 +25,7 @@ from faao_mav.mavlink.client import LinkOptions, holdings
 from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.discover import Discovery, FoundVehicle, choose
 from faao_mav.mavlink.flying.fly import fly
+from faao_mav.mavlink.flying.round_trips import RoundTrips
 from faao_mav.mavlink.framing import message_id, sender_of
 from faao_mav.mavlink.messages import (
     Envelope,
@@ -174,6 +176,37 @@ def test_two_vehicles_of_one_number_are_not_one(system: int | None) -> None:
                 job()
         assert [mock.armed for mock in mocks] == [False, False]
         assert [mock.mission().items for mock in mocks] == [(), ()]
+
+
+def test_another_vehicle_is_noticed_by_whatever_it_says() -> None:
+    """Its heartbeat may be lost."""
+    search = Discovery()
+    search.start(0.0)
+    search.on(Envelope(VEHICLE, BEAT, "192.0.2.1:14550"), 0.1)
+    search.on(Envelope(VEHICLE, Statustext(6, "hello"), ELSEWHERE), 0.5)
+    search.tick(1.5)
+    (vehicle,) = search.outcome or ()
+    assert vehicle.origins == ("192.0.2.1:14550", ELSEWHERE)
+    with pytest.raises(LinkError, match=f"is heard from 192.0.2.1:14550 and {ELSEWHERE}"):
+        choose([vehicle], "udpin:0.0.0.0:14550", None, None, 10.0)
+
+
+def test_nothing_is_started_that_has_a_namesake() -> None:
+    scene = Scene("px4", arm=True)
+    scene.watch.seen.strangers = {ELSEWHERE}
+    assert scene.run() == "refused"
+    assert ELSEWHERE in scene.watch.outcome.text
+    assert scene.orders == []
+
+
+def test_what_others_asked_tells_nothing_of_the_link() -> None:
+    trips = RoundTrips()
+    for now in (1.0, 2.0, 3.0):
+        own = trips.ask(now).ts1
+        trips.hear(Timesync(int(2e9 * now), own), now + 0.1)
+        trips.hear(Timesync(int(2e9 * now), own - 500_000_000), now + 0.2)  # another station's
+    assert trips.clock_speed == pytest.approx(2.0)
+    assert trips.lasting == pytest.approx(0.2)
 
 
 @dataclass

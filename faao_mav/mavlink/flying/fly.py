@@ -79,6 +79,7 @@ def fly(
         else:
             rows = held.items[MissionType.MISSION]
             watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate)
+        watch.seen.strangers = session.link.strangers
         try:
             ending = session.link.watch(
                 watch, lambda: watching(watch), beats=arm or stream is not None

@@ -11,16 +11,24 @@ most that counts, s. Chosen."""
 
 
 class RoundTrips:
-    """What the answers to TIMESYNC tell; before the second one a round trip takes no time."""
+    """What the answers to TIMESYNC tell; before the second one a round trip takes no time.
+
+    Only those to own questions count: vehicles tell everybody what they answer to anybody.
+    """
 
     def __init__(self) -> None:
+        self._asked: deque[int] = deque(maxlen=_KEPT)
         self._kept: deque[tuple[float, int, float]] = deque(maxlen=_KEPT)
 
+    def ask(self, now: float) -> Timesync:
+        """Return the question, with the time `now` in it, which the answer repeats."""
+        self._asked.append(int(now * 1e9))
+        return Timesync(0, self._asked[-1])
+
     def hear(self, answer: Timesync, now: float) -> None:
-        """Take note of an answer, which has our own time when it was asked in `ts1`, ns."""
-        asked = answer.ts1 / 1e9
-        if answer.tc1 and 0 < asked <= now:
-            self._kept.append((now, answer.tc1, now - asked))
+        """Take note of an answer."""
+        if answer.tc1 and answer.ts1 in self._asked:
+            self._kept.append((now, answer.tc1, now - answer.ts1 / 1e9))
 
     @property
     def clock_speed(self) -> float:

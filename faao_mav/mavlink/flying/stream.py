@@ -136,7 +136,7 @@ class Stream(Watch):
         out = super()._time_out(now)
         if self.outcome is not None or self.phase in ("holding", "aside"):
             return out
-        return [*out, Timesync(0, int(now * 1e9))]
+        return [*out, self._round_trips.ask(now)]
 
     # ---- before the flight
 

@@ -1,6 +1,6 @@
 """What a vehicle tells of its flight, and asking it for what it does not tell by itself."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -115,6 +115,7 @@ class Telemetry:
             where it is.
         wanted: the last CURRENT_MODE, None where the last heartbeat tells another mode.
         stations: other ground stations that were heard.
+        strangers: network addresses from which something else speaks in the vehicle's name.
         ending: why nothing more can be known, None as long as something can.
     """
 
@@ -134,6 +135,7 @@ class Telemetry:
         self.wanted: CurrentMode | None = None
         self._periods = {POSITION: 1 / rate} | _PERIODS
         self.stations: set[str] = set()
+        self.strangers: Set[str] = set()
         self.ending: Ending | None = None
         self._next_item = self._home
         self.start(0.0)

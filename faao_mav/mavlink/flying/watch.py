@@ -289,6 +289,9 @@ class Watch(Machine[Ending]):
         elif seen.stations:
             names = "; ".join(sorted(seen.stations))
             self._end("contested", f"nothing was started: another ground station ({names})")
+        elif seen.strangers:
+            text = f"its number is used by another vehicle too, at {', '.join(seen.strangers)}"
+            self._end("refused", f"nothing was started: {text}")
         elif self._last >= 0 and current is not None and current.seq > self._first:
             text = f"it would go on at item {seen.row}, not at the beginning"
             self._end("refused", f"nothing was started: {text}; set the first item (or reboot)")
