@@ -9,17 +9,11 @@ from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from faao_mav.errors import InputError, LinkError
-from faao_mav.mavlink.discover import (
-    SETTLE,
-    AskAlive,
-    AskHome,
-    Discovery,
-    FoundVehicle,
-    choose,
-)
+from faao_mav.mavlink.discover import SETTLE, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.link import Observe, WireLink
 from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
+from faao_mav.mavlink.questions import AskAlive, AskHome
 from faao_mav.mavlink.signing import Verdict, read_signing, remember
 from faao_mav.mavlink.transfer.exchange import Outcome, Peer
 from faao_mav.mavlink.transfer.pace import Timeouts

@@ -1,31 +1,20 @@
-"""Who is on the link, whether it is there now and ready for a mission, and where its home is."""
+"""Who is on the link, and ready for a mission."""
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from faao_mav.errors import LinkError
-from faao_mav.mavlink.machine import AskingMachine, Machine
-from faao_mav.mavlink.messages import (
-    CommandLong,
-    Envelope,
-    Heartbeat,
-    HomePosition,
-    Message,
-    Timesync,
-)
+from faao_mav.mavlink.machine import Machine
+from faao_mav.mavlink.messages import Envelope, Heartbeat, Message, Timesync
 from faao_mav.mavlink.protocol import (
     AUTOPILOT_COMPONENT,
     COMPANION_TYPE,
     GROUND_STATION_TYPE,
-    HOME_POSITION,
     NO_AUTOPILOT,
     Address,
-    MavCommand,
     MavState,
 )
 from faao_mav.mavlink.transport import Origin
-from faao_mav.mission.item import Home
 from faao_mav.plan.autopilots import types
 from faao_mav.vehicle import (
     AutopilotFamily,
@@ -134,11 +123,8 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         if not isinstance(message, Heartbeat) or message.type == GROUND_STATION_TYPE:
             return ()
         found = _found_vehicle(sender, message)
-        meant = self._system in (None, sender.system) and self._component in (
-            None,
-            sender.component,
-        )
-        if not (meant and message.of_autopilot):
+        chosen = Address(self._system or sender.system, self._component or sender.component)
+        if sender != chosen or not message.of_autopilot:
             kind = str(found) if message.of_autopilot else f"MAV_TYPE {message.type} ({sender})"
             self.others[sender] = kind
             return ()
@@ -185,71 +171,6 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
 def _is_main(found: FoundVehicle) -> bool:
     return found.address.component == AUTOPILOT_COMPONENT
-
-
-class AskHome(AskingMachine[list[Home]]):
-    """A machine that asks for HOME_POSITION; its outcome is a list with the home, or empty."""
-
-    progress = ("asking for home", 0, 0)
-
-    def __init__(self, vehicle: Address, wait: float = 1.0, retries: int = 2) -> None:
-        super().__init__(wait, retries)
-        self._vehicle = vehicle
-
-    def _question(self) -> Message:
-        return CommandLong(self._vehicle, MavCommand.REQUEST_MESSAGE, 0, float(HOME_POSITION))
-
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
-        message = envelope.message
-        if isinstance(message, HomePosition) and envelope.sender == self._vehicle:
-            place = (message.latitude / 1e7, message.longitude / 1e7)
-            self.outcome = [Home(*place, message.altitude / 1000)]
-        return ()
-
-    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        self.outcome = []
-        return ()
-
-    def cancel(self, now: float) -> Sequence[Message]:
-        """Do without."""
-        return self._give_up(now)
-
-
-class AskAlive(AskingMachine[bool]):
-    """A machine that asks for the answer to a `number` that nobody could know before.
-
-    It asks twice a second for `patience` seconds. Its outcome is whether `vehicle` answered, which
-    one that reads MAVLink 1 alone does not: on a link that is signed a recording cannot, and what
-    was recorded before the answer is older than it, so that it is passed over from then on.
-
-    >>> vehicle = Address(1, 1)
-    >>> asking = AskAlive(vehicle, number=77)
-    >>> asking.start(now=0.0)
-    [Timesync(tc1=0, ts1=77)]
-    >>> asking.on(Envelope(vehicle, Timesync(123_456, 77)), now=0.1)
-    ()
-    >>> asking.outcome
-    True
-    """
-
-    progress = ("asking for a sign of life", 0, 0)
-
-    def __init__(self, vehicle: Address, number: int, patience: float = 9.0) -> None:
-        super().__init__(0.5, math.ceil(patience / 0.5) - 1)
-        self._vehicle, self._number = vehicle, number
-
-    def _question(self) -> Message:
-        return Timesync(0, self._number)
-
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
-        message = envelope.message
-        if isinstance(message, Timesync) and envelope.sender == self._vehicle:
-            self.outcome = (message.tc1 != 0 and message.ts1 == self._number) or None
-        return ()
-
-    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        self.outcome = False
-        return ()
 
 
 def choose(

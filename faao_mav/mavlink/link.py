@@ -1,9 +1,9 @@
 """A machine on a real link, and the log of what passes it."""
 
 import os
+import secrets
 import struct
 import time
-from collections import deque
 from collections.abc import Callable, Sequence, Set
 from io import FileIO
 from pathlib import Path
@@ -33,10 +33,6 @@ Observe: TypeAlias = Callable[[str, int, int], object]
 _BEAT = 1.0
 """Seconds between two heartbeats, what the MAVLink guide asks for, and between two looks at how
 far a machine is."""
-
-_ECHOED = 64
-"""Packets of this end that are known again if they come back. Chosen: seconds of the quickest
-exchange; few, for another station of the same number sends the same heartbeat once in 256."""
 
 _SHOWN = 3
 """Other origins of the vehicle's packets that are told, at most; chosen."""
@@ -113,7 +109,9 @@ class WireLink:
         self._codec = Codec(address, signing)
         self.log = None if log is None else Tlog(log)
         self._vehicle: tuple[Address, Origin] | None = None
-        self._sent: deque[bytes] = deque(maxlen=_ECHOED)
+        # A number in it tells it from that of another program with this address, if it comes back.
+        token, state = secrets.randbits(32), MavState.ACTIVE
+        self._being_there = Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, token, state)
         self.strangers: set[Origin] = set()
         """Where packets in the name of the vehicle come from that is bound elsewhere."""
         self._transport = open_transport(connection) if isinstance(connection, str) else connection
@@ -190,7 +188,7 @@ class WireLink:
             try:
                 if beats and time.monotonic() >= next_beat:
                     next_beat = time.monotonic() + _BEAT
-                    self._send([_BEING_THERE])
+                    self._send([self._being_there])
                 self.step(machine, time.monotonic() + _BEAT if not beats else next_beat)
                 try:
                     observe()
@@ -212,8 +210,6 @@ class WireLink:
         due = machine.deadline
         until = until if due is None else min(due, until)
         for data, origin in self._transport.read(until - time.monotonic()):
-            if data in self._sent:
-                continue  # an echo
             for packet in self._codec.parse(data, origin):
                 if not self._counts(packet, origin):
                     continue
@@ -225,7 +221,10 @@ class WireLink:
             self._send(machine.tick(time.monotonic()))
 
     def _counts(self, packet: Packet, origin: Origin) -> bool:
-        """Tell whether `packet` is not what only looks like the vehicle's: see `bind`."""
+        """Tell whether `packet` counts: no own heartbeat that comes back; for others see `bind`."""
+        message = None if packet.envelope is None else packet.envelope.message
+        if message == self._being_there:
+            return False
         if self._vehicle is None or sender_of(packet.raw) != self._vehicle[0]:
             return True
         vehicle, own = self._vehicle
@@ -237,7 +236,6 @@ class WireLink:
                     "not count. If the vehicle's address has changed, begin again"
                 )
             return False
-        message = None if packet.envelope is None else packet.envelope.message
         return not isinstance(message, Heartbeat) or message.of_autopilot
 
     def _send(self, messages: Sequence[Message], to: Origin | None = None) -> None:
@@ -245,12 +243,7 @@ class WireLink:
             packet = self._codec.pack(message)
             if self.log is not None:
                 self.log.write(packet, received=False)
-            self._sent.append(packet)
             self._transport.write(packet, to if self._vehicle is None else self._vehicle[1])
-
-
-_BEING_THERE = Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)
-"""What a ground station says once a second."""
 
 
 def _tell_nobody() -> None:

@@ -12,7 +12,7 @@ from faao_mav.cli.upload import as_dict
 from faao_mav.errors import FaaoError
 from faao_mav.mavlink.client import UploadReport
 from faao_mav.mavlink.codec import Codec
-from faao_mav.mavlink.discover import AskAlive, AskHome, Discovery, FoundVehicle, choose
+from faao_mav.mavlink.discover import Discovery, FoundVehicle, choose
 from faao_mav.mavlink.framing import Framer
 from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.messages import (
@@ -36,6 +36,7 @@ from faao_mav.mavlink.protocol import (
     MavCommand,
     MissionType,
 )
+from faao_mav.mavlink.questions import AskAlive, AskHome
 from faao_mav.mavlink.signing import Signing
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.session import (

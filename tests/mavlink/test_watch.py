@@ -167,9 +167,10 @@ def test_a_reboot_ends_it(kind: str) -> None:
 
 @KINDS
 def test_nothing_is_started_beside_another_ground_station(kind: str) -> None:
-    scene = Scene(kind, arm=True)
-    assert scene.run(others=[Station(AnotherStation(), FOREIGN)]) == "contested"
-    assert scene.orders == []
+    for address in (FOREIGN, GROUND_STATION):  # another program of ours too
+        scene = Scene(kind, arm=True)
+        assert scene.run(others=[Station(AnotherStation(), address)]) == "contested"
+        assert scene.orders == []
     scene = Scene(kind, arm=True)
     assert scene.run(others=[Station(AnotherStation(since=10.0), FOREIGN)]) == "finished"
     assert scene.told("another ground station is on this link: system 250, component 190")

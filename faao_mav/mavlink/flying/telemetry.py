@@ -172,7 +172,7 @@ class Telemetry:
         """Take note of a message."""
         sender, message = envelope.sender, envelope.message
         if isinstance(message, Heartbeat) and message.type == GROUND_STATION_TYPE:
-            name = f"system {sender.system}, component {sender.component}"
+            name = str(sender)
             if name not in self.stations:
                 self.stations.add(name)
                 self.told.append(f"another ground station is on this link: {name}")

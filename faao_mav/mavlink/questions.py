@@ -1,0 +1,74 @@
+"""What a vehicle is asked: where its home is, and whether it is there now."""
+
+import math
+from collections.abc import Sequence
+
+from faao_mav.mavlink.machine import AskingMachine
+from faao_mav.mavlink.messages import CommandLong, Envelope, HomePosition, Message, Timesync
+from faao_mav.mavlink.protocol import HOME_POSITION, Address, MavCommand
+from faao_mav.mission.item import Home
+
+
+class AskHome(AskingMachine[list[Home]]):
+    """A machine that asks for HOME_POSITION; its outcome is a list with the home, or empty."""
+
+    progress = ("asking for home", 0, 0)
+
+    def __init__(self, vehicle: Address, wait: float = 1.0, retries: int = 2) -> None:
+        super().__init__(wait, retries)
+        self._vehicle = vehicle
+
+    def _question(self) -> Message:
+        return CommandLong(self._vehicle, MavCommand.REQUEST_MESSAGE, 0, float(HOME_POSITION))
+
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
+        message = envelope.message
+        if isinstance(message, HomePosition) and envelope.sender == self._vehicle:
+            place = (message.latitude / 1e7, message.longitude / 1e7)
+            self.outcome = [Home(*place, message.altitude / 1000)]
+        return ()
+
+    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
+        self.outcome = []
+        return ()
+
+    def cancel(self, now: float) -> Sequence[Message]:
+        """Do without."""
+        return self._give_up(now)
+
+
+class AskAlive(AskingMachine[bool]):
+    """A machine that asks for the answer to a `number` that nobody could know before.
+
+    It asks twice a second for `patience` seconds. Its outcome is whether `vehicle` answered, which
+    one that reads MAVLink 1 alone does not: on a link that is signed a recording cannot, and what
+    was recorded before the answer is older than it, so that it is passed over from then on.
+
+    >>> vehicle = Address(1, 1)
+    >>> asking = AskAlive(vehicle, number=77)
+    >>> asking.start(now=0.0)
+    [Timesync(tc1=0, ts1=77)]
+    >>> asking.on(Envelope(vehicle, Timesync(123_456, 77)), now=0.1)
+    ()
+    >>> asking.outcome
+    True
+    """
+
+    progress = ("asking for a sign of life", 0, 0)
+
+    def __init__(self, vehicle: Address, number: int, patience: float = 9.0) -> None:
+        super().__init__(0.5, math.ceil(patience / 0.5) - 1)
+        self._vehicle, self._number = vehicle, number
+
+    def _question(self) -> Message:
+        return Timesync(0, self._number)
+
+    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
+        message = envelope.message
+        if isinstance(message, Timesync) and envelope.sender == self._vehicle:
+            self.outcome = (message.tc1 != 0 and message.ts1 == self._number) or None
+        return ()
+
+    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
+        self.outcome = False
+        return ()
