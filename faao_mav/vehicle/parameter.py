@@ -22,6 +22,8 @@ class Parameter:
     no use (of a parameter of `either_sign`: their size); `documented` is the narrower range of the
     autopilot's documentation, if recommended values have to stay in it. The autopilot lowers the
     value to that of the parameter `capped_by`. `source` says where names and default come from.
+    `motion`: it shapes how the vehicle flies a mission; the others decide about checks, storage,
+    fence and return.
 
     >>> speed = Parameter("cruise_speed", "m/s", 10.0, {"WP_SPD": 1.0, "WPNAV_SPEED": 0.01})
     >>> speed.name_in({"WPNAV_SPEED": 750})
@@ -40,6 +42,7 @@ class Parameter:
     documented: tuple[float, float] = (-math.inf, math.inf)
     capped_by: str = ""
     source: str = ""
+    motion: bool = True
 
     @property
     def newest_name(self) -> str:

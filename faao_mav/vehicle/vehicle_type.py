@@ -8,6 +8,7 @@ from typing import Literal, Protocol, TypeAlias
 from faao_mav.arrays import Flags, Real
 from faao_mav.power import GRAVITY
 from faao_mav.vehicle.dialect import Dialect
+from faao_mav.vehicle.failsafe import Failsafe
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.orbit import Orbits, RallyRule, no_orbit
 from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
@@ -172,6 +173,7 @@ class VehicleType:
             that follow one without a stop; None if only a flight tells.
         orbits: how it circles at an item.
         rally: where a return goes when there are rally points.
+        failsafes: what it does by itself on a loss.
         corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
             radians; None if no such law is known.
     """
@@ -201,6 +203,7 @@ class VehicleType:
     true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
     speed_rates: Callable[[ParameterValues], SpeedRates] = lambda _: SpeedRates()
     leg_durations: Callable[[ParameterValues, Real, Flags], LegDurations] | None = None
+    failsafes: tuple[Failsafe, ...] = ()
     corner_speed: Callable[[ParameterValues, float], float] | None = None
     orbits: Orbits = no_orbit
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
@@ -213,7 +216,11 @@ class VehicleType:
         return "by a model after the autopilot's documents, not compared with recorded flights"
 
     def defaults(self) -> dict[str, float]:
-        """Return the defaults by the autopilot's oldest names, in the autopilot's own units."""
+        """Return the defaults by the autopilot's oldest names, in the autopilot's own units.
+
+        Those of switches and bits are integers.
+        """
         return {
-            p.oldest_name: p.written(p.default, p.oldest_name) for p in self.parameters.values()
+            p.oldest_name: type(p.default)(p.written(p.default, p.oldest_name))
+            for p in self.parameters.values()
         }

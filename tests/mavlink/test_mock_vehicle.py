@@ -31,6 +31,7 @@ from faao_mav.mavlink.messages import (
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.modes import mode_command, px4_mode
+from faao_mav.mavlink.parameters import setting_in
 from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission, MissionItem
@@ -249,8 +250,9 @@ def test_parameters(kind: MockKind) -> None:
     values = desk.tell(ParamRequestList(TO))
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
-    told = {value.param_id: value.param_value for value in values}
-    assert told.items() >= desk.machine.vehicle.defaults().items()
+    vehicle = desk.machine.vehicle
+    told = {value.param_id: setting_in(value, vehicle).value for value in values}
+    assert told.items() >= vehicle.defaults().items()
     second = values[1]
     assert desk.tell(ParamRequestRead(TO, "", 1)) == [second]
     assert desk.tell(ParamRequestRead(TO, second.param_id, -1)) == [second]

@@ -52,7 +52,7 @@ class ArduPilotFirmware(MockFirmware):
     fence_texts = (Statustext(MavSeverity.NOTICE, "Polygon fence breached"),)
     armed_inside_only = True
     returns_by_mode = frozenset({"plane"})
-    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1})
+    parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4})
     misplaced = MavResult.UNSUPPORTED
     nonsense = MavResult.INVALID
     mode_denied, no_mode = 4, 2  # failed; denied

@@ -123,8 +123,10 @@ class MockAutopilot(Machine[None]):
         self._comes_back = bool(rules.loss)
         self._tells_wanted = False  # only once it is asked for CURRENT_MODE
         known = self.vehicle.defaults() | dict(rules.defaults)
+        for failsafe in self.vehicle.failsafes:
+            known |= dict(failsafe.defaults)
         known |= dict(behaviour.firmware.parameters)
-        self.parameters = ParameterServer(known | dict(parameters or {}))
+        self.parameters = ParameterServer(known, parameters or {}, self.vehicle)
         self._firmware = behaviour.firmware(self.lists, behaviour, self._is_ready, self._is_flying)
         self._fly, self._speedup = fly, speedup
         self._period = 1 / rate / speedup if rate > 0 else None

@@ -1,5 +1,6 @@
 """The parameters that ground stations ask a mock autopilot for, and its answers."""
 
+import math
 from collections.abc import Mapping
 
 from faao_mav.mavlink.messages import (
@@ -9,16 +10,31 @@ from faao_mav.mavlink.messages import (
     ParamSet,
     ParamValue,
 )
+from faao_mav.mavlink.parameters import Setting, on_the_wire, setting_in
+from faao_mav.vehicle import VehicleType
+from faao_mav.vehicle.px4 import PX4
 
-_REAL32 = 9
-"""MAV_PARAM_TYPE of single-precision numbers."""
+_INT32, _REAL32 = 6, 9
+"""MAV_PARAM_TYPE of whole numbers, and of single-precision ones."""
 
 
 class ParameterServer:
-    """Parameters by name, in the autopilot's own units; all are single-precision numbers."""
+    """Parameters of `vehicle` by name, in the autopilot's own units.
 
-    def __init__(self, values: Mapping[str, float]) -> None:
-        self.values = dict(values)
+    Those whose default is an `int` are whole numbers; `given` are other values than the `defaults`.
+    PX4 sends whole numbers as their bits, and sets nothing that comes with another type than it
+    has.
+    """
+
+    def __init__(
+        self, defaults: Mapping[str, float], given: Mapping[str, float], vehicle: VehicleType
+    ) -> None:
+        self._vehicle = vehicle
+        self._whole = {name for name, x in {**given, **defaults}.items() if isinstance(x, int)}
+        self.values = {
+            name: int(value) if name in self._whole else value
+            for name, value in {**defaults, **given}.items()
+        }
 
     def on(self, message: ParamRequestList | ParamRequestRead | ParamSet) -> list[Message]:
         """Return the answer to a request; unknown names get none."""
@@ -30,12 +46,24 @@ class ParameterServer:
             case ParamRequestRead(param_index=index):
                 names = list(self.values)
                 return [self._value(names[index])] if 0 <= index < len(names) else []
-            case ParamSet(param_id=name, param_value=value):
-                if name in self.values:
-                    self.values[name] = value
-                    return [self._value(name)]
+            case ParamSet(param_id=name):
+                return self._set(message) if name in self.values else []
         return []
 
+    def _set(self, message: ParamSet) -> list[Message]:
+        name, kind = message.param_id, message.param_type
+        if self._vehicle.family == PX4 and kind != self._kind(name):
+            return []
+        told = ParamValue(name, message.param_value, kind, 0, 0)
+        value = setting_in(told, self._vehicle).value
+        if math.isfinite(value):
+            self.values[name] = int(value) if name in self._whole else value
+        return [self._value(name)]
+
+    def _kind(self, name: str) -> int:
+        return _INT32 if name in self._whole else _REAL32
+
     def _value(self, name: str) -> ParamValue:
-        index = list(self.values).index(name)
-        return ParamValue(name, float(self.values[name]), _REAL32, len(self.values), index)
+        index, kind = list(self.values).index(name), self._kind(name)
+        number = on_the_wire(Setting(float(self.values[name]), kind), self._vehicle)
+        return ParamValue(name, number, kind, len(self.values), index)

@@ -57,8 +57,8 @@ SOURCE = "ArduPilot 4.7: parameter lists of Copter and Plane"
 
 
 def switch(key: str, default: float, name: str, unit: str = "") -> Parameter:
-    """Return a parameter with one name in all generations, in its own unit."""
-    return Parameter(key, unit, default, {name: 1.0}, source=SOURCE)
+    """Return a parameter of checks, fence or return, with one name in all generations."""
+    return Parameter(key, unit, default, {name: 1.0}, source=SOURCE, motion=False)
 
 
 SHARED = (
@@ -85,7 +85,7 @@ def rally_parameters(limit: float, home: float) -> tuple[Parameter, ...]:
     """
     names = {"RALLY_LIMIT_KM": 1000.0}
     return (
-        Parameter("rally_limit", "m", limit, names, source=SOURCE),
+        Parameter("rally_limit", "m", limit, names, source=SOURCE, motion=False),
         switch("rally_home", home, "RALLY_INCL_HOME"),
     )
 

@@ -20,6 +20,7 @@ from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.orbit import RallyRule, plane_orbit
 from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
 from faao_mav.vehicle.px4.dialect import DIALECT
+from faao_mav.vehicle.px4.failsafes import FAILSAFES
 from faao_mav.vehicle.px4.flight_model import Px4 as Px4
 from faao_mav.vehicle.px4.guidance import corner_speed
 from faao_mav.vehicle.px4.legs import Px4Legs as Px4Legs
@@ -179,6 +180,7 @@ PX4_COPTER = VehicleType(
     vertical=_vertical,
     home_outside_fence=_HOME_OUTSIDE_FENCE,
     at_fence=_at_fence,
+    failsafes=FAILSAFES,
     fence_ahead=_fence_ahead,
     fastest=_FASTEST,
     legs=Px4Legs.from_vehicle,
@@ -203,6 +205,7 @@ PX4_PLANE = VehicleType(
     vertical=_plane_vertical,
     home_outside_fence=_HOME_OUTSIDE_FENCE,
     at_fence=_at_fence,
+    failsafes=FAILSAFES,
     unmodelled="there is no model of how PX4 flies planes",
     orbits=plane_orbit,
     rally=_rally,

@@ -1,6 +1,7 @@
 """PX4's parameters, of its multicopters and of its planes."""
 
 from dataclasses import dataclass
+from functools import partial
 from math import inf, radians
 
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, table
@@ -18,6 +19,7 @@ def _parameter(
     factor: float = 1.0,
     capped_by: str = "",
     documented: tuple[float, float] = (-inf, inf),
+    motion: bool = True,
 ) -> Parameter:
     return Parameter(
         key,
@@ -29,19 +31,23 @@ def _parameter(
         capped_by=capped_by,
         documented=documented,
         source=_SOURCE,
+        motion=motion,
     )
 
 
+_rule = partial(_parameter, motion=False)
+
+
 _SHARED = (
-    _parameter("takeoff_land_required", "", 0, "MIS_TKO_LAND_REQ"),
-    _parameter("first_waypoint_distance", "m", 10_000.0, "MIS_DIST_1WP"),
-    _parameter("takeoff_height", "m", 2.5, "MIS_TAKEOFF_ALT"),
-    _parameter("fence_action", "", 2, "GF_ACTION"),
-    _parameter("fence_predict", "", 0, "GF_PREDICT"),
-    _parameter("fence_distance", "m", 0.0, "GF_MAX_HOR_DIST"),
-    _parameter("fence_height", "m", 0.0, "GF_MAX_VER_DIST"),
-    _parameter("return_height", "m", 60.0, "RTL_RETURN_ALT", 0.0),
-    _parameter("return_type", "", 0, "RTL_TYPE"),
+    _rule("takeoff_land_required", "", 0, "MIS_TKO_LAND_REQ"),
+    _rule("first_waypoint_distance", "m", 10_000.0, "MIS_DIST_1WP"),
+    _rule("takeoff_height", "m", 2.5, "MIS_TAKEOFF_ALT"),
+    _rule("fence_action", "", 2, "GF_ACTION"),
+    _rule("fence_predict", "", 0, "GF_PREDICT"),
+    _rule("fence_distance", "m", 0.0, "GF_MAX_HOR_DIST"),
+    _rule("fence_height", "m", 0.0, "GF_MAX_VER_DIST"),
+    _rule("return_height", "m", 60.0, "RTL_RETURN_ALT", 0.0),
+    _rule("return_type", "", 0, "RTL_TYPE"),
 )
 """Mission checks, fence and return."""
 

@@ -18,6 +18,7 @@ from faao_mav.vehicle.ardupilot.copter.flight_model import ArduCopter as ArduCop
 from faao_mav.vehicle.ardupilot.copter.leg import ArduCopterLegs as ArduCopterLegs
 from faao_mav.vehicle.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.vehicle.ardupilot.dialect import COPTER_DIALECT
+from faao_mav.vehicle.ardupilot.failsafes import COPTER_FAILSAFES
 from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.orbit import Orbit
 from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
@@ -120,6 +121,7 @@ ARDUCOPTER = VehicleType(
     fence_needs_one_inclusion=needs_one_inclusion,
     home_outside_fence=HOME_OUTSIDE_FENCE,
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
+    failsafes=COPTER_FAILSAFES,
     legs=ArduCopterLegs.from_vehicle,
     flight_model=ArduCopter.from_vehicle,
     calibrated=True,

@@ -20,9 +20,12 @@ def _parameter(
     factor: float = 0.01,
     least: float = 0.1,
     documented: tuple[float, float] = (-math.inf, math.inf),
+    motion: bool = True,
 ) -> Parameter:
     names = {new: 1.0, old: factor}
-    return Parameter(key, unit, default, names, least, documented=documented, source=SOURCE)
+    return Parameter(
+        key, unit, default, names, least, documented=documented, source=SOURCE, motion=motion
+    )
 
 
 def _attitude(key: str, unit: str, degrees: float, new: str, old: str) -> Parameter:
@@ -56,7 +59,7 @@ TABLE = table(
     _parameter("velocity_gain", "1/s", 2.0, "PSC_NE_VEL_P", "PSC_VELXY_P", 1.0),
     _parameter("velocity_integral", "1/s^2", 1.0, "PSC_NE_VEL_I", "PSC_VELXY_I", 1.0, 0.0),
     _parameter("landing_speed", "m/s", 0.5, "LAND_SPD_MS", "LAND_SPEED", least=0.05),
-    _parameter("return_height", "m", 15.0, "RTL_ALT_M", "RTL_ALT", least=0.0),
+    _parameter("return_height", "m", 15.0, "RTL_ALT_M", "RTL_ALT", least=0.0, motion=False),
     *SHARED,
     switch("fence_options", 0, "FENCE_OPTIONS"),
     switch("fence_type", 7, "FENCE_TYPE"),

@@ -8,6 +8,7 @@ from faao_mav.vehicle.ardupilot import (
     rally_rule,
 )
 from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
+from faao_mav.vehicle.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane as ArduPlane
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlaneLegs
 from faao_mav.vehicle.ardupilot.plane.motion import SIDESLIP
@@ -65,6 +66,7 @@ ARDUPLANE = VehicleType(
     fence_needs_one_inclusion=needs_one_inclusion,
     home_outside_fence=HOME_OUTSIDE_FENCE,
     at_fence=at_fence({0: "report"}),
+    failsafes=PLANE_FAILSAFES,
     legs=ArduPlaneLegs.from_vehicle,
     flight_model=_model,
     ceilings=_ceilings,
