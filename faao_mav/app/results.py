@@ -5,9 +5,9 @@ from functools import partial
 
 from nicegui import ui
 
-from faao_mav.report.findings import by_rule, message_of
 from faao_mav.report.summary import result_lines
 from faao_mav.validate import Finding
+from faao_mav.validate.words import by_rule, message_of
 from faao_mav.workflow import Result
 
 

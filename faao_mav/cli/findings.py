@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from faao_mav.report.findings import by_rule, count_of, items_of, line_of, message_of
 from faao_mav.report.flights import check_lines
 from faao_mav.validate import Level, Rule
 from faao_mav.validate.check import Check
+from faao_mav.validate.words import by_rule, count_of, items_of, line_of, message_of
 
 _COLOURS = {Level.ERROR: "bold red", Level.WARNING: "yellow", Level.NOTE: "cyan"}
 """How a terminal shows each level."""

@@ -18,6 +18,7 @@ class Modes:
     `rest` is one to stand on the ground in, `mission` flies the mission, `hold` stays at the place
     (a plane circles there) without sticks, `guided` flies by setpoints (None: streams are not flown
     by that type). `at_fence` are those that hold, return and land, as after a breach of the fence.
+    In the modes `not_to_arm_in` the autopilot does not arm, or takes off as soon as it has.
     """
 
     rest: int
@@ -25,6 +26,7 @@ class Modes:
     hold: int
     at_fence: Mapping[FenceAction, int] = field(default_factory=dict)
     guided: int | None = None
+    not_to_arm_in: frozenset[int] = frozenset()
 
 
 def px4_mode(main: int, sub: int) -> int:
@@ -53,15 +55,29 @@ _PX4 = Modes(
     hold=_HOLD,
     at_fence=MappingProxyType({"hold": _HOLD, "return": px4_mode(4, 5), "land": px4_mode(4, 6)}),
     guided=px4_mode(6, 0),
+    not_to_arm_in=frozenset(px4_mode(4, sub) for sub in (2, 5, 6, 9)),
 )
 _BRAKE, _LOITER = 17, 12
+_COPTER = Modes(
+    rest=0,
+    mission=3,
+    hold=_BRAKE,
+    at_fence=MappingProxyType({"return": 6, "land": 9, "hold": _BRAKE}),
+    guided=4,
+    not_to_arm_in=frozenset({6, 7, 9, 14, 15, _BRAKE, 18, 21, 27}),
+)
 _MODES = {
-    (ARDUPILOT, "copter"): Modes(0, 3, _BRAKE, {"return": 6, "land": 9, "hold": _BRAKE}, guided=4),
-    (ARDUPILOT, "plane"): Modes(2, 10, _LOITER, {"return": 11}),
+    (ARDUPILOT, "copter"): _COPTER,
+    (ARDUPILOT, "plane"): Modes(2, 10, _LOITER, {"return": 11}, not_to_arm_in=frozenset({11})),
     (PX4, "copter"): _PX4,
     (PX4, "plane"): replace(_PX4, guided=None),
 }
-"""COPTER_MODE and PLANE_MODE of MAVLink; PX4's main and sub modes in one number."""
+"""COPTER_MODE and PLANE_MODE of MAVLink; PX4's main and sub modes in one number.
+
+ArduCopter 4.7 does not arm in RTL, CIRCLE, LAND, FLIP, AUTOTUNE, BRAKE, SMART_RTL and AUTO_RTL (in
+AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW; ArduPlane not in RTL. PX4 1.16 does
+not in Return, Land and Precision Land, and takes off in Takeoff.
+"""
 
 
 def modes_of(vehicle: VehicleType) -> Modes:

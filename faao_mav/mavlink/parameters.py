@@ -190,8 +190,9 @@ class SetParameter(AskingMachine[bool]):
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
         message = envelope.message
-        ours = isinstance(message, ParamValue) and message.param_id == self._name
-        if ours and envelope.sender == self._peer.address:
+        if envelope.sender != self._peer.address or not isinstance(message, ParamValue):
+            return ()
+        if message.param_id == self._name:
             found = setting_in(message, self._peer.vehicle)
             self.outcome = same_value(found.value, self._setting.value) or None
         return ()

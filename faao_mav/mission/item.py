@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from faao_mav.errors import InputError
-from faao_mav.mission.command import Command, Frame
-from faao_mav.mission.fence import Fence, RallyPoint, check_place
+from faao_mav.mission.command import FLOWN_TO, Command, Frame
+from faao_mav.mission.fence import Fence, LatLon, RallyPoint, check_place
 
 Params: TypeAlias = tuple[float, float, float, float]
 """param1 to param4 of an item."""
@@ -81,6 +81,15 @@ class Mission:
     fence: Fence = field(default_factory=Fence)
     rally: tuple[RallyPoint, ...] = ()
     unread: tuple[str, ...] = ()
+
+    @property
+    def first_place(self) -> LatLon | None:
+        """The first place on Earth that an item flies to, degrees; 0, 0 stands for none."""
+        for item in self.items:
+            on_earth = abs(item.x) <= 90 and abs(item.y) <= 180
+            if item.command in FLOWN_TO and on_earth and (item.x or item.y):
+                return item.x, item.y
+        return None
 
 
 def home_item(home: Home | None) -> MissionItem:

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from functools import partial
 
 from faao_mav.plan import Plan
-from faao_mav.report.findings import counted
 from faao_mav.report.lines import Line, apart, carried, of_plan
 from faao_mav.validate.check import Check
 from faao_mav.validate.flown import Debriefing
+from faao_mav.validate.words import counted
 from faao_mav.workflow import FenceSummary, Result
 
 _MOST_ZONES = 12

@@ -8,8 +8,8 @@ from faao_mav.optimizer.kinematics import kinematics
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
-from faao_mav.report.findings import counted
 from faao_mav.report.lines import Line, carried, told_rate
+from faao_mav.validate.words import counted
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result
 

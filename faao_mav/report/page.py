@@ -7,7 +7,6 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from faao_mav.report.findings import by_rule, said_of
 from faao_mav.report.flights import check_lines, debriefing_lines
 from faao_mav.report.lines import Line
 from faao_mav.report.style import inline_svg
@@ -15,6 +14,7 @@ from faao_mav.report.summary import result_lines
 from faao_mav.validate import Finding
 from faao_mav.validate.check import Check
 from faao_mav.validate.flown import Debriefing
+from faao_mav.validate.words import by_rule, said_of
 from faao_mav.workflow import Result
 
 if TYPE_CHECKING:

@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from faao_mav.report.findings import by_rule, count_of, line_of
 from faao_mav.report.flights import flight_lines
 from faao_mav.report.found import found_lines
 from faao_mav.report.lines import Line, joined
 from faao_mav.schedule.precoder_table import taken_by
 from faao_mav.validate import Level
+from faao_mav.validate.words import by_rule, count_of, line_of
 from faao_mav.workflow import Result
 
 

@@ -57,13 +57,11 @@ class ValidationContext:
 
     @cached_property
     def frame(self) -> LocalFrame | None:
-        """The local frame: about home, else about the first item that has coordinates."""
+        """The local frame: about home, else about the first place that it flies to."""
         if self.mission.home is not None:
             return LocalFrame(self.mission.home.latitude, self.mission.home.longitude)
-        for item in self.items:
-            if item.command in FLOWN_TO and on_earth(item) and not at_zero(item):
-                return LocalFrame(item.x, item.y)
-        return None
+        first = self.mission.first_place
+        return None if first is None else LocalFrame(*first)
 
     @cached_property
     def home(self) -> PlacedItem | None:

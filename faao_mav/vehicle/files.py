@@ -1,11 +1,18 @@
 """What the files of missions and parameters say of a vehicle, and what they are to say."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from faao_mav.mission.formats import MissionFile, PlanTarget
 from faao_mav.plan.autopilots import Autopilot
-from faao_mav.vehicle.vehicle import Vehicle, families, family, vehicle_type_by_numbers
+from faao_mav.vehicle.vehicle import (
+    Vehicle,
+    families,
+    family,
+    kind_by_number,
+    vehicle_type_by_numbers,
+)
 
 
 def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:
@@ -31,6 +38,38 @@ def vehicle_in(file: MissionFile) -> Vehicle | None:
         return None
     found = vehicle_type_by_numbers(file.firmware, file.vehicle_type or None)
     return None if found is None else Vehicle(found.family.key, found.kind)
+
+
+@dataclass(frozen=True, slots=True)
+class MadeFor:
+    """For whom a mission was made, as far as that is told, and what told it (`by`).
+
+    `kind` is a type of vehicle, or the MAV_TYPE of one that is not known here in words.
+    """
+
+    autopilot: Autopilot | None = None
+    kind: str | None = None
+    by: str = ""
+
+
+def made_for(path: Path, file: MissionFile, planned: Vehicle | None = None) -> MadeFor:
+    """Return for whom the mission that was read from `path` was made.
+
+    The vehicle of its plan tells, else the file, else whose file of parameters lies beside it.
+    """
+    if planned is not None:
+        return MadeFor(planned.autopilot, planned.kind, "as the plan says")
+    if file.firmware is not None:
+        keys = [each.key for each in families() if each.mav_autopilot == file.firmware]
+        kind = None
+        if file.vehicle_type:
+            unknown = f"vehicle of MAV_TYPE {file.vehicle_type}"
+            kind = kind_by_number(file.vehicle_type) or unknown
+        return MadeFor(keys[0] if keys else None, kind, "as the file says")
+    beside = [each.key for each in families() if parameter_path(path, each.key).is_file()]
+    if len(beside) != 1:
+        return MadeFor()
+    return MadeFor(beside[0], None, f"as {parameter_path(path, beside[0]).name} beside it says")
 
 
 def parameter_path(mission: Path, autopilot: Autopilot) -> Path:

@@ -78,15 +78,11 @@ def predict(
 
 def _start(mission: Mission) -> tuple[float, float] | None:
     """Return where the flight begins, degrees; None if the mission has no places at all."""
-    places = [item for item in mission.items if item.command in FLOWN_TO]
-    if not places:
+    if not any(item.command in FLOWN_TO for item in mission.items):
         return None
     if mission.home is not None:
         return mission.home.latitude, mission.home.longitude
-    for item in places:
-        if (item.x or item.y) and abs(item.x) <= 90 and abs(item.y) <= 180:
-            return item.x, item.y
-    return 0.0, 0.0
+    return mission.first_place or (0.0, 0.0)
 
 
 def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:

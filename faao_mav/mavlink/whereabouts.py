@@ -1,0 +1,82 @@
+"""Where a vehicle stands beside what its mission counts from."""
+
+import math
+from dataclasses import dataclass
+
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence import LatLon
+from faao_mav.mission.item import Home, Mission
+
+HOME_AWAY = 20.0
+"""The farthest that a vehicle may stand from its mission's home, m. Chosen: several times the error
+of satellite navigation and of a click on a map (3 to 10 m), and small beside the margins of fences
+and the ways from home to the first place and back, which are planned from home."""
+
+HOME_HIGHER = 10.0
+"""The most by which it may stand higher or lower than its mission's home, m. Heights of a mission
+count from where the vehicle stands: one that stands 30 m lower flies 30 m lower everywhere. Chosen:
+what the heights of satellite navigation and of terrain maps differ by in 19 of 20 places."""
+
+FIRST_AWAY, FIRST_FARTHEST = 500.0, 10_000.0
+"""The farthest that the mission's first place may be from where it stands, m: where no home tells
+how far it is meant to be, and in any case. Chosen: how far an aircraft is kept in sight; and PX4's
+default of MIS_DIST_1WP."""
+
+
+@dataclass(frozen=True, slots=True)
+class Whereabouts:
+    """Where a vehicle stands.
+
+    `from_home` and `from_first` are metres to its mission's home and first place, `higher` metres
+    above that home, below zero: lower. None: the mission tells none.
+    """
+
+    from_home: float | None
+    higher: float | None
+    from_first: float | None
+
+    @classmethod
+    def of(cls, place: Home, mission: Mission) -> "Whereabouts":
+        """Return where a vehicle at `place` stands beside `mission`."""
+        home, first = mission.home, mission.first_place
+        return cls(
+            None if home is None else distance(place, (home.latitude, home.longitude)),
+            None if home is None else place.altitude - home.altitude,
+            None if first is None else distance(place, first),
+        )
+
+    @property
+    def home_is_here(self) -> bool:
+        """Whether it stands at the mission's home; also where the mission tells none."""
+        if self.from_home is None or self.higher is None:
+            return True
+        return self.from_home <= HOME_AWAY and abs(self.higher) <= HOME_HIGHER
+
+    @property
+    def height_shown(self) -> str:
+        """By how much it stands higher or lower, for people."""
+        higher = self.higher or 0.0
+        return f"{abs(higher):.0f} m {'lower' if higher < 0 else 'higher'}"
+
+    def __str__(self) -> str:
+        if self.from_home is not None:
+            return f"{shown(self.from_home)} from the mission's home, {self.height_shown}"
+        if self.from_first is not None:
+            return f"{shown(self.from_first)} from the mission's first place; it tells no home"
+        return "the mission tells no place"
+
+
+def distance(place: Home, other: LatLon) -> float:
+    """Return how far it is from `place` to `other`, m; infinity at the antipode."""
+    east, north = LocalFrame(place.latitude, place.longitude).to_local(*other).tolist()
+    away = math.hypot(east, north)
+    return away if math.isfinite(away) else math.inf
+
+
+def shown(metres: float) -> str:
+    """Return a distance for people.
+
+    >>> shown(12.3), shown(1_932.0), shown(15_432_100.0)
+    ('12 m', '1932 m', '15432 km')
+    """
+    return f"{metres:.0f} m" if metres < FIRST_FARTHEST else f"{metres / 1000:.0f} km"
