@@ -14,6 +14,7 @@ from faao_mav.errors import FaaoError, PlanError
 from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import joined
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle
+from faao_mav.vehicle.files import MadeFor
 from faao_mav.workflow import Result
 
 
@@ -69,6 +70,7 @@ def watched(
     given what a `Telling` says; `interrupt`, once set, is Ctrl-C. Raises what `fly` raises.
     """
     from faao_mav.mavlink.flying.fly import fly
+    from faao_mav.mavlink.flying.seen import Flight
     from faao_mav.mavlink.flying.telling import Telling
     from faao_mav.mavlink.flying.watch import Watch
     from faao_mav.report.debrief import flight_lines
@@ -85,8 +87,10 @@ def watched(
     conversion = _to_fly(result)
     track = result.check.track if result.check is not None else None
     telling = Telling(result.solution, track, None, tell)
+    vehicle = conversion.vehicle
+    made_for = MadeFor(vehicle.autopilot, vehicle.kind, "as the plan says")
     report = fly(
-        conversion.mission,
+        Flight(conversion.mission, vehicle, made_for, result.solution),
         connection,
         arm=arm,
         lands=track is None or track.lands,

@@ -1,6 +1,7 @@
 """`faao-mission fly`: watch a mission to its end, beside its plan."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,6 +25,7 @@ from faao_mav.cli.shared import (
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
+    from faao_mav.mavlink.flying.seen import Flight
     from faao_mav.mission.formats import MissionFile
     from faao_mav.optimizer.solution import Solution
     from faao_mav.vehicle import Track
@@ -40,6 +42,12 @@ def fly(
         bool, flag("--stream", "Fly the plan by setpoints instead of the mission; needs --arm.")
     ] = False,
     rate: Annotated[float, option("HZ", "Setpoints a second of --stream.", min=4, max=50)] = 10.0,
+    elsewhere: Annotated[
+        bool, flag("--elsewhere", "Arm it at another place, or height, than MISSION is made for.")
+    ] = False,
+    untimed: Annotated[
+        bool, flag("--untimed", "Arm it with other parameters than MISSION is timed for.")
+    ] = False,
     radio: Radio = None,
     as_json: Annotated[bool, flag("--json", "Print JSON objects, one a line.")] = False,
     system: System = None,
@@ -51,10 +59,13 @@ def fly(
 ) -> None:
     """Watch a vehicle fly a mission that it holds, to the end.
 
-    What the vehicle holds is compared with MISSION first. A line a second tells mode, item and
-    battery; with a plan also how late the flight is, how far from plan and path (m), the rates of
-    both hops, and what is delivered so far and by the end. It arms and starts only with --arm, once
-    the autopilot's own checks pass and no other ground station is on the link. A pilot who changes
+    What the vehicle holds is compared with MISSION first. Then it says what stands against the
+    flight: where the vehicle stands, what it holds beside MISSION, its parameters, its battery, its
+    mode, what validation says with its own parameters; and what it does by itself on a loss. A line
+    a second tells mode, item and battery; with a plan also how late the flight is, how far from
+    plan and path (m), the rates of both hops, and what is delivered so far and by the end. It arms
+    and starts only with --arm, once nothing stands against the flight, the autopilot's own checks
+    pass and no other ground station is on the link. A pilot who changes
     the mode has the aircraft: nothing more is sent. With --stream a copter that holds the mission
     flies the trajectory of the plan by setpoints (GUIDED, Offboard), not the mission. Ctrl-C asks a
     flight that was started here to hold, a second one leaves it; in other flights the first one
@@ -84,17 +95,19 @@ def fly(
         note(line)
     solution = planned(plan_file, solution_file)
     feed = Feed(solution, radio) if solution is not None and radio is not None else None
-    track = None if stream else _predicted(mission_file, file, solution)
+    flight = _flight(mission_file, file, solution, streamed=stream)
+    track = None if stream else _predicted(flight)
     telling = Telling(solution, track, feed, say)
     rate = rate if stream else POSITION_RATE
     if feed is not None:
         rate = max(rate, feed.slots_per_second * 2)  # two positions for each slot at least
     report = run(
-        file.mission,
+        flight,
         to,
         arm=arm,
         lands=track is None or track.lands,
-        stream=solution if stream else None,
+        elsewhere=elsewhere,
+        untimed=untimed,
         rate=rate,
         watching=telling,
         system=system,
@@ -114,6 +127,7 @@ def fly(
             "ending": ending.kind if ending else "different",
             "text": ending.text if ending else "the vehicle holds another mission",
             "differences": [str(each) for each in report.differences],
+            "findings": [asdict(each) for each in report.findings],
             "flight": debriefing_as_dict(found) if found else None,
         }
         typer.echo(json.dumps(told, allow_nan=False))
@@ -125,18 +139,29 @@ def fly(
         raise typer.Exit(1)
 
 
-def _predicted(
-    mission_file: Path, file: "MissionFile", solution: "Solution | None"
-) -> "Track | None":
-    """Return the predicted flight of the mission; None, which is noted, if there is none."""
+def _flight(
+    mission_file: Path, file: "MissionFile", solution: "Solution | None", *, streamed: bool
+) -> "Flight":
+    """Return what is to be flown, and what tells for whom and for which parameters it was made."""
     from faao_mav.cli.vehicle import choose_vehicle
-    from faao_mav.errors import FaaoError
-    from faao_mav.vehicle.predict import predict
+    from faao_mav.mavlink.flying.seen import Flight
+    from faao_mav.vehicle import vehicle_of
+    from faao_mav.vehicle.files import made_for
 
     plan = solution.plan if solution is not None else None
     vehicle, _ = choose_vehicle(mission_file, file, plan, (None, None, None))
+    whose = made_for(mission_file, file, vehicle_of(plan) if plan is not None else None)
+    return Flight(file.mission, vehicle, whose, solution, streamed)
+
+
+def _predicted(flight: "Flight") -> "Track | None":
+    """Return the predicted flight of the mission; None, which is noted, if there is none."""
+    from faao_mav.errors import FaaoError
+    from faao_mav.vehicle.predict import predict
+
+    wind = flight.solution.plan.wind if flight.solution is not None else (0.0, 0.0)
     try:
-        return predict(file.mission, vehicle, wind=plan.wind if plan else (0.0, 0.0))
+        return predict(flight.mission, flight.vehicle, wind=wind)
     except FaaoError as error:
         note(f"the flight is not predicted: {error}")
         return None

@@ -310,6 +310,14 @@ class SysStatus(Message):
         return bool(self.onboard_control_sensors_health & PREARM_CHECK)
 
 
+class BatteryStatus(Message):
+    """BATTERY_STATUS of one battery, percent (-1: unknown); `battery_function`: what it feeds."""
+
+    id: int
+    battery_function: int
+    battery_remaining: int
+
+
 class HomePosition(Spot):
     """HOME_POSITION: where the vehicle returns to."""
 

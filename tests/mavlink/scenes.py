@@ -8,6 +8,9 @@ from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
 
 from faao_mav.mavlink.faults import Faults
+from faao_mav.mavlink.flying.held import Held
+from faao_mav.mavlink.flying.readiness import Readiness
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.mavlink.flying.stream import Stream
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Machine
@@ -22,6 +25,7 @@ from faao_mav.mavlink.messages import (
     Timesync,
 )
 from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mavlink.parameters import Reading, Setting
 from faao_mav.mavlink.protocol import (
     GROUND_STATION,
     GROUND_STATION_TYPE,
@@ -34,8 +38,18 @@ from faao_mav.mission import Mission
 from faao_mav.optimizer.solution import Solution
 
 
+def held_by(mock: MockAutopilot) -> Held:
+    """Return what `mock` holds, as if it had been read."""
+    settings = {name: Setting(value, 9) for name, value in mock.parameters.values.items()}
+    lists = {part: mock.lists.items(part) for part in MissionType}
+    return Held(lists, Reading(settings), home=mock.home)
+
+
 class Scene:
-    """A mock autopilot that holds a mission, and a watch of it on a simulated link."""
+    """A mock autopilot that holds a mission, and a watch of it on a simulated link.
+
+    `flight` is what is asked for beside that mission, for which the mock may not be ready.
+    """
 
     def __init__(
         self,
@@ -44,18 +58,24 @@ class Scene:
         *,
         lands: bool = True,
         solution: Solution | None = None,
+        flight: Flight | None = None,
+        elsewhere: bool = False,
+        untimed: bool = False,
         **options: Any,
     ) -> None:
         self.arm = bool(options.pop("arm", False))
         mission = mission or a_mission(12)
         behaviour = behaviour_of(cast(MockKind, kind))
-        self.mock = MockAutopilot(behaviour, home=HOME, fly=fly, **options)
+        self.mock = MockAutopilot(behaviour, fly=fly, **{"home": HOME, **options})
         for part in MissionType:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
-        rows = self.mock.lists.items(MissionType.MISSION)
-        self.watch: Any = Watch(peer_of(kind), rows, arm=self.arm, lands=lands)
+        rows, peer = self.mock.lists.items(MissionType.MISSION), peer_of(kind)
+        flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
+        allowed = {"elsewhere": elsewhere, "untimed": untimed}
+        ready = Readiness(flight, held_by(self.mock), peer, **allowed)
+        self.watch: Any = Watch(peer, rows, arm=self.arm, lands=lands, readiness=ready)
         if solution is not None:
-            self.watch = Stream(peer_of(kind), solution)
+            self.watch = Stream(peer, solution, ready)
         self.client = Counted(self.watch)
 
     def run(self, faults: Faults | None = None, until: float = 300.0, **more: Any) -> str:

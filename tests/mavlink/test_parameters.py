@@ -70,6 +70,7 @@ def test_what_the_vehicle_does_not_know_is_named_in_time(kind: str) -> None:
     reading = ReadParameters(peer_of(kind), known)
     assert ran(reading, mock) < 15
     assert reading.outcome is not None
+    assert not reading.outcome.values
     assert {*reading.outcome.missing} == {*known}
 
 
@@ -88,7 +89,7 @@ def test_other_vehicles_are_not_listened_to() -> None:
     desk.start()
     desk.tell(ParamValue("NAV_DLL_ACT", 0.0, INT32, 1, 0), Address(2, 1))
     desk.tell(ParamValue("NAV_RCL_ACT", 0.0, INT32, 1, 0))
-    assert desk.machine.outcome is None
+    assert not desk.machine.outcome
     desk.wait(20.0)
     assert desk.machine.outcome.missing == (("NAV_DLL_ACT",),)
 

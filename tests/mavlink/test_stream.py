@@ -11,17 +11,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import AnotherStation, Scene
 from simulate import Station
-from stations import FOREIGN, HOME, peer_of, vehicle_of
+from stations import FOREIGN, HOME, a_mission, peer_of, vehicle_of
 
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.flying.course import Course
+from faao_mav.mavlink.flying.held import Held
+from faao_mav.mavlink.flying.readiness import Readiness
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.mavlink.flying.stream import Stream
 from faao_mav.mavlink.local_frame import frame_of
 from faao_mav.mavlink.messages import CommandLong, Envelope, SetPositionTargetLocalNed
 from faao_mav.mavlink.modes import px4_mode
+from faao_mav.mavlink.parameters import Reading
 from faao_mav.mavlink.protocol import GROUND_STATION, MavCommand
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
@@ -187,7 +191,7 @@ def test_it_is_not_started_where_it_must_not_be(kind: str) -> None:
     scene = Scene(kind, solution=away)
     assert scene.run() == "refused"
     assert scene.orders == []
-    assert "111 m from the plan's home" in scene.watch.outcome.text
+    assert "111 m from the mission's home" in scene.watch.outcome.text
 
 
 @KINDS
@@ -277,7 +281,7 @@ def test_the_ways_out_and_home_keep_the_fence() -> None:
     velocity[0] = [20, 0]  # its run-in begins west of the fence
     begins_at_speed = replace(solution, v=velocity)
     with pytest.raises(InfeasibleError, match="fence"):
-        Stream(peer_of("ardupilot"), begins_at_speed)
+        Scene("ardupilot", solution=begins_at_speed)
 
 
 def test_the_mock_is_late_in_a_wind_that_is_too_strong() -> None:
@@ -289,8 +293,9 @@ def test_the_mock_is_late_in_a_wind_that_is_too_strong() -> None:
 def test_planes_do_not_fly_by_setpoints() -> None:
     peer = peer_of("ardupilot")
     plane = Peer(peer.own, peer.address, vehicle_type("ardupilot", "plane"))
+    ready = Readiness(Flight(a_mission(5)), Held({}, Reading({})), plane)
     with pytest.raises(InputError, match="only copters"):
-        Stream(plane, low())
+        Stream(plane, low(), ready)
 
 
 @KINDS

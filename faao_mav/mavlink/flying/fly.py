@@ -2,22 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.client import LinkOptions, Session
 from faao_mav.mavlink.discover import FoundVehicle
+from faao_mav.mavlink.flying.held import read_held
+from faao_mav.mavlink.flying.readiness import Readiness
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Samples
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Script
 from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mavlink.transfer.session import download_lists
 from faao_mav.mavlink.transfer.verify import Difference, compare
 from faao_mav.mavlink.wire_items import wire_items
-from faao_mav.mission.item import Mission
-
-if TYPE_CHECKING:
-    from faao_mav.optimizer.solution import Solution
+from faao_mav.validate.rule import Finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +24,8 @@ class FlightReport:
     """How a flight was watched: `ending` is None where the vehicle does not hold the mission.
 
     `differences` are what it holds instead; `samples` is where it was. `relay_start` is when the
-    clock of a streamed plan read 0, s on the vehicle's.
+    clock of a streamed plan read 0, s on the vehicle's. `findings` is what the gate before the
+    flight found last.
     """
 
     vehicle: FoundVehicle
@@ -33,24 +33,27 @@ class FlightReport:
     ending: Ending | None
     samples: Samples
     relay_start: float | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 def fly(
-    mission: Mission,
+    flight: Flight,
     connection: str,
     *,
     arm: bool = False,
     lands: bool = True,
-    stream: "Solution | None" = None,
+    elsewhere: bool = False,
+    untimed: bool = False,
     rate: float = POSITION_RATE,
     watching: Callable[[Watch], object] = lambda _: None,
     **options: Unpack[LinkOptions],
 ) -> FlightReport:
-    """Watch the vehicle at `connection` fly `mission`, which it has to hold already.
+    """Watch the vehicle at `connection` fly the mission of `flight`, which it has to hold already.
 
-    It is armed and started only with `arm`; `lands` tells whether the flight ends on the ground:
-    see `Watch`. With `stream` it is armed and flies that solution by setpoints, `rate` a second,
-    instead of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
+    It is armed and started only with `arm`, and only where `preflight` finds no error; for
+    `elsewhere` and `untimed` see there. `lands` tells whether the flight ends on the ground: see
+    `Watch`. A flight that is `streamed` is armed and flown by setpoints, `rate` a second, instead
+    of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
     that it is asked for. `watching` is called after every step. `options` are those of
     `LinkOptions`. Raises `LinkError` if there is no such vehicle, none that is known here, or its
     mission cannot be read.
@@ -59,31 +62,36 @@ def fly(
         vehicle, peer = session.found, session.peer
         if peer.vehicle is None:
             raise LinkError(f"{connection}: {vehicle}: flights of it are not watched")
-        lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
-        asked = tuple(part for part in MissionType if lists[part])
-        held = session.run(Script(download_lists(asked, peer, session.timeouts)))
+        lists = {part: wire_items(flight.mission, part, peer.vehicle) for part in MissionType}
+        held = session.run(Script(read_held(peer, session.timeouts)))
         for part, outcome in held.missing.items():
-            raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
+            if lists[part]:
+                raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
         wrong = tuple(
             each
-            for part in asked
-            for each in compare(lists[part], held.items[part], part, peer.vehicle)
+            for part in MissionType
+            if lists[part]
+            for each in compare(lists[part], held.lists.get(part, ()), part, peer.vehicle)
             if each.kind == "wrong"
         )
         if wrong:
             return FlightReport(vehicle, wrong, None, Samples())
-        if stream is not None:
+        ready = Readiness(
+            flight, held, peer, elsewhere=elsewhere, untimed=untimed, timeouts=session.timeouts
+        )
+        if flight.streamed and flight.solution is not None:
             from faao_mav.mavlink.flying.stream import Stream
 
-            watch: Watch = Stream(peer, stream, rate=rate)
+            watch: Watch = Stream(peer, flight.solution, ready, rate=rate)
         else:
-            rows = held.items[MissionType.MISSION]
-            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate)
+            rows = held.lists[MissionType.MISSION]
+            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate, readiness=ready)
         watch.seen.strangers = session.link.strangers
         try:
             ending = session.link.watch(
-                watch, lambda: watching(watch), beats=arm or stream is not None
+                watch, lambda: watching(watch), beats=arm or flight.streamed
             )
         except LinkError as error:
             ending = Ending("lost", str(error))
-    return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start)
+    found = watch.findings or ()
+    return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start, found)

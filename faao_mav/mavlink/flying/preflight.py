@@ -3,7 +3,7 @@
 Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 from faao_mav.mavlink.flying.seen import Flight, Seen
@@ -35,8 +35,12 @@ Chosen: twice what PX4 takes for low by default."""
 
 _ORDER = {Level.ERROR: 0, Level.WARNING: 1, Level.NOTE: 2}
 
-_PLACE, _TIMING = "place-", "timing-"
-"""How the rules begin that --elsewhere and --untimed overrule."""
+_PLACE, _TIMING = ("place-",), ("timing-", "link-")
+"""How the rules begin that --elsewhere and --untimed overrule: who flies a mission late does not
+deliver its link."""
+
+_OF_THE_PLAN = ("link-", "speed-above-limit")
+"""How the rules begin that hold a mission against its plan."""
 
 _AT_FENCE: dict[FenceAction, str] = {
     "nothing": "flies on",
@@ -64,19 +68,18 @@ def preflight(
     judged = _judged(flight, seen, elsewhere=elsewhere)
     found = [
         *_state(flight, seen),
-        *_overruled(_place(flight, seen), _PLACE, "--elsewhere" if elsewhere else ""),
+        *_place(flight, seen),
         *_lists(flight, seen, judged.vehicle),
-        *_overruled(_timing(flight, seen, judged), _TIMING, "--untimed" if untimed else ""),
+        *_timing(flight, seen, judged),
         *_battery(seen, judged),
         *(each for each in judged.findings if each.level is not Level.NOTE),
         *_failsafes(flight, seen, judged.vehicle),
     ]
+    if elsewhere:
+        found = [_overruled(each, _PLACE, "--elsewhere") for each in found]
+    if untimed:
+        found = [_overruled(each, _TIMING, "--untimed") for each in found]
     return tuple(sorted(found, key=lambda each: _ORDER[each.level]))
-
-
-def errors_in(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return those of `findings` for which nothing is armed."""
-    return tuple(each for each in findings if each.level is Level.ERROR)
 
 
 def addressee_mistake(made_for: MadeFor, vehicle: VehicleType) -> str | None:
@@ -101,13 +104,11 @@ def _note(rule: str, message: str) -> Finding:
     return Finding(Level.NOTE, rule, None, message, "")
 
 
-def _overruled(found: Iterator[Finding], rules: str, option: str) -> Iterator[Finding]:
-    """Yield what was `found`, with errors by `rules` as warnings where an `option` overrules it."""
-    for each in found:
-        if option and each.level is Level.ERROR and each.rule.startswith(rules):
-            yield replace(each, level=Level.WARNING, action=f"{option}: flown all the same")
-        else:
-            yield each
+def _overruled(found: Finding, rules: tuple[str, ...], option: str) -> Finding:
+    """Return what was `found`, an error by one of `rules` as a warning that names the `option`."""
+    if found.level is not Level.ERROR or not found.rule.startswith(rules):
+        return found
+    return replace(found, level=Level.WARNING, action=f"{option}: flown all the same")
 
 
 def _judged(flight: Flight, seen: Seen, *, elsewhere: bool) -> Check:
@@ -119,9 +120,15 @@ def _judged(flight: Flight, seen: Seen, *, elsewhere: bool) -> Check:
     vehicle = replace(
         flight.vehicle, autopilot=own, kind=kind, parameters=values, source="the vehicle"
     ).usable()
-    plan = flight.solution.plan if flight.solution is not None else None
-    limits = Limits(max_speed=plan.vehicle.max_speed) if plan is not None else None
-    return check(mission, vehicle, limits=limits, solution=flight.solution)
+    if flight.solution is None:
+        return check(mission, vehicle)
+    limits = Limits(max_speed=flight.solution.plan.vehicle.max_speed)
+    found = check(mission, vehicle, limits=limits, solution=flight.solution)
+    if not flight.streamed:
+        return found
+    # It is not the mission that keeps the plan, but the setpoints.
+    own = tuple(each for each in found.findings if not each.rule.startswith(_OF_THE_PLAN))
+    return replace(found, findings=own)
 
 
 def _state(flight: Flight, seen: Seen) -> Iterator[Finding]:
@@ -266,7 +273,7 @@ def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
     """Yield what it does by itself on a loss, one line each."""
     values = seen.held.reading.values
     for failsafe in own.type.failsafes:
-        rule = failsafe.loss.replace(" ", "-")
+        rule = f"on-{failsafe.loss.lower().replace(' ', '-')}"
         told = failsafe.told(values, streamed=flight.streamed)
         if told is None:
             names = ", ".join(name for name in failsafe.defaults if name not in values)
@@ -282,10 +289,10 @@ def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
         name = own.name_of(response.parameter)
         message = f"fence left: it {_AT_FENCE[response.action]} ({name})"
         if response.keeps:
-            yield _note("fence-left", message)
+            yield _note("on-fence-left", message)
         else:
-            yield _warning("fence-left", message, f"set {name} {response.set_to}")
+            yield _warning("on-fence-left", message, f"set {name} {response.set_to}")
     height = own.vertical.return_height
     if height > 0:
         name = own.name_of("return_height")
-        yield _note("returns-at", f"a return is flown {height:g} m above home at least ({name})")
+        yield _note("on-return", f"a return is flown {height:g} m above home at least ({name})")

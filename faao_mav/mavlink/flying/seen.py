@@ -1,12 +1,15 @@
 """What is to be flown, and what is seen of the vehicle before: what the gate compares."""
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from faao_mav.mavlink.flying.held import Held
 from faao_mav.mission.item import Home, Mission
-from faao_mav.optimizer.solution import Solution
 from faao_mav.vehicle import Vehicle, VehicleType
 from faao_mav.vehicle.files import MadeFor
+
+if TYPE_CHECKING:
+    from faao_mav.optimizer.solution import Solution
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +24,7 @@ class Flight:
     mission: Mission
     vehicle: Vehicle = field(default_factory=Vehicle)
     made_for: MadeFor = field(default_factory=MadeFor)
-    solution: Solution | None = None
+    solution: "Solution | None" = None
     streamed: bool = False
 
     @property

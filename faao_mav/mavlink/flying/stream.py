@@ -10,6 +10,7 @@ from faao_mav.errors import InputError
 from faao_mav.mavlink.flying.course import Setpoint
 from faao_mav.mavlink.flying.itinerary import Itinerary
 from faao_mav.mavlink.flying.own_frame import OwnFrame
+from faao_mav.mavlink.flying.readiness import Readiness
 from faao_mav.mavlink.flying.round_trips import RoundTrips
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.messages import (
@@ -41,9 +42,6 @@ _ANSWER = 10.0
 _STREAMED = 1.5
 """By how many times as long as the vehicle wants setpoints come before it is asked to follow them.
 Chosen."""
-
-_AT_HOME = 20.0
-"""The aircraft has to stand within so many metres of the plan's home; chosen."""
 
 _ARM_AGAIN = 2.0
 """Seconds after which it is asked to arm again that refused; chosen."""
@@ -82,12 +80,26 @@ class Stream(Watch):
     _start_command = MavCommand.TAKEOFF
 
     def __init__(
-        self, peer: Peer, solution: Solution, *, rate: float = 10.0, patience: float = 60.0
+        self,
+        peer: Peer,
+        solution: Solution,
+        readiness: Readiness,
+        *,
+        rate: float = 10.0,
+        patience: float = 60.0,
     ) -> None:
         plan = solution.plan
         finish = plan.mission.on_finish
         lands = finish != "hover"
-        super().__init__(peer, (), arm=True, lands=lands, patience=patience, rate=rate)
+        super().__init__(
+            peer,
+            (),
+            arm=True,
+            lands=lands,
+            patience=patience,
+            rate=rate,
+            readiness=readiness,
+        )
         if self._modes.guided is None or peer.vehicle is None:
             raise InputError("--stream: only copters fly by setpoints")
         self._family, self._guided = peer.vehicle.family, self._modes.guided
@@ -153,11 +165,6 @@ class Stream(Watch):
         if position is None or self._frame.origin is None:
             return ()
         if not known and now < self._begun + _ANSWER:
-            return ()
-        away = float(np.linalg.norm(self._frame.place(position)[:2]))
-        if away > _AT_HOME:
-            text = f"it stands {away:.0f} m from the plan's home (site.origin)"
-            self._end("refused", f"nothing was started: {text}, not within {_AT_HOME:.0f} m")
             return ()
         self.seen.told.append(f"without setpoints {self._rules.without(self._timeouts)}")
         lean = beyond_lean(self._solution, vehicle_of(self._solution.plan))

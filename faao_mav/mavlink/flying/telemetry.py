@@ -4,7 +4,9 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from faao_mav.mavlink.ask import place_in
 from faao_mav.mavlink.messages import (
+    BatteryStatus,
     CommandLong,
     CurrentMode,
     Envelope,
@@ -37,6 +39,7 @@ from faao_mav.mavlink.wire_items import home_items
 
 if TYPE_CHECKING:
     from faao_mav.mavlink.flying.record import FlightRecord
+    from faao_mav.mission.item import Home
 
 Kind: TypeAlias = Literal[
     "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
@@ -57,8 +60,14 @@ _SLOW = 1.5
 _MISSED = 3.0
 """Seconds without one of these after which it is asked for again; chosen."""
 
+_FRESH = 3.0
+"""Seconds for which what was heard of the vehicle's state counts: three heartbeats. Chosen."""
+
 _READ_AGAIN = 1.0
 """Seconds between two items that are read again; chosen."""
+
+_PROPULSION = (0, 1, 2)
+"""MAV_BATTERY_FUNCTION of batteries that keep the aircraft in the air: unknown, all, propulsion."""
 
 _BACK = 2000
 """Milliseconds by which a vehicle's clock goes back when it has rebooted; less is a late packet."""
@@ -114,6 +123,7 @@ class Telemetry:
         knows_place: LOCAL_POSITION_NED was heard, which ArduPilot sends once its estimator knows
             where it is.
         wanted: the last CURRENT_MODE, None where the last heartbeat tells another mode.
+        place: where it is by `position`, metres above mean sea level; None: not known.
         stations: other ground stations that were heard.
         strangers: network addresses from which something else speaks in the vehicle's name.
         ending: why nothing more can be known, None as long as something can.
@@ -133,6 +143,9 @@ class Telemetry:
         self.knows_place = False
         self.position: GlobalPositionInt | None = None
         self.wanted: CurrentMode | None = None
+        self.place: Home | None = None
+        self._batteries: dict[int, int] = {}
+        self._beat_at = self._placed_at = float("-inf")
         self._periods = {POSITION: 1 / rate} | _PERIODS
         self.stations: set[str] = set()
         self.strangers: Set[str] = set()
@@ -161,6 +174,17 @@ class Telemetry:
         return "unknown" if self.heartbeat is None else mode_name(self.heartbeat)
 
     @property
+    def battery(self) -> int | None:
+        """What is left of the emptiest battery that keeps it in the air, percent."""
+        told = [*self._batteries.values()]
+        told += [] if self.status is None else [self.status.battery_remaining]
+        return min((each for each in told if each >= 0), default=None)
+
+    def is_fresh(self, now: float) -> bool:
+        """Tell whether mode, armed state and place were heard of in the last seconds."""
+        return now - min(self._beat_at, self._placed_at) <= _FRESH
+
+    @property
     def row(self) -> int | None:
         """The row of the mission file that is under way: row 0 is home, also for PX4."""
         return None if self.current is None else self._row(self.current.seq)
@@ -182,8 +206,10 @@ class Telemetry:
             self.told.append(f"heard again after {now - self._heard:.0f} s")
         self._heard, self._silent = now, False
         match message:
+            case BatteryStatus(battery_function=function) if function in _PROPULSION:
+                self._batteries[message.id] = message.battery_remaining
             case Heartbeat():
-                self.heartbeat = message
+                self.heartbeat, self._beat_at = message, now
                 if self.wanted is not None and self.wanted.custom_mode != message.custom_mode:
                     self.wanted = None
             case CurrentMode():
@@ -234,8 +260,8 @@ class Telemetry:
         last = 1000 * samples.t[-1] if samples.t else -1.0
         if t < last - _BACK:
             self._end("rebooted", "the vehicle has rebooted: what it flies now is not known")
-        elif t > last:
-            self.position = message
+        elif t > last and (place := place_in(message)) is not None:
+            self.position, self.place, self._placed_at = message, place, now
             if t < last + 1000 * _SLOW * self._periods[POSITION]:
                 self._needed[POSITION] = now
             samples.t.append(t / 1000)

@@ -1,7 +1,7 @@
 """What is told of a flight while it is watched: to people, to programs, and to radios."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -11,6 +11,8 @@ from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.comparison import on_the_plans_clock
 from faao_mav.validate.flown import Debriefing, Line, Standing, plan_start, planned_line, standing
+from faao_mav.validate.rule import Finding, Level
+from faao_mav.validate.words import by_rule, count_of, line_of
 from faao_mav.vehicle import Track
 
 _PERIOD = 1.0
@@ -27,7 +29,8 @@ def _predicted_line(solution: Solution, track: Track | None) -> Line:
 class Telling:
     """Tells what a watch sees: called after its every step, it says what is new.
 
-    `say` is given events, {"note": text}, and once a second how the flight stands: where the
+    `say` is given events, {"note": text}, of which one has "findings" too, what the gate before the
+    flight found, and once a second how the flight stands: where the
     vehicle is, and beside `solution`, of which `track` is the predicted flight, how late it is and
     what it delivers. A `feed` tells radios the slots of `solution` meanwhile.
     """
@@ -42,11 +45,16 @@ class Telling:
         self._solution, self._feed, self._say = solution, feed, say
         self._start: float | None = None
         self._told, self._next, self._last = 0, 0.0, -_PERIOD
+        self._found: tuple[Finding, ...] | None = None
         self._line = None if solution is None else _predicted_line(solution, track)
 
     def __call__(self, watch: Watch) -> None:
         """Say what has happened since the last call, and once a second how the flight stands."""
         seen = watch.seen
+        if watch.findings is not self._found and watch.findings is not None:
+            self._found = watch.findings
+            told = [asdict(each) for each in self._found]
+            self._say({"note": findings_text(self._found), "findings": told})
         for text in seen.told[self._told :]:
             self._say({"note": text})
         self._told = len(seen.told)
@@ -125,6 +133,16 @@ def _as_dict(watch: Watch, stands: Standing | None, solution: Solution | None) -
             rate = told["plan"][name] / solution.plan.flight.duration
             told["plan"][f"{name}_mbytes"] = solution.plan.megabytes(rate)
     return told
+
+
+def findings_text(findings: Sequence[Finding]) -> str:
+    """Return what the gate before a flight found, for people: a line for each rule."""
+    counts = ", ".join(count_of(findings, level) for level in Level)
+    lines = [f"before the flight: {counts}"]
+    for group in by_rule(findings):
+        action = f"; to do: {group[0].action}" if group[0].action else ""
+        lines.append(f"   {line_of(group)}{action}")
+    return "\n".join(lines)
 
 
 def as_text(told: dict[str, Any]) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias
 
 from faao_mav.mavlink.flying.disarm import Disarm
+from faao_mav.mavlink.flying.readiness import Readiness
 from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.mavlink.machine import Machine, Progress
 from faao_mav.mavlink.messages import (
@@ -19,6 +20,7 @@ from faao_mav.mavlink.modes import mode_command, modes_of
 from faao_mav.mavlink.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, MissionType
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.wire_items import home_items
+from faao_mav.validate.rule import Finding
 
 Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "disarming", "waiting", "flying", "holding",
@@ -54,8 +56,9 @@ class Watch(Machine[Ending]):
     """A machine that watches the vehicle of `peer` fly the mission `rows` to its end.
 
     `rows` are the items that it holds, the home row included where it has one. With `arm` it arms
-    and starts the mission once the autopilot's own checks pass, it knows where it is and no other
-    ground station was heard; else somebody else does. `lands`: the flight ends on the ground.
+    and starts the mission once the autopilot's own checks pass, it knows where it is, no other
+    ground station was heard and the gate before the flight, `readiness`, finds no error; else
+    somebody else does. `lands`: the flight ends on the ground.
     After `patience` seconds without a message, or of checks that do not pass, it ends. `seen` is
     what it has heard; it asks for `rate` positions a second. `relay_start` is when the plan's clock
     read 0, s on the vehicle's, where that is known: in a `Stream`.
@@ -68,7 +71,8 @@ class Watch(Machine[Ending]):
     The phases: "checking", "engaging" (a `Stream` only), "arming" and "starting", with `arm`, or
     "waiting" for others to start it; "disarming", where it did not start; "flying" the mission;
     "ending", when that is over; "holding", as `cancel` asked for; "aside", when the pilot has the
-    aircraft. Raises `ValueError` for a vehicle that is not known.
+    aircraft. Raises `ValueError` for a vehicle that is not known, and where `readiness` is missing
+    with `arm`.
     """
 
     streams = False
@@ -85,10 +89,13 @@ class Watch(Machine[Ending]):
         lands: bool = True,
         patience: float = 60.0,
         rate: float = POSITION_RATE,
+        readiness: Readiness | None = None,
     ) -> None:
         super().__init__()
         if peer.vehicle is None:
             raise ValueError("watch: a vehicle that is known is needed")
+        if arm and readiness is None:
+            raise ValueError("watch: nothing is armed without the gate before a flight")
         self._peer, self._modes = peer, modes_of(peer.vehicle)
         self._family = peer.vehicle.family
         self._first = home_items(peer.vehicle, MissionType.MISSION)
@@ -110,6 +117,18 @@ class Watch(Machine[Ending]):
         self._sent, self._next_try, self._no = 0, 0.0, ""
         self._unattended = False
         self._disarming: Disarm | None = None
+        self._ready = readiness
+
+    @property
+    def findings(self) -> tuple[Finding, ...] | None:
+        """What the gate before the flight found, None before it has looked."""
+        return None if self._ready is None else self._ready.findings
+
+    @property
+    def deadline(self) -> float | None:
+        """When `tick` is due."""
+        own, reading = super().deadline, None if self._ready is None else self._ready.deadline
+        return own if own is None or reading is None else min(own, reading)
 
     @property
     def progress(self) -> Progress:
@@ -120,6 +139,8 @@ class Watch(Machine[Ending]):
         """Listen, and ask for telemetry."""
         self._begun = now
         self.seen.start(now)
+        if self._ready is not None:
+            self._ready.start(now)
         return self._time_out(now)
 
     def cancel(self, now: float) -> Sequence[Message]:
@@ -134,7 +155,7 @@ class Watch(Machine[Ending]):
             self._disarming.leave("interrupted again")
             self.outcome = self._disarming.outcome
         self._end("left", f"no longer watched; the vehicle is in mode {self.seen.mode}")
-        return ()
+        return () if self._ready is None else self._ready.cancel(now)
 
     def hang_up(self, now: float) -> Sequence[Message]:
         """Leave a mission that is under way to the autopilot, cancel anything else.
@@ -160,7 +181,11 @@ class Watch(Machine[Ending]):
             return self._end_early(self.seen.ending, now)
         if envelope.sender != self._peer.address:
             return ()
-        match envelope.message:
+        out = () if self._ready is None else self._ready.on(envelope, now)
+        return [*out, *self._hear(envelope.message, now)]
+
+    def _hear(self, message: Message, now: float) -> Sequence[Message]:
+        match message:
             case Heartbeat() as heartbeat:
                 return self._on_heartbeat(heartbeat, now)
             case MissionCurrent() as current:
@@ -185,6 +210,8 @@ class Watch(Machine[Ending]):
         if self._disarmed_at is not None and now >= self._disarmed_at + _REBOOT:
             self._disarmed_at = None
             return self._on_disarmed()
+        if self._ready is not None and self.phase in ("checking", "waiting"):
+            self._ready.look(self.seen, now)
         if self.phase == "checking":
             return [*questions, *self._check(now)]
         return [*questions, *self._repeat(now)]
@@ -295,6 +322,8 @@ class Watch(Machine[Ending]):
         elif self._last >= 0 and current is not None and current.seq > self._first:
             text = f"it would go on at item {seen.row}, not at the beginning"
             self._end("refused", f"nothing was started: {text}; set the first item (or reboot)")
+        elif self._stopped():
+            pass
         elif waited >= self._patience:
             silent = "it does not say why" if seen.knows_place else "it does not know where it is"
             said = "; ".join(dict.fromkeys(seen.said)) or silent
@@ -303,8 +332,25 @@ class Watch(Machine[Ending]):
             return ()
         if seen.status is None or not (seen.status.may_arm and seen.knows_place):
             return ()
+        if self._ready is not None:
+            out = self._ready.settle(seen, now)
+            if out is not None:
+                return out
+            if self._stopped() or self._ready.errors:
+                return ()
         self._mode_before = beat.custom_mode
         return self._set_out(now)
+
+    def _stopped(self) -> bool:
+        """End where the gate has found an error, and tell whether it has.
+
+        A place that is not known is waited for.
+        """
+        errors = () if self._ready is None else self._ready.errors
+        told = [f"{e.message} ({e.action})" for e in errors if e.rule != "position-unknown"]
+        if told:
+            self._end("refused", f"nothing was started: {'; '.join(told)}")
+        return bool(told)
 
     def _set_out(self, now: float) -> Sequence[Message]:
         """Arm, now that nothing is against it."""

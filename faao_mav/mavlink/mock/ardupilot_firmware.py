@@ -1,11 +1,12 @@
 """How ArduPilot takes and gives lists."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from faao_mav.errors import InputError
 from faao_mav.mavlink.messages import (
     Envelope,
+    GlobalPositionInt,
     ListMessage,
     Message,
     MissionAck,
@@ -51,11 +52,18 @@ class ArduPilotFirmware(MockFirmware):
     mission_limit = 655  # as in its simulator
     fence_texts = (Statustext(MavSeverity.NOTICE, "Polygon fence breached"),)
     armed_inside_only = True
+    not_armed = 4
+    not_armed_text = "Arm: {}"
     returns_by_mode = frozenset({"plane"})
     parameters = MappingProxyType({"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4})
     misplaced = MavResult.UNSUPPORTED
     nonsense = MavResult.INVALID
     mode_denied, no_mode = 4, 2  # failed; denied
+
+    def without_place(self, reports: list[Message]) -> list[Message]:
+        """Return positions at 0, 0, as long as it does not know where it is."""
+        told = [each for each in reports if isinstance(each, GlobalPositionInt)]
+        return [replace(each, lat=0, lon=0, alt=0) for each in told]
 
     def check_beside(self, part: MissionType, item: WireItem) -> MavResult:
         """Return what it answers to `item` of a fence or of rally points that is on Earth."""

@@ -110,6 +110,7 @@ class MockFirmware(ABC):
         fence_texts: what it says when it leaves the fence.
         armed_inside_only: it does not arm where home lies outside the fence.
         mode_denied, no_mode: the MAV_RESULT of a mode that it does not enter, and of no such mode.
+        not_armed, not_armed_text: the MAV_RESULT with which it does not arm, and what it says.
     """
 
     family: ClassVar[AutopilotFamily]
@@ -124,6 +125,8 @@ class MockFirmware(ABC):
     armed_inside_only: ClassVar[bool] = False
     mode_denied: ClassVar[int]
     no_mode: ClassVar[int]
+    not_armed: ClassVar[int]
+    not_armed_text: ClassVar[str]
 
     def __init__(
         self,
@@ -159,6 +162,10 @@ class MockFirmware(ABC):
         """Return the custom mode that DO_SET_MODE asks for, None if it asks for none."""
         number = whole(command.param2)
         return number if is_custom(command) and number >= 0 else None
+
+    def without_place(self, reports: list[Message]) -> list[Message]:
+        """Return what it tells of position `reports` as long as it does not know where it is."""
+        return reports[:0]
 
     def infeasible(self, mission: Mission) -> str | None:  # noqa: ARG002
         """Return why `mission` is not flown though it was taken, None if it is."""

@@ -11,6 +11,7 @@ from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import (
     Addressed,
     AutopilotVersion,
+    BatteryStatus,
     CommandAck,
     CommandLong,
     CurrentMode,
@@ -18,7 +19,6 @@ from faao_mav.mavlink.messages import (
     GpsGlobalOrigin,
     Heartbeat,
     HomePosition,
-    LocalPositionNed,
     Message,
     MissionCurrent,
     MissionSetCurrent,
@@ -61,7 +61,7 @@ from faao_mav.vehicle import Track, Vehicle, vehicle_type
 
 Fly: TypeAlias = Callable[[Mission], Track]
 
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 """MAV_RESULT."""
 
 
@@ -90,7 +90,8 @@ class MockAutopilot(Machine[None]):
     second until it is asked for another rate. Its clock runs `speedup` times as fast as the
     world's, as those of simulators do; on a mission it then stands still while `tick` is late,
     rather than jump, as theirs do. Heartbeats are `beat` of the world's seconds apart.
-    `parameters` are told beside its defaults; what they do to the flight is up to `fly`. In GUIDED
+    `parameters` are told beside its defaults; what they do to the flight is up to `fly`. It tells
+    that its battery is at `battery` percent, -1: not known. In GUIDED
     and Offboard it follows setpoints, in a `wind`, m/s east and north: see `Guided`. `armed`
     tells whether the motors may turn.
     """
@@ -112,8 +113,10 @@ class MockAutopilot(Machine[None]):
         boot: float = 0.0,
         place: float = 0.0,
         wind: tuple[float, float] = (0.0, 0.0),
+        battery: int = 100,
     ) -> None:
         super().__init__()
+        self._battery = battery
         self.behaviour, self.address, self.home = behaviour, address, home
         self.vehicle = vehicle_type(behaviour.family.key, aircraft)
         self._modes = modes_of(self.vehicle)
@@ -181,16 +184,14 @@ class MockAutopilot(Machine[None]):
             out += self._follow_setpoints(now)
         if now >= self._next_beat:
             self._next_beat = now + self._beat
-            out += [self._heartbeat(), self._mission_current(now), self._system_status()]
+            out += [self._heartbeat(), self._mission_current(now), *self._system_status()]
             if self._tells_wanted:
                 out.append(CurrentMode(self._mode, self._wanted))
         if self._period is not None and now >= self._next_report:
             self._next_report = now + self._period
             since_boot = (now - self._booted) * self._speedup
             told = telemetry(self._posture(now), self.home, since_boot)
-            if not self._knows_place():
-                told = [each for each in told if not isinstance(each, LocalPositionNed)]
-            out += told
+            out += told if self._knows_place() else self._firmware.without_place(told)
         return out
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
@@ -255,6 +256,10 @@ class MockAutopilot(Machine[None]):
         match command.command:
             case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
+                why = self._why_not_armed() if result == self._firmware.not_armed else None
+                if why is not None:
+                    text = self._firmware.not_armed_text.format(why)
+                    answers.append(Statustext(MavSeverity.CRITICAL, text))
             case MavCommand.TAKEOFF:
                 climbs = self._guided.take_off(command.param7, self._mode, now)
                 result = ACCEPTED if climbs else DENIED
@@ -290,11 +295,14 @@ class MockAutopilot(Machine[None]):
     def _asked_for(self, kind: int) -> list[Message]:
         if kind == _AUTOPILOT_VERSION:
             return [AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
+        if kind == POSITION:
+            told = telemetry(self._posture(self._now), self.home, self._now - self._booted)
+            return told[:1] if self._knows_place() else self._firmware.without_place(told[:1])
         if kind in (HOME_POSITION, LOCAL_ORIGIN):
             home = self.home
             place = (round(home.latitude * 1e7), round(home.longitude * 1e7))
-            told = HomePosition if kind == HOME_POSITION else GpsGlobalOrigin
-            return [told(*place, round(home.altitude * 1000))]
+            spot = HomePosition if kind == HOME_POSITION else GpsGlobalOrigin
+            return [spot(*place, round(home.altitude * 1000))]
         return []
 
     def _arm(self, wanted: bool, now: float) -> int:
@@ -302,12 +310,20 @@ class MockAutopilot(Machine[None]):
             self.armed, self._flight, self._broken_off = False, None, None
             self._guided.reset()
             return ACCEPTED
-        if not self._is_ready() or self._is_kept_on_ground():
-            return REJECTED
+        if self._why_not_armed() is not None:
+            return self._firmware.not_armed
         self.armed = True
         if self._mode == self._modes.guided:
             self._begin_guided(now)
         return self._begin(now) if self._is_mission else ACCEPTED
+
+    def _why_not_armed(self) -> str | None:
+        """Return what it says when it does not arm, None if it does."""
+        if not self._is_ready():
+            return "Calibrating"
+        if self._mode in self._modes.not_to_arm_in:
+            return "Mode not armable"
+        return "Vehicle breaching Polygon fence" if self._is_kept_on_ground() else None
 
     def _set_mode(self, mode: int | None, now: float) -> int:
         if mode is None:
@@ -438,9 +454,10 @@ class MockAutopilot(Machine[None]):
         number = self.lists.number(MissionType.MISSION) if self._firmware.numbers_missions else 0
         return MissionCurrent(self._current, max(total, 0), state, number)
 
-    def _system_status(self) -> Message:
-        """Return that its checks pass, once it is ready, and that its battery is as good as new."""
-        return SysStatus(PREARM_CHECK * self._is_ready(), 12_600, 100)
+    def _system_status(self) -> list[Message]:
+        """Return that its checks pass, once it is ready, and how its battery is."""
+        passes = PREARM_CHECK * self._is_ready()
+        return [SysStatus(passes, 12_600, self._battery), BatteryStatus(0, 1, self._battery)]
 
     def _heartbeat(self) -> Message:
         if not self._is_ready():

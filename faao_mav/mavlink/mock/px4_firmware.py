@@ -68,6 +68,8 @@ class Px4Firmware(MockFirmware):
     nonsense = MavResult.UNSUPPORTED
     silent_at_boot = True
     mode_denied, no_mode = 1, 0  # temporarily rejected; accepted, but nothing changes
+    not_armed = 1
+    not_armed_text = "Arming denied: {}\t"
 
     def requested_mode(self, command: CommandLong) -> int | None:
         """Return the custom mode that DO_SET_MODE asks for: main and sub mode are two numbers."""
