@@ -28,6 +28,7 @@ from faao_mav.mavlink import link
 from faao_mav.mavlink.client import upload
 from faao_mav.mavlink.faults import Faults, FaultyTransport
 from faao_mav.mavlink.flying.fly import FlightReport, fly
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.transport import Transport, open_transport
 from faao_mav.plan import parse_plan
@@ -113,9 +114,8 @@ def flown(autopilots: Path, autopilot: str, result: Result, case: str) -> Flight
             upload(result.conversion.mission, connection, wait=60)
             with patch.object(link, "open_transport", disturbance.opened):
                 return fly(
-                    result.conversion.mission,
+                    Flight.planned(result.conversion, result.solution, streamed=True),
                     connection,
-                    stream=result.solution,
                     rate=10,
                     wait=60,
                     watching=disturbance,

@@ -33,6 +33,7 @@ from faao_mav.errors import FaaoError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.client import upload
 from faao_mav.mavlink.flying.fly import fly
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
 from missions import PLANS, plan_of, random_changes
@@ -156,7 +157,8 @@ def streamed(autopilots: Path, autopilot: str, result: Result, folder: Path) -> 
     solution = result.solution
     assert result.conversion is not None
     with serving(autopilots, autopilot, result, folder) as connection:
-        report = fly(result.conversion.mission, connection, stream=solution, rate=10, wait=60)
+        flight = Flight.planned(result.conversion, solution, streamed=True)
+        report = fly(flight, connection, rate=10, wait=60)
     if report.relay_start is None or report.ending is None or report.ending.kind != "finished":
         raise SystemExit(f"not flown: {report.ending}")
     t, w = report.samples.record().line(solution)

@@ -19,6 +19,7 @@ from flown import FLOWN, serving
 from faao_mav import Result, plan_mission
 from faao_mav.mavlink.flying.fly import fly
 from faao_mav.mavlink.flying.logs import read_log
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.mavlink.flying.telling import Telling
 from faao_mav.report.debrief import debriefed
 from faao_mav.validate.flown import Debriefing
@@ -33,7 +34,8 @@ def watched(autopilots: Path, autopilot: str, result: Result, folder: Path) -> s
     assert result.check is not None
     telling = Telling(result.solution, result.check.track, None, lambda _: None)
     with serving(autopilots, autopilot, result, folder, speedup=10) as connection:
-        report = fly(result.conversion.mission, connection, arm=True, wait=60, watching=telling)
+        flight = Flight.planned(result.conversion, result.solution)
+        report = fly(flight, connection, arm=True, wait=60, watching=telling)
     seen, ending = telling.debriefing(report), report.ending
     if ending is None or seen is None:
         return f"not flown: {ending}"

@@ -14,9 +14,8 @@ from faao_mav.cli.main import app
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.formats import read_mission
-from faao_mav.mission.formats.parameter_file import read_parameters
-from faao_mav.mission.item import Home, Mission
-from faao_mav.vehicle import Track, Vehicle
+from faao_mav.mission.item import Home
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.files import parameter_path
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -44,11 +43,7 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
     text = (MISSIONS / "copter_relay.yaml").read_text()
     plan.write_text(edited(text, SHORTER | {"vehicle.autopilot": kind}))
     tuned, port = parameter_path(out, kind), free_port()
-
-    def fly(mission: Mission) -> Track:
-        return predicted(Vehicle(kind, parameters=read_parameters(tuned)))(mission)
-
-    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, speedup=SPEEDUP, beat=0.1)
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=predicted(), speedup=SPEEDUP, beat=0.1)
     with running(mock, f"udpin:127.0.0.1:{port}"):
         connection = f"udpout:127.0.0.1:{port}"
         arguments = (plan, "--out", out, "--save", save, "--upload", connection, "--json")
@@ -62,6 +57,14 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
         assert download(connection).items == tuple(map(vehicle.type.dialect.stored, mission.items))
 
         fly_it = ("fly", out, "--to", connection, "--solution", save, "--arm", "--json")
+        result = CliRunner().invoke(app, [str(argument) for argument in fly_it])
+        assert result.exit_code == 1, result.output
+        assert "timing-other" in result.output
+        assert not mock.armed
+        tune = ("upload", out, "--to", connection, "--parameters", tuned, "--json")
+        result = CliRunner().invoke(app, [str(argument) for argument in tune])
+        assert result.exit_code == 0, result.output
+        assert json.loads(result.stdout)["parameters"]
         result = CliRunner().invoke(app, [str(argument) for argument in fly_it])
         assert result.exit_code == 0, result.output
     *lines, end = map(json.loads, result.stdout.splitlines())

@@ -14,7 +14,6 @@ from faao_mav.errors import FaaoError, PlanError
 from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import joined
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle
-from faao_mav.vehicle.files import MadeFor
 from faao_mav.workflow import Result
 
 
@@ -47,10 +46,12 @@ def uploaded(result: Result, connection: str) -> str:
     Nothing is armed or started.
     """
     from faao_mav.mavlink.client import upload
+    from faao_mav.mavlink.flying.seen import Flight
     from faao_mav.mavlink.upload_text import upload_text
 
     try:
-        report = upload(_to_fly(result).mission, connection, note=lambda _: None)
+        flight = Flight.planned(_to_fly(result), result.solution)
+        report = upload(flight.mission, connection, made_for=flight.made_for, note=lambda _: None)
     except FaaoError as error:
         return f"failed       {error}"
     told = upload_text(report)
@@ -87,10 +88,8 @@ def watched(
     conversion = _to_fly(result)
     track = result.check.track if result.check is not None else None
     telling = Telling(result.solution, track, None, tell)
-    vehicle = conversion.vehicle
-    made_for = MadeFor(vehicle.autopilot, vehicle.kind, "as the plan says")
     report = fly(
-        Flight(conversion.mission, vehicle, made_for, result.solution),
+        Flight.planned(conversion, result.solution),
         connection,
         arm=arm,
         lands=track is None or track.lands,

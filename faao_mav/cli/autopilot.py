@@ -93,7 +93,7 @@ def autopilot(
         aircraft=aircraft,
         address=Address(system, 1),
         home=read_home(home),
-        fly=predicted(vehicle, air),
+        fly=predicted(air),
         wind=air,
         parameters=values,
         speedup=speedup,

@@ -159,12 +159,18 @@ def _upload(
 ) -> "UploadReport":
     from faao_mav.cli.progress import transfer_progress
     from faao_mav.mavlink.client import upload
+    from faao_mav.mavlink.flying.seen import Flight
 
     assert result.conversion is not None
-    mission = result.conversion.mission
+    flight = Flight.planned(result.conversion, result.solution)
     with transfer_progress(shown=shown) as observe:
         report = upload(
-            mission, connection, system=system, allow_armed=allow_armed, observe=observe
+            flight.mission,
+            connection,
+            system=system,
+            allow_armed=allow_armed,
+            made_for=flight.made_for,
+            observe=observe,
         )
     if not report.verified:
         note("the mission is not verified; do not fly it")

@@ -12,12 +12,14 @@ from faao_mav.cli.shared import (
     AllowArmed,
     AsJson,
     Component,
+    File,
     Log,
     OwnSystem,
     SigningKey,
     System,
     Wait,
     exit_status,
+    flag,
     note,
     option,
 )
@@ -30,6 +32,13 @@ if TYPE_CHECKING:
 def upload(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
     to: Annotated[str, option("CONNECTION", VEHICLE)],
+    parameters: Annotated[
+        File,
+        option("FILE", "Set the parameters that MISSION is timed for, first, and read them back."),
+    ] = None,
+    clear_rest: Annotated[
+        bool, flag("--clear-rest", "Clear a fence and rally points that MISSION does not have.")
+    ] = False,
     as_json: AsJson = False,
     system: System = None,
     component: Component = None,
@@ -41,17 +50,26 @@ def upload(
 ) -> None:
     """Upload a mission, read it back and compare.
 
+    It says how far the vehicle stands from the mission's home, and how much higher or lower. A
+    mission for another autopilot or type of vehicle is not uploaded. --parameters sets what shapes
+    how a mission is flown, and nothing that decides about failsafes, fence, return or checks.
+
     Exit status: 0 it is on the vehicle, whole and equal; 1 it is not, or that is not known; 2
     unusable arguments or input.
     """
     from faao_mav.cli.progress import transfer_progress
     from faao_mav.mavlink.client import upload as run
+    from faao_mav.mavlink.parameters import check_settable
     from faao_mav.mavlink.upload_text import upload_text
     from faao_mav.mission.formats import read_mission_file
+    from faao_mav.mission.formats.parameter_file import read_parameters
+    from faao_mav.vehicle.files import made_for
 
     file = read_mission_file(mission_file)
     for line in file.warnings:
         note(line)
+    values = None if parameters is None else read_parameters(parameters)
+    check_settable(values or (), parameters)
     with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
         report = run(
             file.mission,
@@ -60,6 +78,9 @@ def upload(
             component=component,
             own_system=own_system,
             allow_armed=allow_armed,
+            made_for=made_for(mission_file, file),
+            parameters=values,
+            clear_rest=clear_rest,
             log=log,
             signing_key=signing_key,
             wait=timeout,
@@ -75,7 +96,7 @@ def upload(
 
 def as_dict(report: "UploadReport") -> dict[str, Any]:
     """Return `report` as JSON takes it."""
-    vehicle = report.vehicle
+    vehicle, stands = report.vehicle, report.stands
     return {
         "verified": report.verified,
         "vehicle": {
@@ -84,6 +105,10 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
             "autopilot": vehicle.autopilot,
             "type": vehicle.kind,
         },
+        "stands": None
+        if stands is None
+        else _fields(stands, "from_home", "higher", "from_first", "is_meant"),
+        "parameters": [_fields(each, "name", "old", "new", "wanted") for each in report.changes],
         "seconds": round(report.seconds, 3),
         "problems": list(report.problems),
         "lists": [

@@ -3,22 +3,30 @@
 import secrets
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypedDict, TypeVar, Unpack
+from typing import Any, TypeAlias, TypedDict, TypeVar, Unpack
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mavlink.discover import SETTLE, Discovery, FoundVehicle, choose
 from faao_mav.mavlink.link import Observe, WireLink
 from faao_mav.mavlink.machine import Machine, Script
-from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavResult, MissionType
-from faao_mav.mavlink.questions import AskAlive, AskHome
+from faao_mav.mavlink.messages import GlobalPositionInt, HomePosition
+from faao_mav.mavlink.parameters import Change, Names, check_settable, set_parameters
+from faao_mav.mavlink.protocol import (
+    GROUND_STATION,
+    HOME_POSITION,
+    POSITION,
+    Address,
+    MavResult,
+    MissionType,
+)
+from faao_mav.mavlink.questions import AskAlive, AskFor
 from faao_mav.mavlink.signing import Verdict, read_signing, remember
 from faao_mav.mavlink.transfer.exchange import Outcome, Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.mavlink.transfer.session import (
-    Job,
     PartReport,
     clear_lists,
     download_lists,
@@ -27,9 +35,11 @@ from faao_mav.mavlink.transfer.session import (
     what_is_left,
 )
 from faao_mav.mavlink.transport import parse_connection
+from faao_mav.mavlink.whereabouts import Whereabouts, home_in, place_in
 from faao_mav.mavlink.wire_items import mission_of, wire_items
 from faao_mav.mission.item import Mission
 from faao_mav.vehicle.ardupilot import ARDUPILOT
+from faao_mav.vehicle.files import MadeFor, addressee_mistake
 
 T = TypeVar("T")
 
@@ -87,12 +97,18 @@ class Holdings:
 
 @dataclass(frozen=True, slots=True)
 class UploadReport:
-    """What became of an upload: one report for each list, `seconds` in all."""
+    """What became of an upload: one report for each list, `seconds` in all.
+
+    `stands` is where the vehicle stands beside the mission, None where it does not tell; `changes`
+    are the parameters that were set.
+    """
 
     vehicle: FoundVehicle
     parts: tuple[PartReport, ...]
     seconds: float
     problems: tuple[str, ...]
+    stands: Whereabouts | None = None
+    changes: tuple[Change, ...] = ()
 
     @property
     def verified(self) -> bool:
@@ -105,25 +121,33 @@ def upload(
     connection: str,
     *,
     allow_armed: bool = False,
+    made_for: MadeFor | None = None,
+    parameters: Mapping[str, float] | None = None,
+    clear_rest: bool = False,
     **options: Unpack[LinkOptions],
 ) -> UploadReport:
     """Put `mission` on the vehicle at `connection`, read it back and compare.
 
     Fence and rally points follow where the mission has them; else those of the vehicle stay as
-    they are. Nothing is armed or started. `options` are those of `LinkOptions`.
+    they are, or are cleared with `clear_rest`. With `parameters`, which have to be a mission's own
+    (see `check_settable`), these are set and read back before. Nothing is armed or started.
+    `options` are those of `LinkOptions`.
 
-    Raises `LinkError` if there is no such vehicle, or it is armed (replacing the mission in
-    flight needs `allow_armed`), or the link breaks; `InputError` for what cannot be sent.
+    Raises `LinkError` if there is no such vehicle, it is another one than the mission was
+    `made_for`, it is armed (replacing the mission in flight needs `allow_armed`), or the link
+    breaks; `InputError` for what cannot be sent.
     """
     if not mission.items:
         raise InputError("upload: the mission has no items; clear the vehicle's instead")
+    check_settable(parameters or (), "parameters")
 
-    def job(session: "Session") -> Job[tuple[PartReport, ...]]:
+    def job(session: "Session") -> "Work":
         vehicle = session.peer.vehicle
-        lists = [(part, wire_items(mission, part, vehicle)) for part in MissionType]
-        return upload_parts(
-            [(part, items) for part, items in lists if items], session.peer, session.timeouts
-        )
+        if made_for is not None and vehicle is not None:
+            mistake = addressee_mistake(made_for, vehicle)
+            if mistake is not None:
+                raise LinkError(f"{connection}: {mistake}: nothing is uploaded")
+        return _upload(mission, session.peer, session.timeouts, parameters or {}, clear_rest)
 
     return _change(connection, mission, allow_armed, job, options)
 
@@ -159,8 +183,8 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
         try:
             mission = mission_of(lists.items, peer.vehicle)
             if mission.home is None:
-                homes = session.run(AskHome(peer.address))
-                mission = replace(mission, home=homes[0] if homes else None)
+                told = session.run(AskFor(peer.address, HOME_POSITION, HomePosition))
+                mission = replace(mission, home=home_in(told[0]) if told else None)
         except InputError as error:
             raise LinkError(
                 f"{connection}: what the vehicle holds is no mission: {error}"
@@ -181,10 +205,24 @@ def clear(
     Arguments and errors as in `upload`.
     """
 
-    def job(session: "Session") -> Job[tuple[PartReport, ...]]:
-        return clear_lists(types, session.peer, session.timeouts)
+    def job(session: "Session") -> "Work":
+        return _Done((yield from clear_lists(types, session.peer, session.timeouts)))
 
     return _change(connection, Mission(()), allow_armed, job, options)
+
+
+@dataclass(frozen=True, slots=True)
+class _Done:
+    """What a change of a vehicle's lists and parameters led to."""
+
+    reports: tuple[PartReport, ...]
+    stands: Whereabouts | None = None
+    changes: tuple[Change, ...] = ()
+    problems: tuple[str, ...] = ()
+
+
+Work: TypeAlias = Generator[Machine[Any], Any, _Done]
+"""What changes a vehicle, for a `Script`."""
 
 
 class Session:
@@ -292,11 +330,35 @@ class Session:
         return self.link.run(machine, self._observe)
 
 
+def _upload(
+    mission: Mission,
+    peer: Peer,
+    timeouts: Timeouts,
+    parameters: Mapping[str, float],
+    clear_rest: bool,
+) -> Work:
+    """Find out where the vehicle stands, set `parameters`, and upload what `mission` has."""
+    lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
+    told = yield AskFor(peer.address, POSITION, GlobalPositionInt)
+    place = place_in(told[0]) if told else None
+    stands = None if place is None else Whereabouts.of(place, mission)
+    changes, unknown = yield from set_parameters(parameters, peer, timeouts)
+    if problems := _parameter_problems(changes, unknown):
+        return _Done((), stands, changes, problems)
+    given = [(part, items) for part, items in lists.items() if items]
+    reports = yield from upload_parts(given, peer, timeouts)
+    if clear_rest and all(each.verified for each in reports):
+        rest = [part for part, items in lists.items() if not items]
+        cleared = yield from clear_lists(rest, peer, timeouts)
+        reports += tuple(each for each in cleared if each.result not in _ABSENT)
+    return _Done(reports, stands, changes)
+
+
 def _change(
     connection: str,
     mission: Mission,
     allow_armed: bool,
-    job: Callable[[Session], Job[tuple[PartReport, ...]]],
+    job: Callable[[Session], Work],
     options: LinkOptions,
 ) -> UploadReport:
     """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
@@ -307,13 +369,26 @@ def _change(
                 "disarm it, or allow it (--allow-armed)"
             )
         session.peer = replace(session.peer, may_be_armed=allow_armed)
+        work = Script(job(session))
         try:
-            reports = session.run(Script(job(session)))
+            done = session.run(work)
         except LinkError as error:
             raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
         seconds = time.monotonic() - session.started
-        problems = _problems(reports, session.peer, mission, session.why_silent())
-    return UploadReport(session.found, reports, seconds, problems)
+        told = _problems(done.reports, session.peer, mission, session.why_silent())
+        problems = done.problems + told
+    return UploadReport(session.found, done.reports, seconds, problems, done.stands, done.changes)
+
+
+def _parameter_problems(changes: Sequence[Change], unknown: Sequence[Names]) -> tuple[str, ...]:
+    """Return in words which parameters were not set, for which nothing else is changed either."""
+    if unknown:
+        names = ", ".join(" or ".join(each) for each in unknown)
+        return (f"parameters: the vehicle has no {names}: nothing was set or uploaded",)
+    failed = [str(each) for each in changes if not each.made]
+    if failed:
+        return (f"parameters: not set: {', '.join(failed)}: the mission was not uploaded",)
+    return ()
 
 
 def _problems(

@@ -6,15 +6,16 @@ PX4 as their bits (its "byte-wise encoding").
 
 import math
 import struct
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from faao_mav.errors import InputError
 from faao_mav.mavlink.machine import AskingMachine, Machine, Progress
 from faao_mav.mavlink.messages import Envelope, Message, ParamRequestRead, ParamSet, ParamValue
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.pace import Pace, Question, Timeouts
-from faao_mav.vehicle import VehicleType
+from faao_mav.vehicle import VehicleType, vehicle_types
 from faao_mav.vehicle.parameter import Parameter
 from faao_mav.vehicle.px4 import PX4
 
@@ -26,6 +27,9 @@ _INT32 = 6
 
 _AT_ONCE = 10
 """Names that are asked for at once. Chosen: half of the queue that ArduPilot has for them."""
+
+_SHOWN = 5
+"""Names that a message lists, at most; chosen."""
 
 _LEAST_WAIT, _TRIES = 0.25, 8
 """Seconds after which a name is asked for again at the earliest, and how often it is asked for.
@@ -241,20 +245,44 @@ def number_in(parameter: Parameter, name: str, given: Mapping[str, float]) -> fl
     return parameter.written(parameter.names[other] * given[other], name)
 
 
+def check_settable(parameters: Iterable[str], source: object) -> None:
+    """Raise `InputError`, which names `source`, for a parameter that is not a mission's own.
+
+    Those are what shapes how some vehicle flies a mission; what decides about failsafes, fence,
+    return and checks is for its pilot to set.
+    """
+    tables = [each.parameters.values() for each in vehicle_types()]
+    own = {name for table in tables for each in table if each.motion for name in each.names}
+    rules = {name for table in tables for each in table if not each.motion for name in each.names}
+    rules |= {name for each in vehicle_types() for f in each.failsafes for name in f.defaults}
+    other = [name for name in parameters if name not in own]
+    decide = [name for name in other if name in rules]
+    for names, what in (
+        (decide, "what decides about failsafes, fence, return and checks"),
+        (other, "what no mission is timed for"),
+    ):
+        if names:
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            raise InputError(
+                f"{source}: {', '.join(names[:_SHOWN])}{more}: {what} is not set with a mission; "
+                "set it with the ground station, and give the mission's own file"
+            )
+
+
 def set_parameters(
     wanted: Mapping[str, float], peer: Peer, timeouts: Timeouts | None = None
 ) -> Generator[Machine[Any], Any, tuple[tuple[Change, ...], tuple[Names, ...]]]:
     """Give the vehicle of `peer` the parameters of its table that `wanted` names, and read them.
 
     Of the names of one parameter it sets the one that the vehicle has. What the vehicle does not
-    know is returned as the second part, and then nothing is set; the first are the changes.
+    know is returned as the second part, and then nothing is set; the first are the changes. It
+    stops at the first that the vehicle does not take.
     """
-    assert peer.vehicle is not None
-    groups = {
-        tuple(each.names): each
-        for each in peer.vehicle.parameters.values()
-        if each.name_in(wanted) is not None
-    }
+    table = () if peer.vehicle is None else peer.vehicle.parameters.values()
+    groups = {tuple(each.names): each for each in table if each.name_in(wanted) is not None}
+    foreign = tuple((name,) for name in wanted if not any(name in names for names in groups))
+    if foreign:
+        return (), foreign
     before: Reading = yield ReadParameters(peer, tuple(groups), timeouts)
     if before.missing:
         return (), before.missing
@@ -265,7 +293,10 @@ def set_parameters(
         if number is not None and not same_value(number, before.settings[name].value):
             asked[name] = number
     for name, number in asked.items():
-        yield SetParameter(peer, name, Setting(number, before.settings[name].kind), timeouts)
+        kind = before.settings[name].kind
+        taken: bool = yield SetParameter(peer, name, Setting(number, kind), timeouts)
+        if not taken:
+            break
     after: Reading = yield ReadParameters(peer, [(name,) for name in asked], timeouts)
     found = after.values
     return tuple(

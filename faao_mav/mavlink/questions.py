@@ -1,31 +1,40 @@
-"""What a vehicle is asked: where its home is, and whether it is there now."""
+"""What a vehicle is asked: for one of its messages, and whether it is there now."""
 
 import math
 from collections.abc import Sequence
+from typing import Generic, TypeVar
 
-from faao_mav.mavlink.machine import AskingMachine
-from faao_mav.mavlink.messages import CommandLong, Envelope, HomePosition, Message, Timesync
-from faao_mav.mavlink.protocol import HOME_POSITION, Address, MavCommand
-from faao_mav.mission.item import Home
+from faao_mav.mavlink.machine import AskingMachine, Progress
+from faao_mav.mavlink.messages import CommandLong, Envelope, Message, Timesync
+from faao_mav.mavlink.protocol import Address, MavCommand
+
+M = TypeVar("M", bound=Message)
 
 
-class AskHome(AskingMachine[list[Home]]):
-    """A machine that asks for HOME_POSITION; its outcome is a list with the home, or empty."""
+class AskFor(AskingMachine[list[M]], Generic[M]):
+    """A machine that asks `vehicle` for its message of the type `kind`, whose number is `number`.
 
-    progress = ("asking for home", 0, 0)
+    Its outcome is a list with the first that comes, asked for or not, or empty.
+    """
 
-    def __init__(self, vehicle: Address, wait: float = 1.0, retries: int = 2) -> None:
+    def __init__(
+        self, vehicle: Address, number: int, kind: type[M], wait: float = 1.0, retries: int = 2
+    ) -> None:
         super().__init__(wait, retries)
-        self._vehicle = vehicle
+        self._vehicle, self._number, self._kind = vehicle, number, kind
+
+    @property
+    def progress(self) -> Progress:
+        """Not counted."""
+        return f"asking for {self._kind.__name__}", 0, 0
 
     def _question(self) -> Message:
-        return CommandLong(self._vehicle, MavCommand.REQUEST_MESSAGE, 0, float(HOME_POSITION))
+        return CommandLong(self._vehicle, MavCommand.REQUEST_MESSAGE, 0, float(self._number))
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
         message = envelope.message
-        if isinstance(message, HomePosition) and envelope.sender == self._vehicle:
-            place = (message.latitude / 1e7, message.longitude / 1e7)
-            self.outcome = [Home(*place, message.altitude / 1000)]
+        if isinstance(message, self._kind) and envelope.sender == self._vehicle:
+            self.outcome = [message]
         return ()
 
     def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002

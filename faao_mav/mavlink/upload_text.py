@@ -7,7 +7,8 @@ from faao_mav.mavlink.transfer.verify import Difference
 
 def upload_text(report: UploadReport) -> str:
     """Return `report` for people."""
-    lines = [f"vehicle      {report.vehicle}"]
+    lines = [f"vehicle      {report.vehicle}", f"stands       {_stands(report)}"]
+    lines += [f"parameter    {change}" for change in report.changes]
     lines += [_part_line(part) for part in report.parts if part.verified]
     for part in report.parts:
         lines += [f"not kept     {text}" for text in _dropped(part)]
@@ -15,6 +16,14 @@ def upload_text(report: UploadReport) -> str:
     if report.verified:
         lines.append(f"verified     read back and compared, {report.seconds:.1f} s")
     return "\n".join(lines)
+
+
+def _stands(report: UploadReport) -> str:
+    """Return where the vehicle stands beside the mission."""
+    stands = report.stands
+    if stands is None:
+        return "not known how far from the mission's home: it does not tell where it is"
+    return str(stands) if stands.is_meant else f"{stands}: it is not armed there"
 
 
 def _dropped(part: PartReport) -> list[str]:

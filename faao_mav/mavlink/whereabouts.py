@@ -3,7 +3,9 @@
 import math
 from dataclasses import dataclass
 
+from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mavlink.messages import GlobalPositionInt, HomePosition
 from faao_mav.mission.fence import LatLon
 from faao_mav.mission.item import Home, Mission
 
@@ -46,11 +48,11 @@ class Whereabouts:
         )
 
     @property
-    def home_is_here(self) -> bool:
-        """Whether it stands at the mission's home; also where the mission tells none."""
-        if self.from_home is None or self.higher is None:
-            return True
-        return self.from_home <= HOME_AWAY and abs(self.higher) <= HOME_HIGHER
+    def is_meant(self) -> bool:
+        """Whether it stands where the mission was made for, as far as the mission tells."""
+        if self.from_home is not None and self.higher is not None:
+            return self.from_home <= HOME_AWAY and abs(self.higher) <= HOME_HIGHER
+        return self.from_first is None or self.from_first <= FIRST_AWAY
 
     @property
     def height_shown(self) -> str:
@@ -80,3 +82,20 @@ def shown(metres: float) -> str:
     ('12 m', '1932 m', '15432 km')
     """
     return f"{metres:.0f} m" if metres < FIRST_FARTHEST else f"{metres / 1000:.0f} km"
+
+
+def home_in(message: HomePosition) -> Home:
+    """Return the home that `message` tells; raises `InputError` for one that is not on Earth."""
+    return Home(message.latitude / 1e7, message.longitude / 1e7, message.altitude / 1000)
+
+
+def place_in(message: GlobalPositionInt) -> Home | None:
+    """Return the place that `message` tells, metres above mean sea level; None: it tells none.
+
+    ArduPilot tells 0, 0 as long as it does not know where it is.
+    """
+    try:
+        place = Home(message.lat / 1e7, message.lon / 1e7, message.alt / 1000)
+    except InputError:
+        return None
+    return place if message.lat or message.lon else None

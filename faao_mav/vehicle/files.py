@@ -13,6 +13,7 @@ from faao_mav.vehicle.vehicle import (
     kind_by_number,
     vehicle_type_by_numbers,
 )
+from faao_mav.vehicle.vehicle_type import VehicleType
 
 
 def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:
@@ -70,6 +71,16 @@ def made_for(path: Path, file: MissionFile, planned: Vehicle | None = None) -> M
     if len(beside) != 1:
         return MadeFor()
     return MadeFor(beside[0], None, f"as {parameter_path(path, beside[0]).name} beside it says")
+
+
+def addressee_mistake(made_for: MadeFor, vehicle: VehicleType) -> str | None:
+    """Return in words that a mission was made for another autopilot or type; None if it was not."""
+    autopilot, kind = vehicle.family.key, vehicle.kind
+    if made_for.autopilot in (None, autopilot) and made_for.kind in (None, kind):
+        return None
+    whose = made_for.autopilot or "any autopilot"
+    told = f"{whose} and a {made_for.kind}" if made_for.kind else whose
+    return f"the mission is for {told} ({made_for.by}), the vehicle is {autopilot} and a {kind}"
 
 
 def parameter_path(mission: Path, autopilot: Autopilot) -> Path:

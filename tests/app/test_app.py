@@ -31,7 +31,6 @@ from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
-from faao_mav.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page
@@ -266,7 +265,7 @@ def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
 def test_a_mission_is_uploaded_watched_and_started_once_that_is_confirmed(window: "Page") -> None:
     port = free_port()
     mock = MockAutopilot(
-        behaviour_of("ardupilot"), home=HOME, fly=predicted(Vehicle()), beat=0.1, speedup=20.0
+        behaviour_of("ardupilot"), home=HOME, fly=predicted(), beat=0.1, speedup=20.0
     )
     with running(mock, f"udpin:127.0.0.1:{port}"):
         window.get_by_role("tab", name="Fly").click()

@@ -15,7 +15,6 @@ from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
-from faao_mav.vehicle import Vehicle
 from faao_mav.workflow import Result
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -36,8 +35,15 @@ def test_a_flight_that_the_page_has_started_is_held_then_left(result: Result) ->
         if each.get("phase") == "flying" or "it holds" in each.get("note", ""):
             interrupt.set()
 
-    fly = predicted(Vehicle())
-    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, fly=fly, beat=0.1, speedup=8.0)
+    assert result.conversion is not None
+    mock = MockAutopilot(
+        behaviour_of("ardupilot"),
+        home=HOME,
+        fly=predicted(),
+        parameters=result.conversion.parameters,
+        beat=0.1,
+        speedup=8.0,
+    )
     with running(mock, f"udpin:127.0.0.1:{port}"):
         assert watched(tell, interrupt, result, connection, arm=True).startswith("different")
         assert told == []

@@ -18,6 +18,7 @@ from faao_mav.mavlink.machine import Machine, Script
 from faao_mav.mavlink.messages import (
     CommandLong,
     Heartbeat,
+    HomePosition,
     MissionRequestInt,
     MissionRequestList,
     MissionSetCurrent,
@@ -32,11 +33,12 @@ from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mavlink.protocol import (
     GROUND_STATION,
+    HOME_POSITION,
     Address,
     MavCommand,
     MissionType,
 )
-from faao_mav.mavlink.questions import AskAlive, AskHome
+from faao_mav.mavlink.questions import AskAlive, AskFor
 from faao_mav.mavlink.signing import Signing
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.session import (
@@ -51,7 +53,7 @@ from faao_mav.mavlink.wire_items import mission_of, wire_items
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import losses_in, render_mission
-from faao_mav.vehicle import Vehicle, vehicle_type
+from faao_mav.vehicle import vehicle_type
 
 _VEHICLE = Address(1, 1)
 _KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")
@@ -107,10 +109,7 @@ def wire_targets() -> dict[str, Target]:
 
 
 def _mock(kind: MockKind) -> MockAutopilot:
-    family = behaviour_of(kind).family.key
-    return MockAutopilot(
-        behaviour_of(kind), home=_HOME, fly=predicted(Vehicle(family)), speedup=50.0
-    )
+    return MockAutopilot(behaviour_of(kind), home=_HOME, fly=predicted(), speedup=50.0)
 
 
 def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
@@ -119,7 +118,7 @@ def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
     yield AskAlive(peer.address, 1)
     yield Script(upload_parts(lists, peer))
     yield Script(download_lists(tuple(MissionType), peer))
-    yield AskHome(peer.address)
+    yield AskFor(peer.address, HOME_POSITION, HomePosition)
     yield Script(clear_lists(tuple(MissionType), peer))
 
 

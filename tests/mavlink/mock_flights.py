@@ -7,13 +7,13 @@ import numpy as np
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Mission
-from faao_mav.vehicle import Track
+from faao_mav.vehicle import Track, Vehicle
 
 SPEED = 10.0
 LANDING = (20, 21)
 
 
-def fly(mission: Mission) -> Track:
+def fly(mission: Mission, _: Vehicle | None = None) -> Track:
     """Return a flight from home over all places, in one second steps; landing where it started."""
     assert mission.home is not None
     frame = LocalFrame(mission.home.latitude, mission.home.longitude)

@@ -71,8 +71,8 @@ class Scene:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         rows, peer = self.mock.lists.items(MissionType.MISSION), peer_of(kind)
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
-        allowed = {"elsewhere": elsewhere, "untimed": untimed}
-        ready = Readiness(flight, held_by(self.mock), peer, **allowed)
+        held = held_by(self.mock)
+        ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
         self.watch: Any = Watch(peer, rows, arm=self.arm, lands=lands, readiness=ready)
         if solution is not None:
             self.watch = Stream(peer, solution, ready)

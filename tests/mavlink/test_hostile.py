@@ -40,7 +40,6 @@ from faao_mav.mavlink.protocol import GROUND_STATION, Address, MavCommand, MavRe
 from faao_mav.mavlink.transfer.verify import compare
 from faao_mav.mavlink.wire_items import mission_of
 from faao_mav.mission.formats.wpl import write_wpl
-from faao_mav.vehicle import Vehicle
 
 DENIED = 2
 """MAV_RESULT_DENIED."""
@@ -72,8 +71,7 @@ def fill(mock: MockAutopilot, part: MissionType, rows: tuple[WireItem, ...]) -> 
 
 
 def flying(kind: MockKind) -> MockAutopilot:
-    family = behaviour_of(kind).family.key
-    mock = mock_of(kind, fly=predicted(Vehicle(family)))
+    mock = mock_of(kind, fly=predicted())
     mock.start(0.0)
     return mock
 

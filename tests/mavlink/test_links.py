@@ -29,7 +29,7 @@ def test_600_items_over_a_quick_link(
 
 SLOW = {
     "0.2 s there and back": Faults(latency=0.1),
-    "0.3 to 0.5 s": Faults(latency=0.15, reordering=1.0, delay=0.1),
+    "0.3 to 0.5 s": Faults(latency=0.15, reordering=1.0, delay=0.1, seed=1),
     "0.1 to 0.3 s": Faults(latency=0.05, reordering=1.0, delay=0.1),
     "1 s": Faults(latency=0.5),
     "57600 baud": Faults(latency=0.03, rate=5760.0),

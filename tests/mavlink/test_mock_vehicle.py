@@ -371,7 +371,7 @@ def test_a_fence_that_is_not_to_be_kept(kind: MockKind, parameters: dict[str, fl
 def test_ardupilot_does_not_arm_outside_its_fence() -> None:
     away = Fence(circles=(Circle((HOME.latitude + 0.01, HOME.longitude), 100.0, inclusion=True),))
     for kind, parameters, expected in (
-        ("ardupilot", {"FENCE_ENABLE": 1}, 1),
+        ("ardupilot", {"FENCE_ENABLE": 1}, 4),
         ("ardupilot", {}, 0),
         ("px4", {}, 0),
     ):

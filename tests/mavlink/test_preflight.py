@@ -30,6 +30,9 @@ KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 ANYWHERE = Fence(circles=(Circle((HOME.latitude, HOME.longitude), 5000.0, inclusion=True),))
 
 
+FENCED = {"FENCE_ENABLE": 1, "FENCE_TYPE": 4}
+
+
 def away(metres: float, higher: float = 0.0) -> Home:
     """Return a place so many metres east of home."""
     frame = LocalFrame(HOME.latitude, HOME.longitude)
@@ -37,7 +40,9 @@ def away(metres: float, higher: float = 0.0) -> Home:
     return Home(float(latitude), float(longitude), HOME.altitude + higher)
 
 
-def holding(mission: Mission, kind: str = "ardupilot", **parameters: float) -> MockAutopilot:
+def holding(
+    mission: Mission, kind: str = "ardupilot", parameters: Mapping[str, float] | None = None
+) -> MockAutopilot:
     mock = mock_of(kind, parameters=parameters)
     for part in MissionType:
         mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
@@ -98,7 +103,7 @@ def test_it_has_to_stand_where_the_mission_was_made_for(
 def test_elsewhere_allows_another_place_and_nothing_else() -> None:
     fence = Fence(circles=(Circle((HOME.latitude, HOME.longitude), 2000.0, inclusion=True),))
     mission = a_mission(12, fence=fence)
-    mock = holding(mission, FENCE_ENABLE=1, FENCE_TYPE=4)
+    mock = holding(mission, parameters=FENCED)
     assert errors(found(Flight(mission), mock)) == set()
     findings = found(Flight(mission), mock, place=away(3_000.0), elsewhere=True)
     assert "fence" in " ".join(errors(findings))  # the way to the first place leaves it
@@ -157,11 +162,10 @@ def test_what_another_mission_left_behind_is_found() -> None:
     fenced = a_mission(12, fence=ANYWHERE)
     findings = found(mock=holding(fenced))
     assert findings["holds-fence"].level is Level.WARNING  # FENCE_ENABLE is 0
-    on = {"FENCE_ENABLE": 1, "FENCE_TYPE": 4}
-    findings = found(mock=holding(fenced, **on))
+    findings = found(mock=holding(fenced, parameters=FENCED))
     assert errors(findings) == {"holds-fence"}
     assert "upload --clear-rest" in findings["holds-fence"].action
-    assert errors(found(Flight(fenced), holding(fenced, **on))) == set()
+    assert errors(found(Flight(fenced), holding(fenced, parameters=FENCED))) == set()
 
 
 def test_what_it_holds_has_to_be_what_the_file_has() -> None:
@@ -181,7 +185,7 @@ def test_its_own_parameters_have_to_be_those_that_the_mission_is_timed_for() -> 
     assert "timed for: WPNAV_ACCEL is 250, not 400; predicted to take" in message
     assert "--untimed" in findings["timing-other"].action
     assert errors(found(flight, untimed=True)) == set()
-    assert errors(found(flight, holding(mission, WPNAV_ACCEL=400.0))) == set()
+    assert errors(found(flight, holding(mission, parameters={"WPNAV_ACCEL": 400.0}))) == set()
     newer = holding(mission)
     newer.parameters.values["WP_ACC"] = newer.parameters.values.pop("WPNAV_ACCEL") / 100
     assert "WP_ACC is 2.5, not 4" in found(flight, newer)["timing-other"].message
@@ -206,7 +210,8 @@ def test_parameters_that_cannot_be_read_are_named() -> None:
 
 
 def test_the_mission_is_validated_with_its_own_parameters() -> None:
-    mock = holding(a_mission(12), FENCE_ENABLE=1, FENCE_TYPE=1, FENCE_ALT_MAX=25.0)
+    low = {"FENCE_ENABLE": 1, "FENCE_TYPE": 1, "FENCE_ALT_MAX": 25.0}
+    mock = holding(a_mission(12), parameters=low)
     assert errors(found(mock=mock)) == {"ardupilot-fence-ceiling"}
 
 
@@ -238,8 +243,8 @@ def test_a_plan_tells_what_the_flight_takes_of_the_battery() -> None:
     assert check is not None
     assert check.energy is not None
     takes = 100 * check.energy.total / 20
-    flight = Flight(conversion.mission, conversion.vehicle, solution=result.solution)
-    mock = holding(conversion.mission, **dict(conversion.vehicle.parameters))
+    flight = Flight.planned(conversion, result.solution)
+    mock = holding(conversion.mission, parameters=conversion.vehicle.parameters)
     findings = found(flight, mock, battery=int(takes) + 19)
     assert errors(findings) == {"battery-low"}
     assert f"takes {takes:.0f} %, and is to leave 20 %" in findings["battery-low"].message
@@ -306,7 +311,7 @@ def test_a_mode_in_which_it_flies_by_itself_is_not_armed_in(
 def test_what_it_does_on_a_loss_is_told(
     kind: str, parameters: dict[str, float], rule: str, told: str, level: Level
 ) -> None:
-    findings = found(mock=holding(a_mission(12), kind, **parameters))
+    findings = found(mock=holding(a_mission(12), kind, parameters))
     assert told in findings[rule].message
     assert findings[rule].level is level
 
@@ -324,7 +329,7 @@ def test_what_it_does_at_its_fence_is_told(
     kind: str, parameters: dict[str, float], told: str
 ) -> None:
     fenced = a_mission(12, fence=ANYWHERE)
-    findings = found(Flight(fenced), holding(fenced, kind, **parameters))
+    findings = found(Flight(fenced), holding(fenced, kind, parameters))
     assert told in findings["on-fence-left"].message
 
 

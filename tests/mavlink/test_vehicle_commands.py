@@ -58,8 +58,9 @@ def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> N
     with running(a_mock(), f"udpin:127.0.0.1:{port}"):
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
         assert result.exit_code == 0, result.output
-        vehicle, mission, verified = result.stdout.splitlines()
+        vehicle, stands, mission, verified = result.stdout.splitlines()
         assert vehicle == "vehicle      ArduPilot copter (system 1, component 1, disarmed)"
+        assert stands == "stands       0 m from the mission's home, 0 m higher"
         assert mission == "mission      6 items stored"
         assert verified.startswith("verified     read back and compared, ")
         assert result.stderr == ""

@@ -5,14 +5,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from faao_mav.errors import InputError
-from faao_mav.mavlink.ask import AskFor, place_in
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import HomePosition, WireItem
 from faao_mav.mavlink.parameters import Names, Reading, ReadParameters
 from faao_mav.mavlink.protocol import HOME_POSITION, MavResult, MissionType
+from faao_mav.mavlink.questions import AskFor
 from faao_mav.mavlink.transfer.exchange import Outcome, Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.mavlink.transfer.session import download_lists
+from faao_mav.mavlink.whereabouts import home_in
 from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.item import Home, Mission
 from faao_mav.vehicle import VehicleType
@@ -62,9 +63,13 @@ def read_held(peer: Peer, timeouts: Timeouts | None = None) -> Generator[Machine
         return Held(lists.items, Reading({}), lists.missing)
     reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle), timeouts)
     told: list[HomePosition] = yield AskFor(peer.address, HOME_POSITION, HomePosition)
+    try:
+        home = home_in(told[0]) if told else None
+    except InputError:
+        home = None
     missing = {
         part: outcome
         for part, outcome in lists.missing.items()
         if part is MissionType.MISSION or outcome.result not in _HAS_NONE
     }
-    return Held(lists.items, reading, missing, place_in(told[0]) if told else None)
+    return Held(lists.items, reading, missing, home)

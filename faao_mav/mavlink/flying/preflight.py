@@ -25,8 +25,8 @@ from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.validate.rule import Finding, Level
 from faao_mav.validate.words import counted
-from faao_mav.vehicle import Vehicle, VehicleType
-from faao_mav.vehicle.files import MadeFor
+from faao_mav.vehicle import Vehicle
+from faao_mav.vehicle.files import addressee_mistake
 from faao_mav.vehicle.vehicle_type import FenceAction
 
 LEAST_BATTERY = 30
@@ -82,16 +82,6 @@ def preflight(
     return tuple(sorted(found, key=lambda each: _ORDER[each.level]))
 
 
-def addressee_mistake(made_for: MadeFor, vehicle: VehicleType) -> str | None:
-    """Return in words that a mission was made for another autopilot or type; None if it was not."""
-    autopilot, kind = vehicle.family.key, vehicle.kind
-    if made_for.autopilot in (None, autopilot) and made_for.kind in (None, kind):
-        return None
-    whose = made_for.autopilot or "any autopilot"
-    told = f"{whose} and a {made_for.kind}" if made_for.kind else whose
-    return f"the mission is for {told} ({made_for.by}), the vehicle is {autopilot} and a {kind}"
-
-
 def _error(rule: str, message: str, action: str) -> Finding:
     return Finding(Level.ERROR, rule, None, message, action)
 
@@ -114,7 +104,7 @@ def _overruled(found: Finding, rules: tuple[str, ...], option: str) -> Finding:
 def _judged(flight: Flight, seen: Seen, *, elsewhere: bool) -> Check:
     """Return what validation says of the mission, from where it stands, with what it holds."""
     mission, values = seen.held.beside(flight.placed, seen.vehicle), seen.held.reading.values
-    if seen.place is not None and (elsewhere or Whereabouts.of(seen.place, mission).home_is_here):
+    if seen.place is not None and (elsewhere or Whereabouts.of(seen.place, mission).is_meant):
         mission = replace(mission, home=seen.place)
     own, kind = seen.vehicle.family.key, seen.vehicle.kind
     vehicle = replace(
@@ -127,8 +117,8 @@ def _judged(flight: Flight, seen: Seen, *, elsewhere: bool) -> Check:
     if not flight.streamed:
         return found
     # It is not the mission that keeps the plan, but the setpoints.
-    own = tuple(each for each in found.findings if not each.rule.startswith(_OF_THE_PLAN))
-    return replace(found, findings=own)
+    kept = tuple(each for each in found.findings if not each.rule.startswith(_OF_THE_PLAN))
+    return replace(found, findings=kept)
 
 
 def _state(flight: Flight, seen: Seen) -> Iterator[Finding]:

@@ -10,6 +10,7 @@ from faao_mav.vehicle.files import MadeFor
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
+    from faao_mav.schedule.conversion import Conversion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +27,15 @@ class Flight:
     made_for: MadeFor = field(default_factory=MadeFor)
     solution: "Solution | None" = None
     streamed: bool = False
+
+    @classmethod
+    def planned(
+        cls, conversion: "Conversion", solution: "Solution", *, streamed: bool = False
+    ) -> "Flight":
+        """Return the flight of the mission that `solution` was made into."""
+        vehicle = conversion.vehicle
+        made_for = MadeFor(vehicle.autopilot, vehicle.kind, "as the plan says")
+        return cls(conversion.mission, vehicle, made_for, solution, streamed)
 
     @property
     def placed(self) -> Mission:

@@ -4,7 +4,6 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from faao_mav.mavlink.ask import place_in
 from faao_mav.mavlink.messages import (
     BatteryStatus,
     CommandLong,
@@ -35,6 +34,7 @@ from faao_mav.mavlink.protocol import (
 )
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.transfer.verify import compare
+from faao_mav.mavlink.whereabouts import place_in
 from faao_mav.mavlink.wire_items import home_items
 
 if TYPE_CHECKING:

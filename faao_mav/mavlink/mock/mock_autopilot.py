@@ -59,7 +59,8 @@ from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
 from faao_mav.vehicle import Track, Vehicle, vehicle_type
 
-Fly: TypeAlias = Callable[[Mission], Track]
+Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
+"""How a vehicle with the parameters that it has flies a mission."""
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 """MAV_RESULT."""
@@ -90,8 +91,8 @@ class MockAutopilot(Machine[None]):
     second until it is asked for another rate. Its clock runs `speedup` times as fast as the
     world's, as those of simulators do; on a mission it then stands still while `tick` is late,
     rather than jump, as theirs do. Heartbeats are `beat` of the world's seconds apart.
-    `parameters` are told beside its defaults; what they do to the flight is up to `fly`. It tells
-    that its battery is at `battery` percent, -1: not known. In GUIDED
+    `parameters` are told beside its defaults, and may be set; of the names of one it has the oldest
+    that is given. It tells that its battery is at `battery` percent, -1: not known. In GUIDED
     and Offboard it follows setpoints, in a `wind`, m/s east and north: see `Guided`. `armed`
     tells whether the motors may turn.
     """
@@ -365,7 +366,7 @@ class MockAutopilot(Machine[None]):
         elif self.armed and self._flight is None:
             mission = replace(self.mission(), home=self.home)
             try:
-                track = self._fly(mission)
+                track = self._fly(mission, self._vehicle_now())
             except InputError:
                 return DENIED
             if self._guided.flying:

@@ -22,6 +22,7 @@ class ParameterServer:
     """Parameters of `vehicle` by name, in the autopilot's own units.
 
     Those whose default is an `int` are whole numbers; `given` are other values than the `defaults`.
+    Of the names that one parameter has it knows the oldest that is given.
     PX4 sends whole numbers as their bits, and sets nothing that comes with another type than it
     has.
     """
@@ -35,6 +36,10 @@ class ParameterServer:
             name: int(value) if name in self._whole else value
             for name, value in {**defaults, **given}.items()
         }
+        for parameter in vehicle.parameters.values():
+            known = [name for name in parameter.names if name in given]
+            for other in {*parameter.names} - {*known[-1:]} if known else ():
+                self.values.pop(other, None)
 
     def on(self, message: ParamRequestList | ParamRequestRead | ParamSet) -> list[Message]:
         """Return the answer to a request; unknown names get none."""

@@ -40,13 +40,13 @@ def serve(
                 observe(mock)
 
 
-def predicted(vehicle: Vehicle, wind: tuple[float, float] = (0.0, 0.0)) -> Fly:
-    """Return how `vehicle` flies missions, by the flight prediction with its parameters.
+def predicted(wind: tuple[float, float] = (0.0, 0.0)) -> Fly:
+    """Return how vehicles fly missions, by the flight prediction with their parameters.
 
     `wind` is in m/s east and north.
     """
 
-    def fly(mission: Mission) -> Track:
+    def fly(mission: Mission, vehicle: Vehicle) -> Track:
         from faao_mav.vehicle.predict import predict  # most uses of a mock never fly
 
         return predict(mission, vehicle, wind=wind)
