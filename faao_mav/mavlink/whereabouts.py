@@ -30,7 +30,7 @@ class Whereabouts:
     """Where a vehicle stands.
 
     `from_home` and `from_first` are metres to its mission's home and first place, `higher` metres
-    above that home, below zero: lower. None: the mission tells none.
+    above that home, below zero: lower. None: the mission does not tell.
     """
 
     from_home: float | None
@@ -41,24 +41,26 @@ class Whereabouts:
     def of(cls, place: Home, mission: Mission) -> "Whereabouts":
         """Return where a vehicle at `place` stands beside `mission`."""
         home, first = mission.home, mission.first_place
-        return cls(
-            None if home is None else distance(place, (home.latitude, home.longitude)),
-            None if home is None else place.altitude - home.altitude,
-            None if first is None else distance(place, first),
-        )
+        from_first = None if first is None else distance(place, first)
+        if home is None:
+            return cls(None, None, from_first)
+        from_home = distance(place, (home.latitude, home.longitude))
+        known = math.isfinite(home.altitude)
+        return cls(from_home, place.altitude - home.altitude if known else None, from_first)
 
     @property
     def is_meant(self) -> bool:
         """Whether it stands where the mission was made for, as far as the mission tells."""
-        if self.from_home is not None and self.higher is not None:
-            return self.from_home <= HOME_AWAY and abs(self.higher) <= HOME_HIGHER
+        if self.from_home is not None:
+            return self.from_home <= HOME_AWAY and abs(self.higher or 0.0) <= HOME_HIGHER
         return self.from_first is None or self.from_first <= FIRST_AWAY
 
     @property
     def height_shown(self) -> str:
         """By how much it stands higher or lower, for people."""
-        higher = self.higher or 0.0
-        return f"{abs(higher):.0f} m {'lower' if higher < 0 else 'higher'}"
+        if self.higher is None:
+            return "how much higher is not known"
+        return f"{abs(self.higher):.0f} m {'lower' if self.higher < 0 else 'higher'}"
 
     def __str__(self) -> str:
         if self.from_home is not None:

@@ -1,5 +1,6 @@
 """The gate before a flight: what it finds, what overrules it, that nothing is armed past it."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -7,17 +8,20 @@ from typing import Any
 import pytest
 from conftest import FLYABLE, edited
 from scenes import Scene, held_by
-from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, vehicle_of
+from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, vehicle_of
 
 from faao_mav import parse_plan, plan_mission
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.flying.held import Held
 from faao_mav.mavlink.flying.preflight import LEAST_BATTERY, preflight
 from faao_mav.mavlink.flying.seen import Flight, Seen
+from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.messages import CommandLong, Envelope, ParamSet
 from faao_mav.mavlink.mock import MockAutopilot
 from faao_mav.mavlink.modes import px4_mode
 from faao_mav.mavlink.protocol import GROUND_STATION, MavCommand, MissionType
+from faao_mav.mavlink.transfer.exchange import Outcome
 from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Home, Mission
 from faao_mav.mission.fence import Circle, Fence
@@ -119,6 +123,13 @@ def test_without_a_home_the_first_place_counts() -> None:
     far = a_mission(12, shift=0.02)
     far = replace(far, items=far.items[1:])  # 2 km from its home, which is where it stands
     assert found(Flight(far), holding(far))["place-first"].level is Level.WARNING
+
+
+def test_a_home_without_a_height_is_told() -> None:
+    mission = replace(a_mission(12), home=Home(HOME.latitude, HOME.longitude, math.nan))
+    findings = found(Flight(mission), place=away(0.0, -32.0))
+    assert errors(findings) == set()
+    assert findings["place-height-unknown"].level is Level.WARNING
 
 
 def test_its_own_home_may_be_elsewhere() -> None:
@@ -399,8 +410,6 @@ def test_a_parameter_that_is_changed_before_it_is_armed_counts(kind: str) -> Non
 @KINDS
 @pytest.mark.parametrize("loss", [0.0, 0.1])
 def test_what_was_read_long_before_is_read_again(kind: str, loss: float) -> None:
-    from faao_mav.mavlink.faults import Faults
-
     for leftover, ending in ((False, "finished"), (True, "refused")):
         scene = Scene(kind, arm=True, boot=20.0)
         rows = wire_items(a_mission(5, rally=RALLY), MissionType.RALLY, vehicle_of(kind))
@@ -424,10 +433,6 @@ def test_an_empty_battery_or_a_return_that_is_not_over_is_not_armed() -> None:
 
 
 def test_nothing_is_armed_without_the_gate() -> None:
-    from stations import peer_of
-
-    from faao_mav.mavlink.flying.watch import Watch
-
     with pytest.raises(ValueError, match="nothing is armed without the gate"):
         Watch(peer_of("px4"), (), arm=True)
 
@@ -435,7 +440,5 @@ def test_nothing_is_armed_without_the_gate() -> None:
 def test_what_was_never_read_does_not_stand_for_nothing() -> None:
     held = held_by(holding(a_mission(12)))
     lists = {MissionType.MISSION: held.lists[MissionType.MISSION]}
-    from faao_mav.mavlink.transfer.exchange import Outcome
-
     unread = Held(lists, held.reading, {MissionType.FENCE: Outcome("silent")})
     assert errors(found(held=unread)) == {"holds-fence"}

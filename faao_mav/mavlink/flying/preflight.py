@@ -164,6 +164,12 @@ def _place(flight: Flight, seen: Seen) -> Iterator[Finding]:
             "see which height above sea level is right, the vehicle's or the mission's "
             "(site.origin.elevation); --elsewhere flies it all the same",
         )
+    if stands.from_home is not None and stands.higher is None:
+        yield _warning(
+            "place-height-unknown",
+            "the mission does not tell how high its home is: it may be made for another height",
+            "give the home its height above sea level",
+        )
     first, no_home = stands.from_first, stands.from_home is None
     if first is not None and not first <= FIRST_AWAY:
         message = f"the mission's first place is {shown(first)} from where it stands"
