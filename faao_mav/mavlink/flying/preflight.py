@@ -289,6 +289,6 @@ def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
         else:
             yield _warning("on-fence-left", message, f"set {name} {response.set_to}")
     height = own.vertical.return_height
-    if height > 0:
+    if height > 0 and "return_height" in own.type.parameters:
         name = own.name_of("return_height")
         yield _note("on-return", f"a return is flown {height:g} m above home at least ({name})")
