@@ -63,7 +63,10 @@ def fly(
         if peer.vehicle is None:
             raise LinkError(f"{connection}: {vehicle}: flights of it are not watched")
         lists = {part: wire_items(flight.mission, part, peer.vehicle) for part in MissionType}
-        held = session.run(Script(read_held(peer, session.timeouts)))
+        # A vehicle that flies already is not judged, and not kept busy.
+        judged = arm or flight.streamed or not vehicle.armed
+        asked = tuple(part for part in MissionType if judged or lists[part])
+        held = session.run(Script(read_held(peer, session.timeouts, asked, parameters=judged)))
         for part, outcome in held.missing.items():
             if lists[part]:
                 raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
@@ -85,7 +88,8 @@ def fly(
             watch: Watch = Stream(peer, flight.solution, ready, rate=rate)
         else:
             rows = held.lists[MissionType.MISSION]
-            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate, readiness=ready)
+            gate = ready if judged else None
+            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate, readiness=gate)
         watch.seen.strangers = session.link.strangers
         try:
             ending = session.link.watch(

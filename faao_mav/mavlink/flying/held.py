@@ -1,6 +1,6 @@
 """What a vehicle holds before a flight: its lists, its parameters, its home."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -55,11 +55,20 @@ def names_of(vehicle: VehicleType) -> tuple[Names, ...]:
     return tuple(dict.fromkeys([*flown, *decided]))
 
 
-def read_held(peer: Peer, timeouts: Timeouts | None = None) -> Generator[Machine[Any], Any, "Held"]:
-    """Read what the vehicle of `peer` holds; it has to be one that is known."""
+def read_held(
+    peer: Peer,
+    timeouts: Timeouts | None = None,
+    parts: Sequence[MissionType] = tuple(MissionType),
+    *,
+    parameters: bool = True,
+) -> Generator[Machine[Any], Any, "Held"]:
+    """Read what the vehicle of `peer`, which has to be one that is known, holds.
+
+    That are the lists `parts`, and with `parameters` these and its home.
+    """
     assert peer.vehicle is not None
-    lists = yield from download_lists(tuple(MissionType), peer, timeouts)
-    if MissionType.MISSION in lists.missing:
+    lists = yield from download_lists(parts, peer, timeouts)
+    if MissionType.MISSION in lists.missing or not parameters:
         return Held(lists.items, Reading({}), lists.missing)
     reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle), timeouts)
     told: list[HomePosition] = yield AskFor(peer.address, HOME_POSITION, HomePosition)
