@@ -83,7 +83,7 @@ def test_a_pilot_who_is_quicker_than_the_start() -> None:
     scene = Scene("ardupilot", arm=True)
     answer = scene.mock.on
 
-    def heedless(envelope: Envelope, now: float) -> Sequence[Message]:
+    def heedless(envelope: Envelope, now: float) -> Any:
         """Arm, but say nothing about it: the answer is lost, and the pilot changes the mode."""
         message = envelope.message
         if isinstance(message, CommandLong) and message.command == MavCommand.ARM:
@@ -92,7 +92,7 @@ def test_a_pilot_who_is_quicker_than_the_start() -> None:
             return ()
         return answer(envelope, now)
 
-    scene.mock.on = heedless  # type: ignore[method-assign]
+    scene.mock.on = heedless
     assert scene.run(until=30.0) == ""
     assert scene.watch.phase == "aside"
     assert {order.command for order in scene.orders if isinstance(order, CommandLong)} == {400}
@@ -135,8 +135,8 @@ def test_outages_are_told_and_survived(kind: str) -> None:
     scene = Scene(kind, arm=True)
     deaf: list[bool] = [False]
     tick, on = scene.mock.tick, scene.mock.on
-    scene.mock.tick = lambda now: () if deaf[0] and tick(now) else tick(now)  # type: ignore
-    scene.mock.on = lambda *told: () if deaf[0] else on(*told)  # type: ignore
+    scene.mock.tick = lambda now: () if deaf[0] and tick(now) else tick(now)
+    scene.mock.on = lambda *told: () if deaf[0] else on(*told)
 
     def switch(_: float) -> None:
         deaf[0] = not deaf[0]
@@ -152,8 +152,8 @@ def test_a_vehicle_that_is_never_heard_again_is_lost() -> None:
     scene = Scene("ardupilot", arm=True)
 
     def vanish(_: float) -> None:
-        scene.mock.tick = lambda *_: ()  # type: ignore[method-assign]
-        scene.mock.on = lambda *_: ()  # type: ignore[method-assign]
+        scene.mock.tick = lambda *_: ()
+        scene.mock.on = lambda *_: ()
 
     assert scene.run(events=[(12.0, vanish)]) == "lost"
 

@@ -127,12 +127,15 @@ class Telemetry:
         stations: other ground stations that were heard.
         strangers: network addresses from which something else speaks in the vehicle's name.
         ending: why nothing more can be known, None as long as something can.
+        patience: seconds without any message after which nothing more can be known.
+        last_heard: when the last message came, s.
+        is_silent: nothing was heard for so long that it was told.
     """
 
     def __init__(
         self, peer: Peer, rows: Sequence[WireItem], patience: float, rate: float = POSITION_RATE
     ) -> None:
-        self._peer, self._rows, self._patience = peer, tuple(rows), patience
+        self._peer, self._rows, self.patience = peer, tuple(rows), patience
         self._home = home_items(peer.vehicle, MissionType.MISSION)
         self.told: list[str] = []
         self.said: list[str] = []
@@ -155,7 +158,7 @@ class Telemetry:
 
     def start(self, now: float) -> None:
         """Begin to listen."""
-        self._heard, self._silent = now, False
+        self.last_heard, self.is_silent = now, False
         self._needed = dict.fromkeys(self._periods, now - _MISSED)
         self._next_reading = now
 
@@ -172,6 +175,12 @@ class Telemetry:
     def mode(self) -> str:
         """The vehicle's mode by its name."""
         return "unknown" if self.heartbeat is None else mode_name(self.heartbeat)
+
+    def where(self, now: float) -> str:
+        """Return in words its mode and height, and how old that is."""
+        height = f", {self.samples.height[-1]:.0f} m above home" if self.samples.t else ""
+        old = f", {now - self.last_heard:.0f} s ago" if self.is_silent else ""
+        return f"in mode {self.mode}{height}{old}"
 
     @property
     def battery(self) -> int | None:
@@ -202,9 +211,9 @@ class Telemetry:
                 self.told.append(f"another ground station is on this link: {name}")
         if sender != self._peer.address:
             return
-        if self._silent:
-            self.told.append(f"heard again after {now - self._heard:.0f} s")
-        self._heard, self._silent = now, False
+        if self.is_silent:
+            self.told.append(f"heard again after {now - self.last_heard:.0f} s")
+        self.last_heard, self.is_silent = now, False
         match message:
             case BatteryStatus(battery_function=function) if function in _PROPULSION:
                 self._batteries[message.id] = message.battery_remaining
@@ -233,11 +242,11 @@ class Telemetry:
 
     def tick(self, now: float) -> Sequence[Message]:
         """Take note of the time, and return what to ask the vehicle."""
-        quiet = now - self._heard
-        if quiet >= self._patience:
+        quiet = now - self.last_heard
+        if quiet >= self.patience:
             self._end("lost", f"nothing was heard for {quiet:.0f} s; the vehicle is on its own")
-        elif quiet >= _SILENT and not self._silent:
-            self._silent = True
+        elif quiet >= _SILENT and not self.is_silent:
+            self.is_silent = True
             self.told.append(f"nothing heard for {quiet:.0f} s")
         out: list[Message] = []
         for kind, period in self._periods.items():

@@ -1,5 +1,6 @@
 """Watching a mission from the ground to its end, and starting it where that is asked for."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias
 
@@ -65,8 +66,9 @@ class Watch(Machine[Ending]):
 
     Nothing is sent but what asks for telemetry, until `arm` or `cancel` has a reason; and nothing
     ever again once the mode is one that was not asked for: then the pilot, or a failsafe, has the
-    aircraft. `cancel` asks a flight that was started here to hold; a second time, and in any other
-    flight, it leaves. `hang_up` leaves a mission to the autopilot.
+    aircraft. `cancel` asks a flight that was started here to hold, and again until it does or a
+    pilot has it, however long the link is silent; a second time, and in any other flight, it
+    leaves, and says how. `hang_up` leaves a mission to the autopilot.
 
     The phases: "checking", "engaging" (a `Stream` only), "arming" and "starting", with `arm`, or
     "waiting" for others to start it; "disarming", where it did not start; "flying" the mission;
@@ -145,16 +147,15 @@ class Watch(Machine[Ending]):
 
     def cancel(self, now: float) -> Sequence[Message]:
         """Ask the flight to hold, or leave it: what has been asked for is told."""
-        if self._arm and self.phase in ("starting", "flying"):
-            self.phase = "holding"
-            self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
-            return self._say(self._hold, now)
+        unfinished = self.phase == "ending" and self._command is not None
+        if self._arm and (self.phase in ("starting", "flying") or unfinished):
+            return self._ask_to_hold(now)
         if self.phase == "arming":
             return self._disarm(Ending("left", "interrupted before the start"), now)
         if self._disarming is not None:
             self._disarming.leave("interrupted again")
             self.outcome = self._disarming.outcome
-        self._end("left", f"no longer watched; the vehicle is in mode {self.seen.mode}")
+        self._end("left", f"no longer watched: {self._left_behind(now)}")
         return () if self._ready is None else self._ready.cancel(now)
 
     def hang_up(self, now: float) -> Sequence[Message]:
@@ -170,6 +171,21 @@ class Watch(Machine[Ending]):
             return self.cancel(now)
         self._end("left", f"the terminal has gone; the vehicle goes on in mode {self.seen.mode}")
         return ()
+
+    def _ask_to_hold(self, now: float) -> Sequence[Message]:
+        """Ask the vehicle to hold, until it does."""
+        if self.phase != "starting" or self.streams:
+            self._mode_before = -1
+        self.phase, self.seen.patience = "holding", math.inf
+        self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
+        return self._say(self._hold, now)
+
+    def _left_behind(self, now: float) -> str:
+        """Return in words what is known of the vehicle."""
+        armed = "armed" if self._armed else "not armed"
+        asked = self.phase == "holding" and self._command is not None
+        unconfirmed = ", and has not confirmed that it holds" if asked else ""
+        return f"it is {armed}, {self.seen.where(now)}{unconfirmed}"
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self.seen.hear(envelope, now)
@@ -250,12 +266,14 @@ class Watch(Machine[Ending]):
             case "flying" if mode != mission:
                 self._aside_since = now
                 self._step_aside()
+            case "holding" if mode == mission and self._command is not None:
+                self._mode_before = -1
+            case "holding" if mode == self._mode_before:
+                pass  # the start that was asked for may still be to come
             case "holding" if mode == hold and self._command is not None:
-                self._command = None
+                self._command, self.seen.patience = None, self._patience
                 self.seen.told.append("it holds; interrupt again to leave it")
-            case "holding" if mode not in (mission, hold) or (
-                mode == mission and self._command is None
-            ):
+            case "holding" if mode != hold:
                 self._step_aside()
         return ()
 
@@ -301,6 +319,7 @@ class Watch(Machine[Ending]):
 
     def _step_aside(self) -> None:
         self.phase, self._command = "aside", None
+        self.seen.patience = self._patience
         self.seen.told.append(
             f"mode {self.seen.mode}: the pilot or a failsafe has the aircraft; nothing more is sent"
         )
@@ -384,10 +403,9 @@ class Watch(Machine[Ending]):
         if self._command is None or now < self._next_try:
             return ()
         if self._sent == _TRIES and self.phase == "holding":
-            self._command = None
-            self.seen.told.append(f"it does not confirm that it holds: it {self._no}")
-            return ()
-        if self._sent >= _TRIES and self.phase != "ending":
+            text = f"it does not confirm that it holds, it {self._no}: it is asked again until then"
+            self.seen.told.append(text)
+        if self._sent >= _TRIES and self.phase not in ("ending", "holding"):
             return self._refused(self._no, now, unsure=self.phase == "arming")
         self._sent, self._next_try = self._sent + 1, now + _AGAIN
         return [self._command()]
