@@ -1,5 +1,6 @@
 """How autopilots follow setpoints, and what they do when no more come."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -8,6 +9,10 @@ from faao_mav.mavlink.modes import px4_mode
 from faao_mav.vehicle import AutopilotFamily
 from faao_mav.vehicle.ardupilot import ARDUPILOT
 from faao_mav.vehicle.px4 import PX4
+
+_GAPS = 2.0
+"""For how many periods of the setpoints an autopilot has to do without one at least: they come
+irregularly. Chosen."""
 
 
 class LossAction(NamedTuple):
@@ -28,8 +33,10 @@ class SetpointRules:
     Attributes:
         timeout: the parameter that says for how many seconds it does without setpoints.
         least_timeout: the least time, s, whatever that parameter says.
+        most_timeout: the longest time, s, with which it is flown by setpoints.
         loss: the parameter that says which of `actions`, by their values, it then does; "": it
             stops in its place, and stays in its mode.
+        forbidden: the values of that parameter with which it is not flown so, and what they do.
         streamed: for so many seconds setpoints have to come before it enters the mode; it then
             takes off by them. 0: it enters the mode at any time, and takes off by a command.
         carries_on: it goes on from a setpoint by the velocity and the acceleration in it; else it
@@ -39,8 +46,10 @@ class SetpointRules:
 
     timeout: str
     least_timeout: float = 0.0
+    most_timeout: float = math.inf
     loss: str = ""
-    actions: Mapping[int, LossAction] = field(default_factory=dict)
+    actions: Mapping[float, LossAction] = field(default_factory=dict)
+    forbidden: Mapping[float, str] = field(default_factory=dict)
     streamed: float = 0.0
     carries_on: bool = False
     defaults: dict[str, float] = field(default_factory=dict)
@@ -56,33 +65,59 @@ class SetpointRules:
         That is so given its parameters' `values`, but not where sticks fly it: somebody may be at
         them.
         """
-        action = self.actions.get(int(values.get(self.loss, -1)))
+        action = self.actions.get(values.get(self.loss, math.nan))
         return action is not None and action.mode == mode and not action.by_sticks
 
+    def refusal(self, values: Mapping[str, float], period: float) -> str | None:
+        """Return why it is not flown by setpoints `period` s apart, None if it may be.
+
+        `values` are those of its parameters: what it does without setpoints has to be known, and
+        neither to stop its motors nor to have it fly on for long.
+        """
+        untold = [name for name in self.defaults if name not in values]
+        if untold:
+            return f"it does not tell {' and '.join(untold)}: what it does without setpoints"
+        least, after = _GAPS * period, values[self.timeout]
+        if not least <= max(after, self.least_timeout) <= self.most_timeout:
+            flies_on = " (until then it flies on)" if self.carries_on else ""
+            limits = f"{least:g} to {self.most_timeout:g}"
+            text = f"without setpoints it would act after {after:g} s{flies_on}"
+            return f"{text}: set {self.timeout} to {limits} s"
+        if self.loss and values[self.loss] not in self.actions:
+            value = values[self.loss]
+            does = self.forbidden.get(value, "do what is not known here")
+            good = [
+                f"{key:g} ({each.name})" for key, each in self.actions.items() if not each.by_sticks
+            ]
+            text = f"without setpoints it would {does}: {self.loss} is {value:g}"
+            return f"{text}, set it to {', '.join(good[:-1])} or {good[-1]}"
+        return None
+
     def without(self, values: Mapping[str, float]) -> str:
-        """Return in words what it does without setpoints, given its parameters' `values`."""
-        if not {*self.defaults} <= {*values}:
-            return "it does what it does: it does not tell its parameters"
+        """Return in words what it does without setpoints, given `values` that are not refused."""
         after = max(values[self.timeout], self.least_timeout)
         if not self.loss:
             return f"it stops after {after:g} s ({self.timeout})"
-        action = self.actions.get(int(values[self.loss]))
+        action = self.actions[values[self.loss]]
         told = ", ".join(f"{name} {values[name]:g}" for name in self.defaults)
-        name = "another mode" if action is None else action.name
-        back = ""
-        if action is not None and action.by_sticks:
-            name += " (and sinks, unless sticks fly it)"
-        elif action is not None:
-            back = ", until they come again"
+        if action.by_sticks:
+            name, back = f"{action.name} (and sinks, unless sticks fly it)", ""
+        else:
+            name, back = action.name, ", until they come again"
         return f"it changes to {name} after {after:g} s ({told}){back}"
 
 
 _RULES = {
     ARDUPILOT: SetpointRules(
-        "GUID_TIMEOUT", least_timeout=0.1, carries_on=True, defaults={"GUID_TIMEOUT": 3.0}
+        "GUID_TIMEOUT",
+        least_timeout=0.1,
+        most_timeout=1.0,  # at 8 m/s it flies 24 m on with its default
+        carries_on=True,
+        defaults={"GUID_TIMEOUT": 3.0},
     ),
     PX4: SetpointRules(
         "COM_OF_LOSS_T",
+        most_timeout=60.0,  # the greatest value that it takes
         loss="COM_OBL_RC_ACT",
         actions={
             0: LossAction("Position", px4_mode(3, 0), by_sticks=True),
@@ -92,6 +127,7 @@ _RULES = {
             4: LossAction("Land", px4_mode(4, 6)),
             5: LossAction("Hold", px4_mode(4, 3)),
         },
+        forbidden={6: "end the flight (terminate)", 7: "stop the motors (disarm)"},
         streamed=1.0,
         defaults={"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0},
     ),

@@ -1,5 +1,7 @@
 """The ways between home and the relay route, which keep the plan's margin from the fence's edge."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from faao_mav.arrays import Real
@@ -41,6 +43,30 @@ def way_home(plan: Plan, last: Real) -> Real:
     if plan.mission.on_finish != "rtl":
         return np.empty((0, 2))
     return _corners(plan, last, _HOME, "flight.end to home (site.origin)")
+
+
+def way_between(plan: Plan, start: Real, end: Real) -> Real | None:
+    """Return the corners (k, 2), m, of a way from `start` to `end`, both (2,), which are its ends.
+
+    It keeps the plan's margin from the edge of the fence, where `start` is nearer to it from the
+    nearest place on that does. None where there is no such way inside the fence.
+    """
+    fence, margin = plan.keep_in, _margin(plan)
+    if fence is None:
+        return np.array([start, end])
+    kept = _kept(fence, margin)
+    if kept.covers_path(np.array([start, end])):
+        return np.array([start, end])
+    begin = start
+    if not kept.covers(start[None]).all():
+        within = fence.inside(margin)
+        if within.empty:
+            return None
+        begin = within.nearest(start, end)
+        if not fence.covers_path(np.array([start, begin])):
+            return None
+    way = _way(fence, margin, begin, end)
+    return None if way is None else np.vstack([start[None], way])
 
 
 def check_run_in(plan: Plan, route: Route) -> None:
@@ -111,6 +137,7 @@ def _straightened(area: FreeArea, way: Real) -> Real:
     return way[[*kept, -1]]
 
 
+@lru_cache(maxsize=8)
 def _kept(fence: FreeArea, margin: float) -> FreeArea:
     """Return where a `fence` and a `margin`, m, let the aircraft be."""
     return fence.inside(max(margin - _SPARE, 0.0))

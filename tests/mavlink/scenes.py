@@ -1,6 +1,6 @@
 """A mock autopilot and a watch of it, on a simulated link."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 from mock_flights import fly
@@ -66,7 +66,9 @@ class Scene:
         self.arm = bool(options.pop("arm", False))
         mission = mission or a_mission(12)
         behaviour = behaviour_of(cast(MockKind, kind))
-        self.mock = MockAutopilot(behaviour, fly=fly, **{"home": HOME, **options})
+        if solution is not None:
+            options["parameters"] = {"GUID_TIMEOUT": 1.0} | dict(options.get("parameters") or {})
+        self.mock: Any = MockAutopilot(behaviour, fly=fly, **{"home": HOME, **options})
         for part in MissionType:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         rows, peer = self.mock.lists.items(MissionType.MISSION), peer_of(kind)
@@ -97,6 +99,16 @@ class Scene:
     def sets(self, mode: int) -> Any:
         """Return an event: the pilot sets a mode."""
         return lambda now: self.mock.on(Envelope(FOREIGN, SetMode(1, 1, mode)), now)
+
+    def tells(self, lens: Callable[[Message, float], Sequence[Message]]) -> None:
+        """Let the vehicle send what `lens` makes of each of its messages, and the time."""
+        tick, on = self.mock.tick, self.mock.on
+
+        def through(messages: Sequence[Message], now: float) -> list[Message]:
+            return [told for message in messages for told in lens(message, now)]
+
+        self.mock.tick = lambda now: through(tick(now), now)
+        self.mock.on = lambda envelope, now: through(on(envelope, now), now)
 
     def told(self, words: str) -> bool:
         return any(words in text for text in self.watch.seen.told)

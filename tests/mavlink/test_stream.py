@@ -122,7 +122,7 @@ def test_it_stops_when_setpoints_cease(kind: str) -> None:
         setpoint = isinstance(envelope.message, SetPositionTargetLocalNed)
         return () if deaf[0] and setpoint else receive(envelope, now)
 
-    scene.mock.on = hear  # type: ignore[method-assign]
+    scene.mock.on = hear
 
     def cease(_: float) -> None:
         deaf[0] = True
@@ -132,7 +132,7 @@ def test_it_stops_when_setpoints_cease(kind: str) -> None:
 
     events = [(14.0, cease), (26.0, look), (27.0, look)]
     words = (
-        "stops after 3 s (GUID_TIMEOUT)" if kind == "ardupilot" else "changes to Return after 1 s"
+        "stops after 1 s (GUID_TIMEOUT)" if kind == "ardupilot" else "changes to Return after 1 s"
     )
     ending = scene.run(events=events, until=90.0)
     assert scene.told(f"without setpoints it {words}")
@@ -170,7 +170,7 @@ def test_without_setpoints_or_sticks_px4_sinks_in_position() -> None:
         ceased = isinstance(envelope.message, SetPositionTargetLocalNed) and now > 14.0
         return () if ceased else receive(envelope, now)
 
-    scene.mock.on = hear  # type: ignore[method-assign]
+    scene.mock.on = hear
     modes = list[int]()
     events = [(16.0, lambda _: modes.append(scene.mock.mode))]
     assert scene.run(events=events, until=90.0) == "taken over"
@@ -248,7 +248,7 @@ def test_a_lost_answer_to_the_take_off_does_not_end_it() -> None:
         takes_off = isinstance(message, CommandLong) and message.command == MavCommand.TAKEOFF
         return () if takes_off else answers
 
-    scene.mock.on = mute  # type: ignore[method-assign]
+    scene.mock.on = mute
     assert scene.run(until=30.0) == ""
     assert scene.watch.phase == "flying"
     assert scene.watch.relay_start is not None

@@ -7,12 +7,15 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
+from faao_mav.mavlink.flying.belief import Belief
 from faao_mav.mavlink.flying.course import Setpoint
+from faao_mav.mavlink.flying.gate import Gate
 from faao_mav.mavlink.flying.itinerary import Itinerary
 from faao_mav.mavlink.flying.own_frame import OwnFrame
 from faao_mav.mavlink.flying.readiness import Readiness
 from faao_mav.mavlink.flying.round_trips import RoundTrips
 from faao_mav.mavlink.flying.watch import Watch
+from faao_mav.mavlink.flying.who_flies import WhoFlies
 from faao_mav.mavlink.messages import (
     CommandLong,
     CurrentMode,
@@ -49,12 +52,20 @@ _ARM_AGAIN = 2.0
 _OFF_GROUND = 0.3
 """Metres above home from which on a take-off is under way, though its answer is lost; chosen."""
 
-_MODE_AGAIN, _TOLD_BY = 0.5, 3.0
-"""Seconds between two messages about the mode that was asked for last; and after which, without
-one, it counts as the pilot who changed it: six of them. Chosen."""
+_MODE_AGAIN = 0.5
+"""Seconds between two messages about the mode that was asked for last; chosen."""
 
 _EARLY = 0.8
 """The share of a period after which the next setpoint may go: they come irregularly; chosen."""
+
+_OLD = 1.0
+"""From so many seconds of the world on a position is too old to be answered by a setpoint: a link
+may have held it back. Chosen."""
+
+_SLOW_CLIMB = 0.5
+"""The least speed, m/s, at which it has to take off by itself; chosen: a third of the defaults."""
+
+_FAILSAFE = "it is in its failsafe, until setpoints come again"
 
 _PARTS = {
     "out": "on the way to flight.start",
@@ -72,6 +83,9 @@ class Stream(Watch):
     says. While nothing is heard of it nothing is sent, and it does what its parameters say. A mode
     that was not asked for ends the setpoints for good, but for a failsafe in which the vehicle
     still wants them, as PX4's CURRENT_MODE tells.
+
+    No setpoint is sent that does not pass the `Gate`, nor for a position that is old, or doubted.
+    An aircraft that cannot be led on is asked to hold.
 
     Raises `InputError` for a vehicle that is not flown by setpoints, and what `Itinerary` raises.
     """
@@ -107,24 +121,27 @@ class Stream(Watch):
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if lands else "hold"]
         self._solution = solution
-        self._height, self._period = plan.flight.altitude, 1 / rate
+        self._height, self._top = plan.flight.altitude, plan.max_ground_speed
+        self._period = 1 / rate
         self._held = 0.0 if self._rules.carries_on else self._period / 2
         self._round_trips = RoundTrips()
-        self.flight = Itinerary(solution, takes_off=not self._rules.takes_off_by_setpoints)
+        takes_off = not self._rules.takes_off_by_setpoints
+        self.flight = Itinerary(solution, Gate(plan), takes_off=takes_off)
+        self._belief = Belief(self._top)
         self._frame = OwnFrame(self._family, plan.origin)
-        self._unsure: float | None = None
+        self._timeouts: dict[str, float] = {}
+        self._who_flies = WhoFlies(self._rules, self._guided, self._timeouts, self.seen)
         self._last_heard = float("inf")
         if self._rules.loss:
             self.seen.ask_for(CURRENT_MODE, _MODE_AGAIN)
-        self._timeouts: dict[str, float] = {}
-        self._ground: Setpoint | None = None
         self._first_sent, self._last_sent = float("inf"), float("-inf")
+        self._sent_by = float("inf")
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         if envelope.sender == self._peer.address:
-            silent = now - self._last_heard
-            if self._rules.loss and self.phase == "flying" and silent > self._without_setpoints:
-                self._unsure = now  # it may be in another mode since
+            under_way = self.phase in ("flying", "ending", "holding")
+            if under_way and now - self._last_heard > self._without_setpoints:
+                self._who_flies.forget(now)
             self._last_heard = now
         out = super()._receive(envelope, now)
         if self.outcome is not None or envelope.sender != self._peer.address:
@@ -138,8 +155,8 @@ class Stream(Watch):
                 self._timeouts[name] = value
             case Timesync() as answer:
                 self._round_trips.hear(answer, now)
-            case CurrentMode(custom_mode=mode) if self.phase == "flying":
-                self._see_who_flies(mode, now)
+            case CurrentMode(custom_mode=mode) if self.phase in ("flying", "ending", "holding"):
+                return [*out, *self._on_mode(mode, now)]
             case GlobalPositionInt() as position:
                 return [*out, *self._on_position(position, now)]
         return out
@@ -148,6 +165,8 @@ class Stream(Watch):
         out = super()._time_out(now)
         if self.outcome is not None or self.phase in ("holding", "aside"):
             return out
+        if self.phase == "flying" and now >= self._sent_by:
+            return [*out, *self._give_up("for too long no setpoint could be sent", now)]
         return [*out, self._round_trips.ask(now)]
 
     # ---- before the flight
@@ -165,6 +184,10 @@ class Stream(Watch):
         if position is None or self._frame.origin is None:
             return ()
         if not known and now < self._begun + _ANSWER:
+            return ()
+        refusal = self._rules.refusal(self._timeouts, self._period)
+        if refusal is not None:
+            self._end("refused", f"nothing was started: {refusal}")
             return ()
         self.seen.told.append(f"without setpoints {self._rules.without(self._timeouts)}")
         lean = beyond_lean(self._solution, vehicle_of(self._solution.plan))
@@ -192,45 +215,30 @@ class Stream(Watch):
                 return self._say(lambda: self._arming(True), now)
             case "engaging" if mode != self._mode_before:
                 self._step_aside()
-            case "flying":
-                self._see_who_flies(mode, now)
             case "arming" | "starting" if mode != self._guided:
                 self._step_aside()
             case "ending" if mode == self._finish:
                 self._command = None
                 if not self._lands:
                     self._over()
-            case "ending" if self._armed and mode != self._guided:  # that may be a late packet
-                self._step_aside()
-            case "holding" if mode == self._modes.hold and self._command is not None:
-                self._command = None
-                self.seen.told.append("it holds; interrupt again to leave it")
-            case "holding" if mode not in (self._guided, self._modes.hold) or (
-                mode == self._guided and self._command is None
-            ):
-                self._step_aside()
+            case "holding" if mode == self._modes.hold or self._command is None:
+                return super()._on_mode(mode, now)
+            case "flying" | "holding":
+                self._see_who_flies(mode, now)
+            case "ending" if self._armed:
+                self._see_who_flies(mode, now)
         return ()
 
     def _see_who_flies(self, mode: int, now: float) -> None:
-        """Step aside for any other `mode` than for setpoints, but a failsafe that waits for them.
+        """Step aside for somebody else; its failsafe for lost setpoints is told."""
+        flier = self._who_flies.see(mode, now)
+        if flier == "others":
+            self._step_aside()
+        elif flier == "failsafe" and self.seen.told[-1] != _FAILSAFE:
+            self.seen.told.append(_FAILSAFE)
 
-        Then the one that was asked for last is still that for setpoints. Until that is told none
-        are sent.
-        """
-        wanted = self.seen.wanted
-        if mode == self._guided:
-            self._unsure = None
-        elif not self._rules.comes_back_from(mode, self._timeouts):
-            self._step_aside()
-        elif wanted is not None and wanted.intended_custom_mode == self._guided:
-            self._unsure = None
-            text = "it is in its failsafe, until setpoints come again"
-            if self.seen.told[-1] != text:
-                self.seen.told.append(text)
-        elif wanted is not None or (self._unsure is not None and now > self._unsure + _TOLD_BY):
-            self._step_aside()
-        elif self._unsure is None:
-            self._unsure = now
+    def _repeat(self, now: float) -> Sequence[Message]:
+        return () if self._who_flies.unsure else super()._repeat(now)
 
     def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:
         if self.phase == "arming" and now < self._begun + self._patience:
@@ -242,7 +250,7 @@ class Stream(Watch):
     def _accepted(self, now: float) -> Sequence[Message]:
         if self.phase == "arming" and not self._rules.takes_off_by_setpoints:
             return super()._accepted(now)
-        self._fly()
+        self._fly(now)
         return ()
 
     def _on_disarmed(self) -> Sequence[Message]:
@@ -251,24 +259,49 @@ class Stream(Watch):
             return ()
         return super()._on_disarmed()
 
-    def _fly(self) -> None:
+    def _fly(self, now: float) -> None:
         self.phase, self._command = "flying", None
         self.seen.told.append("taking off")
+        assert self.seen.position is not None
+        self._frame.depart(self.seen.position)
+        climb = 0.0 if self._rules.takes_off_by_setpoints else self._height / _SLOW_CLIMB
+        self._sent_by = now + self._patience + climb
+
+    def _give_up(self, why: str, now: float) -> Sequence[Message]:
+        """End the setpoints of an aircraft that cannot be led on: it is to hold."""
+        self.seen.told.append(f"setpoints end: {why}")
+        if self._is_guided:
+            return self._ask_to_hold(now)
+        self._step_aside()
+        return ()
 
     # ---- where it is to be
 
     def _on_position(self, position: GlobalPositionInt, now: float) -> Sequence[Message]:
         t, place = position.time_boot_ms / 1000, self._frame.place(position)
+        velocity = np.array([position.vy, position.vx, -position.vz]) / 100
+        if position is not self.seen.position or self._round_trips.age(t, now) > _OLD:
+            return ()
         if self.phase == "starting" and place[2] > _OFF_GROUND:
-            self._fly()
-        setpoint, out = self._setpoint(t, place, position), list[Message]()
+            self._fly(now)
+        if self.phase in ("flying", "ending") and not self._belief.holds(t, place, velocity):
+            self._tell(self._belief.told)
+            lost = self._belief.is_lost(t)
+            return self._give_up("where it is, is not known", now) if lost else ()
+        setpoint, out = self._setpoint(t, place, velocity), list[Message]()
+        self._tell(self._belief.told)
+        self._tell(self.flight.told)
+        if self.flight.trouble is not None and self.phase in ("flying", "ending"):
+            return self._give_up(self.flight.trouble, now)
+        if (news := self._frame.news(position)) is not None:
+            self.seen.told.append(news)
         if self.phase == "flying" and self.flight.part == "over" and self._is_guided:
             self.phase = "ending"
             out += self._say(lambda: self._mode(self._finish), now)
         if self.phase == "engaging" and self._command is None and self._streamed(t):
             out += self._say(lambda: self._mode(self._guided), now)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
-            self._last_sent = t
+            self._last_sent, self._sent_by = t, now + self._patience
             self._first_sent = min(self._first_sent, t)
             out.append(self._frame.message(setpoint, position, self._peer.address))
         return out
@@ -288,20 +321,24 @@ class Stream(Watch):
         """Tell whether the vehicle has had setpoints for long enough."""
         return t >= self._first_sent + _STREAMED * self._rules.streamed
 
-    def _setpoint(self, t: float, place: Real, position: GlobalPositionInt) -> Setpoint | None:
+    def _tell(self, told: list[str]) -> None:
+        self.seen.told += told
+        told.clear()
+
+    def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
         """Return where the aircraft is to be at `t`; None while nothing is to be sent."""
         asked = self.phase == "ending" and self._command is not None
-        if (self.phase == "flying" and self._unsure is None) or (asked and self._is_guided):
+        flying = self.phase == "flying" or (asked and self._is_guided)
+        if flying and not self._who_flies.unsure:
             part = self.flight.part
-            velocity = np.array([position.vy, position.vx, -position.vz]) / 100
-            due = t + self._held + self._round_trips.lasting
-            setpoint = self.flight.setpoint(due, place, velocity)
+            lead = self._held + self._round_trips.lasting
+            speed = max(float(np.linalg.norm(velocity)), self._top)
+            by_then = place + lead * velocity * (self._top / speed)
+            setpoint = self.flight.setpoint(t + lead, by_then, velocity)
             if self.flight.part != part:
                 self.seen.told.append(_PARTS[self.flight.part])
                 self.relay_start = self.flight.relay_start
             return setpoint
         if self._rules.takes_off_by_setpoints and self.phase in ("engaging", "arming"):
-            if self._ground is None:
-                self._ground = Setpoint(place, np.zeros(3), np.zeros(3))
-            return self._ground
+            return Setpoint(place, np.zeros(3), np.zeros(3))
         return None
