@@ -106,7 +106,7 @@ def flown(autopilots: Path, autopilot: str, result: Result, case: str) -> Flight
         else:
             timed = [f"{name} {value}" for name, value in result.conversion.parameters.items()]
             air = [f"SIM_WIND_SPD {speed}", f"SIM_WIND_DIR {origin}"] if speed else []
-            (folder / "own.parm").write_text("\n".join([*timed, *air]))
+            (folder / "own.parm").write_text("\n".join(["GUID_TIMEOUT 1", *timed, *air]))
             defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
             options = ["--speedup", str(SPEEDUP), "--defaults", defaults]
         kind = "px4" if autopilot == "px4" else "arducopter"

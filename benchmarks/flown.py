@@ -186,7 +186,9 @@ def serving(
         told = {**plans, **result.conversion.parameters}
         timed = [f"{name} {value}" for name, value in told.items()]
         air = [f"SIM_WIND_SPD {wind.speed}", f"SIM_WIND_DIR {wind.from_degrees}"]
-        (folder / "own.parm").write_text("\n".join(["LOG_BACKEND_TYPE 1", *timed, *air]))
+        (folder / "own.parm").write_text(
+            "\n".join(["LOG_BACKEND_TYPE 1", "GUID_TIMEOUT 1", *timed, *air])
+        )
         defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
         kind, options = "arducopter", ["--defaults", defaults]
     with simulated(autopilots, kind, folder, "--speedup", str(speedup), *options) as connection:

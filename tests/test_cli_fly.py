@@ -76,7 +76,10 @@ def test_a_plan_is_streamed_and_its_radio_told(tmp_path: Path) -> None:
     assert run(plan, "--out", made, "--save", saved, "--quiet").exit_code == 0
     port = free_port()
     to = ("--to", f"udpout:127.0.0.1:{port}", "--json")
-    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1, speedup=8.0)
+    quick = {"GUID_TIMEOUT": 1.0}
+    mock = MockAutopilot(
+        behaviour_of("ardupilot"), home=HOME, beat=0.1, speedup=8.0, parameters=quick
+    )
     with running(mock, f"udpin:127.0.0.1:{port}"), socket.socket(type=socket.SOCK_DGRAM) as radio:
         radio.bind(("127.0.0.1", 0))
         told = ("--radio", f"udp:127.0.0.1:{radio.getsockname()[1]}")

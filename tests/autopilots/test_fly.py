@@ -38,7 +38,7 @@ def run(*arguments: object) -> list[dict[str, Any]]:
 def options_for(kind: str, autopilots: Path, parameters: Path, where: Path) -> tuple[str, ...]:
     """Return options that make it fly with `parameters`, and quickly, and keep its log in `where`.
 
-    Setpoints may cease for a minute of its time, which is seconds here, and the flight goes on.
+    Setpoints may cease for as long of its time as they may in a stream, and the flight goes on.
     """
     if kind == "px4":
         tuned = ("--param-file", str(parameters), "--params", "SIH_KDV=0.2,COM_OF_LOSS_T=60")
@@ -47,11 +47,11 @@ def options_for(kind: str, autopilots: Path, parameters: Path, where: Path) -> t
     own = where / "own.parm"
     own.write_text(
         "\n".join(
-            ["LOG_BACKEND_TYPE 1", "GUID_TIMEOUT 60", *(line.replace(",", " ") for line in lines)]
+            ["LOG_BACKEND_TYPE 1", "GUID_TIMEOUT 1", *(line.replace(",", " ") for line in lines)]
         )
     )
     defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{own}"
-    return ("--speedup", "20", "--defaults", defaults)
+    return ("--speedup", "5", "--defaults", defaults)
 
 
 RATES = ("rate_bs_uav", "rate_uav_user", "delivered_rate")
