@@ -38,8 +38,9 @@ _WAYS = 10
 """How many ways it is led in a row, none of which it follows to its end, until it is given up;
 chosen."""
 
-_MEETINGS = 4
-"""How many places to meet the plan at are tried before its end is; chosen."""
+_MEETINGS, _MISSED = 4, 2.0
+"""How many places to meet the plan at are tried before its end is; and seconds after which the plan
+has passed by one. Chosen."""
 
 
 class Itinerary:
@@ -140,7 +141,7 @@ class Itinerary:
     def _on_way(self, t: float, place: Real, passed: float) -> Setpoint | None:
         """Return where it is to be on its way, `passed` s later than before, or on a new one."""
         way, ahead = self._course, self._gone + passed
-        missed = self.part == "relay" and t - self._start > self._meets + _REST
+        missed = self.part == "relay" and t - self._start > self._meets + _MISSED
         if way is not None and not missed:
             if self._gate.passes(t, place, way.at(ahead)):
                 self._gone, self._waits_since = ahead, None
