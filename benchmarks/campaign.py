@@ -18,7 +18,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mavlink"))
 
-from campaign import Trial, flown
+from trials import Trial, flown
 
 
 def main() -> int:

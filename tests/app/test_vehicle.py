@@ -51,7 +51,7 @@ def test_a_flight_that_the_page_has_started_is_held_then_left(result: Result) ->
         assert "verified" in uploaded(result, connection)
         said = watched(tell, interrupt, result, connection, arm=True)
         assert mock.armed
-    assert said.endswith("left         no longer watched; the vehicle is in mode BRAKE")
+    assert said.endswith("left         in mode BRAKE, 16 m above home")
     assert any("asking the vehicle to hold" in each.get("note", "") for each in told)
 
 

@@ -1,7 +1,7 @@
 """Flights that meet trouble at random: the first of those that `benchmarks/campaign.py` flies."""
 
 import pytest
-from campaign import Trial, flown
+from trials import Trial, flown
 
 _FLIGHTS = 30
 """How many are flown here; chosen: half a minute."""
