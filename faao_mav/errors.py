@@ -1,6 +1,7 @@
 """The exceptions that faao-mav raises on purpose, and values as their messages show them."""
 
 from collections.abc import Sequence
+from importlib.util import find_spec
 
 _MAX_SHOWN = 60
 """Characters of a value or a key that a message shows; chosen: a message stays within two lines."""
@@ -47,6 +48,18 @@ class LinkError(FaaoError):
 
 class HangUp(KeyboardInterrupt):
     """The terminal has gone, and with it whoever could interrupt a second time."""
+
+
+def check_extra(name: str, module: str, purpose: str) -> None:
+    """Check that the extra `name` of the package, which brings `module`, is installed.
+
+    Where it is not, raises `InputError`: what `purpose` needs, and how to install it.
+    """
+    if find_spec(module) is None:
+        raise InputError(
+            f"{purpose} needs {module}, which is not installed: "
+            f"pip install '.[{name}]' in a checkout of faao-mav"
+        )
 
 
 def quote(value: object) -> str:

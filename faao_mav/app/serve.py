@@ -10,8 +10,15 @@ from collections.abc import Callable, Iterator
 from html import escape
 from pathlib import Path
 
+import uvicorn
+from fastapi import FastAPI, Response
+from nicegui import ui
+
 from faao_mav.app.document import Document
+from faao_mav.app.guard import Guard
+from faao_mav.app.page import Page
 from faao_mav.app.tiles import OPEN_STREET_MAP, TileFile
+from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError, InputError
 
 LOOPBACK = ("127.0.0.1", "localhost")
@@ -33,23 +40,8 @@ def serve(
 
     `port` 0 stands for any that is free. `tiles` are served as the background map in the stead of
     OpenStreetMap's. `note` is told the address, with the token in it; with
-    `browser` that is opened. Raises `InputError` where the port cannot be had, or NiceGUI, which
-    the extra `app` brings, is not installed.
+    `browser` that is opened. Raises `InputError` where the port cannot be had.
     """
-    try:
-        import nicegui  # noqa: F401
-        import uvicorn
-    except ImportError:
-        raise InputError(
-            "faao-mission app: the page is served by nicegui: pip install 'faao-mav[app]'"
-        ) from None
-    from fastapi import FastAPI, Response
-    from nicegui import ui
-
-    from faao_mav.app.guard import Guard
-    from faao_mav.app.page import Page
-    from faao_mav.app.workers import Workers
-
     listening = _bound(host, port)
     port = listening.getsockname()[1]
     token, workers = secrets.token_urlsafe(_TOKEN_BYTES), Workers()

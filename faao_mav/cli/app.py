@@ -45,12 +45,15 @@ def app(
     switched on; that of --mbtiles is served by this command too.
     """
     from faao_mav.app.document import Document
-    from faao_mav.app.serve import serve
-    from faao_mav.app.tiles import TileFile
+    from faao_mav.errors import check_extra
 
     def begin() -> Document:
         return Document(_EMPTY) if plan_file is None else Document.open(plan_file)
 
     begin()  # what is no plan is refused at once
+    check_extra("app", "nicegui", "the planner page")
+    from faao_mav.app.serve import serve
+    from faao_mav.app.tiles import TileFile
+
     tiles = None if mbtiles is None else TileFile(mbtiles)
     serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=note)

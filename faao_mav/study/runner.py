@@ -1,11 +1,11 @@
 """All cases of a study over all cores, each kept as soon as it is done."""
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from faao_mav.errors import FaaoError, InputError
+from faao_mav.errors import FaaoError, InputError, check_extra
 from faao_mav.files import check_writable, write_whole
 from faao_mav.study.rows import TABLE, StudyRow, append_row, in_order, load_rows, table
 from faao_mav.study.sweep import StudyCase
@@ -66,31 +66,31 @@ def run_study(
     `observe` is told each row, old ones first. Raises `InputError` for a directory or a cluster of
     no use.
     """
-    old = _prepare(directory, cases) if directory is not None else ()
-    for row in old:
-        if observe is not None:
-            observe(row)
-    done = {row.key: row for row in old}
-    for row in _rows([case for case in cases if case.key not in done], jobs, cluster):
+    with nullcontext() if cluster is None else _connected(cluster):
+        old = _prepare(directory, cases) if directory is not None else ()
+        for row in old:
+            if observe is not None:
+                observe(row)
+        done = {row.key: row for row in old}
+        for row in _rows([case for case in cases if case.key not in done], jobs, cluster):
+            if directory is not None:
+                append_row(row, directory)
+            done[row.key] = row
+            if observe is not None:
+                observe(row)
+        rows = in_order(cases, done)
         if directory is not None:
-            append_row(row, directory)
-        done[row.key] = row
-        if observe is not None:
-            observe(row)
-    rows = in_order(cases, done)
-    if directory is not None:
-        write_whole(directory / TABLE, table(rows).encode())
-    return rows
+            write_whole(directory / TABLE, table(rows).encode())
+        return rows
 
 
 def _rows(cases: Sequence[StudyCase], jobs: int, cluster: str | None) -> Iterator[StudyRow]:
-    """Run `cases`; yield their rows as they finish."""
+    """Run `cases`; yield their rows as they finish. With a `cluster` joblib is connected to it."""
     from joblib import Parallel, delayed, effective_n_jobs
 
     if cluster is not None:
-        with _connected(cluster):
-            workers = Parallel(return_as="generator_unordered", batch_size=1)
-            yield from workers(delayed(run_case)(case) for case in cases)
+        workers = Parallel(return_as="generator_unordered", batch_size=1)
+        yield from workers(delayed(run_case)(case) for case in cases)
         return
     processes = min(effective_n_jobs(jobs), len(cases))  # no more than there is work for
     if processes <= 1:
@@ -105,10 +105,9 @@ def _connected(address: str) -> Iterator[None]:
     """Let joblib send its work to the Dask scheduler at `address`."""
     from joblib import parallel_config
 
-    try:
-        from distributed import Client
-    except ModuleNotFoundError:
-        raise InputError("a cluster needs Dask: pip install 'faao-mav[cluster]'") from None
+    check_extra("cluster", "distributed", f"cluster {address}: a study there")
+    from distributed import Client
+
     try:
         client = Client(address, timeout=_CONNECTING)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:

@@ -5,11 +5,10 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from faao_mav.errors import InputError, shortened
+from faao_mav.errors import InputError, check_extra, shortened
 from faao_mav.mavlink.flying import log_messages
 from faao_mav.mavlink.flying.log_flights import flights
 from faao_mav.mavlink.flying.log_messages import Said
@@ -62,8 +61,8 @@ def _check(path: Path) -> None:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     if ending not in _ENDINGS:
         raise InputError(f"{path}: give a flight log: {', '.join(_ENDINGS)}")
-    if ending == ".ulg" and find_spec("pyulog") is None:
-        raise InputError(f"{path}: PX4's logs are read by pyulog: pip install 'faao-mav[debrief]'")
+    if ending == ".ulg":
+        check_extra("debrief", "pyulog", f"{path}: a log of PX4")
 
 
 def _told(path: Path) -> Iterator[Said]:
