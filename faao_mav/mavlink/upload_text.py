@@ -14,7 +14,7 @@ def upload_text(report: UploadReport) -> str:
         lines += [f"not kept     {text}" for text in _dropped(part)]
     lines += [f"failed       {problem}" for problem in report.problems]
     if report.verified:
-        lines.append(f"verified     read back and compared, {report.seconds:.1f} s")
+        lines.append(f"verified     read back and compared; the upload took {report.seconds:.1f} s")
     return "\n".join(lines)
 
 

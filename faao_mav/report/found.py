@@ -49,7 +49,7 @@ def found_lines(result: Result, *, timed: bool) -> Iterator[Line]:
         (worst, low), (best, high) = ranked[0], ranked[-1]
         yield "starts", f"{len(ranked)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
     state = "converged" if solution.converged else "NOT CONVERGED"
-    seconds = f", {result.seconds_optimize:.1f} s" if timed else ""
+    seconds = f", which took {result.seconds_optimize:.1f} s" if timed else ""
     steps = counted(solution.iterations, "iteration")
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
     yield from _limits(solution)

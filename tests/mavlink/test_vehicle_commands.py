@@ -62,7 +62,7 @@ def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> N
         assert vehicle == "vehicle      ArduPilot copter (system 1, component 1, disarmed)"
         assert stands == "stands       0 m from the mission's home, 0 m higher"
         assert mission == "mission      6 items stored"
-        assert verified.startswith("verified     read back and compared, ")
+        assert verified.startswith("verified     read back and compared; the upload took ")
         assert result.stderr == ""
         out = tmp_path / "back.plan"
         result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out, "--system", 1)
