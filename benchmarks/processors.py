@@ -1,14 +1,16 @@
-"""Whether other processors write the same missions: samples and random plans, byte for byte.
+"""Whether other processors find the same optima: samples and random plans.
 
     python benchmarks/processors.py [--plans 20] [NAME ...]
 
 Each plan is planned and converted anew by the command for each of `PROCESSORS`, as OpenBLAS and
 NumPy let this machine pass for another one of its family. One row for each plan: the items, and for
-each processor whether its mission file has the same bytes as the first one's. Status 1 where one
-has not. NAMEs choose plans.
+each other processor whether its mission has the same bytes as this one's, and its rate less this
+one's, as a share. Status 1 where a rate is more than `SAME_RATE` apart. NAMEs choose plans.
 """
 
 import argparse
+import json
+import math
 import os
 import subprocess
 import sys
@@ -22,14 +24,20 @@ from faao_mav.plan.yaml_text import dump_yaml
 
 SAMPLES = Path(__file__).parents[1] / "missions"
 
-_VECTORS = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+SAME_RATE = 1e-6
+"""How far the rates of one plan may be apart on two processors, as a share: what is promised."""
+
+_FOUND = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+_NUMPY_NARROW = {"NPY_DISABLE_CPU_FEATURES": " ".join(_FOUND)}
+_OPENBLAS_NARROW = {"OPENBLAS_CORETYPE": "Nehalem"}
+
+NARROW = _NUMPY_NARROW | _OPENBLAS_NARROW
+"""The environment in which NumPy and OpenBLAS know of no AVX."""
+
 PROCESSORS = {
-    "this one": {},
-    "Nehalem": {"OPENBLAS_CORETYPE": "Nehalem"},
-    "NumPy without AVX-512": {
-        "NPY_DISABLE_CPU_FEATURES": " ".join(each for each in _VECTORS if each != "X86_V3")
-    },
-    "NumPy without AVX2": {"NPY_DISABLE_CPU_FEATURES": " ".join(_VECTORS)},
+    "OpenBLAS for Nehalem": _OPENBLAS_NARROW,
+    "NumPy without AVX": _NUMPY_NARROW,
+    "both": NARROW,
 }
 """The environment in which the program takes this processor for another one."""
 
@@ -75,18 +83,25 @@ def random_plan(seed: int) -> str:
     )
 
 
-def mission(plan: Path, environment: dict[str, str]) -> bytes:
-    """Return the mission file for `plan`, or what the program says instead of one."""
+def planned(plan: Path, environment: dict[str, str]) -> tuple[bytes, float]:
+    """Return the mission file for `plan` and the rate that was maximised, bit/s/Hz.
+
+    Where there is no mission, what the program says instead, and nan.
+    """
+    own = {name: value for name, value in os.environ.items() if name not in NARROW}
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "mission.waypoints"
         program = "from faao_mav.cli.main import run; run()"
         told = subprocess.run(
-            [sys.executable, "-c", program, str(plan), "--out", str(out), "--quiet", "--force"],
-            env=os.environ | environment,
+            [sys.executable, "-c", program, str(plan), "--out", str(out), "--json", "--force"],
+            env=own | environment,
             capture_output=True,
             check=False,
         )
-        return out.read_bytes() if out.exists() else told.stderr
+        if not out.exists():
+            return told.stderr, math.nan
+        data = json.loads(told.stdout)
+        return out.read_bytes(), data["delivered_rate" if data["causal"] else "average_rate"]
 
 
 def main() -> int:
@@ -101,15 +116,17 @@ def main() -> int:
         for plan in (*sorted(SAMPLES.glob("*.yaml")), *sorted(Path(folder).glob("*.yaml"))):
             if asked.names and plan.stem not in asked.names:
                 continue
-            first, *others = (mission(plan, each) for each in PROCESSORS.values())
-            same = [other == first for other in others]
-            told = ", ".join(
-                f"{name}: {'same' if is_same else 'DIFFERS'}"
-                for name, is_same in zip(list(PROCESSORS)[1:], same, strict=True)
-            )
-            print(f"{plan.stem}: {len(first.splitlines()) - 1} items; {told}", flush=True)
-            differ += not all(same)
-    print(f"{differ} plans differ")
+            first, rate = planned(plan, {})
+            told = []
+            for name, environment in PROCESSORS.items():
+                other, its_rate = planned(plan, environment)
+                apart = its_rate / rate - 1
+                same = other == first
+                differ += not (same or abs(apart) <= SAME_RATE)
+                told.append(f"{name}: {'same bytes' if same else f'DIFFERS, rate {apart:+.1e}'}")
+            items = len(first.splitlines()) - 1
+            print(f"{plan.stem}: {items} items; {', '.join(told)}", flush=True)
+    print(f"{differ} rates differ")
     return 1 if differ else 0
 
 

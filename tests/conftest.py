@@ -13,17 +13,14 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from xdist.scheduler import LoadScopeScheduling
 
-from faao_mav.cli.main import pin_kernels
-
-# As the command does, and before NumPy is imported: what is computed is then the same.
+# As the command does, and before NumPy is imported.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-pin_kernels()
 
-from faao_mav.optimizer.search import bound  # noqa: E402
-from faao_mav.optimizer.search.map_bound import map_bound  # noqa: E402
-from faao_mav.plan import Plan, parse_plan  # noqa: E402
-from faao_mav.plan.model import PlanContents  # noqa: E402
-from faao_mav.plan.yaml_text import dump_yaml, load_yaml  # noqa: E402
+from faao_mav.optimizer.search import bound
+from faao_mav.optimizer.search.map_bound import map_bound
+from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.model import PlanContents
+from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 # Hypothesis tries numbers that it reads in the project's modules loaded so far. Which are loaded
 # depends on how the tests are shared out among processes: without them, examples are the same.
@@ -38,6 +35,9 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("deterministic")
+
+PATIENCE = 300.0
+"""How long a test waits for another process, s: on a busy machine, only a failure takes so long."""
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 

@@ -1,6 +1,5 @@
 """Which command an argument list is for."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,9 +9,8 @@ import pytest
 from conftest import FLYABLE
 from typer.testing import CliRunner
 
-from faao_mav.cli.main import app, pin_kernels
+from faao_mav.cli.main import app
 
-PROCESSORS = Path("/proc/cpuinfo")
 HOME = "0\t1\t0\t16\t0\t0\t0\t0\t47.4\t8.5\t400\t1"
 MISSION = f"QGC WPL 110\n{HOME}\n1\t0\t3\t16\t0\t0\t0\t0\t47.5\t8.6\t50\t1\n"
 
@@ -94,43 +92,3 @@ def test_help_loads_nothing_that_costs() -> None:
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout
     assert "faao_mav.cli.convert" in loaded
     assert not {"numpy", "scipy", "pymavlink", "ruamel", "pydantic"} & set(loaded.split())
-
-
-@pytest.mark.parametrize(
-    ("flags", "kernels"),
-    [("fpu avx2 bmi2 fma", "Haswell"), ("fpu avx", "Nehalem"), ("", "Nehalem")],
-)
-def test_every_processor_with_avx2_takes_the_same_kernels(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flags: str, kernels: str
-) -> None:
-    processors = tmp_path / "cpuinfo"
-    processors.write_text(
-        f"processor\t: 0\nflags\t\t: {flags}\n\nprocessor\t: 1\nflags\t: avx2 fma\n"
-    )
-    monkeypatch.setenv("OPENBLAS_CORETYPE", "Nehalem")
-    pin_kernels(processors)
-    assert os.environ["OPENBLAS_CORETYPE"] == kernels
-    pin_kernels(tmp_path / "absent")
-    assert os.environ["OPENBLAS_CORETYPE"] == kernels
-
-
-@pytest.mark.skipif(
-    not PROCESSORS.exists() or " avx2 " not in PROCESSORS.read_text(), reason="no AVX2 known here"
-)
-def test_the_command_computes_with_the_kernels_it_chose() -> None:
-    code = (
-        "import sys; from faao_mav.cli.main import run; sys.argv = ['faao-mission', '--version']\n"
-        "try: run()\n"
-        "except SystemExit: import numpy, threadpoolctl\n"
-        "print(*{each['architecture'] for each in threadpoolctl.threadpool_info()})"
-    )
-    told = {
-        subprocess.run(
-            [sys.executable, "-c", code],
-            capture_output=True,
-            text=True,
-            env=os.environ | {"OPENBLAS_CORETYPE": other},
-        ).stdout.splitlines()[-1]
-        for other in ("Nehalem", "Haswell")
-    }
-    assert told == {"Haswell"}

@@ -1,6 +1,5 @@
 """`faao-mission`: which command an argument list is for."""
 
-import contextlib
 import difflib
 import gc
 import io
@@ -32,13 +31,6 @@ _ALLOCATIONS = 50_000
 
 Modules and short-lived arrays leave hardly any cycles. Chosen; what a change costs is not
 measured.
-"""
-
-_KERNELS = "Haswell"
-"""OpenBLAS's kernels for each x86-64 processor with AVX2, which is Intel's since 2013, AMD's 2015.
-
-Each set of kernels adds in its own order, and an optimum that hangs on the last digit becomes
-another mission. They take as long as a newer processor's own for matrices as small as ours.
 """
 
 DEFAULT = plan.__name__
@@ -105,18 +97,6 @@ def main(
     """
 
 
-def pin_kernels(processors: Path = Path("/proc/cpuinfo")) -> None:
-    """Have OpenBLAS take `_KERNELS` if the first of `processors`, as Linux tells them, has AVX2.
-
-    Then the same plan becomes the same mission on another processor. To be called before NumPy is
-    imported. Elsewhere OpenBLAS goes on choosing by the processor.
-    """
-    with contextlib.suppress(OSError), processors.open() as told:
-        flags = next((line for line in told if line.startswith("flags")), "")
-        if {"avx2", "fma"} <= set(flags.split()):
-            os.environ["OPENBLAS_CORETYPE"] = _KERNELS
-
-
 def _hang_up(*_: object) -> None:
     raise HangUp
 
@@ -138,7 +118,6 @@ def run() -> None:
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, handler)
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # small matrices: more threads wait and spin
-    pin_kernels()
     gc.set_threshold(_ALLOCATIONS)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
