@@ -328,6 +328,7 @@ def test_a_small_problem_agrees_with_slsqp(law: Law) -> None:
     assert best.value == pytest.approx(float(peer.x[-1]), rel=1e-5)
 
 
+@pytest.mark.figures
 def test_the_published_rate_is_reached() -> None:
     """Zeng and Zhang, IEEE TWC 2017, Table II: 9.53 Mbit/s; 9.5208 by CVXPY.
 

@@ -128,6 +128,7 @@ class Known:
     rate: float
 
 
+@pytest.mark.figures
 @pytest.mark.parametrize(
     "known",
     [
@@ -145,7 +146,7 @@ def test_the_sample_delivers_what_is_known_to_be_possible(known: Known) -> None:
         "optimizer.max_iterations": 100,
     }
     solution = optimize(parse_plan(edited(SAMPLE, changes)))
-    assert solution.delivered_rate >= known.rate
+    assert solution.delivered_rate >= known.rate * (1 - 1e-3)
     assert solution.delivered_rate <= solution.rates.R_avg
     assert solution.history[-1] == solution.delivered_rate
     assert solution.is_feasible()

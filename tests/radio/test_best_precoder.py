@@ -113,6 +113,7 @@ def test_search_reaches_the_closed_form(seed: int, snr: float) -> None:
     np.testing.assert_allclose(cutoff_rate(H, P, classes, 1.0), expected, rtol=1e-6)
 
 
+@pytest.mark.figures
 @pytest.mark.parametrize(("snr_db", "rate"), [(0, 2.2761), (5, 3.5514), (10, 3.9964)])
 def test_known_qpsk_rates(snr_db: float, rate: float) -> None:
     H = TABLE * 10.0 ** (snr_db / 20.0)

@@ -23,6 +23,7 @@ def drawn(seed: int, *shape: int) -> Complex:
     return np.asarray(parts[0] + 1j * parts[1])
 
 
+@pytest.mark.figures
 @pytest.mark.parametrize(
     ("modulation", "decibels", "exact"),
     [

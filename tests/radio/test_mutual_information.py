@@ -54,6 +54,7 @@ def test_single_antenna_oracle(modulation: str, decibels: float, expected: float
 
 
 # As for the cutoff rate: unit noise, H = [2 1; 1 1] √(snr/2), P = I with tr(P^H P) = W = 2.
+@pytest.mark.figures
 @pytest.mark.parametrize(
     ("modulation", "closed_form", "decibels", "expected"),
     [

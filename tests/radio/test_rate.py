@@ -33,6 +33,7 @@ def test_single_antenna_oracle(modulation: str, decibels: float, expected: float
 
 # The table's SNR is per stream with H divided by √2: unit noise, H = [2 1; 1 1] √(snr/2), and
 # P = I, so tr(P^H P) = W = 2. The closed form is scaled to the same W = 2.
+@pytest.mark.figures
 @pytest.mark.parametrize(
     ("modulation", "closed_form", "decibels", "expected"),
     [
