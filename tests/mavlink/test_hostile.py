@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import free_port
+from conftest import PATIENCE, free_port
 from mock_flights import fly
 from served import running
 from stations import FENCE, HOME, VEHICLE, a_mission, mock_of, rows_for, vehicle_of
@@ -272,7 +272,7 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
             stderr=subprocess.PIPE,
             text=True,
         )
-        _, errors = client.communicate(timeout=30)
+        _, errors = client.communicate(timeout=PATIENCE)
     assert client.returncode == 1
     assert "interrupted while uploading mission at item 3 of" in errors
     assert f"cancelled. {holds}" in errors
@@ -313,7 +313,7 @@ def test_a_mission_goes_on_when_nobody_can_be_told_any_more(gone: str, tmp_path:
             client.send_signal(signal.SIGHUP)
             assert "the terminal has gone" in client.stdout.read()
         client.stdout.close()
-        assert client.wait(timeout=30) != 0
+        assert client.wait(timeout=PATIENCE) != 0
         assert (mock.armed, mock.mode) == (True, 3)
     assert orders == [MavCommand.ARM, MavCommand.START]
 

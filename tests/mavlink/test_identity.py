@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import free_port
+from conftest import PATIENCE, free_port
 from hypothesis import given
 from hypothesis import strategies as st
 from mock_flights import fly as flies
@@ -303,12 +303,12 @@ def test_a_mock_answers_who_asked() -> None:
         for station in stations:
             station.mav.timesync_send(0, 1)
         for station in stations:
-            assert station.recv_match(type="TIMESYNC", blocking=True, timeout=5)
+            assert station.recv_match(type="TIMESYNC", blocking=True, timeout=PATIENCE)
         stations[0].mav.mission_request_list_send(1, 1, 0)
-        assert stations[0].recv_match(type="MISSION_COUNT", blocking=True, timeout=5)
+        assert stations[0].recv_match(type="MISSION_COUNT", blocking=True, timeout=PATIENCE)
         heard = set()
         for _ in range(6):
-            heard.add(stations[1].recv_match(blocking=True, timeout=5).get_type())
+            heard.add(stations[1].recv_match(blocking=True, timeout=PATIENCE).get_type())
         assert "MISSION_COUNT" not in heard
         for station in stations:
             station.close()

@@ -30,7 +30,7 @@ TEXT = Statustext(6, "hello")
 NOW = 1_800_000_000.0
 """A time after 2015, s since 1970."""
 
-HASTY = Timeouts(response=0.1, retries=2, attempts=1, silence=0.5)
+HASTY = Timeouts(response=0.4, retries=2, attempts=1, silence=0.5)
 
 
 @pytest.fixture
@@ -222,9 +222,7 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
         return recorders[-1]
 
     def put(**options: Any) -> Any:
-        return upload(
-            a_mission(5), connection, system=1, wait=0.3, signing_key=key_file, timeouts=HASTY
-        )
+        return upload(a_mission(5), connection, system=1, signing_key=key_file, **options)
 
     monkeypatch.setattr(link, recorded)
     with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
@@ -234,7 +232,7 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
         key_file.with_name("key.last").unlink()
     told = "no vehicle: packets come .* of a recording" if remembered else "a recording of it"
     with pytest.raises(LinkError, match=told):
-        put()
+        put(wait=1.0, timeouts=HASTY)
 
 
 @pytest.mark.parametrize(
@@ -253,7 +251,7 @@ def test_another_key_or_none_is_told_as_such(
         running(mock(), f"udpin:127.0.0.1:{port}", key=theirs),
         pytest.raises(LinkError, match=told),
     ):
-        upload(a_mission(5), connection, signing_key=key_file, wait=0.4)
+        upload(a_mission(5), connection, signing_key=key_file, wait=2.0)
 
 
 def test_a_heartbeat_is_not_enough_to_be_alive(

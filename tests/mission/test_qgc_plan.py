@@ -187,12 +187,12 @@ def test_a_long_key_over_many_numbers_takes_little_memory_and_time() -> None:
         GOOD.replace('"items": [', f'"items": [{{"{key}": [{numbers}]}}, '),
     ):
         tracemalloc.start()
-        began = time.perf_counter()
+        began = time.process_time()
         try:
             read_qgc_plan(text, "x")
         except MissionFileError as error:
             assert len(str(error)) < 200
-        took, (_, peak) = time.perf_counter() - began, tracemalloc.get_traced_memory()
+        took, (_, peak) = time.process_time() - began, tracemalloc.get_traced_memory()
         tracemalloc.stop()
         assert took < 5
         assert peak < 50e6

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from conftest import FLYABLE, SMALL
+from conftest import FLYABLE, PATIENCE, SMALL
 from reported import HOSTILE, conversion, flown, prediction
 from typer.testing import CliRunner
 
@@ -254,6 +254,6 @@ def test_a_browser_shows_it_without_scrolling_sideways(
         ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000",
          "--allow-file-access-from-files", f"--user-data-dir={tmp_path / 'profile'}",
          "--dump-dom", (tmp_path / "probe.html").as_uri()],
-        capture_output=True, text=True, timeout=120, check=True,
+        capture_output=True, text=True, timeout=PATIENCE, check=True,
     )  # fmt: skip
     assert "<title>wide true drawn true</title>" in shown.stdout

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from conftest import SMALL, edited
+from conftest import PATIENCE, SMALL, edited
 from distributed import LocalCluster
 from typer.testing import CliRunner
 
@@ -362,11 +362,11 @@ def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> 
         [*map(str, command)], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     rows = out / "rows.jsonl"
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline and not (rows.exists() and rows.read_bytes().count(b"\n")):
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert f"interrupted; finished rows are in {out}; the same command goes on there" in said
     assert "Traceback" not in said
