@@ -18,7 +18,7 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.schedule.conversion import convert
-from faao_mav.schedule.prediction import predict_delivery
+from faao_mav.schedule.prediction import price_flight
 
 SAMPLE = Path(__file__).parents[1] / "missions" / "copter_relay.yaml"
 
@@ -133,7 +133,8 @@ def main() -> None:
         started = time.process_time()
         conversion = convert(solution)
         seconds = time.process_time() - started
-        found = predict_delivery(solution, conversion)
+        track = conversion.schedule.track()
+        found = price_flight(solution, track["predicted_t"], track["predicted_w"])
         print(
             f"{name:28} {seconds:6.2f} {len(conversion.mission.items) + 1:6d} "
             f"{found.rms_position_error:5.2f} {found.max_position_error:6.2f} "

@@ -29,7 +29,7 @@ from faao_mav.plan import Plan
 from faao_mav.plan.autopilots import autopilots
 from faao_mav.plan.fields import dbm
 from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
-from faao_mav.schedule.prediction import Prediction, predict_delivery
+from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.validate.flown import Debriefing
@@ -345,10 +345,8 @@ def with_mission(result: Result) -> Result:
         conversion.vehicle,
         limits=Limits(max_speed=solution.plan.vehicle.max_speed),
         solution=solution,
-        lead=conversion.schedule.route.lead,
     )
-    prediction = predict_delivery(solution, conversion)
-    return replace(result, conversion=conversion, prediction=prediction, check=judged)
+    return replace(result, conversion=conversion, prediction=judged.prediction, check=judged)
 
 
 def mission_files(path: str | Path, plan: Plan) -> tuple[Path, ...]:

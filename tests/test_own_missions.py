@@ -9,7 +9,7 @@ from conftest import MISSIONS, SMALL, MakePlan, edited
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.conversion import Conversion, convert
-from faao_mav.schedule.prediction import predict_delivery
+from faao_mav.schedule.prediction import price_flight
 from faao_mav.validate.check import Check, check
 from faao_mav.workflow import plan_mission
 
@@ -108,7 +108,8 @@ def test_the_whole_flight_agrees_with_the_relay_flight(
     """The mission, predicted from take-off, against the route that it was timed by."""
     solution = optimize(small_plan(SHORT | {"vehicle.autopilot": autopilot}))
     conversion = convert(solution)
-    relay = predict_delivery(solution, conversion)
+    track = conversion.schedule.track()
+    relay = price_flight(solution, track["predicted_t"], track["predicted_w"])
     whole = check(conversion.mission, conversion.vehicle, solution=solution).link
     assert whole is not None
     assert whole.predicted_rate == pytest.approx(relay.rates.R_avg, rel=0.005)

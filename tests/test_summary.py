@@ -1,6 +1,7 @@
 """The summary for people."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from faao_mav.optimizer.pricing import MutualInformation
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import summary
 from faao_mav.schedule import Conversion
+from faao_mav.validate.check import check
 from faao_mav.vehicle import ARDUCOPTER
 from faao_mav.workflow import Result, plan_mission
 
@@ -38,7 +40,7 @@ def conversion(result: Result) -> Conversion:
 def test_a_prediction_that_no_flight_has_confirmed_says_so(
     result: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert "not compared" not in summary(result)
+    assert "not compared" not in summary(result, verbose=True)
     assert result.as_dict()["predicted"]["calibrated"] is True
     uncompared = replace(ARDUCOPTER, calibrated=False)
     monkeypatch.setattr("faao_mav.vehicle.vehicle.vehicle_type", lambda *_: uncompared)
@@ -46,18 +48,56 @@ def test_a_prediction_that_no_flight_has_confirmed_says_so(
     assert result.as_dict()["predicted"]["calibrated"] is False
 
 
+def test_the_first_line_is_for_who_flies(result: Result) -> None:
+    rate, duration = result.solution.delivered_rate, result.solution.plan.flight.duration
+    first = summary(result).splitlines()[0]
+    assert result.prediction is not None
+    kept = 100 * result.prediction.delivered_rate / rate
+    assert first == (
+        f"over the hill: delivers {rate:.4f} bit/s/Hz for {duration:g} s; the mission keeps "
+        f"{kept:.2f} % of it; 4 warnings"
+    )
+    plan = result.solution.plan.changed({"radio.bandwidth_mhz": 20, "name": ""})
+    told = summary(replace(result, solution=replace(result.solution, plan=plan)))
+    megabytes = 20 * rate * duration / 8
+    assert told.startswith(f"delivers {megabytes:.4g} megabytes in {duration:g} s ({20 * rate:.4g}")
+
+
+def test_a_summary_of_a_flight_without_findings_is_short(result: Result) -> None:
+    assert result.check is not None
+    result = replace(result, check=replace(result.check, findings=()))
+    text = summary(result, [Path("m.waypoints"), Path("m.param")])
+    assert "; no errors or warnings" in text
+    assert len(text.splitlines()) <= 10
+    assert "files        m.waypoints, m.param" in text
+    for word in ("starts", "iteration", "mutual information", "straight start"):
+        assert word not in text
+        assert word in summary(result, verbose=True)
+
+
+def test_the_summary_and_the_findings_tell_one_flight(result: Result) -> None:
+    assert result.check is not None
+    link, prediction = result.check.link, result.prediction
+    assert link is not None
+    assert prediction is not None
+    assert link.rms_position_error == prediction.rms_position_error
+    assert link.predicted_duration == prediction.duration
+    again = check(result.check.mission, result.check.vehicle, solution=result.solution).prediction
+    assert again is not None
+    assert again.rms_position_error == prediction.rms_position_error
+
+
 def test_it_says_what_was_found(result: Result) -> None:
-    lines = summary(result).splitlines()
-    assert lines[0] == "over the hill"
-    assert f"{result.solution.rates.R_avg:.4f} bit/s/Hz of at most 2" in lines[1]
-    text = "\n".join(lines)
+    text = summary(result, verbose=True)
+    average = result.solution.rates.R_avg
+    assert f"{average:.4f} bit/s/Hz, at most 2 by the alphabet" in text
     assert "mutual information 1.800 +- 0.001, 1.700 delivered" in text
     assert "more than by the plan" not in text
     assert "3, from 1.0000 (user) to 1.5000 (bs-user) bit/s/Hz" in text
     assert "within 50 % of the best that any route can do" in text
     assert "(numerical)" in text
     assert "converged after" in text
-    assert "nothing: give --out" in text
+    assert "none: give --out" in text
 
 
 def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) -> None:
@@ -65,7 +105,7 @@ def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) 
     wanted = plan.changed({"optimizer.rate": "mutual_information"})
     for gain, doubted in ((0.05, False), (0.0005, True)):
         solution = replace(result.solution, plan=wanted, gain=gain)
-        text = summary(replace(result, solution=solution))
+        text = summary(replace(result, solution=solution), verbose=True)
         assert "of mutual information (base station to UAV" in text
         assert f"{gain:.4f} bit/s/Hz more than by the plan for the cutoff rate" in text
         assert ("below the error of averages over the noise, 0.001" in text) is doubted
@@ -114,7 +154,7 @@ def test_numbers_for_programs_are_the_solutions(result: Result, conversion: Conv
 def test_it_says_how_the_mission_will_fly_and_what_it_needs(
     result: Result, conversion: Conversion
 ) -> None:
-    text, prediction = summary(result), result.prediction
+    text, prediction = summary(result, verbose=True), result.prediction
     assert prediction is not None
     assert f"predicted    {prediction.rates.R_avg:.4f} bit/s/Hz" in text
     assert f"{prediction.rms_position_error:.1f} m rms from the plan" in text
@@ -126,7 +166,8 @@ def test_a_flight_without_a_mission_says_why_and_has_no_figures_of_it(result: Re
     none = Result(result.solution, no_mission=InfeasibleError("more than 4 items"))
     assert "mission      none: more than 4 items" in summary(none)
     assert "predicted" not in summary(none)
-    assert "checked" not in summary(none)
+    assert "there is no mission for it" in summary(none)
+    assert "checks" not in summary(none)
     data = none.as_dict()
     assert data.keys() == result.as_dict().keys()
     assert (data["mission"], data["predicted"], data["validation"]) == (None, None, [])

@@ -98,7 +98,8 @@ def show(checked: CheckedFile, console: Console) -> None:
         console.print(table)
     else:
         for group in groups:
-            _line(console, f"{line_of(group)}\n    to do: {group[0].action}")
+            to_do = f"\n    to do: {group[0].action}" if group[0].action else ""
+            _line(console, f"{line_of(group)}{to_do}")
     _line(console, ", ".join(count_of(check.findings, level) for level in Level))
 
 

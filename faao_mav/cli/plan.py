@@ -45,6 +45,9 @@ def plan(
     bound: Annotated[bool, flag("--bound", "Also compute what no route can exceed.")] = False,
     as_json: AsJson = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
+    verbose: Annotated[
+        bool, flag("--verbose", "Print how the flight was found, and every rate.")
+    ] = False,
 ) -> None:
     """Optimise a radio-relay flight and write it as a MAVLink mission.
 
@@ -91,7 +94,7 @@ def plan(
         except FaaoError as error:  # told after the result
             failure = error
     if not quiet or as_json:
-        _show(result, written, precoders, uploaded, as_json)
+        _show(result, written, precoders, uploaded, as_json=as_json, verbose=verbose)
     if failure is not None:
         raise failure
     if not sound or (uploaded is not None and not uploaded.verified):
@@ -148,7 +151,7 @@ def _sound(result: "Result") -> bool:
 
     errors = [finding for finding in result.findings if finding.level is Level.ERROR]
     for group in by_rule(errors):
-        note(f"{line_of(group)}; {group[0].action}")
+        note("; ".join(filter(None, (line_of(group), group[0].action))))
     if errors:
         note("the mission does not pass validation; do not fly it")
     return not errors
@@ -182,7 +185,9 @@ def _show(
     written: list[Path],
     precoders: Path | None,
     uploaded: "UploadReport | None",
+    *,
     as_json: bool,
+    verbose: bool,
 ) -> None:
     from faao_mav.cli import upload
     from faao_mav.report import summary
@@ -191,7 +196,7 @@ def _show(
         told = upload.as_dict(uploaded) if uploaded is not None else None
         typer.echo(json.dumps(result.as_dict() | {"upload": told}, allow_nan=False))
         return
-    typer.echo(summary(result, written, precoders))
+    typer.echo(summary(result, written, precoders, verbose=verbose))
     if uploaded is not None:
         from faao_mav.mavlink.upload_text import upload_text
 

@@ -9,6 +9,7 @@ from faao_mav.mavlink.flying.record import FlightRecord
 from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import Line
 from faao_mav.validate import flown
+from faao_mav.validate.comparison import on_the_plans_clock
 from faao_mav.validate.flown import Debriefing
 from faao_mav.workflow import Result
 
@@ -33,9 +34,8 @@ def debriefed(
     Of several `records` it is the nearest to the plan. Raises `FaaoError` where none is.
     """
     line = flown.planned_line(result.solution)
-    if result.conversion is not None:
-        track = result.conversion.schedule.track()
-        line = flown.Line(track["predicted_t"], track["predicted_w"])
+    if result.check is not None and result.check.track is not None:
+        line = flown.Line(*on_the_plans_clock(result.solution, result.check.track))
     debriefings = ((record, record.debriefing(result.solution, line)) for record in records)
     found = [(record, each) for record, each in debriefings if each is not None]
     if not found:

@@ -18,6 +18,29 @@ _MOST_ZONES = 12
 def flight_lines(result: Result) -> Iterator[Line]:
     """Yield how the mission of `result` will fly: beside its plan, in wind, energy and fence."""
     yield from _mission(result)
+    yield from conditions(result)
+
+
+def brief_flight(result: Result) -> Iterator[Line]:
+    """Yield in a line what the mission of `result` is, and how near its flight is to the plan."""
+    conversion, flown = result.conversion, result.prediction
+    if result.no_mission is not None:
+        yield "mission", f"none: {result.no_mission}"
+    if conversion is None or flown is None:
+        return
+    items = counted(len(conversion.mission.items), "item")
+    way = f"{conversion.schedule.route.distance:.0f} m in {flown.duration:.1f} s"
+    yield (
+        "flight",
+        f"{items}, {way}; predicted {flown.rms_position_error:.1f} m rms from the plan at equal "
+        f"times, {flown.max_position_error:.1f} m at most",
+    )
+    if doubt := conversion.vehicle.type.caveat:
+        yield "", doubt
+
+
+def conditions(result: Result) -> Iterator[Line]:
+    """Yield the wind, the energy and the fence of a flight, each where the plan has it."""
     yield from _wind(result.solution.plan)
     yield from _energy(result.check)
     yield from _fenced(result.fence)

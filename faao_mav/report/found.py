@@ -22,28 +22,14 @@ _LOSS_TOLD = 0.01
 
 def found_lines(result: Result, *, timed: bool) -> Iterator[Line]:
     """Yield what the optimiser found; with `timed` also how long that took."""
-    solution, plan = result.solution, result.solution.plan
-    limit, bound, causal = result.saturation, result.bound, plan.radio.causal
+    solution, causal = result.solution, result.solution.plan.radio.causal
     yield from _least(solution)
     # what was maximised comes first, with how that came about
     yield from (_delivered if causal else _rate)(result)
     yield from (_rate if causal else _delivered)(result)
     yield from _gained(result)
-    if bound is not None:
-        reached = solution.delivered_rate if causal else solution.rates.R_avg
-        short = 100 * (1 - reached / bound.value) if bound.value else 0.0
-        yield (
-            "bound",
-            f"within {short:.2g} % of the best that any route can do: at most "
-            f"{told_rate(bound.value, plan.radio.bandwidth_mhz)}"
-            f"{'' if bound.exact else ' (numerical)'}",
-        )
-    if limit is not None and limit.saturated:
-        yield (
-            "saturated",
-            "the alphabet is used up and the route hardly matters: "
-            f"{limit.spare_db:.1f} dB less power at both stations would do",
-        )
+    yield from _bounded(result)
+    yield from _saturated(result)
     if len(solution.starts) > 1:
         ranked = sorted(solution.starts.items(), key=lambda start: start[1])
         (worst, low), (best, high) = ranked[0], ranked[-1]
@@ -53,6 +39,70 @@ def found_lines(result: Result, *, timed: bool) -> Iterator[Line]:
     steps = counted(solution.iterations, "iteration")
     yield "optimiser", f"{state} after {steps}{seconds}: {solution.ending}"
     yield from _limits(solution)
+
+
+def brief_link(result: Result) -> Iterator[Line]:
+    """Yield in a line what both hops carry, and the most that their alphabet could."""
+    solution, plan, limit = result.solution, result.solution.plan, result.saturation
+    rates, most = solution.rates, ""
+    if limit is not None:
+        most = f"; {limit.ceiling:.5g} at most, by the alphabet"
+    average = f"R_avg {rates.R_avg:.4f}, " if not plan.radio.causal else ""
+    yield (
+        "link",
+        f"{average}base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f} bit/s/Hz"
+        f"{_of_measure(plan)}{most}",
+    )
+    yield from _lost(result)
+
+
+def remarkable(result: Result) -> Iterator[Line]:
+    """Yield what came of a goal, of a bound that was asked for, and what is out of the ordinary."""
+    solution = result.solution
+    yield from _least(solution)
+    yield from _bounded(result)
+    yield from _saturated(result)
+    if not solution.converged:
+        yield "optimiser", f"NOT CONVERGED: {solution.ending}"
+    yield from _limits(solution)
+
+
+def _bounded(result: Result) -> Iterator[Line]:
+    solution, plan, bound = result.solution, result.solution.plan, result.bound
+    if bound is None:
+        return
+    reached = solution.delivered_rate if plan.radio.causal else solution.rates.R_avg
+    short = 100 * (1 - reached / bound.value) if bound.value else 0.0
+    yield (
+        "bound",
+        f"within {short:.2g} % of the best that any route can do: at most "
+        f"{told_rate(bound.value, plan.radio.bandwidth_mhz)}"
+        f"{'' if bound.exact else ' (numerical)'}",
+    )
+
+
+def _saturated(result: Result) -> Iterator[Line]:
+    limit = result.saturation
+    if limit is not None and limit.saturated:
+        yield (
+            "saturated",
+            "the alphabet is used up and the route hardly matters: "
+            f"{limit.spare_db:.1f} dB less power at both stations would do",
+        )
+
+
+def _lost(result: Result) -> Iterator[Line]:
+    """Yield how much of R_avg does not arrive, of a plan for R_avg that loses much of it."""
+    solution, plan = result.solution, result.solution.plan
+    R_avg = solution.rates.R_avg
+    share = solution.delivered_rate / R_avg if R_avg else 1.0
+    if not plan.radio.causal and share < 1 - _LOSS_TOLD:
+        why = "both hops share the time, and " if plan.radio.duplex == "half" else ""
+        yield (
+            "",
+            f"warning: {100 * (1 - share):.2g} % of R_avg does not arrive: {why}the relay "
+            "forwards only what it has received; radio.causal: true plans for what arrives",
+        )
 
 
 def _limits(solution: Solution) -> Iterator[Line]:
@@ -94,7 +144,7 @@ def _least(solution: Solution) -> Iterator[Line]:
     limit = {
         "duration": f"{found.limit:g} s given",
         "power": f"{found.limit:g} dBm given",
-        "energy": f"{found.limit:.4g} Wh without",
+        "energy": f"{found.limit:.4g} Wh without that goal",
     }[of]
     yield (
         "goal",
@@ -144,7 +194,7 @@ def _rate(result: Result) -> Iterator[Line]:
     solution, plan = result.solution, result.solution.plan
     rates, information, fresh = solution.rates, result.information, result.fresh
     limit = None if plan.radio.causal else result.saturation
-    most = f" of at most {limit.ceiling:g}" if limit else ""
+    most = f", at most {limit.ceiling:g} by the alphabet" if limit else ""
     yield (
         "rate",
         f"{told_rate(rates.R_avg, plan.radio.bandwidth_mhz)}{most}{_of_measure(plan)} "
@@ -169,22 +219,16 @@ def _delivered(result: Result) -> Iterator[Line]:
     half = plan.radio.duplex == "half"
     share = delivered / R_avg if R_avg else 1.0
     limit = result.saturation if causal else None
-    most = f" of at most {limit.ceiling:.5g}" if limit else ""
+    most = f", at most {limit.ceiling:.5g} by the alphabet" if limit else ""
     yield (
         "delivered",
         f"{told_rate(delivered, plan.radio.bandwidth_mhz)}{most}{_of_measure(plan)}"
         f"{carried(plan.megabytes(delivered))}; "
-        f"{'in half duplex ' if half else ''}{100 * share:.2f} % of the rate",
+        f"{'in half duplex ' if half else ''}{100 * share:.2f} % of R_avg",
     )
     if causal:
         yield "", f"{solution.history[0]:.4f} on the straight start"
-    elif share < 1 - _LOSS_TOLD:
-        why = "both hops share the time, and " if half else ""
-        yield (
-            "",
-            f"warning: {100 * (1 - share):.2g} % of the rate does not arrive: {why}the relay "
-            "forwards only what it has received; radio.causal: true plans for what arrives",
-        )
+    yield from _lost(result)
     if fresh:
         unseen = "on fading that was not planned on"
         yield "", f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} {unseen}"

@@ -9,7 +9,6 @@ from faao_mav.errors import InputError
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Rates, Solution
 from faao_mav.radio.relay import Relayed
-from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.schedule import deviation, positions_at
 
 
@@ -46,12 +45,6 @@ class Prediction:
     def delivered_rate(self) -> float:
         """The delivered rate of the predicted flight, bit/s/Hz."""
         return self.relayed.rate
-
-
-def predict_delivery(solution: Solution, conversion: Conversion) -> Prediction:
-    """Return what the channel of `solution` delivers along the predicted flight of its mission."""
-    track = conversion.schedule.track()
-    return price_flight(solution, track["predicted_t"], track["predicted_w"])
 
 
 def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:

@@ -12,6 +12,7 @@ from faao_mav.vehicle import Track, Vehicle
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
+    from faao_mav.schedule.prediction import Prediction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +20,8 @@ class Check:
     """What was found in `mission` for `vehicle`.
 
     `track` is the predicted flight; where there is none `unpredicted` says why. `link` is what the
-    flight makes of a plan, None without a plan or a track. `findings` are the worst first. `wind`,
+    flight makes of a plan, and `prediction` how it flies that, slot by slot; both are None without
+    a plan or a track. `findings` are the worst first. `wind`,
     m/s, is what `track` is predicted in, `energy` what the flight takes, None where no plan tells
     its power.
     """
@@ -32,6 +34,7 @@ class Check:
     findings: tuple[Finding, ...] = ()
     wind: Vector = (0.0, 0.0)
     energy: EnergyUse | None = None
+    prediction: "Prediction | None" = None
 
     def of(self, level: Level) -> tuple[Finding, ...]:
         """Return the findings of `level`."""
@@ -44,16 +47,14 @@ def check(
     *,
     limits: Limits | None = None,
     solution: "Solution | None" = None,
-    lead: float | None = None,
     wind: Vector | None = None,
 ) -> Check:
     """Predict the flight of `mission` by `vehicle` and judge both by all rules.
 
     The flight is predicted in a `wind`, east and north, m/s: without one in that of the plan, or in
     none. With a `solution` the flight is judged by what it makes of that plan too, from the ground
-    or from the air, as the plan has it. `lead`, where it is
-    known, is by how many seconds the aircraft sets out before the plan does. A mission that cannot
-    be predicted is judged by its items alone; nothing is raised.
+    or from the air, as the plan has it. A mission that cannot be predicted is judged by its items
+    alone; nothing is raised.
 
     >>> from faao_mav.mission import Mission, MissionItem
     >>> from faao_mav.vehicle import Vehicle
@@ -65,11 +66,11 @@ def check(
     if wind is None:
         wind = solution.plan.wind if solution is not None else (0.0, 0.0)
     track, unpredicted = _track(mission, vehicle, wind)
-    link = energy = None
+    link = prediction = energy = None
     if solution is not None and track is not None:
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
 
-        link = compare_with_plan(solution, track, lead=lead)
+        link, prediction = compare_with_plan(solution, track)
         energy = energy_use(solution.plan, track, wind)
     airborne = solution is not None and not solution.plan.mission.takeoff
     findings = validate(
@@ -81,7 +82,7 @@ def check(
         airborne=airborne,
         energy=energy,
     )
-    return Check(mission, vehicle, track, unpredicted, link, findings, wind, energy)
+    return Check(mission, vehicle, track, unpredicted, link, findings, wind, energy, prediction)
 
 
 def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:

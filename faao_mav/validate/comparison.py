@@ -29,22 +29,20 @@ _LEAST = 1e-6
 """The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
 
 
-def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = None) -> LinkCheck:
+def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Prediction]:
     """Return what the flight `track` makes of the plan that `solution` solves.
 
     The plan's clock is put on the flight's: the plan begins when the flight leaves the item nearest
-    to w_I, or `lead` seconds later. A mission does not say its lead; without one it is that, up to
-    `MOST_LEAD`, for which plan and flight are closest at equal times, rms. So is the item, where
-    several are as near. A plan that begins at speed does when the flight passes w_I. A flight that
-    is nowhere near the plan is compared all the same.
+    to w_I, or up to `MOST_LEAD` later, for that lead for which plan and flight are closest at equal
+    times, rms: a mission does not say its lead. So is the item, where several are as near. A plan
+    that begins at speed does when the flight passes w_I. A flight that is nowhere near the plan is
+    compared all the same.
     """
-    w = _in_frame_of(solution, track)
-    start = _start(solution, track, w, lead)
-    t = track.t - start
+    t, w = on_the_plans_clock(solution, track)
     flown = price_flight(solution, t, w)
     during = np.interp(solution.t, t, track.position[:, 2])
     plan = solution.plan
-    return LinkCheck(
+    link = LinkCheck(
         planned_rate=solution.rates.R_avg,
         predicted_rate=flown.rates.R_avg,
         planned_delivered=solution.delivered_rate,
@@ -62,17 +60,16 @@ def compare_with_plan(solution: Solution, track: Track, *, lead: float | None = 
         worst=_worst(solution, flown),
         away=float(distances_to_path(w[::_EVERY], solution.w).min()),
     )
+    return link, flown
 
 
-def on_the_plans_clock(
-    solution: Solution, track: Track, *, lead: float | None = None
-) -> tuple[Real, Real]:
+def on_the_plans_clock(solution: Solution, track: Track) -> tuple[Real, Real]:
     """Return times (k,), s, and positions (k, 2), m, of `track` on the plan's clock, in its frame.
 
-    How the clock is put, and the `lead`: see `compare_with_plan`.
+    How the clock is put: see `compare_with_plan`.
     """
     w = _in_frame_of(solution, track)
-    return track.t - _start(solution, track, w, lead), w
+    return track.t - _start(solution, track, w), w
 
 
 def _in_frame_of(solution: Solution, track: Track) -> Real:
@@ -83,7 +80,7 @@ def _in_frame_of(solution: Solution, track: Track) -> Real:
     return own.to_local(*track.frame.to_geodetic(track.position[:, :2]))
 
 
-def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> float:
+def _start(solution: Solution, track: Track, w: Real) -> float:
     """Return the time, s, on the clock of `track` at which the plan begins."""
     waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
     moving = waited == 0 and begins_at_speed(solution.t, solution.w)
@@ -100,8 +97,6 @@ def _start(solution: Solution, track: Track, w: Real, lead: float | None) -> flo
     nearest = min(map(float, near), key=apart)
     if moving:
         return passing(track.t, w, solution.w[0], nearest)
-    if lead is not None:
-        return nearest + lead
     return min((nearest + each for each in map(float, _LEADS)), key=apart)
 
 

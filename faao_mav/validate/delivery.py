@@ -199,5 +199,5 @@ def _timing(context: ValidationContext) -> Iterator[Issue]:
             f"predicted {link.predicted_duration:.1f} s of flight ({late:+.1f} s against the "
             f"plan); position at equal times {link.rms_position_error:.1f} m rms, at most "
             f"{link.max_position_error:.1f} m; rate {100 * link.share:.1f} % of the plan",
-            "nothing, if the rate is good enough",
+            "",
         )

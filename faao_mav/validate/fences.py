@@ -167,7 +167,7 @@ def _margin(context: ValidationContext) -> Iterator[Issue]:
         yield Issue(
             nearest[1],
             f"{nearest[0]:.1f} m from the edge of the fence, the nearest that the mission comes",
-            "nothing",
+            "",
         )
 
 

@@ -32,7 +32,8 @@ class Finding:
 
     `item` is the number that people see: the row of a `.waypoints` file, where row 0 is home, and
     the item's number in QGroundControl and Mission Planner; None if it is about no single item.
-    `message` says what is the context, with the value and the limit; `action` what to do about it.
+    `message` says what is the case, with the value and the limit; `action` what to do about it, ""
+    for nothing.
     """
 
     level: Level

@@ -8,7 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule import convert
-from faao_mav.schedule.prediction import predict_delivery, price_flight, rates_along
+from faao_mav.schedule.prediction import price_flight, rates_along
 
 GENTLE = {
     "vehicle.max_speed": 8,
@@ -40,7 +40,8 @@ def test_the_plan_itself_delivers_the_plan(solution: Solution) -> None:
 
 def test_a_mission_delivers_nearly_the_plan(solution: Solution) -> None:
     conversion = convert(solution)
-    found = predict_delivery(solution, conversion)
+    track = conversion.schedule.track()
+    found = price_flight(solution, track["predicted_t"], track["predicted_w"])
     assert found.rates.R_avg == pytest.approx(solution.rates.R_avg, rel=0.02)
     assert found.duration == pytest.approx(30, abs=1)
     assert found.w == pytest.approx(conversion.schedule.positions(solution.t))
