@@ -138,6 +138,9 @@ def any_flight(kin: Kinematics, rng: np.random.Generator) -> Trajectory | None:
     size, first = ca.sqrt(speeds), kin.first_bounded_acceleration
     opti.subject_to((size[:-1] - size[1:])[first:] <= kin.most_fall * dt)
     opti.subject_to((speeds[1:] - speeds[:-1])[first:] <= 2 * kin.most_power * dt)
+    if kin.turn_binds:
+        turned = (speeds[:-1] + speeds[1:])[first:] / 2 + kin.wind_in_turns**2
+        opti.subject_to(ca.sum1(steps**2).T <= (kin.most_turn * dt) ** 2 * turned)
     for end, velocity in ((0, kin.start_velocity), (n - 1, kin.end_velocity)):
         if velocity is not None:
             opti.subject_to(v[:, end] == velocity)

@@ -22,6 +22,15 @@ Chosen; with 1 m instead Clarabel fails on (27), with residuals of exponential c
 """
 
 
+_WIND_IN_TURNS = 1 / math.sqrt(3)
+"""The share of the wind that counts as speed in turns, beside the speed over ground.
+
+With c^2 = ||v||^2 + ||u||^2 / 3, c is at least half the airspeed ||v - u|| in every wind u, with
+equality where three quarters of it are wind from ahead: a plane that a strong wind holds at a place
+may still turn. That half is chosen. Below a quarter of the airspeed, wind adds at most 2 % to c.
+"""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """Positions w (m), velocities v (m/s) and accelerations a (m/s²), each (N + 2, 2)."""
@@ -39,7 +48,9 @@ class Kinematics:
     paper, every sample of the airspeed v - `wind` is at least `min_speed`, for fixed wings do not
     hover, and at most `max_airspeed`, m/s. From each to the next its size falls by at most
     `most_fall`, m/s^2, and half its square rises by at most `most_power`, m^2/s^3: what drag takes
-    and thrust gives. Neither is infinite alone, nor without a least speed.
+    and thrust gives. Neither is infinite alone, nor without a least speed. An acceleration is at
+    most `most_turn`, rad/s, times the speed that counts in a turn (`turning`): guidance follows no
+    faster turns.
 
     >>> kin = Kinematics(np.zeros(2), np.array([40.0, 0.0]), 9, 1.0, 6.0, 3.0, None, None, True)
     >>> flight = kin.follow(np.full((9, 2), [4.0, 0.0]))  # 4 m/s do not get there in 8 s: 5 m/s do
@@ -61,6 +72,7 @@ class Kinematics:
     wind: Vector = (0.0, 0.0)
     most_fall: float = math.inf
     most_power: float = math.inf
+    most_turn: float = math.inf
 
     @property
     def first_bounded_acceleration(self) -> int:
@@ -72,6 +84,36 @@ class Kinematics:
         """How fast the speed may rise and fall whatever it is, with no turn, m/s^2."""
         rise = min(self.max_acceleration, self.most_power / self.max_speed)
         return rise, min(self.max_acceleration, self.most_fall)
+
+    @property
+    def wind_in_turns(self) -> float:
+        """The speed that counts in turns at no speed over ground, m/s."""
+        return _WIND_IN_TURNS * math.hypot(*self.wind)
+
+    def turning(self, speed: float) -> float:
+        """Return the largest acceleration at a `speed` over ground, m/s: m/s^2.
+
+        >>> kin = Kinematics(np.zeros(2), np.zeros(2), 5, 1.0, 8.0, 2.0, None, None, True,
+        ...                  most_turn=0.5)
+        >>> kin.turning(3.0), kin.turning(6.0)
+        (1.5, 2.0)
+        """
+        return min(self.max_acceleration, self.most_turn * math.hypot(speed, self.wind_in_turns))
+
+    @property
+    def turn_binds(self) -> bool:
+        """Whether `most_turn` forbids what a_max allows, at some speed from the least up."""
+        slowest = max(0.0, self.min_speed - math.hypot(*self.wind))
+        return math.isfinite(self.most_turn) and self.turning(slowest) < self.max_acceleration
+
+    def turn_limits(self, v: Real) -> Real:
+        """Return what `most_turn` leaves of accelerations at velocities v (n, 2): (n - 1,), m/s^2.
+
+        In a slot the mean of the squared speeds at both its ends counts.
+        """
+        squares = (v * v).sum(axis=1)
+        counting = (squares[:-1] + squares[1:]) / 2 + self.wind_in_turns**2
+        return np.asarray(self.most_turn * np.sqrt(counting))
 
     def longest_ways(self) -> tuple[Real, Real]:
         """Return the longest ways (N + 2,), m, from w_I until each slot, and from there to w_F.
@@ -113,8 +155,12 @@ class Kinematics:
         return low, high
 
     def in_the_air(self) -> "Kinematics":
-        """Return the feasible set in the frame that moves with the wind, which is calm there."""
+        """Return feasible flights in the frame that moves with the wind, which is calm there.
+
+        They turn no faster than is allowed at their airspeed in every direction over ground.
+        """
         wind, lasting = np.array(self.wind), self.time_step * (self.slots - 1)
+        ahead = min(0.75, math.hypot(*wind) / self.min_speed) if self.min_speed > 0 else 0.75
 
         def through_air(velocity: Real | None) -> Real | None:
             return None if velocity is None else velocity - wind
@@ -127,6 +173,8 @@ class Kinematics:
             end_velocity=through_air(self.end_velocity),
             max_airspeed=math.inf,
             wind=(0.0, 0.0),
+            # the share of an airspeed that counts in turns against the wind, or at least a half
+            most_turn=self.most_turn * math.hypot(1 - ahead, _WIND_IN_TURNS * ahead),
         )
 
     def over_ground(self, flight: Trajectory) -> Trajectory:
@@ -158,6 +206,9 @@ class Kinematics:
             fall, power = np.diff(airspeed)[first:] / -dt, np.diff(airspeed**2)[first:] / (2 * dt)
             found["fall of airspeed"] = float(max(0.0, fall.max() - self.most_fall))
             found["power of airspeed"] = float(max(0.0, power.max() - self.most_power))
+        if math.isfinite(self.most_turn):
+            beyond = acceleration[:-1] - self.turn_limits(v)
+            found["turn"] = float(max(0.0, beyond[self.first_bounded_acceleration :].max()))
         if math.isfinite(self.max_airspeed):
             found["airspeed"] = float(max(0.0, airspeed.max() - self.max_airspeed))
         return found
@@ -194,16 +245,11 @@ def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
 
 
 def kinematics(plan: Plan) -> Kinematics:
-    """Return the feasible set of `plan`.
-
-    A plane's acceleration is also limited to what turns it no faster than its guidance follows, at
-    its least speed against the wind, or at half its least airspeed if that is more.
-    """
+    """Return the feasible set of `plan`."""
     flight, vehicle = plan.flight, plan.vehicle
     aircraft = vehicle_of(plan)
     rates = aircraft.type.speed_rates(aircraft)
-    slowest = max(vehicle.min_speed - math.hypot(*plan.wind), vehicle.min_speed / 2)
-    turning = rates.turn * slowest if vehicle.min_speed > 0 else math.inf
+    fastest = math.hypot(plan.max_ground_speed, _WIND_IN_TURNS * math.hypot(*plan.wind))
 
     def vector(value: tuple[float, float] | None) -> Real | None:
         return None if value is None else np.array(value, dtype=float)
@@ -214,7 +260,7 @@ def kinematics(plan: Plan) -> Kinematics:
         slots=flight.slots,
         time_step=flight.time_step,
         max_speed=plan.max_ground_speed,
-        max_acceleration=min(vehicle.max_acceleration, turning),
+        max_acceleration=min(vehicle.max_acceleration, rates.turn * fastest),
         start_velocity=vector(flight.start_velocity),
         end_velocity=vector(flight.end_velocity),
         bound_first_acceleration=flight.bound_first_acceleration,
@@ -223,6 +269,7 @@ def kinematics(plan: Plan) -> Kinematics:
         wind=plan.wind,
         most_fall=rates.fall,
         most_power=rates.power,
+        most_turn=rates.turn,
     )
 
 

@@ -97,6 +97,8 @@ def flight_variables(kin: Kinematics, about: Real | None = None) -> FlightVariab
         constraints.append(along[free] >= least)
         if np.isfinite(kin.most_fall):
             constraints += _slow_to_change(kin, about, along, v - wind)
+        if kin.turn_binds:
+            constraints.append(_slow_to_turn(kin, about, v, a))
     return FlightVariables(kin, w, v, a, constraints)
 
 
@@ -114,6 +116,15 @@ def _slow_to_change(kin: Kinematics, about: Real, along: Any, airspeed: Any) -> 
         (cp.norm(airspeed[:-1], axis=1) - along[1:])[first:] <= fall,
         (cp.sum(cp.square(airspeed[1:]), axis=1) - square[:-1])[first:] <= rise,
     ]
+
+
+def _slow_to_turn(kin: Kinematics, about: Real, v: cp.Variable, a: cp.Variable) -> Any:
+    """Return that turns keep `most_turn`, convex and inside: c^2 to first order about `about`."""
+    at, first = about / kin.max_speed, kin.first_bounded_acceleration
+    square = cp.sum(2 * cp.multiply(at, v) - at**2, axis=1)
+    counts = (square[:-1] + square[1:]) / 2 + (kin.wind_in_turns / kin.max_speed) ** 2
+    share = (kin.most_turn * kin.max_speed / kin.max_acceleration) ** 2
+    return (cp.sum(cp.square(a[:-1]), axis=1) - share * counts)[first:] <= 0
 
 
 def solve(problem: cp.Problem) -> str:

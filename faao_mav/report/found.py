@@ -1,5 +1,6 @@
 """What the optimiser found, in words: delivered rate, rate, bound, starts and limits."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -106,14 +107,17 @@ def _lost(result: Result) -> Iterator[Line]:
 
 
 def _limits(solution: Solution) -> Iterator[Line]:
-    """Yield how fast turns and the airspeed change at most, if the plan allows or wants more."""
-    kin, allowed = kinematics(solution.plan), solution.plan.vehicle.max_acceleration
-    if kin.max_acceleration < allowed:
-        yield (
-            "turns",
-            f"accelerate by at most {kin.max_acceleration:.3g} m/s^2, which the vehicle's guidance "
-            f"follows; the plan allows {allowed:g}",
-        )
+    """Yield how fast turns and the airspeed change at most, where that binds the plan."""
+    kin = kinematics(solution.plan)
+    if kin.turn_binds:
+        turned = lengths(solution.a)[:-1] > _AT_LIMIT * kin.turn_limits(solution.v)
+        if turned.any():
+            yield (
+                "turns",
+                f"by at most {math.degrees(kin.most_turn):.3g} degrees per second over ground, as "
+                "the vehicle's guidance follows, which binds the plan for "
+                f"{kin.time_step * turned.sum():.3g} s",
+            )
     speed = lengths(solution.v - kin.wind)
     change, square = np.diff(speed) / kin.time_step, np.diff(speed**2) / (2 * kin.time_step)
     bound = (change < -_AT_LIMIT * kin.most_fall) | (square > _AT_LIMIT * kin.most_power)

@@ -12,16 +12,8 @@ from hypothesis import strategies as st
 from test_interior import STATIONS, bpsk, gaussian, links, plane, reward, worst
 
 from faao_mav.errors import InfeasibleError, PlanError
-from faao_mav.optimizer.interior.constraint import (
-    Forces,
-    Move,
-    ScaledFlight,
-    Start,
-    quadratic,
-)
 from faao_mav.optimizer.interior.maximize import maximize
-from faao_mav.optimizer.interior.speed_change import speed_change
-from faao_mav.optimizer.kinematics import Kinematics, kinematics
+from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.scaled import kkt_residual
 from faao_mav.optimizer.search.starts import starts, straight_flight
@@ -158,21 +150,6 @@ def test_circles_turn_as_a_whole_until_the_search_has_converged(wind: Vector) ->
     assert best.value >= reward(stage, start)
 
 
-def test_the_gradients_and_curvatures_are_those_of_the_limits() -> None:
-    kin, random = cruiser(4, 8.0, wind=(3.0, -2.0)), np.random.default_rng(2)
-    limit, flight = speed_change(kin), ScaledFlight(kin, (speed_change(kin),))
-    v, step = 0.6 + 0.1 * random.normal(size=(2, 2, 1, kin.slots))
-    step = 1e-4 * (step - 0.6)
-    start = limit.begin(flight, Start(0 * v, v, np.ones((1, 1)), 1.0, slice(0)))
-    move = Move(0 * v, step, np.zeros(0))
-    (ds, _, twice), _ = start.solved(move, None, Forces())
-    before, after = (start.at(v + sign * step).slack for sign in (-1, 1))
-    assert (after - before) / 2 == pytest.approx(ds + start.margin, abs=1e-9)
-    assert after - 2 * start.slack + before == pytest.approx(twice, abs=1e-9)
-    turning = quadratic(np.asarray(start.stiffness().turning), step)
-    assert turning == pytest.approx(-(start.z * twice).sum(), rel=1e-9)
-
-
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -2.0)])
 def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it(wind: Vector) -> None:
     over_ground, through_air = (20.0 + math.hypot(*wind), 20.0) if any(wind) else (20.0, math.inf)
@@ -261,21 +238,6 @@ def test_the_published_flight_is_reached() -> None:
 
 PLANE = {"AIRSPEED_CRUISE": 22, "NAVL1_PERIOD": 5}
 """Its guidance follows any turn of the plans here."""
-
-
-def test_a_plane_turns_no_faster_than_its_guidance_follows(small_plan: MakePlan) -> None:
-    changes = {"vehicle.min_speed": 9.0, "vehicle.type": "plane", "flight.duration": 40, **FREE}
-    plan = small_plan(changes)
-    look_ahead = 0.75 * 17 / math.pi  # NAVL1_DAMPING and NAVL1_PERIOD, s
-    limit = 9 / (1.2 * look_ahead)
-    assert limit < plan.vehicle.max_acceleration
-    assert kinematics(plan).max_acceleration == pytest.approx(limit)
-    windy = small_plan(changes | {"site.wind": {"speed": 3.0, "from": 200.0}})
-    assert kinematics(windy).max_acceleration == pytest.approx(limit * (9 - 3) / 9)
-    lively = small_plan(changes | {"vehicle.parameters": PLANE})
-    assert kinematics(lively).max_acceleration == plan.vehicle.max_acceleration
-    told = dict(result_lines(Result(optimize(plan))))
-    assert told["turns"].startswith(f"accelerate by at most {limit:.3g} m/s^2")
 
 
 @pytest.mark.parametrize("kind", ["copter", "plane"])

@@ -19,6 +19,7 @@ from faao_mav.optimizer.interior.search import (
     StartStrategy,
 )
 from faao_mav.optimizer.interior.speed_change import speed_change
+from faao_mav.optimizer.interior.turn_rate import turn_rate
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
 
@@ -182,7 +183,8 @@ def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
     """Return the constraints of `kin` itself, the limits on speed and acceleration first."""
     if kin.min_speed > 0:
         changes = () if math.isinf(kin.most_fall) else (speed_change(kin),)
-        return (*limits_with_least_speed(kin), *changes)
+        turns = (turn_rate(kin),) if kin.turn_binds else ()
+        return (*limits_with_least_speed(kin), *changes, *turns)
     if math.isinf(kin.max_airspeed):
         return (FlightLimits(),)
     east, north = (part / kin.max_speed for part in kin.wind)

@@ -20,7 +20,7 @@ from faao_mav.optimizer.search.track import MOST_STEPS, nearest_flight
 from faao_mav.optimizer.search.turning import turning_curves
 
 _TURN_SHARE = 0.95
-"""Share of a_max that turns use; the rest is for meeting the ends. Chosen."""
+"""Share of the largest acceleration that turns use; the rest is for meeting the ends. Chosen."""
 
 _WIDEST = 2.404825557695773
 """Amplitude of a weave of no displacement, radians: the first zero of J_0."""
@@ -57,12 +57,13 @@ def cruise(kin: Kinematics) -> Trajectory:
     turning = (v for c in _speeds(kin) for v in turning_curves(kin, c))
     flight = _first_flight(kin, chain(_curves(kin), turning))
     if flight is None:
+        turns = f", turns of {np.degrees(kin.most_turn):.3g} degrees a second (its guidance's)"
         raise InfeasibleError(
             f"no flight from start to end was found that keeps at least {kin.min_speed:g} m/s "
             f"(vehicle.min_speed) for {kin.time_step * kin.slots:g} s within {kin.max_speed:g} "
-            f"m/s, {kin.max_acceleration:.3g} m/s^2 (vehicle.max_acceleration, or less where its "
-            "guidance follows no more) and the end velocities; give a longer or shorter "
-            "flight.duration, free end velocities or a lower vehicle.min_speed"
+            f"m/s, {kin.max_acceleration:.3g} m/s^2{turns if kin.turn_binds else ''} and the end "
+            "velocities; give a longer or shorter flight.duration, free end velocities or a lower "
+            "vehicle.min_speed"
         )
     return flight
 
@@ -83,7 +84,7 @@ def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
         if max(missed.values()) < _TOLERANCE:
             return flight
         speed = max(missed["(13e) speed"], missed["minimum speed"]) / kin.max_speed
-        changing = missed["(13f) acceleration"] / kin.max_acceleration
+        changing = max(missed["(13f) acceleration"], missed.get("turn", 0)) / kin.max_acceleration
         changing += missed.get("fall of airspeed", 0) / kin.most_fall
         changing += missed.get("power of airspeed", 0) / kin.most_power
         near.append((speed + changing, len(near), flight))
@@ -117,7 +118,7 @@ def _curves(kin: Kinematics) -> Iterator[Real]:
         share = distance / (c * kin.time_step * steps)
         if share > 1:
             continue
-        turn = c / (_TURN_SHARE * kin.max_acceleration)  # seconds per radian
+        turn = c / (_TURN_SHARE * kin.turning(c))  # seconds per radian
         most = int((1 - share) * kin.time_step * steps / (2 * np.pi * turn))
         circles = sorted({min(1, most), most} - {0})
         for theta in (
@@ -166,7 +167,7 @@ def _with_ends(
         angle = float(np.arctan2(v[1], v[0])) - theta[at]
         angle = (angle + np.pi) % (2 * np.pi) - np.pi + 2 * np.pi * more
         # turning and changing speed share the limit: the sum of their squares stays below its own
-        change = np.hypot(angle * max(size, c), size - c) / kin.max_acceleration
+        change = np.hypot(angle * max(size, c), size - c) / kin.turning(min(size, c))
         rising = (c > size) == (at == 0)
         change = max(change, abs(size - c) / kin.even_rates[0 if rising else 1])
         left = np.clip(1 - since * _TURN_SHARE / max(change, _TOLERANCE), 0, 1)
@@ -191,7 +192,7 @@ def _circling(kin: Kinematics, stations: Sequence[Real], c: float) -> Real | Non
     spare = kin.slots - 1 - int(steps.sum())
     if lengths.min() < _TOLERANCE or spare < 0:
         return None
-    fastest = _TURN_SHARE * kin.max_acceleration * kin.time_step / c  # radians per step
+    fastest = _TURN_SHARE * kin.turning(c) * kin.time_step / c  # radians per step
     theta = [np.full(steps[0] + 1, headings[0])]
     for k, corner in enumerate((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi):
         count = spare // len(stations) + (k < spare % len(stations))

@@ -16,7 +16,8 @@ from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.track import ALLOWED, nearest_flight
 
 _TURN_SHARE = 0.7
-"""Share of a_max that the circles of a start take; the rest is for the way. Chosen."""
+"""Share of the largest acceleration that circles of a start take; the rest is for the way. Chosen.
+"""
 
 _SPEEDS = 200
 """Speeds up to v_max among which that of least power is looked for. Chosen."""
@@ -45,6 +46,6 @@ def sparing_starts(
 def _circled(kin: Kinematics, route: Trajectory, limit: EnergyLimit, side: int) -> Real:
     """Return the path (n, 2) of `route` with circles about it, to the left where `side` is 1."""
     speed, _ = limit.model.least_power(np.linspace(kin.max_speed / _SPEEDS, kin.max_speed, _SPEEDS))
-    per_second = _TURN_SHARE * kin.max_acceleration / speed
+    per_second = _TURN_SHARE * kin.turning(speed) / speed
     angle = side * per_second * kin.time_step * np.arange(kin.slots)
     return route.w + speed / per_second * np.stack([np.cos(angle), np.sin(angle)], axis=1)

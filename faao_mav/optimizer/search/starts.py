@@ -92,7 +92,9 @@ def straight_flight(kin: Kinematics) -> Trajectory:
     if not _leads_aside(kin, direction):
         speed = even_speed(kin, direction, distance)
         if speed is not None:
-            return kin.follow(speed[:, None] * direction)
+            flight = kin.follow(speed[:, None] * direction)
+            if kin.residuals(flight).get("turn", 0.0) < 1e-9:
+                return flight
     return cruise(kin) if kin.min_speed > 0 else _gentlest_flight(kin)
 
 

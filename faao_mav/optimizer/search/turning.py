@@ -1,9 +1,9 @@
 """Curves whose turn rate is constant piece by piece: circles, eights, Dubins paths and between.
 
 The curve has one speed c but near given end velocities. Its heading is theta(t) = theta_0 +
-integral of u_k, with turn rates |u_k| <= a_max / c in pieces of equal time; theta_0 is free where
-the start velocity is. The rates that lead nearest to w_F, and to the end velocity's heading, are
-found by bounded least squares from several random ones.
+integral of u_k, with turn rates |u_k| <= a / c in pieces of equal time, a the largest acceleration
+at c; theta_0 is free where the start velocity is. The rates that lead nearest to w_F, and to the
+end velocity's heading, are found by bounded least squares from several random ones.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ _TRIES = 8
 else found a flight for, they find one for the two that IPOPT has one for."""
 
 _TURN_SHARE = 0.98
-"""Share of a_max that turns use; the rest is for rounding to samples. Chosen."""
+"""Share of the largest acceleration that turns use; the rest is for rounding to samples. Chosen."""
 
 _MOST_EVALUATIONS = 60
 """Evaluations of one least-squares problem; chosen."""
@@ -69,7 +69,7 @@ def turning_curves(kin: Kinematics, c: float) -> Iterator[Real]:
         across = _direction(theta[-1] + np.pi / 2)
         return np.vstack([rows, reach * across[:, None] * turned[-1]])
 
-    most = np.full(turned.shape[1], _TURN_SHARE * kin.max_acceleration / speed.max())
+    most = np.full(turned.shape[1], _TURN_SHARE * kin.turning(speed.max()) / speed.max())
     if start is None:
         most[-1] = 2 * np.pi
     random = np.random.default_rng(0)
@@ -87,16 +87,17 @@ def turning_curves(kin: Kinematics, c: float) -> Iterator[Real]:
 
 
 def _speeds(kin: Kinematics, c: float, time: Real) -> Real:
-    """Return speeds (N + 2,), m/s: c, but for changes from and to the given end velocities."""
-    speed, rates = np.full(kin.slots, c), kin.even_rates
-    for velocity, at, since in (
-        (kin.start_velocity, 0, time),
-        (kin.end_velocity, -1, time[::-1]),
+    """Return speeds (N + 2,), m/s: as near to c as changes from and to the given ends allow."""
+    speed, (rise, fall) = np.full(kin.slots, c), kin.even_rates
+    for velocity, since, gain, loss in (
+        (kin.start_velocity, time, rise, fall),
+        (kin.end_velocity, time[::-1], fall, rise),
     ):
         if velocity is not None:
-            more = float(np.hypot(*velocity)) - c
-            rate = rates[0 if (more < 0) == (at == 0) else 1]
-            speed += np.sign(more) * np.maximum(abs(more) - rate * since, 0.0)
+            size = float(np.hypot(*velocity))
+            most = kin.turning(min(size, c))
+            low, high = size - min(loss, most) * since, size + min(gain, most) * since
+            speed = np.clip(speed, low, high)
     return speed
 
 

@@ -1,0 +1,170 @@
+"""Turns within what a plane's guidance follows at its speed, whatever its least speed is."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import MakePlan
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_interior import plane, worst
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.interior.constraint import Forces, Move, ScaledFlight, Start, quadratic
+from faao_mav.optimizer.interior.neighbours import Neighbours
+from faao_mav.optimizer.interior.speed_change import speed_change
+from faao_mav.optimizer.interior.turn_rate import turn_rate
+from faao_mav.optimizer.kinematics import Kinematics, kinematics
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.search.turning import turning_curves
+from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Vector
+from faao_mav.report.summary import result_lines
+from faao_mav.workflow import Result
+
+PLANE = {
+    "vehicle.type": "plane",
+    "flight.duration": 40,
+    "flight.time_step": 1,
+    "flight.start_velocity": "free",
+    "flight.end_velocity": "free",
+}
+TURN = math.pi / (1.2 * 0.75 * 17)
+"""rad/s: 1.2 look-aheads of ArduPlane's guidance, of NAVL1_DAMPING and NAVL1_PERIOD, a radian."""
+
+WINDS = st.tuples(st.floats(-30, 30), st.floats(-30, 30))
+
+
+def cruiser(duration: float, least: float, wind: Vector = (0.0, 0.0)) -> Kinematics:
+    return plane(
+        duration,
+        time_step=0.5,
+        max_speed=25.0 + math.hypot(*wind),
+        max_airspeed=25.0,
+        min_speed=least,
+        wind=wind,
+        most_fall=0.8,
+        most_power=24.5,
+        most_turn=TURN,
+    )
+
+
+def turned(solution: Solution) -> Real:
+    """Return the shares of what turns may take, in calm air, (N + 1,)."""
+    squares = (solution.v**2).sum(axis=1)
+    most = TURN * np.sqrt((squares[1:] + squares[:-1]) / 2)
+    return np.asarray(np.linalg.norm(solution.a[:-1], axis=1) / most)
+
+
+@given(st.sampled_from([speed_change, turn_rate]), WINDS, st.integers(0, 10**6))
+@settings(max_examples=20)
+def test_gradients_and_curvatures_are_those_of_the_limits(
+    limit_of: Callable[[Kinematics], Neighbours], wind: Vector, seed: int
+) -> None:
+    kin, random = cruiser(4, 8.0, wind), np.random.default_rng(seed)
+    limit, flight = limit_of(kin), ScaledFlight(kin, (limit_of(kin),))
+    v, step = 2.0 + 0.1 * random.normal(size=(2, 2, 1, kin.slots))
+    step = 1e-4 * (step - 2.0)
+    start = limit.begin(flight, Start(0 * v, v, np.ones((1, 1)), 1.0, slice(0)))
+    (ds, _, twice, held), _ = start.solved(Move(0 * v, step, np.zeros(0)), None, Forces())
+    before, after = (start.at(v + sign * step).slack for sign in (-1, 1))
+    assert (after - before) / 2 == pytest.approx(ds + start.margin, abs=1e-9)
+    assert after - 2 * start.slack + before == pytest.approx(twice, abs=1e-9)
+
+    # what the method takes for -z times the curvature, and for z / s ds^2, is just that
+    stiff, z = start.stiffness(), start.z
+    turning = quadratic(np.asarray(stiff.turning), step)
+    assert turning == pytest.approx(-(z * (twice + held)).sum(), rel=1e-6)
+    between = np.einsum("ijbn,ibn,jbn->b", stiff.between, step[..., :-1], step[..., 1:])
+    kept = quadratic(np.asarray(stiff.v), step) + 2 * between
+    squares = z / start.s * (ds + start.margin) ** 2 + z * held
+    assert kept == pytest.approx(squares.sum(), rel=1e-6)
+
+
+@given(WINDS, st.floats(1, 25), st.lists(st.floats(0, 1), min_size=6, max_size=6))
+def test_turns_allowed_in_the_air_are_allowed_over_ground(
+    wind: Vector, least: float, drawn: list[float]
+) -> None:
+    kin, share = cruiser(2, least, wind), np.array(drawn).reshape(2, 3)
+    size, theta = least + (25 - least) * share[0], 2 * np.pi * share[1]
+    x = size[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    allowed = kin.turn_limits(x + wind)
+    assert (kin.in_the_air().turn_limits(x) <= allowed * (1 + 1e-9)).all()
+    both = np.sqrt((size[1:] ** 2 + size[:-1] ** 2) / 2)
+    assert (TURN * both / 2 <= allowed * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("wind", [0.0, 4.0])
+def test_a_lower_least_speed_never_shrinks_what_is_allowed(
+    small_plan: MakePlan, wind: float
+) -> None:
+    delivered: list[float] = []
+    at_wind = {"site.wind": {"speed": wind, "from": 200.0}} if wind else {}
+    powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
+    plans = [
+        small_plan({**PLANE, **at_wind, **powers, "vehicle.min_speed": least})
+        for least in (9, 6, 1)
+    ]
+    for plan in plans:
+        solution = optimize(plan)
+        assert solution.residuals()["turn"] < 1e-9
+        for lower in (kinematics(each) for each in plans):
+            if lower.min_speed <= plan.vehicle.min_speed:
+                assert worst(lower, solution.trajectory) < 1e-6
+        delivered.append(solution.rates.R_avg)
+    assert (np.diff(delivered) > -1e-3).all()
+    assert delivered[-1] > delivered[0] + 1e-3
+
+
+def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: MakePlan) -> None:
+    plan = small_plan(PLANE | {"vehicle.min_speed": 9})
+    solution, kin = optimize(plan), kinematics(plan)
+    share = turned(solution)
+    assert share.max() == pytest.approx(1, abs=1e-3)
+    assert np.linalg.norm(solution.a, axis=1).max() > 1.1 * TURN * 9
+    told = dict(result_lines(Result(solution)))["turns"]
+    assert told.startswith(f"by at most {math.degrees(TURN):.3g} degrees per second over ground")
+    assert f"binds the plan for {kin.time_step * (share > 0.999).sum():.3g} s" in told
+
+    lively = small_plan(PLANE | {"vehicle.min_speed": 9, "vehicle.parameters": {"NAVL1_PERIOD": 5}})
+    assert not kinematics(lively).turn_binds
+    assert kinematics(lively).max_acceleration == lively.vehicle.max_acceleration
+
+
+def test_algorithm_1_keeps_it_too(paper_plan: MakePlan) -> None:
+    plan = paper_plan(PLANE | {"vehicle.min_speed": 9, "optimizer.max_iterations": 3})
+    solution = optimize(plan)
+    assert solution.residuals()["turn"] < 1e-6
+    assert turned(solution).max() > 0.99
+
+
+@pytest.mark.parametrize("least", [1, 3, 28])
+def test_the_published_aircraft_flies_with_any_least_speed(
+    small_plan: MakePlan, least: int
+) -> None:
+    """That of Zeng and Zhang, IEEE TWC 2017: 3 to 100 m/s, 5 m/s^2, 30 m/s at both ends."""
+    changes = {
+        "vehicle.max_speed": 100,
+        "vehicle.min_speed": least,
+        "flight.end": [1000, 0],
+        "flight.start_velocity": [30, 0],
+        "flight.end_velocity": [30, 0],
+        "radio.ground_user.position": [500, 500],
+    }
+    solution = optimize(small_plan(PLANE | changes))
+    assert solution.converged
+    assert worst(kinematics(solution.plan), solution.trajectory) < 1e-6
+
+
+@pytest.mark.parametrize("c", [1.3, 8.0, 25.0])
+@pytest.mark.parametrize("seconds", [3.0, 30.0])
+def test_curves_too_short_for_their_changes_of_speed_go_forward(seconds: float, c: float) -> None:
+    ahead = np.array([12.0, 0.0])
+    kin = replace(cruiser(seconds, 1.0), start_velocity=ahead, end_velocity=ahead)
+    for v in turning_curves(kin, c):
+        size = np.linalg.norm(v, axis=1)
+        assert size.min() > 0
+        assert (size <= max(c, 12) + 1e-9).all()
+        assert (size >= min(c, 12) - 1e-9).all()
