@@ -12,11 +12,12 @@ import csv
 from dataclasses import replace
 
 import numpy as np
-from record_plane import ELEVATIONS, PARAMETERS, PLACE
+from record_plane import BODY, ELEVATIONS, PARAMETERS, PLACE
 from recorded import FLIGHTS, Row, compared, read, show, wind_of
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
+from faao_mav.plan.body import PlaneBody
 from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.ardupilot.plane import ArduPlane
 from faao_mav.vehicle.flight_path import FlightPath
@@ -49,7 +50,8 @@ def row(name: str) -> Row:
     recorded = read(FOLDER, name, home_row=True)
     # When the last waypoint is left depends on where the item after it is.
     recorded.left[-1] = np.nan
-    plane = ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", PARAMETERS, name))
+    vehicle = Vehicle("ardupilot", "plane", PARAMETERS, name, PlaneBody(**BODY))
+    plane = ArduPlane.from_vehicle(vehicle)
     place, velocity = _taken_off(name)
     path = recorded.path
     whole = FlightPath(

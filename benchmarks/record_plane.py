@@ -40,9 +40,11 @@ PARAMETERS = {
     "NAVL1_PERIOD": 15.0,
     "WP_RADIUS": 50.0,
     "WP_LOITER_RAD": 80.0,
-    "SIM_ARSPD_RATIO": 2.0,
 }
 """What the simulator's plane has that is not ArduPlane's default."""
+
+BODY = {"airspeed_exponent": 1}
+"""What the simulator's plane of before July 2026 has, which flew, and that of `sitl` has not."""
 
 
 def wandering(seed: int, *, count: int = 12, turn: float = 100.0, least: float = 80.0) -> list[Leg]:
@@ -125,7 +127,11 @@ PLANS: dict[str, dict[str, Any]] = {
 def plan_of(changes: dict[str, Any], elevation: float) -> Plan:
     """Return the sample plan with the dotted keys of `changes` replaced, for the simulator."""
     data = load_yaml(SAMPLE.read_text(), "sample")
-    own = {"site.origin.elevation": elevation, "vehicle.parameters": PARAMETERS}
+    own = {
+        "site.origin.elevation": elevation,
+        "vehicle.parameters": PARAMETERS,
+        "vehicle.body": BODY,
+    }
     for path, value in (own | changes).items():
         *parents, last = path.split(".")
         section = data

@@ -28,7 +28,7 @@ from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.autopilots import autopilots
 from faao_mav.plan.fields import dbm
-from faao_mav.schedule.conversion import Conversion, check_vehicle, convert
+from faao_mav.schedule.conversion import Conversion, beyond_vehicle, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
@@ -114,9 +114,9 @@ class Result:
 
     @property
     def flyable(self) -> bool:
-        """Whether there is a mission, and validation found no error in it."""
+        """Whether there is a mission without errors, of a plan that is not beyond its vehicle."""
         errors = any(finding.level is Level.ERROR for finding in self.findings)
-        return self.conversion is not None and not errors
+        return self.conversion is not None and not errors and not beyond_vehicle(self.solution.plan)
 
     def write(self, path: str | Path) -> tuple[Path, ...]:
         """Write the mission to the file `path`, its parameters and its fence to files beside it.
@@ -198,7 +198,7 @@ class Result:
             else None,
             "predicted": {
                 **flight_as_dict(plan, flown),
-                "calibrated": not conversion.vehicle.type.caveat,
+                "assumption": conversion.vehicle.assumption,
             }
             if conversion and flown
             else None,

@@ -144,4 +144,6 @@ def test_a_mission_that_goes_elsewhere_does_not_do_the_job(small_plan: MakePlan)
         replace(item, x=item.x + 0.02 if item.x else 0.0) for item in conversion.mission.items
     )
     found = check(replace(conversion.mission, items=items), conversion.vehicle, solution=solution)
-    assert found.findings[0].rule == "link-rate-lost"
+    assert found.findings[0].rule == "link-rate-reduced"
+    assert found.link is not None
+    assert found.link.share < 0.95

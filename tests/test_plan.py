@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from faao_mav.errors import InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import Plan, parse_plan, read_plan, reference
+from faao_mav.plan.body import ARDUCOPTER_BODY, PX4_BODY
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 NAN, INF = float("nan"), float("inf")
@@ -125,6 +126,18 @@ def test_the_wind_blows_away_from_where_it_comes_from(
     ).wind == pytest.approx(velocity, abs=1e-9)
 
 
+def test_a_body_is_numbers_over_those_of_the_autopilots_simulator() -> None:
+    for autopilot, sitl in (("ardupilot", ARDUCOPTER_BODY), ("px4", PX4_BODY)):
+        own = {"vehicle.autopilot": autopilot}
+        for same in ("sitl", None, {}, {"lag": sitl.lag}):
+            plan = parse_plan(edited(SMALL, own | {"vehicle.body": same}))
+            assert (plan.vehicle.body, plan.body) == (None, sitl)
+        windy = {"vehicle.body": {"linear_drag": 0.4}, "site.wind": {"speed": 3, "from": 4}}
+        plan = parse_plan(edited(SMALL, own | windy))
+        assert plan.vehicle.body == plan.body == replace(sitl, linear_drag=0.4)
+    assert parse_plan(edited(SMALL, windy)).max_airspeed == pytest.approx(8.05, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("changes", "parts"),
     [
@@ -186,6 +199,10 @@ def test_the_wind_blows_away_from_where_it_comes_from(
         ),
         ({"flight.start_velocity": [30, 0]}, ["flight.start_velocity", "30 m/s", "20 m/s"]),
         ({"flight.end_velocity": "slow"}, ["flight.end_velocity", "'slow'", "hover, free"]),
+        ({"vehicle.body": "mine"}, ["vehicle.body", "'mine'", "give sitl, the airframe"]),
+        ({"vehicle.body": {"lga": 0.2}}, ["vehicle.body.lga: unknown key; did you mean lag?"]),
+        ({"vehicle.body": {"lag": 3}}, ["vehicle.body.lag", "3", "seconds, 0.05 to 1"]),
+        ({"vehicle.body": {"thrust": 6}}, ["vehicle.body: thrust is not of a copter's", "lag"]),
         ({"vehicle.parameters": {"WPNAV_JERK": "x"}}, ["vehicle.parameters.WPNAV_JERK", "number"]),
         ({"radio.base_station.power_dbm": 1e6}, ["radio.base_station.power_dbm", "100 dBm"]),
         ({"optimizer.tolerance": 0}, ["optimizer.tolerance", "above 0"]),
@@ -501,7 +518,7 @@ def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
     written = {path: load_yaml(f"x: {key.default}", path)["x"] for path, key in keys.items()
                if key.default}  # fmt: skip
     plan = parse_plan(SMALL)
-    optional = ("fence", "site.wind", "vehicle.battery", "vehicle.power")
+    optional = ("fence", "site.wind", "vehicle.battery", "vehicle.body", "vehicle.power")
     changed = {path for path in written if path in SMALL_KEYS or path.startswith(optional)}
     full = parse_plan(edited(SMALL, {k: v for k, v in written.items() if k not in changed}))
     assert contents(full) | {"study": None} == contents(plan)

@@ -33,10 +33,10 @@ def _to_fly(result: Result) -> Conversion:
     What the command line would not upload is not returned: `PlanError` for a mission with errors,
     and for that of a plan beyond its vehicle.
     """
-    if result.conversion is None or not result.flyable:
-        raise PlanError("the mission does not pass validation; do not fly it")
     if beyond := beyond_vehicle(result.solution.plan):
         raise PlanError("\n".join(beyond))
+    if result.conversion is None or not result.flyable:
+        raise PlanError("the mission does not pass validation; do not fly it")
     return result.conversion
 
 

@@ -35,7 +35,7 @@ def as_dict(checked: CheckedFile) -> dict[str, Any]:
     check, vehicle = checked.check, checked.check.vehicle
     predicted = None
     if check.track is not None:
-        predicted = {"duration": float(check.track.t[-1]), "calibrated": not vehicle.type.caveat}
+        predicted = {"duration": float(check.track.t[-1]), "assumption": vehicle.assumption}
     link = None
     if (found := check.link) is not None:
         link = asdict(found) | {"share": found.share, "predicted_mbytes": found.predicted_mbytes}

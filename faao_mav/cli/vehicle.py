@@ -53,7 +53,8 @@ def choose_vehicle(
             f"{family(whose).name} ({chosen_by}): "
             f"give the vehicle's own (--parameters), or --autopilot {theirs}"
         )
-    return Vehicle(whose, kind or base.kind, values, source), chosen_by
+    body = base.body if (whose, kind or base.kind) == (base.autopilot, base.kind) else None
+    return Vehicle(whose, kind or base.kind, values, source, body), chosen_by
 
 
 def told_vehicle(

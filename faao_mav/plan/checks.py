@@ -70,7 +70,7 @@ def _speeds(plan: PlanContents) -> Iterator[str]:
     if plan.max_airspeed <= least:
         yield (
             f"site.wind: {_wind(plan)}: the gusts leave {plan.max_airspeed:.4g} m/s of airspeed; "
-            "give a wind that the aircraft can fly in"
+            "give a wind that the aircraft can fly in, or its vehicle.max_airspeed"
         )
     for end, velocity in (("start", flight.start_velocity), ("end", flight.end_velocity)):
         if velocity is None:
@@ -198,7 +198,8 @@ def _power(plan: PlanContents) -> Iterator[str]:
 
 def _airspeed(plan: PlanContents) -> str:
     most = plan.max_airspeed
-    return "" if most == math.inf else f" and at most {most:.4g} m/s through the air"
+    told = f" and at most {most:.4g} m/s through the air (vehicle.max_airspeed)"
+    return "" if most == math.inf else told
 
 
 def _study(plan: PlanContents) -> Iterator[str]:

@@ -26,7 +26,6 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from faao_mav.geodesy import LocalFrame
-from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
 
 Vector: TypeAlias = tuple[float, float]
 """East and north components, metres or m/s."""
@@ -75,7 +74,7 @@ def listed(words: Sequence[str], last: str = "or") -> str:
     return f" {last} ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
-def _one_of(names: Callable[[], tuple[str, ...]]) -> PlainValidator:
+def one_of(names: Callable[[], tuple[str, ...]]) -> PlainValidator:
     """Check that a value is one of the `names` known when it is read."""
 
     def check(value: object) -> object:
@@ -243,10 +242,6 @@ Gain: TypeAlias = Annotated[
     AfterValidator(linear),
     Written("a gain from -200 to 0 dB (1e-5, linear, is -50)", _db),
 ]
-AutopilotName: TypeAlias = Annotated[
-    Autopilot, _one_of(autopilots), Written(lambda: listed(autopilots()))
-]
-TypeName: TypeAlias = Annotated[Kind, _one_of(types), Written(lambda: listed(types()))]
 Antennas: TypeAlias = Annotated[
     Whole, Field(ge=1, le=64), Written("a whole number of antennas, 1 to 64")
 ]

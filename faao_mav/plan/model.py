@@ -14,6 +14,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
 from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.plan.body import Body
 from faao_mav.plan.fields import (
     Section,
     Text,
@@ -80,6 +81,11 @@ class PlanContents(PlanFile):
         return None if asked is None else asked.model(hovers=self._known.hovers)
 
     @property
+    def body(self) -> Body | None:
+        """The airframe; None where no flight model of the vehicle has one."""
+        return self.vehicle.body or self._known.body
+
+    @property
     def powers(self) -> tuple[float, float]:
         """W_B and W_U, W."""
         return self.radio.base_station.power, self.radio.relay.power
@@ -104,7 +110,7 @@ class PlanContents(PlanFile):
         wind, most = self.site.wind, self.vehicle.max_airspeed
         gusts = max(0.0, wind.gust - wind.speed)
         if most is None:
-            most = self._known.max_airspeed if wind.speed or gusts else math.inf
+            most = self._known.max_airspeed(self.body) if wind.speed or gusts else math.inf
         if not self._known.hovers:
             most = min(most, self.vehicle.max_speed)
         return most - gusts if most - gusts < self.max_ground_speed + wind.speed else math.inf

@@ -5,16 +5,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, ValidationInfo
+from pydantic import AfterValidator, PlainValidator, ValidationInfo
 
+from faao_mav.plan.autopilots import AutopilotName, TypeName, body_of
+from faao_mav.plan.body import Body
 from faao_mav.plan.energy import Battery, PowerOptions
 from faao_mav.plan.fields import (
-    AutopilotName,
     Flag,
     Number,
     Position,
     Section,
-    TypeName,
     Vector,
     Velocity,
     Whole,
@@ -143,6 +143,14 @@ class VehicleOptions(Section):
             accepted="autopilot parameters as NAME: number",
         ),
     ] = field(default_factory=dict)
+    body: Annotated[
+        Body | None,
+        PlainValidator(body_of),
+        key(
+            "The airframe that flights are predicted with: numbers over those of the simulator's.",
+            accepted="sitl, the airframe of the autopilot's simulator, or a mapping of its numbers",
+        ),
+    ] = None
     power: PowerOptions | None = None
     battery: Battery | None = None
 

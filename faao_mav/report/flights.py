@@ -35,8 +35,7 @@ def brief_flight(result: Result) -> Iterator[Line]:
         f"{items}, {way}; predicted {flown.rms_position_error:.1f} m rms from the plan at equal "
         f"times, {flown.max_position_error:.1f} m at most",
     )
-    if doubt := conversion.vehicle.type.caveat:
-        yield "", doubt
+    yield "", conversion.vehicle.assumption
 
 
 def conditions(result: Result) -> Iterator[Line]:
@@ -51,11 +50,12 @@ def check_lines(check: Check) -> Iterator[Line]:
     if check.track is None:
         yield "flight not predicted", check.unpredicted
     else:
-        doubt = check.vehicle.type.caveat
         lasting = f"{check.track.t[-1]:.0f} s"
         if any(check.wind):
             lasting = f"{lasting} in {math.hypot(*check.wind):.3g} m/s of wind"
-        yield "predicted flight", f"{lasting} ({doubt})" if doubt else lasting
+            if not check.vehicle.type.models_wind:
+                lasting += ", as in calm air: its model leaves wind out"
+        yield "predicted flight", f"{lasting}; {check.vehicle.assumption}"
     yield from _energy(check)
     if link := check.link:
         share = partial(of_plan, bandwidth_mhz=link.bandwidth_mhz)
@@ -117,8 +117,7 @@ def _mission(result: Result) -> Iterator[Line]:
         yield "predicted", average + lasting
         yield "", delivers
     yield "", apart(flown.rms_position_error, flown.max_position_error, flown.max_path_error)
-    if doubt := conversion.vehicle.type.caveat:
-        yield "", doubt
+    yield "", conversion.vehicle.assumption
 
 
 def _wind(plan: Plan) -> Iterator[Line]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import floor, inf, isfinite
+from math import floor, inf
 from typing import TypeAlias
 
 import numpy as np
@@ -106,15 +106,6 @@ def beyond_vehicle(plan: Plan) -> list[str]:
             lines.append(
                 f"{plan.source}: vehicle.{key}: {value:g} {unit}; {vehicles[0].type.name} keeps "
                 f"plans of at most {floor(10 * most) / 10:g} {unit} ({why})"
-            )
-    if vehicles[0].type.hovers and isfinite(plan.max_airspeed):
-        wind = plan.site.wind
-        value = plan.max_airspeed + max(0.0, wind.gust - wind.speed)
-        most = max(vehicle.type.max_airspeed(vehicle) for vehicle in vehicles)
-        if value > most + 1e-9:
-            lines.append(
-                f"{plan.source}: vehicle.max_airspeed: {value:g} m/s; {vehicles[0].type.name} "
-                f"holds {floor(10 * most) / 10:g} m/s in wind"
             )
     return lines
 

@@ -9,9 +9,6 @@ from faao_mav.validate.rule import Issue, Rules
 
 RULES = Rules()
 
-LEAST_SHARE = 0.95
-"""The share of what is planned below which the mission does not do its job. Chosen."""
-
 GOOD_SHARE = 0.995
 """The share of what is planned below which something can be won back. Chosen."""
 
@@ -78,18 +75,6 @@ def _there(context: ValidationContext) -> LinkCheck | None:
     return context.link if context.link is not None and not context.link.elsewhere else None
 
 
-@RULES.error(
-    "link-rate-lost",
-    _SOURCE,
-    summary=f"the flight is predicted to deliver less than {100 * LEAST_SHARE:g} % of what is "
-    "planned",
-)
-def _lost(context: ValidationContext) -> Iterator[Issue]:
-    link = _there(context)
-    if link is not None and link.share < LEAST_SHARE:
-        yield _rate_issue(link)
-
-
 @RULES.warning(
     "link-rate-reduced",
     _SOURCE,
@@ -98,18 +83,15 @@ def _lost(context: ValidationContext) -> Iterator[Issue]:
 )
 def _reduced(context: ValidationContext) -> Iterator[Issue]:
     link = _there(context)
-    if link is not None and LEAST_SHARE <= link.share < GOOD_SHARE:
-        yield _rate_issue(link)
-
-
-def _rate_issue(link: LinkCheck) -> Issue:
+    if link is None or link.share >= GOOD_SHARE:
+        return
     where = ""
     if link.worst is not None:
         where = (
             f"; {link.worst.rate_lost:.3g} of it between {link.worst.start:.0f} and "
             f"{link.worst.end:.0f} s"
         )
-    return Issue(
+    yield Issue(
         None,
         f"predicted to deliver {link.predicted_delivered:.4f} bit/s/Hz of the planned "
         f"{link.planned_delivered:.4f} (R_avg {link.predicted_rate:.4f} of "

@@ -11,12 +11,16 @@ from faao_mav.plan.energy import Battery
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.vehicle import Track
 
+_AIRSPEEDS = np.linspace(0.0, 100.0, 1001)
+"""The airspeeds, m/s, of which one has the least power. Chosen: all that are flown."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EnergyUse:
     """The power, W, of flight and relay at the times `t` (n,), s, and what was used by then, Wh.
 
-    `battery` is the plan's, if it has one; `lands` is whether the flight ends on the ground.
+    `battery` is the plan's, if it has one; `lands` is whether the flight ends on the ground;
+    `least_power`, W, is that of flight and relay at the airspeed of least power.
     """
 
     t: Real
@@ -24,6 +28,7 @@ class EnergyUse:
     used: Real
     battery: Battery | None
     lands: bool
+    least_power: float
 
     @property
     def total(self) -> float:
@@ -34,11 +39,6 @@ class EnergyUse:
     def left(self) -> float | None:
         """The share of the battery that is left at the end; None without a battery."""
         return None if self.battery is None else 1 - self.total / self.battery.capacity_wh
-
-    @property
-    def enough(self) -> bool:
-        """Whether the battery's reserve is left at the end."""
-        return self.battery is None or self.total <= self.battery.usable
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `energy` of `--json`: Wh, W, a share."""
@@ -64,6 +64,7 @@ def energy_use(plan: Plan, track: Track, wind: Vector) -> EnergyUse | None:
     air = track.velocity - np.array([*wind, 0.0])
     acceleration = np.gradient(air, track.t, axis=0)
     power = model(air, acceleration) + plan.radio.relay.power
+    least = model.least_power(_AIRSPEEDS)[1] + plan.radio.relay.power
     steps = np.diff(track.t) * (power[1:] + power[:-1]) / 2
     used = np.concatenate([[0.0], np.cumsum(steps)]) / JOULES_PER_WH
-    return EnergyUse(track.t, power, used, plan.vehicle.battery, track.lands)
+    return EnergyUse(track.t, power, used, plan.vehicle.battery, track.lands, least)

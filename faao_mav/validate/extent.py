@@ -1,12 +1,13 @@
 """How high, how far and how long the mission goes."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
+from faao_mav.plan.energy import Battery
+from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
@@ -27,9 +28,11 @@ HIGHEST = 20_000.0
 """The height, m above home, that no vehicle here reaches; plans end there too. Chosen."""
 
 _WOBBLE = 1.0
-"""By how much, m, the predicted flight may exceed a limit: aircraft wobble. Chosen."""
+"""By how much, m or s, the predicted flight may exceed a limit: aircraft wobble. Chosen."""
 
 _GIVEN = "the limit that was given"
+_CEILING, _RANGE = "m above home; --max-altitude is", "m from home; --max-distance is"
+_CHANGE = "change the item, or raise the limit if you may"
 _HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
 _DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
@@ -101,41 +104,38 @@ def _too_high(context: ValidationContext) -> Iterator[Issue]:
 
 @RULES.error("above-ceiling", _GIVEN)
 def _above_ceiling(context: ValidationContext) -> Iterator[Issue]:
-    """Higher than the ceiling that was set."""
+    """An item higher than the ceiling that was set."""
     limit = context.limits.max_altitude
-    if limit is not None:
-        heights = None if context.track is None else context.track.position[:, 2]
-        shown = f"m above home; --max-altitude is {limit:g} m"
-        yield from _outside(context, limit, lambda place: place.up, heights, shown)
+    for place in context.places:
+        if limit is not None and place.up > limit:
+            yield Issue(place.index, f"{place.up:.6g} {_CEILING} {limit:g} m", _CHANGE)
 
 
 @RULES.error("beyond-distance", _GIVEN)
 def _beyond(context: ValidationContext) -> Iterator[Issue]:
-    """Farther from home than was set."""
-    limit, positions = context.limits.max_distance, context.track_positions
-    if limit is not None and context.home is not None:
-        distances = None if positions is None else np.hypot(*positions[:, :2].T)
-        shown = f"m from home; --max-distance is {limit:g} m"
-        yield from _outside(context, limit, lambda place: place.from_origin, distances, shown)
+    """An item farther from home than was set."""
+    limit = context.limits.max_distance
+    for place in context.places:
+        if limit is not None and context.home is not None and place.from_origin > limit:
+            yield Issue(place.index, f"{place.from_origin:.6g} {_RANGE} {limit:g} m", _CHANGE)
 
 
-def _outside(
-    context: ValidationContext,
-    limit: float,
-    measure: Callable[[PlacedItem], float],
-    flown: Real | None,
-    shown: str,
-) -> Iterator[Issue]:
-    """Yield the items beyond `limit`, m; without any, where the flight, at `flown` (n,), is."""
-    action = "change the item, or raise the limit if you may"
-    beyond = [place for place in context.places if measure(place) > limit]
-    for place in beyond:
-        yield Issue(place.index, f"{measure(place):.6g} {shown}", action)
-    if context.track is not None and flown is not None and len(flown) and not beyond:
+@RULES.warning("predicted-beyond", f"{_GIVEN}; predicted flight")
+def _predicted_beyond(context: ValidationContext) -> Iterator[Issue]:
+    """The predicted flight goes higher, farther or on for longer than was set."""
+    track, positions, limits = context.track, context.track_positions, context.limits
+    if track is None or positions is None or not len(track.t):
+        return
+    away = np.hypot(*positions[:, :2].T) * (context.home is not None)
+    for limit, flown, shown in (
+        (limits.max_altitude, track.position[:, 2], _CEILING),
+        (limits.max_distance, away, _RANGE),
+        (limits.max_duration, track.t, "s long; --max-duration is"),
+    ):
         worst = int(np.argmax(flown))
-        if flown[worst] > limit + _WOBBLE:
-            there = f"the predicted flight gets {flown[worst]:.1f} {shown}"
-            yield Issue(int(context.track.item[worst]), there, action)
+        if limit is not None and flown[worst] > limit + _WOBBLE:
+            told = f"the predicted flight gets {flown[worst]:.1f} {shown} {limit:g}"
+            yield Issue(int(track.item[worst]), told, _CHANGE)
 
 
 @RULES.note(
@@ -200,33 +200,39 @@ def _long(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@RULES.error("too-long", f"{_GIVEN}; predicted flight")
+@RULES.error("too-long", f"{_GIVEN}; the commanded speeds")
 def _too_long(context: ValidationContext) -> Iterator[Issue]:
-    """The flight takes longer than was set."""
+    """The flight takes longer than was set, whatever the aircraft."""
     limit = context.limits.max_duration
-    if limit is None:
-        return
-    if context.track is not None and len(context.track.t):
-        duration, how = float(context.track.t[-1]), "is predicted to take"
-    else:
-        duration, how = least_duration(context), "takes at least"
-    if duration > limit:
+    if limit is not None and (least := least_duration(context)) > limit:
         yield Issue(
             None,
-            f"the flight {how} {duration:.0f} s; the limit is {limit:g} s",
+            f"the flight takes at least {least:.0f} s; the limit is {limit:g} s",
             "shorten the mission, or raise --max-duration",
         )
 
 
-@RULES.error("battery-reserve", "the plan's vehicle.power and vehicle.battery; predicted flight")
+@RULES.error("battery-reserve", "the plan's vehicle.power and vehicle.battery; commanded speeds")
 def _reserve(context: ValidationContext) -> Iterator[Issue]:
-    """The flight leaves less than the reserve of the plan's battery."""
-    energy = context.energy
-    if energy is not None and energy.battery is not None and not energy.enough:
-        battery = energy.battery
+    """The flight leaves less than the reserve of the plan's battery, whatever the aircraft."""
+    if (energy := context.energy) is not None:
+        least = least_duration(context) * energy.least_power / JOULES_PER_WH
+        yield from _short(energy.battery, "takes at least", least)
+
+
+@RULES.warning("battery-tight", "the plan's vehicle.power and vehicle.battery; predicted flight")
+def _tight(context: ValidationContext) -> Iterator[Issue]:
+    """The flight is predicted to leave less than the reserve of the plan's battery."""
+    if context.energy is not None:
+        yield from _short(context.energy.battery, "is predicted to take", context.energy.total)
+
+
+def _short(battery: Battery | None, takes: str, watt_hours: float) -> Iterator[Issue]:
+    """Yield that a flight which `takes` so many Wh leaves less than the reserve, if it does."""
+    if battery is not None and watt_hours > battery.usable:
         yield Issue(
             None,
-            f"the flight is predicted to take {energy.total:.4g} Wh; of {battery.capacity_wh:g} Wh "
+            f"the flight {takes} {watt_hours:.4g} Wh; of {battery.capacity_wh:g} Wh "
             f"{battery.usable:.4g} are above the reserve of {battery.reserve:g} %",
             "plan with less flight.duration or a nearer start and end, or give a larger battery",
         )
@@ -235,9 +241,10 @@ def _reserve(context: ValidationContext) -> Iterator[Issue]:
 def least_duration(context: ValidationContext) -> float:
     """Return what legs and circles at the commanded speeds and the holds take, s, without ramps.
 
+    It is no more than what is predicted: an aeroplane's tail wind and thin air make it quicker.
     Jumps are not followed; circles without end are left out.
     """
-    climb = context.vehicle.value("climb_speed")
+    climb, track = context.vehicle.value("climb_speed"), context.track
     flying = sum(_leg_duration(leg, climb) for leg in context.legs if not leg.jump)
     waiting = sum(
         item.params[0]
@@ -247,7 +254,8 @@ def least_duration(context: ValidationContext) -> float:
     circling = sum(
         orbit.lasting(context.speeds[k]) for k, orbit in context.orbits.items() if not orbit.endless
     )
-    return flying + waiting + circling
+    predicted = float(track.t[-1]) if track is not None and len(track.t) else math.inf
+    return min(flying + waiting + circling, predicted)
 
 
 def _leg_duration(leg: Straight, climb: float) -> float:

@@ -126,7 +126,7 @@ def _circles(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.error("fence-flight", _GEOMETRY)
+@RULES.warning("fence-flight", f"{_GEOMETRY}; predicted flight")
 def _flight(context: ValidationContext) -> Iterator[Issue]:
     """The predicted flight leaves the fence."""
     fence, track = context.fence, context.track
@@ -207,7 +207,7 @@ def _fence_margin(context: ValidationContext) -> Iterator[Issue]:
         )
 
 
-@RULES.error(
+@RULES.warning(
     "fence-ahead",
     "GF_PREDICT: PX4 1.16 GeofenceBreachAvoidance; measured: at 7 m/s it stopped 32 m before",
 )

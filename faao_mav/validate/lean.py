@@ -27,8 +27,9 @@ class Lean:
         """Return it in words."""
         needed, allowed = (f"{math.degrees(each):.0f}" for each in (self.needed, self.allowed))
         return (
-            f"the plan asks for a lean of up to {needed} degrees, and for {self.seconds:.1f} s of "
-            f"more than the {allowed} that its parameters allow: there it falls behind"
+            f"the plan asks for a lean of up to {needed} degrees against the drag of vehicle.body, "
+            f"and for {self.seconds:.1f} s of more than the {allowed} that its parameters allow: "
+            "there it falls behind"
         )
 
 
@@ -39,7 +40,7 @@ def beyond_lean(solution: Solution, vehicle: Vehicle) -> Lean | None:
 
         tan(lean) = |a + (c_1 + c_2 |v|) v| / g,
 
-    with the drag of ArduPilot's simulated quadrotor. Others are not known to lack any.
+    with the drag of its body. Others are not known to lack any.
     """
     if vehicle.type.family != ARDUPILOT or vehicle.type.kind != "copter":
         return None
@@ -47,7 +48,7 @@ def beyond_lean(solution: Solution, vehicle: Vehicle) -> Lean | None:
     pushes = []
     for v in (solution.v[:-1] - solution.plan.wind, solution.v[1:] - solution.plan.wind):
         speed = np.linalg.norm(v, axis=1, keepdims=True)
-        drag = (limits.linear_drag + limits.quadratic_drag * speed) * v
+        drag = (limits.body.linear_drag + limits.body.quadratic_drag * speed) * v
         pushes.append(np.linalg.norm(solution.a[:-1] + drag, axis=1))
     push, slot = np.maximum(*pushes), float(solution.t[1])
     missing = np.maximum(push - limits.lean, 0.0)

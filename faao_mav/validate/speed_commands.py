@@ -7,9 +7,8 @@ from faao_mav.mission.command import Command
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.vehicle import ARDUCOPTER, PX4_COPTER
-from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 
-_ARDUPILOT, _PX4 = Rules(ARDUCOPTER.family), Rules(PX4_COPTER.family)
+_COPTERS, _ARDUPILOT, _PX4 = Rules(), Rules(ARDUCOPTER.family), Rules(PX4_COPTER.family)
 
 _MEASURED = "measured on PX4 1.16.1"
 
@@ -37,24 +36,25 @@ def _ignored(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-@_ARDUPILOT.warning(
-    "ardupilot-speed-lean",
-    "measured: 10.3 m/s at 30 degrees, 15.2 m/s at 45 (quadrotor of ArduPilot's simulator)",
-    kind="copter",
-)
+@_COPTERS.note("speed-lean", "the drag of vehicle.body, and the lean limit", kind="copter")
 def _lean(context: ValidationContext) -> Iterator[Issue]:
-    """Faster than a copter flies at its lean limit."""
-    angle = round(math.degrees(context.vehicle.value("lean_angle")), 9)
-    top = ArduCopterLimits.from_vehicle(context.vehicle).top_speed
-    for index, kind, speed in _asked(context):
-        if kind in (0, 1) and speed > top:
-            yield Issue(
-                index,
-                f"{speed:g} m/s; with a lean of at most {angle:g} degrees "
-                f"({context.vehicle.name_of('lean_angle')}) ArduPilot's simulated quadrotor "
-                f"reaches {top:.1f}",
-                f"ask for {top:.1f} m/s or less, or set ANGLE_MAX if your aircraft can lean more",
-            )
+    """Faster than the airframe that predictions assume flies at the lean limit."""
+    vehicle, top = context.vehicle, context.vehicle.top_airspeed
+    asked = []
+    for index, item in context.each(Command.DO_CHANGE_SPEED):
+        change = vehicle.type.dialect.speed_change(item)
+        if change is not None and change.axis == "horizontal" and change.speed is not None:
+            asked.append((change.speed, index))
+    fastest, at = max(asked, key=lambda each: each[0], default=(0.0, 0))
+    if fastest > top:
+        angle = round(math.degrees(vehicle.value("lean_angle")), 9)
+        yield Issue(
+            at,
+            f"{fastest:g} m/s; with a lean of at most {angle:g} degrees "
+            f"({vehicle.name_of('lean_angle')}) the predicted aircraft gets to {top:.1f} in calm "
+            f"air: this {vehicle.assumption}",
+            "nothing, if yours is faster; else ask for less, or let it lean more",
+        )
 
 
 @_ARDUPILOT.warning("ardupilot-plane-speed", "ArduPlane 4.7 Plane::do_change_speed", kind="plane")
@@ -121,4 +121,4 @@ def _capped(context: ValidationContext) -> Iterator[Issue]:
             )
 
 
-RULES = [*_ARDUPILOT, *_PX4]
+RULES = [*_COPTERS, *_ARDUPILOT, *_PX4]

@@ -4,7 +4,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import ClassVar, Protocol, Self, TypeAlias
+from typing import Any, ClassVar, Protocol, Self, TypeAlias
+
+from faao_mav.plan.body import Body
 
 _GENTLE = (1.35, 2.0)
 """The gentle accelerations to try, as multiples of a_max: 1.35 makes up for the time that
@@ -90,14 +92,21 @@ ParameterTable: TypeAlias = Mapping[str, Parameter]
 
 
 class ParameterValues(Protocol):
-    """Where values of parameters come from: a `Vehicle`."""
+    """Where values of parameters, and the airframe, come from: a `Vehicle`."""
+
+    @property
+    def airframe(self) -> Body | None:
+        """The airframe, None where there is none."""
 
     def value(self, key: str) -> float:
         """Return the value of the parameter `key` in the unit of its table."""
 
 
 class ParameterRecord:
-    """Values of some parameters of a `table`: base of dataclasses whose fields are its keys."""
+    """Values of some parameters of a `table`: base of dataclasses whose fields are its keys.
+
+    A field `body` is the airframe.
+    """
 
     __slots__ = ()
     _keys: ClassVar[frozenset[str]] = frozenset()
@@ -110,7 +119,10 @@ class ParameterRecord:
     def from_vehicle(cls, vehicle: ParameterValues) -> Self:
         """Return the values that `vehicle` has; raises `InputError` for one that is no use."""
         own = {each.name for each in fields(cls) if each.init}  # type: ignore[arg-type]
-        return cls(**{key: vehicle.value(key) for key in own & cls._keys})
+        values: dict[str, Any] = {key: vehicle.value(key) for key in own & cls._keys}
+        if "body" in own and vehicle.airframe is not None:
+            values["body"] = vehicle.airframe
+        return cls(**values)
 
 
 def table(*parameters: Parameter) -> ParameterTable:

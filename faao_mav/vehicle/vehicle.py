@@ -3,12 +3,14 @@
 Another vehicle is one folder with one `VehicleType` and one call of `register`.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.plan.body import Body, CopterBody
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.vehicle_type import AutopilotFamily, LegLimits, VehicleType
 
@@ -21,8 +23,9 @@ class Vehicle:
     """A vehicle, named as in a plan, with parameters by its autopilot's names and in its units.
 
     Parameters that are not given have the autopilot's defaults. `source` says where the parameters
-    come from, for error messages. Methods raise `InputError` for a parameter that is no use, naming
-    source, parameter and value; `usable` returns the vehicle without those.
+    come from, for error messages. `body` is its airframe, None for the simulator's. Methods raise
+    `InputError` for a parameter that is no use, naming source, parameter and value; `usable`
+    returns the vehicle without those.
 
     >>> vehicle = Vehicle("ardupilot", "copter", {"WPNAV_ACCEL": 400})
     >>> vehicle.value("acceleration"), vehicle.value("jerk")
@@ -35,6 +38,29 @@ class Vehicle:
     kind: str = "copter"
     parameters: Mapping[str, float] = field(default_factory=dict)
     source: str = "parameters"
+    body: Body | None = None
+
+    @property
+    def airframe(self) -> Body | None:
+        """The airframe that its flights are predicted with; None where its type has none."""
+        return self.body or self.type.body
+
+    @property
+    def assumption(self) -> str:
+        """What its predicted flights rest on, in words."""
+        if self.airframe is None:
+            return "by a model after the autopilot's documents, not compared with recorded flights"
+        if self.body is not None:
+            return "assumes the airframe of vehicle.body"
+        return "assumes the simulator's airframe (vehicle.body: sitl)"
+
+    @property
+    def top_airspeed(self) -> float:
+        """The airspeed, m/s, at which drag takes all of its lean limit; infinite if none does."""
+        body = self.airframe
+        if not isinstance(body, CopterBody) or "lean_angle" not in self.type.parameters:
+            return math.inf
+        return body.top_airspeed(self.value("lean_angle"))
 
     @property
     def type(self) -> VehicleType:
@@ -113,9 +139,8 @@ class Vehicle:
 def vehicle_of(plan: Plan) -> Vehicle:
     """Return the vehicle of `plan`."""
     given = plan.vehicle
-    return Vehicle(
-        given.autopilot, given.type, given.parameters, f"{plan.source}: vehicle.parameters"
-    )
+    source = f"{plan.source}: vehicle.parameters"
+    return Vehicle(given.autopilot, given.type, given.parameters, source, given.body)
 
 
 def candidates(plan: Plan) -> tuple[Mapping[str, float], ...]:
@@ -137,9 +162,11 @@ def register(vehicle_type: VehicleType) -> VehicleType:
     key = (vehicle_type.family.key, vehicle_type.kind)
     _TYPES[key] = vehicle_type
     planned = vehicle_type.legs is not None and vehicle_type.flight_model is not None
-    own = Vehicle(*key)
-    one, holds = vehicle_type.fence_needs_one_inclusion(own), vehicle_type.max_airspeed(own)
-    VEHICLES[key] = PlannedVehicle(*key, vehicle_type.hovers, planned, one, holds)
+    one = vehicle_type.fence_needs_one_inclusion(Vehicle(*key))
+    lean = vehicle_type.parameters.get("lean_angle")
+    VEHICLES[key] = PlannedVehicle(
+        *key, vehicle_type.hovers, planned, one, vehicle_type.body, lean.default if lean else 0.0
+    )
     return vehicle_type
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.plan.body import Body
 from faao_mav.power import GRAVITY
 from faao_mav.vehicle.dialect import Dialect
 from faao_mav.vehicle.failsafe import Failsafe
@@ -16,10 +17,6 @@ from faao_mav.vehicle.parameter import ParameterTable, ParameterValues
 OVERSPEED = 1.1
 """The greatest speed that a mission may command, as a multiple of the plan's max_speed: it makes up
 for corners. Chosen; what a change costs is not measured."""
-
-HELD = 0.9
-"""The greatest airspeed that a plan asks of a copter, in that at which drag takes all of its lean
-limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
 
 
 def lean_acceleration(angle: float) -> float:
@@ -161,10 +158,10 @@ class VehicleType:
             `unmodelled` says why there is no model.
         recommended: the sets of parameters to try for a plan's greatest speed, m/s, and
             acceleration, m/s², the gentlest first; one empty set: it flies with its own.
-        calibrated: the flight model is compared with recorded flights.
         ceilings: how far a plan may go for the vehicle to keep it, beside `fastest`; the least of
             those with one key counts.
-        max_airspeed: the greatest airspeed, m/s, that it holds in wind with room to correct.
+        body: the airframe of the autopilot's simulator, fitted to recorded flights; None where the
+            model is compared with none.
         models_wind: its flight model flies in wind: what hovers in more than it can hold as well.
         true_over_commanded: true airspeed over the one that a mission commands, at a height in m
             above sea level; 1 where missions command ground speeds.
@@ -195,10 +192,9 @@ class VehicleType:
     legs: Callable[[ParameterValues], LegLimits] | None = None
     flight_model: Callable[[ParameterValues, float | None], FlightModel] | None = None
     unmodelled: str = ""
-    calibrated: bool = False
     recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
     ceilings: Callable[[ParameterValues], Sequence[Ceiling]] = lambda _: ()
-    max_airspeed: Callable[[ParameterValues], float] = lambda _: math.inf
+    body: Body | None = None
     models_wind: bool = False
     true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
     speed_rates: Callable[[ParameterValues], SpeedRates] = lambda _: SpeedRates()
@@ -207,13 +203,6 @@ class VehicleType:
     corner_speed: Callable[[ParameterValues, float], float] | None = None
     orbits: Orbits = no_orbit
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
-
-    @property
-    def caveat(self) -> str:
-        """What to say of predicted flights; nothing where the model is compared with flights."""
-        if self.calibrated or self.flight_model is None:
-            return ""
-        return "by a model after the autopilot's documents, not compared with recorded flights"
 
     def defaults(self) -> dict[str, float]:
         """Return the defaults by the autopilot's oldest names, in the autopilot's own units.

@@ -27,14 +27,13 @@ def limited(small_plan: MakePlan, speed: float, acceleration: float, **vehicle: 
 @pytest.mark.parametrize(
     ("vehicle", "most"),
     [
-        ({}, (10.3, 5)),
-        ({"keep": True}, (10.3, 2.5)),
-        ({"keep": True, "parameters": {"WPNAV_ACCEL": 700}}, (10.3, 5.6)),  # g tan 30 degrees
-        ({"parameters": {"ANGLE_MAX": 4500}}, (15.2, 5)),
-        ({"parameters": {"ANGLE_MAX": 8000}}, (20, 5)),  # the most that it is told
+        ({}, (20, 5)),  # the most that it is told
+        ({"keep": True}, (20, 2.5)),
+        ({"keep": True, "parameters": {"WPNAV_ACCEL": 700}}, (20, 5.6)),  # g tan 30 degrees
+        ({"body": {"linear_drag": 5}}, (20, 5)),  # an airframe refuses nothing
         ({"autopilot": "px4"}, (20, 9.8)),
         ({"autopilot": "px4", "keep": True}, (12, 3)),
-        ({"autopilot": "px4", "parameters": {"MPC_TILTMAX_AIR": 20}}, (17.8, 3.5)),
+        ({"autopilot": "px4", "parameters": {"MPC_TILTMAX_AIR": 20}}, (20, 3.5)),
         ({"autopilot": "px4", "keep": True, "parameters": {"MPC_XY_VEL_MAX": 9}}, (9, 3)),
     ],
 )
@@ -52,7 +51,7 @@ def test_what_is_accepted_follows_the_parameters(
 
 def test_the_line_names_what_sets_the_limit(small_plan: MakePlan) -> None:
     """Also where that is the greatest speed that the vehicle can be told."""
-    (line,) = beyond_vehicle(limited(small_plan, 25, 1, parameters={"ANGLE_MAX": 8000}))
+    (line,) = beyond_vehicle(limited(small_plan, 25, 1))
     assert line == (
         "plan: vehicle.max_speed: 25 m/s; ArduCopter keeps plans of at most 20 m/s "
         "(the most that it is told)"
@@ -79,5 +78,5 @@ def test_what_is_accepted_is_accepted(
 def test_a_plane_turns_no_tighter_than_its_bank_allows(small_plan: MakePlan) -> None:
     plane = {"type": "plane", "min_speed": 12, "parameters": {"ROLL_LIMIT_DEG": 30}}
     (line,) = beyond_vehicle(limited(small_plan, 16, 7, **plane))
-    assert line.endswith("ArduPlane keeps plans of at most 4 m/s^2 (ROLL_LIMIT_DEG)")
-    assert beyond_vehicle(limited(small_plan, 16, 4, **plane)) == []
+    assert line.endswith("ArduPlane keeps plans of at most 5.6 m/s^2 (ROLL_LIMIT_DEG)")
+    assert beyond_vehicle(limited(small_plan, 16, 5.6, **plane)) == []

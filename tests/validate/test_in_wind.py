@@ -52,7 +52,9 @@ def test_a_mission_is_validated_in_a_wind(tmp_path: Path) -> None:
     slow, quick = (json.loads(each)["predicted"]["duration"] for each in (windy, calm))
     assert slow > quick + 20
     told = validated(tmp_path, "--wind", "8,180")[1]
-    assert "in 8 m/s of wind" in told
+    assert "s in 8 m/s of wind; assumes the simulator's airframe (vehicle.body: sitl)" in told
+    on_px4 = validated(tmp_path, "--wind", "8,180", "--autopilot", "px4")[1]
+    assert "s in 8 m/s of wind, as in calm air: its model leaves wind out; assumes" in on_px4
 
 
 @pytest.mark.parametrize("given", ["8", "8,400", "fast,90", "-1,90", "nan,90", "8,90,3"])

@@ -187,13 +187,6 @@ CASES = [
         2,
         Given(flown(do(178, 0, -1, 60)), PLANE),
     ),
-    ("ardupilot-speed-lean", Given(flown(speed(10.4))), 2, Given(flown(speed(10.3)))),
-    (
-        "ardupilot-speed-lean",
-        Given(flown(speed(15.3)), having(COPTER, ANGLE_MAX=4500)),
-        2,
-        Given(flown(speed(15.2)), having(COPTER, ANGLE_MAX=4500)),
-    ),
     (
         "ardupilot-plane-speed",
         Given(flown(speed(8.9, kind=0)), PLANE),

@@ -28,10 +28,10 @@ def flight(*points: tuple[float, float, float]) -> Track:
     return track(points, range(len(points) - 1), 5.0)
 
 
-def taking(watt_hours: float) -> EnergyUse:
+def taking(watt_hours: float, least_power: float = 0.0) -> EnergyUse:
     """A flight of an hour at an even power, with a battery of 100 Wh of which 20 % are kept."""
-    t, power = np.array([0.0, 3600.0]), np.full(2, watt_hours)
-    return EnergyUse(t, power, np.array([0.0, watt_hours]), Battery(capacity_wh=100), lands=True)
+    t, power, used = np.array([0.0, 3600.0]), np.full(2, watt_hours), np.array([0.0, watt_hours])
+    return EnergyUse(t, power, used, Battery(capacity_wh=100), True, least_power)
 
 
 # the rule, what it speaks about, the item that it names, what it lets pass
@@ -47,7 +47,7 @@ CASES = [
         Given(flown(at(0, 9, 50)), limits=Limits(max_altitude=50)),
     ),
     (
-        "above-ceiling",
+        "predicted-beyond",
         Given(
             flown(at(0, 9, 50)),
             track=flight((0, 0, 0), (0, 0, 51.1)),
@@ -86,7 +86,7 @@ CASES = [
         Given(flown(at(0, 99.9, 30)), limits=Limits(max_distance=100)),
     ),
     (
-        "beyond-distance",
+        "predicted-beyond",
         Given(flown(), track=flight((0, 0, 0), (0, 101.1, 9)), limits=Limits(max_distance=100)),
         1,
         Given(flown(), track=flight((0, 0, 0), (0, 100.9, 9)), limits=Limits(max_distance=100)),
@@ -112,13 +112,33 @@ CASES = [
         Given(flown(at(0, 100, 30, 10)), limits=Limits(max_duration=42.1)),
     ),
     (
-        "too-long",
-        Given(flown(), track=flight((0, 0, 0), (0, 50, 0)), limits=Limits(max_duration=9.8)),
+        "too-long",  # a tail wind makes it quicker than the commanded speeds
+        Given(
+            flown(at(0, 100, 30, 10)),
+            track=flight((0, 0, 0), (0, 215, 0)),
+            limits=Limits(max_duration=41.9),
+        ),
         None,
-        Given(flown(), track=flight((0, 0, 0), (0, 50, 0)), limits=Limits(max_duration=10.2)),
+        Given(
+            flown(at(0, 100, 30, 10)),
+            track=flight((0, 0, 0), (0, 205, 0)),
+            limits=Limits(max_duration=41.9),
+        ),
     ),
     (
-        "battery-reserve",
+        "predicted-beyond",
+        Given(flown(), track=flight((0, 0, 0), (0, 65, 0)), limits=Limits(max_duration=11.8)),
+        1,
+        Given(flown(), track=flight((0, 0, 0), (0, 65, 0)), limits=Limits(max_duration=12.2)),
+    ),
+    (
+        "battery-reserve",  # 42 s at least
+        Given(flown(at(0, 100, 30, 10)), energy=taking(90, 6870)),
+        None,
+        Given(flown(at(0, 100, 30, 10)), energy=taking(90, 6850)),
+    ),
+    (
+        "battery-tight",
         Given(flown(), energy=taking(80.1)),
         None,
         Given(flown(), energy=taking(79.9)),

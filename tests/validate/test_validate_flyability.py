@@ -1,5 +1,7 @@
 """Speeds, corners and climbs."""
 
+from dataclasses import replace
+
 import pytest
 from judged import (
     COPTER,
@@ -17,6 +19,7 @@ from judged import (
     track,
 )
 
+from faao_mav.plan.body import CopterBody
 from faao_mav.validate import Limits
 
 OUT_AND_BACK = ((0, 0, 0), (0, 0, 30), (0, 100, 30), (0, 0, 30))
@@ -66,6 +69,25 @@ CASES = [
         Given(flown(at(0, 99, 30)), limits=Limits(max_speed=8)),
         2,
         Given(flown(at(0, 99, 30)), PX4, limits=Limits(max_speed=8)),
+    ),
+    ("speed-lean", Given(flown(speed(10.4))), 2, Given(flown(speed(10.3)))),
+    (
+        "speed-lean",
+        Given(flown(speed(14.8)), having(COPTER, ANGLE_MAX=4500)),
+        2,
+        Given(flown(speed(14.7)), having(COPTER, ANGLE_MAX=4500)),
+    ),
+    (
+        "speed-lean",
+        Given(flown(speed(17.9)), having(PX4, MPC_TILTMAX_AIR=20)),
+        2,
+        Given(flown(speed(17.8)), having(PX4, MPC_TILTMAX_AIR=20)),
+    ),
+    (
+        "speed-lean",
+        Given(flown(speed(8)), replace(COPTER, body=CopterBody(linear_drag=1.0))),
+        2,
+        Given(flown(speed(20)), replace(COPTER, body=CopterBody(linear_drag=0, quadratic_drag=0))),
     ),
     (
         "acceleration-above-limit",

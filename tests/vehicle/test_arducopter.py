@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from faao_mav.errors import InputError
 from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.ardupilot.copter import ARDUCOPTER, ArduCopter
+from faao_mav.vehicle.ardupilot.copter import ArduCopter
 from faao_mav.vehicle.flight_path import FlightPath
 
 QUICK = ArduCopter(acceleration=4, jerk=10)
@@ -59,7 +59,7 @@ def test_motion_is_continuous_and_within_limits(path: FlightPath, model: ArduCop
     middle = (flown.velocity[1:] + flown.velocity[:-1]) / 2
     assert np.diff(flown.position, axis=0) / 0.05 == pytest.approx(middle, abs=0.25)
     ground = np.hypot(*flown.velocity[:, :2].T)
-    drag = model.linear_drag * ground + model.quadratic_drag * ground**2
+    drag = model.body.linear_drag * ground + model.body.quadratic_drag * ground**2
     acceleration = np.linalg.norm(np.diff(flown.velocity[:, :2], axis=0), axis=1) / 0.05
     assert np.all(acceleration <= 9.81 * math.tan(model.lean_angle) + drag[1:] + 0.2)
     # Where two legs overlap both move the target: their climbs never add up to more than both.
@@ -273,10 +273,6 @@ def test_a_useless_parameter_is_named(value: float) -> None:
     vehicle = Vehicle("ardupilot", "copter", {"WPNAV_JERK": value}, "quad.param")
     with pytest.raises(InputError, match=r"quad\.param: WPNAV_JERK: .*at least 0\.1"):
         ArduCopter.from_vehicle(vehicle)
-
-
-def test_calibrated() -> None:
-    assert ARDUCOPTER.calibrated
 
 
 def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:

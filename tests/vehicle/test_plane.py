@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from faao_mav.errors import InputError
 from faao_mav.plan import Wind
-from faao_mav.vehicle import ARDUPLANE, Vehicle
+from faao_mav.plan.body import PlaneBody
+from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane
-from faao_mav.vehicle.ardupilot.plane.parameters import true_over_commanded
 from faao_mav.vehicle.flight_path import FlightPath
 
 PLANE = ArduPlane()
@@ -75,14 +75,14 @@ def test_a_wind_that_carries_it_away_is_told() -> None:
 @pytest.mark.parametrize(("command", "flown"), [(3, 9), (40, 22), (0, 12), (15, 15)])
 def test_airspeed_is_held_within_its_limits(command: float, flown: float) -> None:
     track = PLANE.fly(line(800, 1, float(command)))
-    true = flown * true_over_commanded(PLANE.simulated_pitot, 30)
+    true = flown * PLANE.true_over_commanded(30)
     assert np.linalg.norm(track.velocity, axis=1)[-1] == pytest.approx(true, abs=0.05)
 
 
-@pytest.mark.parametrize(("pitot", "ratio"), [(0.0, 1.0337), (2.0, 1.0337**2)])
-def test_thin_air_is_flown_through_faster(pitot: float, ratio: float) -> None:
+@pytest.mark.parametrize(("exponent", "ratio"), [(0.5, 1.0337), (1.0, 1.0337**2)])
+def test_thin_air_is_flown_through_faster(exponent: float, ratio: float) -> None:
     """Standard atmosphere, 684 m: the density is 0.9359 of that at sea level."""
-    plane = ArduPlane(simulated_pitot=pitot)
+    plane = ArduPlane(body=PlaneBody(airspeed_exponent=exponent))
     track = plane.fly(replace(line(1500, 1, 15.0), elevation=654.0))
     speed = np.linalg.norm(track.velocity, axis=1)[-1]
     assert speed == pytest.approx(15 * ratio, rel=2e-4)
@@ -172,10 +172,6 @@ def test_limits_come_from_parameters_of_either_generation() -> None:
 def test_a_useless_parameter_is_named(name: str, value: float, least: str) -> None:
     with pytest.raises(InputError, match=rf"plane\.parm: {name}: {value}; .*at least {least}"):
         ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", {name: value}, "plane.parm"))
-
-
-def test_calibrated() -> None:
-    assert ARDUPLANE.calibrated
 
 
 def test_energy_is_held_as_the_vehicles_own_parameters_say() -> None:

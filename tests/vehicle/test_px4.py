@@ -12,7 +12,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.vehicle import Vehicle
 from faao_mav.vehicle.flight_path import FlightPath
-from faao_mav.vehicle.px4 import PX4_COPTER, Px4
+from faao_mav.vehicle.px4 import Px4
 from faao_mav.vehicle.px4.simulation import SWITCH_DELAY
 
 SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)
@@ -196,7 +196,3 @@ def test_a_useless_parameter_is_named(value: float) -> None:
     vehicle = Vehicle("px4", "copter", {"MPC_JERK_AUTO": value}, "quad.params")
     with pytest.raises(InputError, match=r"quad\.params: MPC_JERK_AUTO: .*at least 0\.1"):
         Px4.from_vehicle(vehicle)
-
-
-def test_calibrated() -> None:
-    assert PX4_COPTER.calibrated

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from faao_mav.arrays import Real
+from faao_mav.plan.body import PX4_BODY
 from faao_mav.vehicle.px4 import response
 from faao_mav.vehicle.px4.smoothing import follow, soon_there
 
@@ -69,10 +70,18 @@ def test_what_is_soon_there_is_there(share: float, angle: float, push: float, dt
     st.floats(-1, 1),
     st.floats(-5, 5),
     st.floats(-5, 5),
-    steps,
+    st.floats(0.01, 0.4),
+    st.sampled_from([0.05, PX4_BODY.lag, 1.0]),
+    st.floats(0, 2),
 )
 def test_response_solves_the_equations_of_motion(
-    motion: response.Motion[float], shift: float, velocity: float, acceleration: float, dt: float
+    motion: response.Motion[float],
+    shift: float,
+    velocity: float,
+    acceleration: float,
+    dt: float,
+    lag: float,
+    drag: float,
 ) -> None:
     began, change = np.array(motion[4:]), np.array([shift, velocity, acceleration])
     change[1:] -= began[1:]
@@ -82,12 +91,12 @@ def test_response_solves_the_equations_of_motion(
         place, wanted, feed = began + change * (t / dt)
         position, speed, thrust, integrated = own
         error = wanted + response.POSITION_GAIN * (place - position) - speed
-        pull = thrust - response.DRAG * speed
+        pull = thrust - drag * speed
         demand = feed + proportional * error + integrated - derivative * pull
-        lag = response.ATTITUDE_LAG
         return np.array([speed, pull, (demand - thrust) / lag, integral * error])
 
     solved = solve_ivp(rates, (0, dt), motion[:4], rtol=1e-10, atol=1e-10).y[:, -1]
-    after = response.advance(response.step_of(dt), motion, shift, velocity, acceleration)
-    np.testing.assert_allclose(after[:4], solved, atol=1e-7)
+    step = response.step_of(dt, lag, drag)
+    after = response.advance(step, motion, shift, velocity, acceleration)
+    np.testing.assert_allclose(after[:4], solved, atol=1e-5)
     np.testing.assert_allclose(after[4:], [began[0] + shift, velocity, acceleration])

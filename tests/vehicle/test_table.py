@@ -135,8 +135,8 @@ def test_plans_know_the_vehicles_of_the_registry() -> None:
         key = (each.family.key, each.kind)
         made = each.legs is not None and each.flight_model is not None
         one = each.fence_needs_one_inclusion(Vehicle(*key))
-        holds = each.max_airspeed(Vehicle(*key))
-        assert VEHICLES[key] == PlannedVehicle(*key, each.hovers, made, one, holds)
+        lean = each.parameters["lean_angle"].default if "lean_angle" in each.parameters else 0.0
+        assert VEHICLES[key] == PlannedVehicle(*key, each.hovers, made, one, each.body, lean)
         assert vehicle_type(*key) is each
         assert (each.flight_model is None) == bool(each.unmodelled)
         for number in each.mav_types:

@@ -178,7 +178,7 @@ class Guided:
             return
         lasts = _SETTLED + (0.0 if self._course is None else self._course.end)
         left = min((now - self._time) * self._speedup, lasts - self._elapsed(self._time))
-        most = self._of.type.max_airspeed(self._of) if left > 0 else 0.0
+        most = self._of.top_airspeed if left > 0 else 0.0
         longest = min(max(_STEP, left / _STEPS), _LONGEST_STEP)
         while left > 0:
             step = min(longest, left)

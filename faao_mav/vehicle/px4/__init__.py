@@ -16,6 +16,7 @@ from math import cos
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.plan.body import PX4_BODY
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.orbit import RallyRule, plane_orbit
 from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
@@ -25,9 +26,7 @@ from faao_mav.vehicle.px4.flight_model import Px4 as Px4
 from faao_mav.vehicle.px4.guidance import corner_speed
 from faao_mav.vehicle.px4.legs import Px4Legs as Px4Legs
 from faao_mav.vehicle.px4.parameters import COPTER_TABLE, PLANE_TABLE
-from faao_mav.vehicle.px4.response import DRAG
 from faao_mav.vehicle.vehicle_type import (
-    HELD,
     OVERSPEED,
     AutopilotFamily,
     Ceiling,
@@ -149,14 +148,9 @@ def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
     lean = lean_acceleration(vehicle.value("lean_angle"))
     return (
         Ceiling("max_speed", vehicle.value("max_speed"), "max_speed"),
-        Ceiling("max_speed", lean / DRAG, "lean_angle"),
         Ceiling("max_acceleration", lean, "lean_angle"),
         Ceiling("max_acceleration", vehicle.value("acceleration"), "acceleration"),
     )
-
-
-def _max_airspeed(vehicle: ParameterValues) -> float:
-    return round(HELD * lean_acceleration(vehicle.value("lean_angle")) / DRAG, 2)
 
 
 def _rally(vehicle: ParameterValues) -> RallyRule:
@@ -185,10 +179,9 @@ PX4_COPTER = VehicleType(
     fastest=_FASTEST,
     legs=Px4Legs.from_vehicle,
     flight_model=_model,
-    calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),
     ceilings=_ceilings,
-    max_airspeed=_max_airspeed,
+    body=PX4_BODY,
     corner_speed=_corner_speed,
     rally=_rally,
 )

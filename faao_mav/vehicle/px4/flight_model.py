@@ -18,11 +18,10 @@ class Px4(Px4Limits):
     A simulation of PX4's own chain: guidance with a look at the next waypoint only, smoothing
     within jerk and acceleration, a clock that runs slower while the aircraft lags behind, a
     cascaded controller and an aircraft with lag and drag; see the modules of this package for the
-    equations. Four constants are fitted to recorded flights (`response.ATTITUDE_LAG`,
-    how its position estimate strays in `step`, `simulation.START_LAG`,
-    `simulation.SWITCH_DELAY`), the rest is PX4's. Limits are
-    SI: m, m/s, m/s², m/s³; the defaults are those of PX4 1.16. A steady wind changes nothing: the
-    drag is linear in the airspeed, the controller's integral holds against the wind from the
+    equations. Fitted to recorded flights are the `body`, how its position estimate strays in
+    `step`, `simulation.START_LAG` and `simulation.SWITCH_DELAY`; the rest is PX4's. Limits are SI:
+    m, m/s, m/s², m/s³; the defaults are those of PX4 1.16. Wind and the lean limit are left out:
+    with the simulator's drag the controller's integral holds against a steady wind from the
     take-off on, and drag takes all of the lean limit at 49 m/s only.
     """
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf, radians
 
+from faao_mav.plan.body import PX4_BODY, CopterBody
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, table
 
 _SOURCE = "PX4 1.16: parameter reference"
@@ -80,7 +81,10 @@ MPC_Z_VEL_MAX_UP (mc_pos_control, parameters_update); likewise down, and over th
 
 @dataclass(frozen=True, slots=True)
 class Px4Limits(ParameterRecord, table=COPTER_TABLE):
-    """What bounds a multicopter's flight, in SI units: keys and defaults of `COPTER_TABLE`."""
+    """What bounds a multicopter's flight, in SI units: keys and defaults of `COPTER_TABLE`.
+
+    `body` is the aircraft.
+    """
 
     cruise_speed: float = COPTER_TABLE["cruise_speed"].default
     max_speed: float = COPTER_TABLE["max_speed"].default
@@ -94,6 +98,7 @@ class Px4Limits(ParameterRecord, table=COPTER_TABLE):
     descent_speed: float = COPTER_TABLE["descent_speed"].default
     climb_acceleration: float = COPTER_TABLE["climb_acceleration"].default
     descent_acceleration: float = COPTER_TABLE["descent_acceleration"].default
+    body: CopterBody = PX4_BODY
 
 
 PLANE_TABLE = table(

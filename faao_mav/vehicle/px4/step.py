@@ -47,7 +47,9 @@ def moved(limits: Px4Limits, leg: GuidedLeg, state: FlightState, dt: float) -> F
     midway = place + velocity * (dt / 2)
     direction, speed, remembered = level_setpoint(limits, leg, midway, velocity, remembered)
     clock = dt * _pace(limits.error_limit, place - position, velocity)
-    step = step_of(dt)
+    body = limits.body  # drag to 1e-3, so that few steps are worked out
+    drag = round(body.linear_drag + body.quadratic_drag * abs(level[1]), 3)
+    step = step_of(dt, body.lag, drag)
     if climb is None:
         after, push, _ = _pursued(limits, level, direction * speed, None, clock)
     else:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from faao_mav.arrays import Flags, Real
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
+from faao_mav.plan.body import ARDUCOPTER_BODY
 from faao_mav.vehicle.ardupilot import (
     ARDUPILOT,
     HOME_OUTSIDE_FENCE,
@@ -22,7 +23,7 @@ from faao_mav.vehicle.ardupilot.failsafes import COPTER_FAILSAFES
 from faao_mav.vehicle.flight_path import VerticalProfile
 from faao_mav.vehicle.orbit import Orbit
 from faao_mav.vehicle.parameter import ParameterValues, accelerations_to_try
-from faao_mav.vehicle.vehicle_type import HELD, Ceiling, VehicleType
+from faao_mav.vehicle.vehicle_type import Ceiling, VehicleType
 
 _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""
@@ -71,14 +72,9 @@ def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[
 def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
     limits = ArduCopterLimits.from_vehicle(vehicle)
     return (
-        Ceiling("max_speed", limits.top_speed, "lean_angle"),
         Ceiling("max_acceleration", limits.lean, "lean_angle"),
         Ceiling("max_acceleration", limits.acceleration, "acceleration"),
     )
-
-
-def _max_airspeed(vehicle: ParameterValues) -> float:
-    return round(HELD * ArduCopterLimits.from_vehicle(vehicle).top_speed, 2)
 
 
 def _leg_durations(vehicle: ParameterValues, lengths: Real, joined: Flags) -> StraightDurations:
@@ -124,10 +120,9 @@ ARDUCOPTER = VehicleType(
     failsafes=COPTER_FAILSAFES,
     legs=ArduCopterLegs.from_vehicle,
     flight_model=ArduCopter.from_vehicle,
-    calibrated=True,
     recommended=lambda *limits: tuple(_recommended(*limits)),
     ceilings=_ceilings,
-    max_airspeed=_max_airspeed,
+    body=ARDUCOPTER_BODY,
     models_wind=True,
     leg_durations=_leg_durations,
     orbits=_orbit,

@@ -87,9 +87,10 @@ def pursue(
     turns as `_ASTRAY` says.
     """
     kp, kv, ki = limits.position_gain, limits.velocity_gain, limits.velocity_integral
-    linear, quadratic, lean = limits.linear_drag, limits.quadratic_drag, limits.lean
+    body, lean = limits.body, limits.lean
+    linear, quadratic = body.linear_drag, body.quadratic_drag
     patience = limits.acceleration / limits.jerk
-    leaning, adapting = 1 - math.exp(-GRID / limits.lag), 1 - math.exp(-GRID / patience)
+    leaning, adapting = 1 - math.exp(-GRID / body.lag), 1 - math.exp(-GRID / patience)
     hypot, sqrt, most = math.hypot, math.sqrt, lean * lean
     turning = limits.turn_rate * GRID or math.pi
     least_cosine, most_sine = math.cos(turning), math.sin(turning)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import Self
 
+from faao_mav.plan.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.power import GRAVITY
 from faao_mav.vehicle.ardupilot import DEGREE, SHARED, SOURCE, rally_parameters, switch
 from faao_mav.vehicle.parameter import Parameter, ParameterRecord, ParameterValues, table
@@ -70,10 +71,6 @@ TABLE = table(
 """ArduCopter's parameters. A `corner_acceleration` of 0 stands for twice `acceleration`."""
 
 
-_TOP_SPEEDS = ((30.0, 10.3), (45.0, 15.2))
-"""The largest lean angle, degrees, and the top speed that it gave, m/s. Measured: a quadrotor of
-ArduPilot's simulator."""
-
 _LEAST_INPUT_TIME = 0.1
 """The autopilot's own lower bound of ATC_INPUT_TC, s."""
 
@@ -83,9 +80,7 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
     """What bounds a flight of ArduCopter, in SI units: keys and defaults of `TABLE`.
 
     `east_metre` and `north_metre` are the autopilot's metres per metre: it takes the Earth for a
-    sphere. The last three describe the aircraft and are no parameters of the autopilot: the time
-    constant of leaning, s, and the drag per mass `linear_drag` v + `quadratic_drag` v², m/s². They
-    are fitted to flights of the autopilot's simulated quadrotor.
+    sphere. `body` is the aircraft.
     """
 
     cruise_speed: float = TABLE["cruise_speed"].default
@@ -106,9 +101,7 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
     velocity_integral: float = TABLE["velocity_integral"].default
     east_metre: float = 1.0
     north_metre: float = 1.0
-    lag: float = 0.17
-    linear_drag: float = 0.28
-    quadratic_drag: float = 0.0261
+    body: CopterBody = ARDUCOPTER_BODY
 
     @classmethod
     def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> Self:
@@ -150,13 +143,6 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
     def lean(self) -> float:
         """The acceleration at the largest lean angle, m/s²."""
         return lean_acceleration(self.lean_angle)
-
-    @property
-    def top_speed(self) -> float:
-        """The speed, m/s, at which the drag takes all of `lean`: on the line of `_TOP_SPEEDS`."""
-        (a0, v0), (a1, v1) = _TOP_SPEEDS
-        angle = round(math.degrees(self.lean_angle), 9)
-        return max(v0 + (angle - a0) * (v1 - v0) / (a1 - a0), 0.0)
 
 
 def _metres(latitude: float) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """ArduPlane: what it is, and how it flies a mission."""
 
+from faao_mav.plan.body import ARDUPLANE_BODY
 from faao_mav.vehicle.ardupilot import (
     ARDUPILOT,
     HOME_OUTSIDE_FENCE,
@@ -11,8 +12,7 @@ from faao_mav.vehicle.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.vehicle.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlane as ArduPlane
 from faao_mav.vehicle.ardupilot.plane.flight_model import ArduPlaneLegs
-from faao_mav.vehicle.ardupilot.plane.motion import SIDESLIP
-from faao_mav.vehicle.ardupilot.plane.parameters import TABLE, ArduPlaneLimits, true_over_commanded
+from faao_mav.vehicle.ardupilot.plane.parameters import TABLE, ArduPlaneLimits
 from faao_mav.vehicle.flight_path import FlightModel, VerticalProfile
 from faao_mav.vehicle.orbit import plane_orbit
 from faao_mav.vehicle.parameter import ParameterValues
@@ -41,12 +41,12 @@ def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # 
 
 
 def _true_over_commanded(vehicle: ParameterValues, altitude: float) -> float:
-    return true_over_commanded(vehicle.value("simulated_pitot"), altitude)
+    return ArduPlaneLimits.from_vehicle(vehicle).true_over_commanded(altitude)
 
 
 def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
-    """A turn accelerates by what the bank and sideslip give; airspeeds have limits of their own."""
-    bank = (1 - SIDESLIP) * lean_acceleration(vehicle.value("roll_limit"))
+    """A turn accelerates by what the bank gives; airspeeds have limits of their own."""
+    bank = lean_acceleration(vehicle.value("roll_limit"))
     return (Ceiling("max_acceleration", bank, "roll_limit"),)
 
 
@@ -70,7 +70,7 @@ ARDUPLANE = VehicleType(
     legs=ArduPlaneLegs.from_vehicle,
     flight_model=_model,
     ceilings=_ceilings,
-    calibrated=True,
+    body=ARDUPLANE_BODY,
     models_wind=True,
     true_over_commanded=_true_over_commanded,
     speed_rates=_speed_rates,

@@ -3,7 +3,7 @@
 Total energy control (Lambregts, AIAA 83-2239; ArduPilot's documentation, TECS tuning): throttle by
 the error of the sum of kinetic and potential energy, pitch by that of their difference. Each rule
 here was told by the autopilot's logs of its simulator's flights (TECS, TEC2, TEC3 and TEC4), which
-list its terms. The aircraft's constants are fitted, as `motion` says of its own.
+list its terms.
 """
 
 import math
@@ -16,20 +16,6 @@ _LEAST_PITCH = math.radians(-20)  # PTCH_LIM_MIN_DEG of the simulator's plane
 _EASE = 0.2  # TECS_THR_ERATE, 1/s: how fast the full throttle of a take-off goes at most
 _CLIMBING = 1.0  # a flight that begins with so much of a climb, m/s, comes from a take-off; chosen
 _KINETIC_SHARE = 0.25  # of the range of pitch, the most that the integral of kinetic energy takes
-
-_THRUST = 6.28
-"""The acceleration that full throttle gives, m/s²."""
-
-_DRAG = (0.00532, 67.1)
-"""The drag at sea level: over the airspeed's square, 1/m, and over the load factor's square over
-the airspeed's, m³/s⁴."""
-
-_ANGLE_OF_ATTACK = (25.3, 0.0573)
-"""The angle of attack at sea level: over the load factor over the airspeed's square, rad m²/s², and
-below that, rad."""
-
-_PITCH_LAG = 1.05
-"""The time constant with which the path's angle follows the pitch demanded, s."""
 
 
 class Energy:
@@ -49,6 +35,7 @@ class Energy:
     ) -> None:
         self.height, self.speed, self.climb = height, speed, climb
         self._limits, self._density, self._rates = limits, density, limits.speed_rates
+        self._body = limits.body
         self._pitches = least, most = _LEAST_PITCH, limits.climb_pitch or limits.pitch_limit
         self._kinetic_weight = _KINETIC_SHARE * (most - least) * GRAVITY
         self._powers = -GRAVITY * limits.descent_speed, GRAVITY * limits.climb_speed
@@ -57,7 +44,7 @@ class Energy:
         self._demanded_rate = self._flown_rate = self._rate = 0.0
         self._least_throttle = float(climb > _CLIMBING)
         if climb <= _CLIMBING:  # in trim, with what logs show that a take-off leaves behind
-            self._throttle_integral = self._drag(1.0) / _THRUST - _TRIM
+            self._throttle_integral = self._drag(1.0) / self._body.thrust - _TRIM
             self._kinetic_integral = self._most_kinetic()
             trim = self._attack(1.0) * GRAVITY * speed
             self._pitch_integral = trim - self._kinetic_integral
@@ -136,8 +123,9 @@ class Energy:
         """Let the aircraft fly for `step` seconds."""
         steepness = self.climb / self.speed
         angle = math.asin(-1.0 if steepness < -1.0 else 1.0 if steepness > 1.0 else steepness)
-        angle += (pitch - self._attack(load) - angle) * -math.expm1(-step / _PITCH_LAG)
-        self._rate = _THRUST * throttle - self._drag(load) - GRAVITY * math.sin(angle)
+        angle += (pitch - self._attack(load) - angle) * -math.expm1(-step / self._body.pitch_lag)
+        push = self._body.thrust * throttle - self._drag(load)
+        self._rate = push - GRAVITY * math.sin(angle)
         speed = self.speed + self._rate * step
         self.speed = 1.0 if speed < 1.0 else speed
         self.climb = self.speed * math.sin(angle)
@@ -145,11 +133,10 @@ class Energy:
 
     def _attack(self, load: float) -> float:
         """Return the angle of attack, rad."""
-        by_lift, least = _ANGLE_OF_ATTACK
-        return by_lift * load / (self._density * self.speed**2) - least
+        body, dynamic = self._body, self._density * self.speed**2
+        return body.lift_angle * load / dynamic - body.no_lift_angle
 
     def _drag(self, load: float) -> float:
         """Return the deceleration by drag, m/s²."""
-        parasitic, induced = _DRAG
-        dynamic = self._density * self.speed**2
-        return parasitic * dynamic + induced * load**2 / dynamic
+        body, dynamic = self._body, self._density * self.speed**2
+        return body.parasitic_drag * dynamic + body.induced_drag * load**2 / dynamic

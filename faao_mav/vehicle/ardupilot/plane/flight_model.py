@@ -41,8 +41,8 @@ _HEADED = math.radians(10)
 """A loiter is left when the course is this close to the next waypoint."""
 
 _NOTICED = 0.05
-"""How long after it is passed a waypoint counts as reached, s. Fitted as `motion`'s constants, and
-to eleven flights of missions that circle: with 0.12 these were flown up to 2 m inside."""
+"""How long after it is passed a waypoint counts as reached, s. Fitted to the flights that the
+airframe is, and to eleven of missions that circle: with 0.12 these were flown up to 2 m inside."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,4 @@
-"""An aeroplane with the guidance that banks it and the energy that carries it.
-
-Constants that say no other are fitted to flights of ArduPilot's simulator from sea level
-(`benchmarks/flights_arduplane.py`): they are its aircraft's.
-"""
+"""An aeroplane with the guidance that banks it and the energy that carries it."""
 
 import cmath
 import math
@@ -14,17 +10,6 @@ from faao_mav.vehicle.atmosphere import density_ratio
 
 STEP = 0.1
 """The longest step of the simulation, s. Chosen; what a change costs is not measured."""
-
-SIDESLIP = 0.286
-"""The share of a coordinated turn's acceleration that sideslip takes, at sea level's density: the
-simulator's aircraft turns without enough rudder."""
-
-_SLOW = 13.0
-"""The airspeed, m/s, below which that share falls in proportion to the speed. A flight of 12 m/s
-showed it: in its log, sideslip times the airspeed's square is less there, and turns are tighter."""
-
-_ROLL_TURN = 0.01
-"""How far the course turns while the aircraft banks, over the change of bank."""
 
 _INTERCEPT = math.sin(math.radians(45))
 """The sine of the steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
@@ -89,7 +74,7 @@ class Motion:
         self._bank, density, flown = 0.0, density_ratio(altitude), math.hypot(abs(airspeed), climb)
         demand = flown if speed is None else speed
         self._energy = Energy(limits, density, height, flown, climb, demand)
-        self._sideslip = SIDESLIP * density
+        self._body, self._sideslip = limits.body, limits.body.sideslip * density
         self._look(self._airspeed())
 
     def sample(self) -> tuple[float, ...]:
@@ -171,8 +156,10 @@ class Motion:
         self._bank += change
         airspeed = self._airspeed()
         lift = GRAVITY + (energy.climb - before) / step
-        turning = 1 - self._sideslip * (1.0 if airspeed > _SLOW else airspeed / _SLOW)
-        turn = turning * lift * math.tan(self._bank) / airspeed * step + _ROLL_TURN * change
+        slow = self._body.sideslip_airspeed
+        turning = 1 - self._sideslip * (1.0 if airspeed > slow else airspeed / slow)
+        turn = turning * lift * math.tan(self._bank) / airspeed * step
+        turn += self._body.roll_turn * change
         self.place += (cmath.rect(airspeed, self.heading + turn / 2) + self._wind) * step
         self.heading += turn
         self.time += step

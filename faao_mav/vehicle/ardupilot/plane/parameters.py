@@ -1,8 +1,10 @@
 """ArduPlane's parameters: the newer names first, the older ones second."""
 
+import math
 from dataclasses import dataclass
 from math import pi, radians
 
+from faao_mav.plan.body import ARDUPLANE_BODY, PlaneBody
 from faao_mav.power import GRAVITY
 from faao_mav.vehicle.ardupilot import SHARED, SOURCE, rally_parameters, switch
 from faao_mav.vehicle.atmosphere import density_ratio
@@ -61,7 +63,6 @@ TABLE = table(
         source=SOURCE,
         motion=False,
     ),
-    _parameter("simulated_pitot", "", 0.0, {"SIM_ARSPD_RATIO": 1.0}, 0.0),
     *SHARED,
     switch("fence_options", 1, "FENCE_OPTIONS"),
     switch("fence_type", 4, "FENCE_TYPE"),
@@ -71,10 +72,7 @@ TABLE = table(
 """ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate
 with an idling engine; `turn_power` is per unit of load factor squared beyond 1; a `climb_pitch`
 of 0 is the `pitch_limit`; a `return_height` below 0 keeps the height at which the return begins.
-
-`simulated_pitot` is above 0 in ArduPilot's simulator only. Up to July 2026 its airspeed sensor
-takes the density out twice (ArduPilot's issue 31004), and it flies faster for it. A real aircraft
-has no such parameter, and a newer simulator does not need it."""
+"""
 
 
 _TURN = 1.2
@@ -87,7 +85,10 @@ were flown 17 and 38 m rms from them; planned with 1.2 over ground these were 5.
 
 @dataclass(frozen=True, slots=True)
 class ArduPlaneLimits(ParameterRecord, table=TABLE):
-    """What bounds a flight of ArduPlane, in SI units: keys and defaults of `TABLE`."""
+    """What bounds a flight of ArduPlane, in SI units: keys and defaults of `TABLE`.
+
+    `body` is the aircraft.
+    """
 
     cruise_speed: float = TABLE["cruise_speed"].default
     min_speed: float = TABLE["min_speed"].default
@@ -100,7 +101,6 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
     descent_speed: float = TABLE["descent_speed"].default
     period: float = TABLE["period"].default
     damping: float = TABLE["damping"].default
-    simulated_pitot: float = TABLE["simulated_pitot"].default
     energy_time: float = TABLE["energy_time"].default
     throttle_damping: float = TABLE["throttle_damping"].default
     pitch_damping: float = TABLE["pitch_damping"].default
@@ -108,6 +108,7 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
     turn_power: float = TABLE["turn_power"].default
     climb_pitch: float = TABLE["climb_pitch"].default
     pitch_limit: float = TABLE["pitch_limit"].default
+    body: PlaneBody = ARDUPLANE_BODY
 
     @property
     def look_ahead(self) -> float:
@@ -122,7 +123,11 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
         """
         wanted = commanded if commanded > 0 else self.cruise_speed
         held = min(max(wanted, self.min_speed), self.max_speed)
-        return held * true_over_commanded(self.simulated_pitot, altitude)
+        return held * self.true_over_commanded(altitude)
+
+    def true_over_commanded(self, altitude: float) -> float:
+        """Return true over commanded airspeed at `altitude`, m above sea level."""
+        return math.pow(density_ratio(altitude), -self.body.airspeed_exponent)
 
     @property
     def speed_rates(self) -> SpeedRates:
@@ -136,9 +141,3 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
         fall = 0.9 * GRAVITY * self.descent_speed / self.cruise_speed
         turn = 1 / (_TURN * self.look_ahead)
         return SpeedRates(fall, 0.5 * GRAVITY * self.climb_speed, turn)
-
-
-def true_over_commanded(simulated_pitot: float, altitude: float) -> float:
-    """Return true over commanded airspeed at `altitude`, m above sea level."""
-    density = density_ratio(altitude)
-    return 1 / density if simulated_pitot > 0 else density**-0.5

@@ -1,0 +1,110 @@
+"""The airframe, apart from the autopilot that flies it: `vehicle.body`.
+
+The numbers here are fitted to flights of the autopilots' simulators (tests/data/flights): they are
+those of the simulated aircraft, yours has others. Limits are chosen.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, TypeAlias
+
+from faao_mav.plan.fields import Number, Section, key
+from faao_mav.power import GRAVITY
+
+_HELD = 0.9
+"""The greatest airspeed that a plan asks of a copter, in that at which drag takes all of its lean
+limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CopterBody(Section):
+    """A copter's airframe: by default the quadrotor of ArduPilot's simulator."""
+
+    lag: Annotated[
+        Number, key("Copter: time constant of the thrust's lag; PX4: 0.26.", "s", ge=0.05, le=1)
+    ] = 0.17
+    linear_drag: Annotated[
+        Number, key("Copter: drag over mass and airspeed; PX4: 0.2.", "1/s", ge=0, le=5)
+    ] = 0.28
+    quadratic_drag: Annotated[
+        Number, key("Copter: drag over mass and airspeed squared; PX4: 0.", "1/m", ge=0, le=1)
+    ] = 0.0261
+
+    def top_airspeed(self, lean_angle: float) -> float:
+        """Return the airspeed, m/s, at which the drag takes all that `lean_angle`, rad, gives.
+
+        It is the root v of k v + q v² = g tan(lean).
+
+        >>> round(CopterBody().top_airspeed(math.radians(30)), 1)
+        10.3
+        """
+        lean, k = GRAVITY * math.tan(lean_angle), self.linear_drag
+        rooted = k + math.sqrt(k**2 + 4 * self.quadratic_drag * lean)
+        return 2 * lean / rooted if rooted > 0 else math.inf
+
+    def held_airspeed(self, lean_angle: float) -> float:
+        """Return the greatest airspeed, m/s, that is held in wind with room to correct."""
+        return round(_HELD * self.top_airspeed(lean_angle), 2)
+
+
+ARDUCOPTER_BODY = CopterBody()
+"""The quadrotor of ArduPilot's simulator."""
+
+PX4_BODY = CopterBody(lag=0.26, linear_drag=0.2, quadratic_drag=0.0)
+"""The quadrotor of PX4's simulator: its drag is SIH_KDV over SIH_MASS of the recorded flights, of
+which a fit finds 0.19."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlaneBody(Section):
+    """A plane's airframe: by default that of ArduPilot's simulator, at sea level's density.
+
+    A log of 12 m/s showed `sideslip_airspeed`: less sideslip, and tighter turns. Up to July 2026
+    the simulator's airspeed sensor takes the density out twice (ArduPilot's issue 31004), and it
+    flies 3 % faster for it at 584 m.
+    """
+
+    thrust: Annotated[
+        Number, key("Plane: acceleration by full throttle.", "m/s^2", gt=0, le=100)
+    ] = 6.28
+    parasitic_drag: Annotated[
+        Number, key("Plane: drag over mass and airspeed squared.", "1/m", gt=0, le=1)
+    ] = 0.00532
+    induced_drag: Annotated[
+        Number, key("Plane: drag over mass, times airspeed squared.", "m^3/s^4", ge=0, le=1e4)
+    ] = 67.1
+    lift_angle: Annotated[
+        Number,
+        key("Plane: angle of attack times airspeed squared.", "rad m^2/s^2", ge=0, le=1000),
+    ] = 25.3
+    no_lift_angle: Annotated[
+        Number, key("Plane: what is taken off the angle of attack.", "rad", ge=0, le=0.5)
+    ] = 0.0573
+    pitch_lag: Annotated[
+        Number, key("Plane: time constant from pitch to the path's slope.", "s", ge=0.05, le=10)
+    ] = 1.05
+    sideslip: Annotated[
+        Number, key("Plane: share of a turn's acceleration that sideslip takes.", ge=0, le=0.9)
+    ] = 0.286
+    sideslip_airspeed: Annotated[
+        Number, key("Plane: airspeed below which `sideslip` falls.", "m/s", gt=0, le=1000)
+    ] = 13.0
+    roll_turn: Annotated[
+        Number, key("Plane: turn of the course while it banks, over the bank.", ge=0, le=1)
+    ] = 0.01
+    airspeed_exponent: Annotated[
+        Number,
+        key(
+            "Plane: power of the air's density, over sea level's, by which the airspeed reads low; "
+            "0.5 is right, the simulator up to July 2026: 1.",
+            ge=0,
+            le=2,
+        ),
+    ] = 0.5
+
+
+ARDUPLANE_BODY = PlaneBody()
+"""The plane of ArduPilot's simulator."""
+
+Body: TypeAlias = CopterBody | PlaneBody
+"""The airframe of one family."""
