@@ -76,12 +76,18 @@ def fly(
     """
     from faao_mav.mavlink.flying.fly import fly as run
     from faao_mav.mavlink.flying.telemetry import POSITION_RATE
-    from faao_mav.mavlink.flying.telling import Feed, Telling, as_text
+    from faao_mav.mavlink.flying.telling import HEADER, Feed, Telling, as_text
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.lines import joined
 
+    begun = False
+
     def say(told: dict[str, Any]) -> None:
+        nonlocal begun
+        if not as_json and not begun and "note" not in told:
+            begun = True
+            typer.echo(HEADER)
         typer.echo(json.dumps(told, allow_nan=False) if as_json else as_text(told))
 
     check_one(plan_file, solution_file)

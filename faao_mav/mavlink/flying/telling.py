@@ -145,19 +145,27 @@ def findings_text(findings: Sequence[Finding]) -> str:
     return "\n".join(lines)
 
 
+HEADER = "    plan  mode      item   height     late  off plan  off path  to UAV  to user  arrived"
+"""What the columns of `as_text` are: the plan's clock, s, the mode, the item under way, m above
+home, how late against the plan, how far from it now and from its path, both hops' rates now,
+bit/s/Hz, and what is delivered so far of what is expected by the end."""
+
+
 def as_text(told: dict[str, Any]) -> str:
-    """Return what a `Telling` says for people."""
+    """Return what a `Telling` says for people: an event, or a row of the table under `HEADER`."""
     if "note" in told:
         return f"-- {told['note']}"
-    item = "?" if told["item"] is None else told["item"]
-    parts = [f"{told['mode']:<10}item {item:<3}{told['height']:6.1f} m"]
-    if (plan := told["plan"]) is not None:
+    plan, item = told["plan"], "?" if told["item"] is None else told["item"]
+    clock = f"{plan['time']:6.1f} s" if plan is not None else f"{'-':>8}"
+    parts = [clock, f"{told['mode']:<8}", f"{item:>4}", f"{told['height']:5.1f} m"]
+    if plan is not None:
         unit, suffix = ("bit/Hz", "") if plan["expected_mbytes"] is None else ("MB", "_mbytes")
-        parts = [
-            f"{plan['time']:6.1f} s",
-            *parts,
-            f"{plan['late']:+5.1f} s, {plan['apart']:.1f} m off, {plan['astray']:.1f} m from path",
-            f"rates {plan['I_U']:.2f} {plan['I_G']:.2f}",
+        parts += [
+            f"{plan['late']:+5.1f} s",
+            f"{plan['apart']:6.1f} m",
+            f"{plan['astray']:6.1f} m",
+            f"{plan['I_U']:6.2f}",
+            f"{plan['I_G']:7.2f}",
             f"{plan['delivered' + suffix]:.1f} of {plan['expected' + suffix]:.1f} {unit}",
         ]
     if told["battery"] is not None:
