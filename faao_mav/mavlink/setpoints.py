@@ -10,9 +10,9 @@ from faao_mav.vehicle import AutopilotFamily
 from faao_mav.vehicle.ardupilot import ARDUPILOT
 from faao_mav.vehicle.px4 import PX4
 
-_GAPS = 2.0
-"""For how many periods of the setpoints an autopilot has to do without one at least: they come
-irregularly. Chosen."""
+_LEAST_TIMEOUT = 0.5
+"""Seconds for which an autopilot has to do without setpoints at least; chosen: the slowest come
+four times a second, irregularly."""
 
 
 class LossAction(NamedTuple):
@@ -68,34 +68,35 @@ class SetpointRules:
         action = self.actions.get(values.get(self.loss, math.nan))
         return action is not None and action.mode == mode and not action.by_sticks
 
-    def refusal(self, values: Mapping[str, float], period: float) -> str | None:
-        """Return why it is not flown by setpoints `period` s apart, None if it may be.
+    def refusal(self, values: Mapping[str, float]) -> tuple[str, str] | None:
+        """Return why it is not flown by setpoints, and what to do; None where it may be.
 
         `values` are those of its parameters: what it does without setpoints has to be known, and
         neither to stop its motors nor to have it fly on for long.
         """
         untold = [name for name in self.defaults if name not in values]
         if untold:
-            return f"it does not tell {' and '.join(untold)}: what it does without setpoints"
-        least, after = _GAPS * period, values[self.timeout]
-        if not least <= max(after, self.least_timeout) <= self.most_timeout:
-            flies_on = " (until then it flies on)" if self.carries_on else ""
-            limits = f"{least:g} to {self.most_timeout:g}"
-            text = f"without setpoints it would act after {after:g} s{flies_on}"
-            return f"{text}: set {self.timeout} to {limits} s"
+            text = f"it does not tell {' and '.join(untold)}, what it does without setpoints"
+            return text, "try again, or fly the mission"
+        after = values[self.timeout]
+        if not _LEAST_TIMEOUT <= after <= self.most_timeout:
+            flies_on = ", and until then flies on" if self.carries_on else ""
+            limits = f"{_LEAST_TIMEOUT:g} to {self.most_timeout:g} s"
+            text = f"without setpoints it acts after {after:g} s ({self.timeout}){flies_on}"
+            return text, f"set {self.timeout} to {limits}"
         if self.loss and values[self.loss] not in self.actions:
             value = values[self.loss]
-            does = self.forbidden.get(value, "do what is not known here")
-            good = [
+            does = self.forbidden.get(value, "does what is not known here")
+            *some, last = (
                 f"{key:g} ({each.name})" for key, each in self.actions.items() if not each.by_sticks
-            ]
-            text = f"without setpoints it would {does}: {self.loss} is {value:g}"
-            return f"{text}, set it to {', '.join(good[:-1])} or {good[-1]}"
+            )
+            text = f"without setpoints it {does} ({self.loss} {value:g})"
+            return text, f"set {self.loss} to {', '.join(some)} or {last}"
         return None
 
     def without(self, values: Mapping[str, float]) -> str:
         """Return in words what it does without setpoints, given `values` that are not refused."""
-        after = max(values[self.timeout], self.least_timeout)
+        after = values[self.timeout]
         if not self.loss:
             return f"it stops after {after:g} s ({self.timeout})"
         action = self.actions[values[self.loss]]
@@ -127,7 +128,7 @@ _RULES = {
             4: LossAction("Land", px4_mode(4, 6)),
             5: LossAction("Hold", px4_mode(4, 3)),
         },
-        forbidden={6: "end the flight (terminate)", 7: "stop the motors (disarm)"},
+        forbidden={6: "terminates the flight", 7: "stops its motors"},
         streamed=1.0,
         defaults={"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0},
     ),

@@ -1,6 +1,6 @@
 """A mock autopilot and a watch of it, on a simulated link."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, cast
 
 from mock_flights import fly
@@ -38,9 +38,10 @@ from faao_mav.mission import Mission
 from faao_mav.optimizer.solution import Solution
 
 
-def held_by(mock: MockAutopilot) -> Held:
-    """Return what `mock` holds, as if it had been read."""
-    settings = {name: Setting(value, 9) for name, value in mock.parameters.values.items()}
+def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
+    """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
+    values = mock.parameters.values.items()
+    settings = {name: Setting(value, 9) for name, value in values if name not in untold}
     lists = {part: mock.lists.items(part) for part in MissionType}
     return Held(lists, Reading(settings), home=mock.home)
 
@@ -61,6 +62,7 @@ class Scene:
         flight: Flight | None = None,
         elsewhere: bool = False,
         untimed: bool = False,
+        untold: Collection[str] = (),
         **options: Any,
     ) -> None:
         self.arm = bool(options.pop("arm", False))
@@ -73,7 +75,7 @@ class Scene:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         rows, peer = self.mock.lists.items(MissionType.MISSION), peer_of(kind)
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
-        held = held_by(self.mock)
+        held = held_by(self.mock, untold)
         ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
         self.watch: Any = Watch(peer, rows, arm=self.arm, lands=lands, readiness=ready)
         if solution is not None:

@@ -135,7 +135,8 @@ def test_it_stops_when_setpoints_cease(kind: str) -> None:
         "stops after 1 s (GUID_TIMEOUT)" if kind == "ardupilot" else "changes to Return after 1 s"
     )
     ending = scene.run(events=events, until=90.0)
-    assert scene.told(f"without setpoints it {words}")
+    (lost,) = (each for each in scene.watch.findings if each.rule == "on-setpoints-lost")
+    assert lost.message.startswith(f"setpoints lost: it {words}")
     if kind == "ardupilot":
         assert np.linalg.norm(at[1].position - at[0].position) < 0.1
     else:
@@ -174,7 +175,8 @@ def test_without_setpoints_or_sticks_px4_sinks_in_position() -> None:
     modes = list[int]()
     events = [(16.0, lambda _: modes.append(scene.mock.mode))]
     assert scene.run(events=events, until=90.0) == "taken over"
-    assert scene.told("it changes to Position (and sinks, unless sticks fly it) after 1 s")
+    told = "setpoints lost: it changes to Position (and sinks, unless sticks fly it) after 1 s"
+    assert any(each.message.startswith(told) for each in scene.watch.findings)
     assert modes == [px4_mode(3, 0)]
     assert scene.watch.seen.samples.height[-1] == pytest.approx(0.0, abs=0.1)
 

@@ -1,5 +1,6 @@
 """Streams in trouble: no setpoint beyond the gate, and every end has its name."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -19,7 +20,6 @@ from faao_mav.mavlink.messages import (
     Envelope,
     GlobalPositionInt,
     Message,
-    SetMode,
     SetPositionTargetLocalNed,
 )
 from faao_mav.mavlink.modes import px4_mode
@@ -212,7 +212,7 @@ def test_a_hold_is_asked_for_until_it_is_confirmed(kind: str, action: int, silen
         (end + 6.0, interrupt(scene)),
     ]
     assert scene.run(Faults(outages=((44.0, end),)), events=events) == "left"
-    assert scene.told("does not confirm that it holds: it is asked again")
+    assert scene.told("does not confirm that it holds, it does not answer: it is asked again")
     assert modes == [HOLD[kind]]
     assert scene.told("it holds")
     assert scene.watch.outcome.text.startswith("no longer watched: it is armed, in mode ")
@@ -230,8 +230,7 @@ def test_a_pilot_who_has_it_meanwhile_keeps_it(kind: str) -> None:
         (90.0, scene.does(MavCommand.ARM, 0)),
     ]
     assert scene.run(Faults(outages=((44.0, 64.0),)), events=events) == "taken over"
-    holds = [each for each in scene.orders[sent[0] :] if isinstance(each, SetMode)]
-    assert holds == []
+    assert scene.orders[sent[0] :] == []
 
 
 @KINDS
@@ -298,7 +297,8 @@ def test_a_landing_that_is_not_confirmed_is_interrupted_by_a_hold() -> None:
     answer = scene.mock.on
     scene.mock.on = lambda envelope, now: (
         ()
-        if isinstance(envelope.message, SetMode) and envelope.message.custom_mode == 9
+        if getattr(envelope.message, "command", None) == MavCommand.SET_MODE
+        and envelope.message.param2 == 9
         else answer(envelope, now)
     )
     events = [
@@ -316,15 +316,15 @@ def test_a_landing_that_is_not_confirmed_is_interrupted_by_a_hold() -> None:
 @pytest.mark.parametrize(
     ("kind", "parameters", "told"),
     [
-        ("px4", {"COM_OBL_RC_ACT": 6}, "would end the flight (terminate): COM_OBL_RC_ACT is 6"),
-        ("px4", {"COM_OBL_RC_ACT": 7}, "would stop the motors (disarm): COM_OBL_RC_ACT is 7"),
-        ("px4", {"COM_OBL_RC_ACT": 8}, "would do what is not known here: COM_OBL_RC_ACT is 8"),
-        ("px4", {"COM_OBL_RC_ACT": -1}, "would do what is not known here: COM_OBL_RC_ACT is -1"),
-        ("px4", {"COM_OF_LOSS_T": 0}, "act after 0 s: set COM_OF_LOSS_T to 0.2 to 60 s"),
-        ("px4", {"COM_OF_LOSS_T": 61}, "act after 61 s: set COM_OF_LOSS_T to 0.2 to 60 s"),
-        ("ardupilot", {"GUID_TIMEOUT": 3}, "3 s (until then it flies on): set GUID_TIMEOUT to 0.2"),
-        ("ardupilot", {"GUID_TIMEOUT": 1.01}, "act after 1.01 s (until then it flies on)"),
-        ("ardupilot", {"GUID_TIMEOUT": 0}, "set GUID_TIMEOUT to 0.2 to 1 s"),
+        ("px4", {"COM_OBL_RC_ACT": 6}, "without setpoints it terminates the flight (COM_OBL_RC_"),
+        ("px4", {"COM_OBL_RC_ACT": 7}, "it stops its motors (COM_OBL_RC_ACT 7)"),
+        ("px4", {"COM_OBL_RC_ACT": 8}, "it does what is not known here (COM_OBL_RC_ACT 8)"),
+        ("px4", {"COM_OBL_RC_ACT": -1}, "it does what is not known here (COM_OBL_RC_ACT -1)"),
+        ("px4", {"COM_OF_LOSS_T": 0}, "it acts after 0 s (COM_OF_LOSS_T) (set COM_OF_LOSS_T to 0."),
+        ("px4", {"COM_OF_LOSS_T": 61}, "it acts after 61 s (COM_OF_LOSS_T)"),
+        ("ardupilot", {"GUID_TIMEOUT": 3}, "after 3 s (GUID_TIMEOUT), and until then flies on"),
+        ("ardupilot", {"GUID_TIMEOUT": 1.01}, "(set GUID_TIMEOUT to 0.5 to 1 s)"),
+        ("ardupilot", {"GUID_TIMEOUT": 0}, "after 0 s (GUID_TIMEOUT)"),
     ],
 )
 def test_it_does_not_stream_to_what_would_not_be_safe_without(
@@ -337,11 +337,18 @@ def test_it_does_not_stream_to_what_would_not_be_safe_without(
 
 
 @KINDS
-def test_nor_to_one_that_does_not_tell(kind: str) -> None:
-    scene = Scene(kind, solution=low())
+@pytest.mark.parametrize("value", [math.nan, 2.5])
+def test_what_is_no_number_of_an_action_or_no_time_is_refused(kind: str, value: float) -> None:
     rules = setpoint_rules(ARDUPILOT if kind == "ardupilot" else PX4)
-    for name in rules.defaults:
-        del scene.mock.parameters.values[name]
+    values = rules.defaults | {rules.timeout: 1.0}
+    assert rules.refusal(values) is None
+    assert rules.refusal(values | {rules.loss or rules.timeout: value}) is not None
+
+
+@KINDS
+def test_nor_to_one_that_does_not_tell(kind: str) -> None:
+    rules = setpoint_rules(ARDUPILOT if kind == "ardupilot" else PX4)
+    scene = Scene(kind, solution=low(), untold=rules.defaults)
     assert scene.run() == "refused"
     assert f"it does not tell {' and '.join(rules.defaults)}" in scene.watch.outcome.text
     assert scene.orders == []

@@ -215,11 +215,11 @@ def test_it_arms_nothing_that_does_not_know_where_it_is() -> None:
 
 def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
     scene = Scene("ardupilot", arm=True)
-    scene.mock._why_not_armed = lambda: "Compass not healthy"  # type: ignore[method-assign]
+    scene.mock._why_not_armed = lambda: "Compass not healthy"
     assert scene.run() == "refused"
     assert [order.command for order in scene.orders if isinstance(order, CommandLong)] == [400]
     scene = Scene("px4", arm=True)
-    scene.mock._problem = lambda: "no valid mission"  # type: ignore[method-assign]
+    scene.mock._problem = lambda: "no valid mission"
     assert scene.run() == "refused"
     orders = [each for each in scene.orders if isinstance(each, CommandLong)]
     assert [(each.command, each.param1) for each in orders] == [(400, 1.0), (300, 0.0), (400, 0.0)]
@@ -244,7 +244,7 @@ def refuses_to_start(scene: Scene, deaf: Callable[[float], bool] = lambda _: Fal
     """Have the mock deny the start, and hear no order to disarm while it is `deaf`."""
     on = scene.mock.on
 
-    def deny(envelope: Envelope, now: float) -> Sequence[Message]:
+    def deny(envelope: Envelope, now: float) -> Any:
         match envelope.message:
             case CommandLong(command=MavCommand.START):
                 return [CommandAck(GROUND_STATION, MavCommand.START, 4)]
@@ -252,7 +252,7 @@ def refuses_to_start(scene: Scene, deaf: Callable[[float], bool] = lambda _: Fal
                 return ()
         return on(envelope, now)
 
-    scene.mock.on = deny  # type: ignore[method-assign]
+    scene.mock.on = deny
 
 
 def disarmings(scene: Scene) -> int:
@@ -301,7 +301,7 @@ def test_what_keeps_refusing_to_disarm_or_falls_silent_is_told() -> None:
     scene = Scene("ardupilot", arm=True)
     refuses_to_start(scene)
     arm = scene.mock._arm
-    scene.mock._arm = lambda wanted, now: arm(True, now) if wanted else 4  # type: ignore
+    scene.mock._arm = lambda wanted, now: arm(True, now) if wanted else 4
     assert scene.run() == "refused"
     assert scene.watch.outcome.text.endswith("it may still be armed: it answers MAV_RESULT 4")
     assert disarmings(scene) == 5
@@ -309,8 +309,8 @@ def test_what_keeps_refusing_to_disarm_or_falls_silent_is_told() -> None:
     refuses_to_start(scene, lambda _: True)
 
     def vanish(_: float) -> None:
-        scene.mock.tick = lambda *_: ()  # type: ignore[method-assign]
-        scene.mock.on = lambda *_: ()  # type: ignore[method-assign]
+        scene.mock.tick = lambda *_: ()
+        scene.mock.on = lambda *_: ()
 
     assert scene.run(events=[(4.0, vanish)]) == "refused"
     assert scene.watch.outcome.text.endswith("may still be armed: nothing was heard for 60 s")
@@ -332,7 +332,7 @@ def test_interrupted_while_it_arms_it_is_disarmed(again: bool) -> None:
         for message in scene.watch.cancel(now):
             scene.mock.on(Envelope(GROUND_STATION, message), now)
 
-    scene.mock.on = quiet  # type: ignore[method-assign]
+    scene.mock.on = quiet
     events = [(3.0, interrupt), *([(9.0, interrupt)] if again else [])]
     assert scene.run(events=events) == "left"
     assert scene.mock.armed == again
@@ -347,7 +347,7 @@ def test_a_mission_that_changes_while_it_is_started_is_disarmed() -> None:
     refuses_to_start(scene)
     rows, on = scene.mock.lists.items(MissionType.MISSION), scene.mock.on
 
-    def change(envelope: Envelope, now: float) -> Sequence[Message]:
+    def change(envelope: Envelope, now: float) -> Any:
         """Hold another mission as soon as it is armed, and say nothing to the start."""
         message = envelope.message
         if isinstance(message, CommandLong) and message.command == MavCommand.START:
@@ -355,7 +355,7 @@ def test_a_mission_that_changes_while_it_is_started_is_disarmed() -> None:
             return ()
         return on(envelope, now)
 
-    scene.mock.on = change  # type: ignore[method-assign]
+    scene.mock.on = change
     assert scene.run() == "changed"
     assert not scene.mock.armed
 
@@ -400,7 +400,7 @@ def test_a_terminal_that_goes_before_the_start_takes_the_start_along(kind: str) 
         for message in scene.watch.hang_up(now):
             scene.mock.on(Envelope(GROUND_STATION, message), now)
 
-    scene.mock.on = quiet  # type: ignore[method-assign]
+    scene.mock.on = quiet
     assert scene.run(events=[(3.0, hang_up)]) == "left"
     assert not scene.mock.armed
 

@@ -228,7 +228,7 @@ def flown(trial: Trial) -> Judged:
         solution=trial.solution,
         home=home,
         parameters=trial.parameters,
-        **({} if trial.streams else {"arm": True}),
+        arm=not trial.streams,
     )
     judge = Judge(scene.watch, trial, home)
     scene.client = judge

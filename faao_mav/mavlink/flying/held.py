@@ -7,9 +7,11 @@ from typing import Any
 from faao_mav.errors import InputError
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import HomePosition, WireItem
+from faao_mav.mavlink.modes import modes_of
 from faao_mav.mavlink.parameters import Names, Reading, ReadParameters
 from faao_mav.mavlink.protocol import HOME_POSITION, MavResult, MissionType
 from faao_mav.mavlink.questions import AskFor
+from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.exchange import Outcome, Peer
 from faao_mav.mavlink.transfer.pace import Timeouts
 from faao_mav.mavlink.transfer.session import download_lists
@@ -52,7 +54,9 @@ def names_of(vehicle: VehicleType) -> tuple[Names, ...]:
     """Return the parameters of `vehicle` that a flight depends on, each with all of its names."""
     flown = [tuple(each.names) for each in vehicle.parameters.values()]
     decided = [(name,) for each in vehicle.failsafes for name in each.defaults]
-    return tuple(dict.fromkeys([*flown, *decided]))
+    rules = setpoint_rules(vehicle.family)
+    streamed = [(name,) for name in rules.defaults if modes_of(vehicle).guided is not None]
+    return tuple(dict.fromkeys([*flown, *decided, *streamed]))
 
 
 def read_held(

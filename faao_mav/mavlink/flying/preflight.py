@@ -10,6 +10,7 @@ from faao_mav.mavlink.flying.seen import Flight, Seen
 from faao_mav.mavlink.modes import modes_of
 from faao_mav.mavlink.parameters import close, number_in
 from faao_mav.mavlink.protocol import MissionType
+from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.verify import compare
 from faao_mav.mavlink.whereabouts import (
     FIRST_AWAY,
@@ -280,6 +281,12 @@ def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
         else:
             action = "set what it is to do, unless that is meant: see docs/first-flight.md"
             yield _warning(rule, f"{failsafe.loss}: it {told.text}", action)
+    if flight.streamed:
+        rules = setpoint_rules(seen.vehicle.family)
+        if (refusal := rules.refusal(values)) is not None:
+            yield _error("on-setpoints-lost", *refusal)
+        else:
+            yield _note("on-setpoints-lost", f"setpoints lost: {rules.without(values)}")
     if seen.held.rows(MissionType.FENCE, seen.vehicle):
         response = own.type.at_fence(own)
         name = own.name_of(response.parameter)

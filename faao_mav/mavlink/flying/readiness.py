@@ -57,6 +57,11 @@ class Readiness:
         return tuple(each for each in self.findings or () if each.level is Level.ERROR)
 
     @property
+    def values(self) -> dict[str, float]:
+        """The vehicle's parameters that a flight depends on, by name."""
+        return self._held.reading.values
+
+    @property
     def deadline(self) -> float | None:
         """When `settle` is due, None: not by itself."""
         return None if self._reading is None else self._reading.deadline

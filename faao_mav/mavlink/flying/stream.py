@@ -1,7 +1,6 @@
 """Flying a plan by setpoints: the trajectory itself, not way points along it."""
 
-import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -24,8 +23,6 @@ from faao_mav.mavlink.messages import (
     GpsGlobalOrigin,
     Message,
     MissionCurrent,
-    ParamRequestRead,
-    ParamValue,
     Timesync,
 )
 from faao_mav.mavlink.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
@@ -33,14 +30,7 @@ from faao_mav.mavlink.setpoints import setpoint_rules
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.lean import beyond_lean
-from faao_mav.vehicle.px4 import PX4
 from faao_mav.vehicle.vehicle import vehicle_of
-
-_INT32 = 6
-"""MAV_PARAM_TYPE of whole numbers, which PX4 sends as their bits."""
-
-_ANSWER = 10.0
-"""Seconds in which the parameters of `SetpointRules` are asked for; chosen."""
 
 _STREAMED = 1.5
 """By how many times as long as the vehicle wants setpoints come before it is asked to follow them.
@@ -129,8 +119,7 @@ class Stream(Watch):
         self.flight = Itinerary(solution, Gate(plan), takes_off=takes_off)
         self._belief = Belief(self._top)
         self._frame = OwnFrame(self._family, plan.origin)
-        self._timeouts: dict[str, float] = {}
-        self._who_flies = WhoFlies(self._rules, self._guided, self._timeouts, self.seen)
+        self._who_flies = WhoFlies(self._rules, self._guided, self.seen)
         self._last_heard = float("inf")
         if self._rules.loss:
             self.seen.ask_for(CURRENT_MODE, _MODE_AGAIN)
@@ -149,10 +138,6 @@ class Stream(Watch):
         match envelope.message:
             case GpsGlobalOrigin() as origin:
                 self._frame.origin = origin
-            case ParamValue(name, value, kind) if name in self._rules.defaults:
-                if self._family == PX4 and kind == _INT32:
-                    (value,) = struct.unpack("<i", struct.pack("<f", value))
-                self._timeouts[name] = value
             case Timesync() as answer:
                 self._round_trips.hear(answer, now)
             case CurrentMode(custom_mode=mode) if self.phase in ("flying", "ending", "holding"):
@@ -176,20 +161,11 @@ class Stream(Watch):
         if self._frame.origin is None:
             ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
             out.append(CommandLong(target, *ask))
-        unread = [name for name in self._rules.defaults if name not in self._timeouts]
-        return [*out, *(ParamRequestRead(target, name, -1) for name in unread)]
+        return out
 
     def _set_out(self, now: float) -> Sequence[Message]:
-        position, known = self.seen.position, len(self._timeouts) == len(self._rules.defaults)
-        if position is None or self._frame.origin is None:
+        if self.seen.position is None or self._frame.origin is None:
             return ()
-        if not known and now < self._begun + _ANSWER:
-            return ()
-        refusal = self._rules.refusal(self._timeouts, self._period)
-        if refusal is not None:
-            self._end("refused", f"nothing was started: {refusal}")
-            return ()
-        self.seen.told.append(f"without setpoints {self._rules.without(self._timeouts)}")
         lean = beyond_lean(self._solution, vehicle_of(self._solution.plan))
         if lean is not None:
             self.seen.told.append(str(lean))
@@ -231,7 +207,7 @@ class Stream(Watch):
 
     def _see_who_flies(self, mode: int, now: float) -> None:
         """Step aside for somebody else; its failsafe for lost setpoints is told."""
-        flier = self._who_flies.see(mode, now)
+        flier = self._who_flies.see(mode, self._values, now)
         if flier == "others":
             self._step_aside()
         elif flier == "failsafe" and self.seen.told[-1] != _FAILSAFE:
@@ -307,9 +283,14 @@ class Stream(Watch):
         return out
 
     @property
+    def _values(self) -> Mapping[str, float]:
+        """The vehicle's parameters."""
+        return {} if self._ready is None else self._ready.values
+
+    @property
     def _without_setpoints(self) -> float:
         """For how many of the world's seconds it keeps its mode without setpoints."""
-        kept = (self._rules.defaults | self._timeouts)[self._rules.timeout]
+        kept = {**self._rules.defaults, **self._values}[self._rules.timeout]
         return kept / max(self._round_trips.clock_speed, 1.0)
 
     @property

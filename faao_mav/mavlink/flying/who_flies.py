@@ -16,14 +16,12 @@ pilot who changed it: six of them. Chosen."""
 class WhoFlies:
     """Tells from the modes that a vehicle is `seen` in who flies it.
 
-    `guided` is the mode for setpoints, `values` are the parameters of its `rules`. `unsure` tells
-    whether it is not known: nothing that moves it may be sent then.
+    `guided` is the mode for setpoints, which it follows by `rules`. `unsure`: it is not known, and
+    nothing that moves the vehicle may be sent.
     """
 
-    def __init__(
-        self, rules: SetpointRules, guided: int, values: Mapping[str, float], seen: Telemetry
-    ) -> None:
-        self._rules, self._guided, self._values, self._seen = rules, guided, values, seen
+    def __init__(self, rules: SetpointRules, guided: int, seen: Telemetry) -> None:
+        self._rules, self._guided, self._seen = rules, guided, seen
         self._unsure_since: float | None = None
 
     @property
@@ -35,8 +33,8 @@ class WhoFlies:
         """Know no more who flies it: it was silent, and may be in another mode since."""
         self._unsure_since, self._seen.wanted = now, None
 
-    def see(self, mode: int, now: float) -> Flier:
-        """Return who flies a vehicle that is in `mode` now.
+    def see(self, mode: int, values: Mapping[str, float], now: float) -> Flier:
+        """Return who flies a vehicle that is in `mode` now, `values` being its parameters.
 
         In the mode of its failsafe it is that, if the mode that was asked for last is still the one
         for setpoints.
@@ -45,7 +43,7 @@ class WhoFlies:
         flier: Flier = "others"
         if mode == self._guided:
             flier = "setpoints"
-        elif not self._rules.comes_back_from(mode, self._values):
+        elif not self._rules.comes_back_from(mode, values):
             flier = "others"
         elif wanted is not None:
             flier = "failsafe" if wanted.intended_custom_mode == self._guided else "others"
