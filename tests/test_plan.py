@@ -405,7 +405,7 @@ def test_shortest_duration_depends_on_the_ends(
         ("a: " + "9" * 5000, "thousands of digits"),
         ("a\x00b", "not valid YAML"),
         ("a: 1\n---\nb: 2\n", "line 2"),
-        ("x" * 200_001, "at most 200,000"),
+        ("x" * 655_361, "at most 655,360"),
     ],
 )
 def test_text_that_is_no_plan(text: str, part: str) -> None:

@@ -9,6 +9,14 @@ from faao_mav.errors import InputError
 LatLon: TypeAlias = tuple[float, float]
 """Latitude and longitude, WGS84 degrees."""
 
+MAX_CORNERS = 8_192
+"""Corners and circles of a fence, in all: ArduPilot keeps 8 bytes for each in at most 64 kB of its
+card (BRD_SD_FENCE), without a card 84 of them, and PX4 64 to 128."""
+
+_MAX_AREAS = 255
+"""Polygons or circles of a fence, to stay in or out of: ArduPilot counts each of these four kinds
+in 8 bits."""
+
 
 def check_place(place: LatLon, what: str, altitude: float = 0.0) -> None:
     """Raise `InputError`, which names `what`, for coordinates that are no place on Earth.
@@ -83,7 +91,8 @@ class Fence:
     """Where the aircraft may be: inside every inclusion, outside every exclusion.
 
     `breach_return` is where ArduPilot flies after a breach, or None. `notes` tell what of a drawing
-    was passed over. A fence without areas is false.
+    was passed over. A fence without areas is false. Raises `InputError` for more of anything than any
+    autopilot keeps.
 
     >>> bool(Fence(circles=(Circle((47.4, 8.5), 300.0, inclusion=True),))), bool(Fence())
     (True, False)
@@ -93,6 +102,22 @@ class Fence:
     circles: tuple[Circle, ...] = ()
     breach_return: RallyPoint | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        for shape, areas in (("polygons", self.polygons), ("circles", self.circles)):
+            for inclusion, kind in ((True, "inclusion"), (False, "exclusion")):
+                count = sum(area.inclusion is inclusion for area in areas)
+                if count > _MAX_AREAS:
+                    raise InputError(
+                        f"fence: {count:,} {kind} {shape}; at most {_MAX_AREAS} are accepted, as "
+                        "many as an autopilot tells apart"
+                    )
+        corners = sum(len(polygon.vertices) for polygon in self.polygons) + len(self.circles)
+        if corners > MAX_CORNERS:
+            raise InputError(
+                f"fence: {corners:,} corners and circles; at most {MAX_CORNERS:,} are accepted, as "
+                "many as an autopilot keeps: simplify it"
+            )
 
     def __bool__(self) -> bool:
         return bool(self.polygons or self.circles)

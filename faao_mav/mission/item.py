@@ -13,6 +13,14 @@ Params: TypeAlias = tuple[float, float, float, float]
 """param1 to param4 of an item."""
 
 
+MAX_ITEMS = 65_535
+"""Items of a mission: MISSION_COUNT has 16 bits. PX4 keeps 65,534 on Linux and 2,000 elsewhere,
+ArduPilot 15 bytes for each in at most 64 kB of its card (BRD_SD_MISSION)."""
+
+_MAX_RALLY = 255
+"""Rally points of a mission: ArduPilot counts them in 8 bits; PX4 keeps 8."""
+
+
 @dataclass(frozen=True, slots=True)
 class Home:
     """Where relative altitudes count from: WGS84 degrees, metres above mean sea level.
@@ -73,7 +81,8 @@ class Mission:
 
     The target of a DO_JUMP (param1) counts the items from 1, as every file format does: home is 0.
     A fence and rally points travel beside it: only some formats hold them. `unread` has those of
-    `BESIDE` that a vehicle may hold, but that could not be read from it.
+    `BESIDE` that a vehicle may hold, but that could not be read from it. Raises `InputError` for
+    more items or rally points than any autopilot keeps.
     """
 
     items: tuple[MissionItem, ...]
@@ -81,6 +90,10 @@ class Mission:
     fence: Fence = field(default_factory=Fence)
     rally: tuple[RallyPoint, ...] = ()
     unread: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_count(len(self.items), "items", MAX_ITEMS)
+        check_count(len(self.rally), "rally points", _MAX_RALLY)
 
     @property
     def first_place(self) -> LatLon | None:
@@ -90,6 +103,14 @@ class Mission:
             if item.command in FLOWN_TO and on_earth and (item.x or item.y):
                 return item.x, item.y
         return None
+
+
+def check_count(count: int, what: str, most: int) -> None:
+    """Raise `InputError` where a `count` of `what` is above the `most` that is accepted."""
+    if count > most:
+        raise InputError(
+            f"{count:,} {what}; at most {most:,} are accepted, as many as an autopilot keeps"
+        )
 
 
 def home_item(home: Home | None) -> MissionItem:

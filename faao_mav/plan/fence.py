@@ -43,7 +43,10 @@ def geofence(contents: PlanFile, source: str) -> Fence:
         for zone, inclusion in zones
         if isinstance(zone, CircleZone)
     ]
-    fence = Fence((*polygons, *of_file.polygons), (*circles, *of_file.circles))
+    try:
+        fence = Fence((*polygons, *of_file.polygons), (*circles, *of_file.circles))
+    except InputError as error:
+        raise PlanError(f"{source}: {error}") from None
     if not fence:
         raise PlanError(f"{source}: fence: has no zones; give inclusion, exclusion or file")
     return fence

@@ -18,10 +18,15 @@ from ruamel.yaml.nodes import MappingNode, Node
 from ruamel.yaml.resolver import VersionedResolver
 
 from faao_mav.errors import PlanError, shortened
+from faao_mav.mission.fence import MAX_CORNERS
 
-MAX_CHARACTERS = 200_000
-"""Characters of the longest plan that is read; chosen: a plan of every key has 3,000, and the
-slowest text of this length, a list of 100,000 numbers, takes 3 s."""
+MAX_CHARACTERS = 80 * MAX_CORNERS
+"""Characters of the longest plan that is read: a corner of the fence, written in degrees with all
+their digits, takes 76, and a plan of every other key 3,000."""
+
+_MAX_VALUES = 6 * MAX_CORNERS
+"""Keys, values, lists and mappings of the largest plan that is read: a corner of the fence, in
+degrees, is 5, and a plan of every other key 300. So many take 3 s."""
 
 _MAX_DEPTH = 20
 """Levels of nesting that are read; chosen: a plan has at most six."""
@@ -67,10 +72,15 @@ class _CoreResolver(VersionedResolver):
 
 
 class _PlainComposer(Composer):
+    _values = 0
+
     def compose_node(self, parent: Any, index: Any) -> Any:
         event = self.parser.peek_event()
+        self._values += 1
         problem = ""
-        if isinstance(event, AliasEvent):
+        if self._values > _MAX_VALUES:
+            problem = f"more than {_MAX_VALUES:,} keys and values, the most of a plan"
+        elif isinstance(event, AliasEvent):
             problem = "aliases (*name) are not used in plans"
         elif event.ctag is not None:
             problem = f"tags ({event.ctag}) are not used in plans"

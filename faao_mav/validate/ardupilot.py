@@ -293,7 +293,7 @@ def _altitude(context: ValidationContext) -> Iterator[Issue]:
     """An altitude is stored in whole centimetres."""
     changed = []
     for index, item in context.each(*FLOWN_TO):
-        stored = context.stored(item)
+        stored = context.stored(index)
         if stored is not None and abs(stored.z - item.z) > 1e-4 * max(1.0, abs(item.z)):
             changed.append((index, item.z, stored.z))
     if changed:

@@ -192,13 +192,19 @@ class ValidationContext:
         east, north = rally[chosen].tolist()
         return PlacedItem(home.index, east, north, math.nan)
 
-    def stored(self, item: MissionItem) -> MissionItem | None:
-        """Return what the vehicle gives back for `item`, None if it refuses it."""
-        dialect = self.vehicle.type.dialect
-        sent = dialect.sent(item)
-        if not fits_message(item) or dialect.refusal(sent):
-            return None
-        return dialect.stored(sent)
+    def stored(self, index: int) -> MissionItem | None:
+        """Return what the vehicle gives back for the item at `index`, None if it refuses it."""
+        if index not in self._stored:
+            item, dialect = self.items[index], self.vehicle.type.dialect
+            sent = dialect.sent(item)
+            taken = fits_message(item) and not dialect.refusal(sent)
+            self._stored[index] = dialect.stored(sent) if taken else None
+        return self._stored[index]
+
+    @cached_property
+    def _stored(self) -> dict[int, MissionItem | None]:
+        """What `stored` has found: three rules ask."""
+        return {}
 
     def jump_target(self, index: int) -> int | None:
         """Return the index that the jump at `index` goes to, None if there is no such item."""

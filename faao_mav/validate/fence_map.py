@@ -16,6 +16,9 @@ from faao_mav.validate.straight import Straight
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
+_NAMED = 3
+"""Parts of the fence that a path is told to break, at most; chosen: more help nobody."""
+
 
 def _lines(starts: Real, ends: Real) -> NDArray[np.object_]:
     """Return the straights from `starts` to `ends`, each (n, 2), as an array of n geometries."""
@@ -31,7 +34,7 @@ def _lines(starts: Real, ends: Real) -> NDArray[np.object_]:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """Which of n paths leave the fence, `any` (n,), and by which of its parts, `by`.
+    """Which of n paths leave the fence, `any` (n,), and by which of its parts, up to three, `by`.
 
     A part of None stands for several inclusions of which one would be enough.
     """
@@ -111,21 +114,35 @@ class FenceMap:
         return self.broken(self.rings)
 
     def broken(self, paths: Any) -> Broken:
-        """Return which of `paths` (n,), geometries of the local frame, leave the fence."""
+        """Return which of `paths` (n,), geometries of the local frame, leave the fence.
+
+        Of a path that breaks several parts the first `_NAMED` are told.
+        """
         import shapely
 
         by: list[tuple[Area | None, NDArray[np.bool_]]] = []
+        counts = np.zeros(len(paths), dtype=int)
+
+        def note(part: Area | None, tried: Integers, breaks: NDArray[np.bool_]) -> None:
+            broken = np.zeros(len(paths), dtype=np.bool_)
+            broken[tried[breaks]] = True
+            counts[broken] += 1
+            by.append((part, broken))
+
         inclusions = [area for area in self.areas if area.inclusion]
-        if self.any_inclusion and len(inclusions) > 1:
-            by.append((None, ~shapely.covers(self.free, paths)))
-        else:
-            by += [(area, ~shapely.covers(area.shape, paths)) for area in inclusions]
+        one_is_enough = self.any_inclusion and len(inclusions) > 1
+        if one_is_enough:
+            note(None, np.arange(len(paths)), ~shapely.covers(self.free, paths))
+        for area in () if one_is_enough else inclusions:
+            tried = np.flatnonzero(counts < _NAMED)
+            note(area, tried, ~shapely.covers(area.shape, paths[tried]))
         for area in self.areas:
             if not area.inclusion:
-                inside = shapely.intersects(area.shape, paths)
-                inside[inside] = ~shapely.touches(area.shape, paths[inside])
-                by.append((area, inside))
-        return Broken(np.logical_or.reduce([broken for _, broken in by]), tuple(by))
+                tried = np.flatnonzero(counts < _NAMED)
+                inside = shapely.intersects(area.shape, paths[tried])
+                inside[inside] = ~shapely.touches(area.shape, paths[tried[inside]])
+                note(area, tried, inside)
+        return Broken(counts > 0, tuple(by))
 
     @cached_property
     def nearest(self) -> tuple[float, int] | None:
@@ -133,25 +150,22 @@ class FenceMap:
 
         None if there are no legs, or if anything leaves the fence.
         """
-        paths = (self.broken_legs, self.broken_rings, self.broken_flight)
-        if not len(self.legs) or any(path.any.any() for path in paths):
-            return None
-        margins = self._margins(np.concatenate([self.legs, self.rings, self.flight]))
-        ordered = [*(leg.index for leg in self.straights), *self.circles]
-        items = [*ordered, *self.flight_items.tolist()]
-        nearest = int(np.argmin(margins))
-        return float(margins[nearest]), items[nearest]
-
-    def _margins(self, paths: NDArray[np.object_]) -> Real:
         import shapely
 
-        margin = np.full(len(paths), np.inf)
+        broken = (self.broken_legs, self.broken_rings, self.broken_flight)
+        if not len(self.legs) or any(each.any.any() for each in broken):
+            return None
+        paths = np.concatenate([self.legs, self.rings, self.flight])
+        ordered = [*(leg.index for leg in self.straights), *self.circles]
+        items = [*ordered, *self.flight_items.tolist()]
+        edges = [area.shape for area in self.areas if not area.inclusion]
         if self.free is not None:
-            margin = np.minimum(margin, shapely.distance(self.free.boundary, paths))
-        for area in self.areas:
-            if not area.inclusion:
-                margin = np.minimum(margin, shapely.distance(area.shape, paths))
-        return margin
+            edges.append(self.free.boundary)
+        (_, found), margins = shapely.STRtree(paths).query_nearest(edges, return_distance=True)
+        if not len(margins):  # exclusions that enclose nothing
+            return None
+        nearest = int(np.argmin(margins))
+        return float(margins[nearest]), items[found[nearest]]
 
 
 def fence_map(

@@ -126,7 +126,7 @@ _YAW = 3
 def _hold(context: ValidationContext) -> Iterator[Issue]:
     """A hold is not stored as it is written."""
     for index, item in context.each(*_HELD):
-        stored = context.stored(item)
+        stored = context.stored(index)
         if stored is not None and not _same(item.params[0], stored.params[0]):
             flies_on = not context.vehicle.type.hovers and item.command == Command.NAV_WAYPOINT
             yield Issue(
@@ -144,7 +144,7 @@ def _dropped(context: ValidationContext) -> Iterator[Issue]:
     """A parameter is not stored as it is written."""
     found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
     for index, item in context.each(*FLOWN_TO):
-        stored = context.stored(item)
+        stored = context.stored(index)
         if stored is None:
             continue
         for n, (value, kept) in enumerate(zip(item.params, stored.params, strict=True)):

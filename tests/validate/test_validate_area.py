@@ -93,6 +93,23 @@ def test_the_margin_is_the_distance_to_the_nearest_edge(spare: float) -> None:
         assert float(margin.message.split(" m ")[0]) == pytest.approx(spare, abs=0.06)
 
 
+def test_the_margin_is_that_of_the_nearest_of_many_areas() -> None:
+    posts = [circle(40 + 20 * k, 30 * (k % 9), 5) for k in range(255)]
+    legs = [at(0, 25 * k, 30) for k in range(1, 10)]
+    (margin,) = Given(flown(*legs, fence=fence(square(20_000), *posts))).by("fence-margin")
+    assert margin.message.startswith("35.0 m")
+    point = polygon((20, 0), (20, 0), (20, 0), inclusion=False)  # encloses nothing
+    assert Given(flown(*legs, fence=fence(point))).by("fence-margin") == []
+    (margin,) = Given(flown(*legs, fence=fence(point, posts[0]))).by("fence-margin")
+    assert margin.message.startswith("35.0 m")
+
+
+def test_of_many_areas_that_a_leg_breaks_three_are_named() -> None:
+    nested = [circle(0, 60, 10 + k) for k in range(100)]
+    (out,) = Given(flown(at(0, 300, 30), fence=fence(*nested))).by("fence-leg")[:1]
+    assert out.message.count("m of it inside exclusion circle") == 3
+
+
 def test_the_flight_counts_for_the_margin() -> None:
     bulge = track(((0, 0, 0), (60, 50, 30), (0, 100, 30)), [0, 1], 5.0)
     given_ = Given(flown(at(0, 100, 30), fence=fence(square(300))), track=bulge)

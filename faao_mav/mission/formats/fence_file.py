@@ -12,9 +12,6 @@ FENCE_SUFFIXES = (".plan", ".kml", ".kmz", ".geojson", ".json")
 MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
 
-_MAX_CORNERS = 2_000
-"""Corners of the largest fence that is read; chosen: autopilots store some hundred."""
-
 
 def read_fence(path: Path) -> Fence:
     """Return the fence in the file `path`, whose format its name's ending tells.
@@ -36,11 +33,6 @@ def read_fence(path: Path) -> Fence:
         fence = _drawing(path, suffix)
     if not fence:
         raise MissionFileError(f"{path}: holds no fence; expected polygons")
-    corners = sum(len(polygon.vertices) for polygon in fence.polygons) + len(fence.circles)
-    if corners > _MAX_CORNERS:
-        raise MissionFileError(
-            f"{path}: {corners:,} corners; at most {_MAX_CORNERS:,} are accepted: simplify it"
-        )
     return fence
 
 

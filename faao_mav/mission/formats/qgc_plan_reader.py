@@ -20,11 +20,11 @@ from pydantic import (
 
 from faao_mav.errors import InputError, MissionFileError, place_of, quote
 from faao_mav.mission.command import Command, Frame
-from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission.fence import MAX_CORNERS, Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats.losses import unread_losses
 from faao_mav.mission.formats.mission_file import MissionFile
 from faao_mav.mission.formats.strict_json import parse_json
-from faao_mav.mission.item import BESIDE, Home, Mission, MissionItem
+from faao_mav.mission.item import BESIDE, MAX_ITEMS, Home, Mission, MissionItem
 
 _AGAIN = "open the file in a current QGroundControl and save it again"
 _HINTS = {
@@ -73,7 +73,7 @@ class _SimpleItem(_Object):
 
 
 class _Transects(_Object):
-    Items: Annotated[list[_SimpleItem], FailFast()]
+    Items: Annotated[list[_SimpleItem], FailFast(), Field(max_length=MAX_ITEMS)]
 
 
 class _ComplexItem(_Object):
@@ -92,7 +92,7 @@ class _Mission(_Object):
     firmwareType: Byte | None = None
     vehicleType: Byte | None = None
     plannedHomePosition: Triple | None = None
-    items: Annotated[list[_Item], FailFast()]
+    items: Annotated[list[_Item], FailFast(), Field(max_length=MAX_ITEMS)]
 
 
 class _Disc(_Object):
@@ -108,20 +108,20 @@ class _Circle(_Object):
 
 class _Polygon(_Object):
     version: Version1
-    polygon: Annotated[list[Pair], FailFast()]
+    polygon: Annotated[list[Pair], FailFast(), Field(max_length=MAX_CORNERS)]
     inclusion: bool
 
 
 class _Fence(_Object):
     version: Version2
-    polygons: Annotated[list[_Polygon], FailFast()]
-    circles: Annotated[list[_Circle], FailFast()]
+    polygons: Annotated[list[_Polygon], FailFast(), Field(max_length=MAX_CORNERS)]
+    circles: Annotated[list[_Circle], FailFast(), Field(max_length=MAX_CORNERS)]
     breachReturn: Triple | None = None
 
 
 class _Rally(_Object):
     version: Version2
-    points: Annotated[list[Triple], FailFast()]
+    points: Annotated[list[Triple], FailFast(), Field(max_length=MAX_CORNERS)]
 
 
 def _or_none(part: object) -> object:
@@ -156,7 +156,7 @@ def read_qgc_plan(text: str, source: str) -> MissionFile:
         read = _mission(file)
     except ValidationError as error:
         raise MissionFileError(f"{source}: {_describe(error)}") from None
-    except MissionFileError as error:
+    except InputError as error:
         raise MissionFileError(f"{source}: {error}") from None
     warnings = tuple(f"{source}: {line}" for line in unread_losses(read))
     return MissionFile(read, file.mission.firmwareType, file.mission.vehicleType, warnings)
@@ -178,6 +178,8 @@ def _describe(error: ValidationError) -> str:
         return f"{where}.type: {quote(told['tag'])}; expected {told['expected_tags']}"
     if kind in ("too_short", "too_long"):
         length = told.get("min_length", told.get("max_length"))
+        if length >= MAX_CORNERS:
+            return f"{where}: more than {length:,} values, and no autopilot keeps so many"
         return f"{where}: {quote(detail['input'])}; expected an array of {length} values"
     words = (
         "an object" if kind.startswith("model_") else detail["msg"].removeprefix("Input should be ")

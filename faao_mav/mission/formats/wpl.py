@@ -26,7 +26,15 @@ from faao_mav.mission.command import ABOVE_HOME, CIRCLE, FENCE_RETURN_POINT, POL
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_items import fence_items, fence_of
 from faao_mav.mission.formats.mission_file import MissionFile
-from faao_mav.mission.item import Home, Mission, MissionItem, home_item, jump_moved
+from faao_mav.mission.item import (
+    MAX_ITEMS,
+    Home,
+    Mission,
+    MissionItem,
+    check_count,
+    home_item,
+    jump_moved,
+)
 
 HEADER = "QGC WPL 110"
 
@@ -148,7 +156,12 @@ def _rows(text: str, source: str) -> "tuple[_Layout, list[_Line]]":
     """Return the layout that the header names, and the rows under it: one at least."""
     lines = _lines(text)
     layout = _layout(next(lines, None), source)
-    rows = [_Line(source, number, line, layout) for number, line in lines]
+    told = list(lines)
+    try:
+        check_count(len(told) - layout.home_row, "items", MAX_ITEMS)
+    except InputError as error:
+        raise MissionFileError(f"{source}: {error}") from None
+    rows = [_Line(source, number, line, layout) for number, line in told]
     if not rows:
         first = "row 0, the home position, and the items" if layout.home_row else "items"
         raise MissionFileError(f"{source}: a header but no items; expected {first}")

@@ -1,0 +1,193 @@
+"""What no autopilot keeps is refused by every format, at the same count, in one line."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import SMALL
+
+from faao_mav.errors import InputError
+from faao_mav.mission import fence
+from faao_mav.mission.fence import MAX_CORNERS, Circle, Fence, LatLon, Polygon, RallyPoint
+from faao_mav.mission.fence_items import fence_items
+from faao_mav.mission.formats import read_mission, write_mission
+from faao_mav.mission.formats.fence_file import read_fence
+from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
+from faao_mav.mission.item import MAX_ITEMS, Mission, MissionItem
+from faao_mav.plan import parse_plan, read_plan, yaml_text
+from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml
+
+Zones = tuple[tuple[LatLon, ...], ...]
+"""Corners of exclusions in degrees."""
+
+
+def ring(corners: int, number: int = 0) -> tuple[LatLon, ...]:
+    """Return the corners of a thin strip that crosses nothing."""
+    half, west = corners // 2, 149.17 + number * 1e-5
+    there = [(-35.36 + k * 1e-6, west) for k in range(half)]
+    back = [(-35.36 + k * 1e-6, west + 5e-6) for k in reversed(range(corners - half))]
+    return (*there, *back)
+
+
+def as_plan(zones: Zones, folder: Path) -> Path:
+    path = folder / "x.plan"
+    polygons = [{"polygon": zone, "inclusion": False, "version": 1} for zone in zones]
+    contents = {
+        "fileType": "Plan",
+        "version": 1,
+        "mission": {"version": 2, "items": []},
+        "geoFence": {"version": 2, "polygons": polygons, "circles": []},
+    }
+    path.write_text(json.dumps(contents))
+    return path
+
+
+def as_geojson(zones: Zones, folder: Path) -> Path:
+    path = folder / "x.geojson"
+    rings = [[[list(place[::-1]) for place in zone]] for zone in zones]
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"name": f"no-fly {k}"},
+            "geometry": {"type": "Polygon", "coordinates": ring},
+        }
+        for k, ring in enumerate(rings)
+    ]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    return path
+
+
+def as_kml(zones: Zones, folder: Path) -> Path:
+    path = folder / "x.kml"
+    placemarks = "".join(
+        f"<Placemark><name>no-fly {k}</name><Polygon><outerBoundaryIs><LinearRing><coordinates>"
+        + " ".join(f"{longitude},{latitude}" for latitude, longitude in zone)
+        + "</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>"
+        for k, zone in enumerate(zones)
+    )
+    path.write_text(f"<kml><Document>{placemarks}</Document></kml>")
+    return path
+
+
+def as_rows(zones: Zones, folder: Path) -> Path:
+    path = folder / "x.waypoints"
+    write_mission(Mission((MissionItem(16, 3),)), path)
+    rows = [
+        f"{k}\t0\t0\t{item.command}\t{item.params[0]}\t0\t0\t0\t{item.x}\t{item.y}\t0\t1"
+        for zone in zones
+        for k, item in enumerate(fence_items(Fence((Polygon(zone, False),))))
+    ]
+    (folder / "x.fence.waypoints").write_text("\n".join(["QGC WPL 110", *rows]))
+    return path
+
+
+def as_yaml(zones: Zones, folder: Path) -> Path:
+    path = folder / "x.yaml"
+    places = [{"polygon": [{"latitude": a, "longitude": b} for a, b in zone]} for zone in zones]
+    path.write_text(f"{SMALL}fence: {{exclusion: {json.dumps(places)}}}\n")
+    return path
+
+
+FORMATS: dict[Callable[[Zones, Path], Path], Callable[[Path], object]] = {
+    as_plan: read_mission,
+    as_geojson: read_fence,
+    as_kml: read_fence,
+    as_rows: read_mission,
+    as_yaml: read_plan,
+}
+
+
+@pytest.mark.parametrize("write", FORMATS)
+def test_a_fence_has_one_limit_in_all_formats(
+    write: Callable[[Zones, Path], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fence, "MAX_CORNERS", 1_000)  # as many as are quick to read
+    read = FORMATS[write]
+    many = tuple(ring(3, k) for k in range(255))
+    long = (ring(600), ring(400, 1))
+    for kept in (many, long):
+        read(write(kept, tmp_path))
+    for zones, told in (
+        ((*many, ring(3, 255)), "256 exclusion polygons; at most 255 are accepted"),
+        ((*long, ring(3, 2)), "1,003 corners and circles; at most 1,000 are accepted"),
+    ):
+        path = write(zones, tmp_path)
+        with pytest.raises(InputError, match=rf"x\.(fence\.)?[a-z]+: fence: {told}") as caught:
+            read(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_each_kind_of_area_is_counted_by_itself() -> None:
+    circles = tuple(
+        Circle((1.0, 2.0), 3.0, inclusion) for inclusion in (True, False) for _ in range(255)
+    )
+    assert Fence((), circles)
+    with pytest.raises(InputError, match="256 inclusion circles"):
+        Fence((), (*circles, circles[0]))
+
+
+def test_the_fence_of_a_plan_and_that_of_its_file_have_the_limit_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fence, "MAX_CORNERS", 1_000)
+    as_geojson((ring(600),), tmp_path)
+    path = as_yaml((ring(400, 1),), tmp_path)
+    path.write_text(path.read_text().replace("fence: {", "fence: {file: x.geojson, "))
+    text = read_plan(path).text  # the copy beside a result, with all corners in it
+    assert sum(len(polygon.vertices) for polygon in parse_plan(text).geofence.polygons) == 1_000
+    as_geojson((ring(601),), tmp_path)
+    with pytest.raises(InputError, match=r"x\.yaml: fence: 1,001 corners and circles"):
+        read_plan(path)
+
+
+def test_the_largest_fence_fits_into_the_longest_plan() -> None:
+    place = {"latitude": -35.000000000000004, "longitude": -149.00000000000003}
+    one, other = (
+        dump_yaml({"fence": {"exclusion": [{"polygon": [place] * count}]}}) for count in (1, 2)
+    )
+    corner = len(other) - len(one)
+    assert corner * MAX_CORNERS + len(SMALL) < MAX_CHARACTERS
+
+
+def test_more_items_than_a_count_can_tell_are_refused(tmp_path: Path) -> None:
+    row = "\n0 0 3 16 0 0 0 0 1 1 1 1"
+    path = tmp_path / "x.waypoints"
+    path.write_text("QGC WPL 110" + row * (MAX_ITEMS + 1))
+    assert len(read_mission(path).items) == MAX_ITEMS
+    path.write_text("QGC WPL 110" + row * (MAX_ITEMS + 2))
+    with pytest.raises(InputError, match="65,536 items; at most 65,535 are accepted"):
+        read_mission(path)
+    with pytest.raises(InputError, match="256 rally points; at most 255"):
+        Mission((), rally=(RallyPoint(1.0, 2.0, 3.0),) * 256)
+
+
+@pytest.mark.parametrize(
+    ("key", "inside", "most"),
+    [
+        ("mission.items", '"items": [', MAX_ITEMS),
+        ("geoFence.polygons", '"polygons": [', MAX_CORNERS),
+        ("rallyPoints.points", '"points": [', MAX_CORNERS),
+    ],
+)
+def test_endless_lists_of_a_plan_file_are_not_read_to_their_end(
+    key: str, inside: str, most: int, tmp_path: Path
+) -> None:
+    one = {
+        "mission.items": '{"type": "SimpleItem", "command": 16, "frame": 3, "autoContinue": true,'
+        '"params": [0, 0, 0, 0, 1, 1, 1]}',
+        "geoFence.polygons": '{"version": 1, "polygon": [[1, 1], [1, 2], [2, 2]],'
+        '"inclusion": true}',
+        "rallyPoints.points": "[1, 1, 1]",
+    }[key]
+    text = as_plan((), tmp_path).read_text()
+    text = text[:-1] + ', "rallyPoints": {"version": 2, "points": []}}'
+    with pytest.raises(InputError, match=rf"x: {key}: more than {most:,} values"):
+        read_qgc_plan(text.replace(inside, inside + ", ".join([one] * (most + 1))), "x")
+
+
+def test_a_plan_of_too_many_values_is_not_read_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(yaml_text, "_MAX_VALUES", 1_000)
+    for value in ("[]", "{}", "1", "{a: 1}", "a: 1", "''"):
+        with pytest.raises(InputError, match=r"line 1, .* 1,000 keys and values"):
+            parse_plan("{a: [" + f"{value}," * 1_000 + "]}")
