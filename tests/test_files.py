@@ -6,9 +6,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from full_disk import files_of_at_most
 
 from faao_mav.errors import InputError, PlanError
-from faao_mav.files import check_apart, check_writable, read_text, write_together, write_whole
+from faao_mav.files import (
+    append_whole,
+    check_apart,
+    check_writable,
+    cut,
+    read_text,
+    write_together,
+    write_whole,
+)
 
 
 def test_content_arrives_and_replaces(tmp_path: Path) -> None:
@@ -40,6 +49,24 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(
         write_whole(path, b"new")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_is_added_is_added_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "rows"
+    append_whole(path, b"one\n")
+    append_whole(path, b"two\n")
+    with (
+        files_of_at_most(10),
+        pytest.raises(InputError, match="rows: cannot be written: File too large"),
+    ):
+        append_whole(path, b"three\n")  # two of its bytes fit
+    assert path.read_bytes() == b"one\ntwo\n"
+    append_whole(path, b"three\n")
+    cut(path, 4)
+    assert path.read_bytes() == b"one\n"
+    for full in (tmp_path / "absent" / "rows", Path("/dev/full")):
+        with pytest.raises(InputError, match=f"{full}: cannot be written"):
+            append_whole(full, b"x")
 
 
 def test_places_that_cannot_be_written(tmp_path: Path) -> None:

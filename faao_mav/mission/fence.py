@@ -91,8 +91,8 @@ class Fence:
     """Where the aircraft may be: inside every inclusion, outside every exclusion.
 
     `breach_return` is where ArduPilot flies after a breach, or None. `notes` tell what of a drawing
-    was passed over. A fence without areas is false. Raises `InputError` for more of anything than any
-    autopilot keeps.
+    was passed over. A fence without areas is false. Raises `InputError` for more of anything than
+    any autopilot keeps.
 
     >>> bool(Fence(circles=(Circle((47.4, 8.5), 300.0, inclusion=True),))), bool(Fence())
     (True, False)

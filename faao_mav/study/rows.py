@@ -15,7 +15,7 @@ from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError, place_of
-from faao_mav.files import read_bytes, write_whole
+from faao_mav.files import append_whole, cut, read_bytes
 from faao_mav.study.sweep import StudyCase, Value
 
 ROWS, TABLE = "rows.jsonl", "table.csv"
@@ -83,17 +83,14 @@ def as_dict(row: StudyRow) -> dict[str, Any]:
 
 
 def append_row(row: StudyRow, directory: Path) -> None:
-    """Add `row` to the directory's rows by one write: another reader sees all of it or nothing.
-
-    Raises `InputError`.
-    """
+    """Add `row` to the directory's rows. Raises `InputError`, and leaves them as they were."""
     line = json.dumps(asdict(row) | {"route": row.route.tolist()}, allow_nan=False) + "\n"
-    path = directory / ROWS
     try:
-        with path.open("ab", buffering=0) as file:
-            file.write(line.encode())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        append_whole(directory / ROWS, line.encode())
+    except InputError as error:
+        raise InputError(
+            f"{error}; the rows before are kept, and the same command goes on there"
+        ) from None
 
 
 def load_rows(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ...]:
@@ -114,7 +111,7 @@ def load_rows(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ..
                 raise InputError(
                     f"{path}: its last line is no row of a study; give another directory"
                 )
-            write_whole(path, content[: -len(line)])
+            cut(path, len(content) - len(line))
             break
         row = _row(line, f"{path}: line {number}")
         if row.key in keys:

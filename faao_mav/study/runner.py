@@ -1,6 +1,7 @@
 """All cases of a study over all cores, each kept as soon as it is done."""
 
-from collections.abc import Callable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -72,19 +73,26 @@ def run_study(
             if observe is not None:
                 observe(row)
         done = {row.key: row for row in old}
-        for row in _rows([case for case in cases if case.key not in done], jobs, cluster):
-            if directory is not None:
-                append_row(row, directory)
-            done[row.key] = row
-            if observe is not None:
-                observe(row)
+        running = _rows([case for case in cases if case.key not in done], jobs, cluster)
+        try:
+            for row in running:
+                if directory is not None:
+                    append_row(row, directory)
+                done[row.key] = row
+                if observe is not None:
+                    observe(row)
+        finally:
+            with warnings.catch_warnings(action="ignore"):  # joblib says that it leaves work undone
+                running.close()
         rows = in_order(cases, done)
         if directory is not None:
             write_whole(directory / TABLE, table(rows).encode())
         return rows
 
 
-def _rows(cases: Sequence[StudyCase], jobs: int, cluster: str | None) -> Iterator[StudyRow]:
+def _rows(
+    cases: Sequence[StudyCase], jobs: int, cluster: str | None
+) -> Generator[StudyRow, None, None]:
     """Run `cases`; yield their rows as they finish. With a `cluster` joblib is connected to it."""
     from joblib import Parallel, delayed, effective_n_jobs
 

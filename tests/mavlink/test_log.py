@@ -1,13 +1,11 @@
 """The log of an exchange: whose it is, what it leaves out, and a disk that is full."""
 
-import resource
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from conftest import free_port
+from full_disk import files_of_at_most
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 from served import running
@@ -37,17 +35,6 @@ def names(path: Path) -> list[str]:
         found.append(message.get_type())
     log.close()
     return found
-
-
-@contextmanager
-def files_of_at_most(size: int) -> Iterator[None]:
-    """Let nobody write beyond `size` bytes: what a full disk does to a file."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("there_before", [True, False])

@@ -14,6 +14,7 @@ from typing import Any, get_args
 import pytest
 from conftest import PATIENCE, SMALL, edited
 from distributed import LocalCluster
+from full_disk import files_of_at_most
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -247,6 +248,28 @@ def test_a_row_that_cannot_be_kept_is_an_input_error(tmp_path: Path) -> None:
     (tmp_path / "rows.jsonl").mkdir()
     with pytest.raises(InputError, match=r"rows\.jsonl: cannot be written"):
         append_row(StudyRow("k", {}, "faao", 0), tmp_path)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_study_on_a_full_disk_keeps_whole_rows_and_goes_on(
+    tmp_path: Path, whole: tuple[Path, tuple[StudyRow, ...]], jobs: int, plan: Path
+) -> None:
+    path = tmp_path / "out" / "rows.jsonl"
+    arguments = (plan, "--power", "0,10,20", "--schemes", "faao,mrt", "--out", path.parent)
+    with files_of_at_most(2_000):  # two rows and a part of the third
+        result = run(*arguments, "--jobs", jobs)
+    assert result.exit_code == 2
+    kept = path.read_bytes()
+    assert kept.endswith(b"}\n")
+    assert kept.count(b"\n") == 2
+    (line,) = result.stderr.splitlines()
+    assert f"{path}: cannot be written: File too large; the rows before are kept" in line
+    path.write_bytes(kept + kept[:700])  # where nothing could be cut back
+    with files_of_at_most(1_500):  # less than the file has: the torn row is dropped all the same
+        assert len(load_rows(path.parent, CASES)) == 2
+    assert path.read_bytes() == kept
+    assert run(*arguments, "--jobs", jobs).exit_code == 0
+    assert timeless(load_rows(path.parent, CASES)) == timeless(whole[1])
 
 
 def test_there_are_no_more_processes_than_cases(monkeypatch: pytest.MonkeyPatch) -> None:
