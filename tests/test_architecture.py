@@ -15,7 +15,7 @@ PACKAGE = Path(faao_mav.__file__).parent
 
 FLOORS = (
     ("errors", "arrays"),
-    ("vector", "files", "geodesy", "power"),
+    ("vector", "files", "geodesy", "power", "processes"),
     ("radio", "mission"),
     ("plan",),
     ("vehicle",),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from faao_mav.errors import FaaoError, InputError, check_extra
 from faao_mav.files import check_writable, write_whole
+from faao_mav.processes import apart_from_the_current_directory
 from faao_mav.study.rows import TABLE, StudyRow, append_row, in_order, load_rows, table
 from faao_mav.study.sweep import StudyCase
 
@@ -103,7 +104,8 @@ def _rows(
     processes = min(effective_n_jobs(jobs), len(cases))  # no more than there is work for
     if processes <= 1:
         yield from map(run_case, cases)
-    else:
+        return
+    with apart_from_the_current_directory():
         workers = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1)
         yield from workers(delayed(run_case)(case) for case in cases)
 

@@ -15,6 +15,7 @@ import pytest
 from conftest import PATIENCE, SMALL, edited
 from distributed import LocalCluster
 from full_disk import files_of_at_most
+from planted import plant
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -28,6 +29,16 @@ from faao_mav.study.rows import ROWS, append_row, as_dict, comparison
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
+
+CALL = """
+import os
+from pathlib import Path
+from faao_mav.study import make_cases, run_study
+if __name__ == "__main__":
+    cases = make_cases(Path("plan.yaml").read_text(), vary={"power_dbm": (0, 10)})
+    print(len(run_study(cases, jobs=2)), "PYTHONSAFEPATH" in os.environ)
+"""
+"""A study that is called from Python."""
 
 
 def timeless(rows: tuple[StudyRow, ...]) -> list[StudyRow]:
@@ -91,6 +102,25 @@ def test_a_resumed_study_is_the_uninterrupted_one(
 
 def test_processes_do_not_change_the_result(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     assert timeless(run_study(CASES, jobs=2)) == timeless(whole[1])
+
+
+def test_modules_beside_the_plan_are_not_run(plan: Path) -> None:
+    ran = plant(plan.parent)
+    command = [str(Path(sys.executable).with_name("faao-mission")), "study", plan.name]
+    for more in (["--power", "0,10", "--jobs", "2"], ["--frontier", "power,data", "--points", "3"]):
+        study = subprocess.run(
+            [*command, *more], cwd=plan.parent, capture_output=True, text=True, check=False
+        )
+        assert (study.returncode, study.stderr) == (0, "")
+    assert not ran.exists()
+    script = plan.parent / "elsewhere" / "call.py"
+    script.parent.mkdir()
+    script.write_text(CALL)
+    called = subprocess.run(
+        [sys.executable, script], cwd=plan.parent, capture_output=True, text=True, check=False
+    )
+    assert (called.stdout, called.stderr) == ("2 False\n", "")
+    assert not ran.exists()
 
 
 def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:

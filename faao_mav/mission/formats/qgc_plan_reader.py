@@ -177,7 +177,7 @@ def _describe(error: ValidationError) -> str:
     if kind == "union_tag_invalid":
         return f"{where}.type: {quote(told['tag'])}; expected {told['expected_tags']}"
     if kind in ("too_short", "too_long"):
-        length = told.get("min_length", told.get("max_length"))
+        length = int(told.get("min_length", told.get("max_length", 0)))
         if length >= MAX_CORNERS:
             return f"{where}: more than {length:,} values, and no autopilot keeps so many"
         return f"{where}: {quote(detail['input'])}; expected an array of {length} values"
