@@ -16,9 +16,11 @@ from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
+from faao_mav.mission.fence_area import Area, FreeArea
 from faao_mav.optimizer.rough import RoughFlight, rough_flight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
+from faao_mav.plan.zones import PolygonZone
 from faao_mav.report.parts import write_part
 from faao_mav.validate.energy import energy_use
 from faao_mav.vector import lengths
@@ -134,12 +136,15 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
         "track": [],
         "waypoints": [],
         "margin": [],
-        "fixed": [],
+        "zones": [],
     }
     if plan.fence is not None and (area := plan.keep_in) is not None:
         drawn["margin"] = [degrees(edge) for edge in area.inside(plan.fence.margin).edges()]
-        if plan.fence.file is not None:
-            drawn["fixed"] = [degrees(edge) for edge in area.edges()]
+        drawn["zones"] = [
+            [zone.inclusion, degrees(edge)]
+            for zone in _zones_of_file(plan)
+            for edge in FreeArea(zone.shape).edges()
+        ]
     if result is not None and result.conversion is not None:
         drawn["track"] = degrees(thinned(result.conversion.schedule.track()["predicted_w"]))
         drawn["waypoints"] = [
@@ -148,6 +153,18 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
             if item.command in _WAYPOINTS and (item.x or item.y)
         ]
     return drawn
+
+
+def _zones_of_file(plan: Plan) -> list[Area]:
+    """Return the zones of the fence that are of its file: of each shape they come last."""
+    assert plan.fence is not None
+    own = (*plan.fence.inclusion, *plan.fence.exclusion)
+    own_polygons, all_polygons = (
+        sum(isinstance(zone, PolygonZone) for zone in own),
+        len(plan.geofence.polygons),
+    )
+    polygons, circles = plan.zones[:all_polygons], plan.zones[all_polygons:]
+    return [*polygons[own_polygons:], *circles[len(own) - own_polygons :]]
 
 
 def thinned(values: Real) -> Real:

@@ -16,7 +16,9 @@ _HEIGHT, _ABOVE, _WIDE = 70, 50, 560
 """Height of a plot and of what is above it, and from where on two are side by side, in pixels.
 Chosen."""
 
-_GREY, _COLOURS = "#888", ("#3b7ddd", "#d9731a", "#2a9d5c", "#8a5cd0", "#c23b6a", "#c9a227")
+_GREY = "#888"
+_COLOURS = ("#3b7ddd", "#d9731a", "#2a9d5c", "#8a5cd0", "#c23b6a", "#c9a227", "#4a9aa8")
+"""Of each curve, in the order of `_PLOTS`."""
 
 
 def options(series: dict[str, list[float]], unit: str) -> dict[str, Any]:
@@ -24,12 +26,17 @@ def options(series: dict[str, list[float]], unit: str) -> dict[str, Any]:
     plots = [plot for plot in _PLOTS if plot[0][0] in series]
     axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
             "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
-    xs, ys, curves = [], [], []
+    xs: list[dict[str, Any]] = []
+    ys: list[dict[str, Any]] = []
+    curves: list[dict[str, Any]] = []
     for k, (names, of) in enumerate(plots):
-        title = f"{', '.join(names)}, {of.format(unit=unit)}"
+        colours = _COLOURS[len(curves) :]
+        title = ", ".join(f"{{c{n}|━}} {name}" for n, name in enumerate(names))
+        marks = {f"c{n}": {"color": colours[n], "fontWeight": "bold"} for n in range(len(names))}
         xs.append({**axis, "gridIndex": k, "max": "dataMax"})
-        ys.append({**axis, "gridIndex": k, "min": 0, "name": title, "nameGap": 10,
-                   "nameTextStyle": {"align": "left", "color": _GREY}})  # fmt: skip
+        ys.append({**axis, "gridIndex": k, "min": 0, "nameGap": 10,
+                   "name": f"{title}, {of.format(unit=unit)}",
+                   "nameTextStyle": {"align": "left", "color": _GREY, "rich": marks}})  # fmt: skip
         for name in names:
             curve = [list(pair) for pair in zip(series["t"], series[name], strict=True)]
             curves.append({"type": "line", "name": name, "xAxisIndex": k, "yAxisIndex": k,

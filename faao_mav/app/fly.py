@@ -1,4 +1,4 @@
-"""The panel "Fly": upload, watch, arm and start, debrief; the vehicle and its track on the map."""
+"""The panel "Fly": upload, watch, the command that flies, debrief; the vehicle on the map."""
 
 import asyncio
 import tempfile
@@ -9,8 +9,8 @@ from typing import Any
 from nicegui import events, ui
 
 from faao_mav.app.planner import mistake
-from faao_mav.app.vehicle import debriefed, uploaded, watched
-from faao_mav.app.workers import Workers
+from faao_mav.app.vehicle import MISSION, debriefed, fly_command, uploaded, watched
+from faao_mav.app.workers import Interrupt, Workers
 from faao_mav.errors import FaaoError
 from faao_mav.mavlink.flying.telling import as_text
 from faao_mav.workflow import Result
@@ -22,37 +22,46 @@ _MOST_LINES = 100
 """Lines of what has happened that are shown. Chosen."""
 
 _ABOUT = """Upload reads the mission back and compares; Watch compares, then follows the vehicle on
-the map. Neither arms nor starts it: while it is watched on the ground, Arm and start does, once you
-confirm it."""
+the map, and may be left or closed at any time. Neither arms nor starts it."""
+
+_HOW = f"Arm and start on the command line, in the folder to which {MISSION} was downloaded:"
 
 
 class Fly:
     """What is done with a vehicle: one thing at a time, with the mission of the finished flight.
 
-    Setup, once: `Fly(workers, draw)`, where `draw` calls the map's method of a name; `show` is for
-    a finished flight, `stale` for when the plan has changed since; at the end: `close`. A watch
-    goes on with the flight with which it began.
+    Setup, once: `Fly(workers, draw, download)`, where `draw` calls the map's method of a name and
+    `download` sends the browser the file of a name; `show` is for a finished flight, `stale` for
+    when the plan has changed since; at the end: `close`. A watch goes on with the flight with
+    which it began.
     """
 
-    def __init__(self, workers: Workers, draw: Callable[..., object]) -> None:
+    def __init__(
+        self, workers: Workers, draw: Callable[..., object], download: Callable[[str], object]
+    ) -> None:
         self._workers, self._draw = workers, draw
         self._result: Result | None = None  # of the finished flight
-        self._watched: Result | None = None
+        self._file: Path | None = None  # that has its plan
         self._task: asyncio.Task[None] | None = None
-        self._arms, self._phase = False, ""
-        self._interrupt = workers.event()
+        self._interrupt = Interrupt()
         with ui.tab_panel("Fly"):
-            self._connection = ui.input("Connection", value="udpout:127.0.0.1:14550")
+            self._connection = ui.input(
+                "Connection", value="udpout:127.0.0.1:14550", on_change=self._enable
+            )
             self._connection.classes("w-full")
             with ui.row().classes("mt-2 gap-2"):
                 self._upload_button = _button("Upload and verify", self._upload)
-                self._watch_button = _button("Watch", self._begin_to_watch)
-                self._arm_button = _button("Arm and start", self._ask_to_arm)
-                self._leave_button = _button("Leave", self._leave)
-            self._arm_button.props("color=red-9")
+                self._watch_button = _button("Watch", self._watch)
+                self._leave_button = _button("Leave", self._interrupt.set)
             self._stands = ui.label().classes("uploaded stands")
             self._told = ui.label().classes("uploaded").props('aria-live="polite"')
             ui.label(_ABOUT).classes("about mt-2")
+            with ui.element("div").classes("to-fly") as self._to_fly:
+                ui.label(_HOW).classes("about")
+                self._command = ui.label().classes("command")
+                with ui.row().classes("gap-2"):
+                    _button(f"Download {MISSION}", lambda: download(MISSION))
+                    _button("Copy", lambda: ui.clipboard.write(self._command.text))
             ui.separator().classes("my-3")
             self._log = ui.upload(
                 label="Debrief: drop a log (.bin, .tlog, .ulg)",
@@ -67,87 +76,64 @@ class Fly:
         self._result = None
         self._enable()
 
-    def show(self, result: Result) -> None:
-        """Take `result` for the finished flight."""
-        self._result = result
+    def show(self, result: Result, file: Path | None) -> None:
+        """Take `result` for the finished flight; `file` has its plan, where one has."""
+        self._result, self._file = result, file
         self._enable()
 
     def close(self) -> None:
-        """Watch no longer; the vehicle goes on with what it does."""
+        """Watch no longer, and cancel an upload; the vehicle goes on with what it does."""
         if self._task is not None:
             self._task.cancel()
 
     def _enable(self) -> None:
-        ready = self._result is not None and self._result.flyable and self._task is None
-        self._upload_button.set_enabled(ready)
-        self._watch_button.set_enabled(ready)
-        self._arm_button.set_enabled(self._phase == "waiting")
-        self._leave_button.set_enabled(self._watched is not None)
-        holds = self._arms and self._phase in ("starting", "flying")
-        self._leave_button.text = "Hold" if holds else "Leave"
+        flyable = self._result is not None and self._result.flyable
+        self._upload_button.set_enabled(flyable and self._task is None)
+        self._watch_button.set_enabled(flyable and self._task is None)
+        self._leave_button.set_enabled(self._task is not None)
+        self._command.text = fly_command(str(self._connection.value), self._file)
+        self._to_fly.set_visibility(flyable and bool(self._command.text))
 
-    def _begin(self, work: Coroutine[Any, Any, str]) -> None:
+    def _begin(self, work: Callable[..., str]) -> None:
+        """Do `work` with the mission and the connection as they stand now."""
+        if self._result is None or self._task is not None:
+            return
         self._stands.text = self._told.text = ""
-        self._task = asyncio.create_task(self._until_done(work))
+        asked = (self._interrupt, self._result, str(self._connection.value))
+        self._task = asyncio.create_task(
+            self._until_done(self._workers.talk(work, self._hear, *asked))
+        )
         self._enable()
 
-    async def _until_done(self, work: Coroutine[Any, Any, str]) -> None:
+    async def _until_done(self, talk: Coroutine[Any, Any, str]) -> None:
         try:
-            self._tell(await work)
+            said = await talk
         except Exception as error:
-            self._tell(_failure(error))
-        finally:
-            self._task = self._watched = None
-            self._arms, self._phase = False, ""
-            self._enable()
+            said = _failure(error)
+        self._task = None
+        self._tell(said)
+        self._enable()
 
     def _tell(self, text: str) -> None:
         lines = [*self._told.text.splitlines(), *text.splitlines()]
         self._told.text = "\n".join(lines[-_MOST_LINES:])
 
     def _upload(self) -> None:
-        if self._result is not None and self._task is None:
-            asked = (self._result, str(self._connection.value))
-            self._begin(asyncio.to_thread(uploaded, *asked))
+        self._begin(uploaded)
 
-    def _begin_to_watch(self) -> None:
-        if self._result is not None and self._task is None:
-            self._watch(self._result, arm=False)
-
-    def _watch(self, result: Result, *, arm: bool) -> None:
-        self._watched, self._arms = result, arm
-        self._interrupt.clear()
+    def _watch(self) -> None:
         self._draw("flown", [])
-        asked = (self._interrupt, result, str(self._connection.value), arm)
-        self._begin(self._workers.talk(watched, self._hear, *asked))
+        self._begin(watched)
 
     def _hear(self, told: dict[str, Any]) -> None:
         if "note" in told:
             self._tell(as_text(told))
             return
-        self._phase, self._stands.text = told["phase"], f"{told['phase']:<10}{as_text(told)}"
+        if "doing" in told:
+            self._stands.text = told["doing"]
+            return
+        self._stands.text = f"{told['phase']:<10}{as_text(told)}"
         self._draw("flies", [told["latitude"], told["longitude"]])
-        self._enable()
-
-    def _leave(self) -> None:
-        self._interrupt.set()
-
-    async def _ask_to_arm(self) -> None:
-        """Arm and start the vehicle that is watched, if that is confirmed."""
-        with ui.dialog() as dialog, ui.card():
-            ui.label(f"Arm the vehicle at {self._connection.value} and start its mission?")
-            ui.label("Its propellers will turn, and it will take off, once its own checks pass and "
-                     "no other ground station is on the link.")  # fmt: skip
-            with ui.row():
-                _button("Cancel", lambda: dialog.submit(False)).props("flat autofocus")
-                _button("Yes, arm it", lambda: dialog.submit(True)).props("color=red-9")
-        confirmed = await dialog
-        dialog.delete()
-        watched, task = self._watched, self._task
-        if confirmed and watched is not None and task is not None and self._phase == "waiting":
-            self._leave()
-            await task
-            self._watch(watched, arm=True)
 
     async def _debrief(self, event: events.UploadEventArguments) -> None:
         self._log.reset()

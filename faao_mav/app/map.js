@@ -6,6 +6,13 @@ import { loadResource } from "../../static/utils/resources.js";
 const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [200, 220, 50]];
 const SHADES = 20; // colours of the route
 const PERIOD = 50; // milliseconds between two reports of one drag
+const LINES = {
+  "zone-in": "stay in",
+  "zone-out": "stay out",
+  margin: "margin of the fence",
+  track: "predicted flight",
+  flown: "flown",
+};
 const NUDGE = 10, FINE = 1; // pixels by which an arrow key moves a marker, and with Shift
 
 function colour(share) {
@@ -14,6 +21,7 @@ function colour(share) {
   return `rgb(${mixed.join(",")})`;
 }
 
+const zone_class = (inclusion) => (inclusion ? "zone-in" : "zone-out");
 const pair = (p) => [p.lat, p.lng];
 
 function icon(kind, label = "") {
@@ -32,7 +40,7 @@ export default {
     this.map.attributionControl.setPrefix(false);
     L.control.scale({ imperial: false }).addTo(this.map);
     const legend = L.control({ position: "topright" });
-    legend.onAdd = () => (this.speeds = L.DomUtil.create("div", "speeds"));
+    legend.onAdd = () => (this.key = L.DomUtil.create("div", "key"));
     legend.addTo(this.map);
     const group = () => L.layerGroup().addTo(this.map);
     Object.assign(this, { zones: group(), route: group(), marks: group(), handles: group() });
@@ -45,7 +53,7 @@ export default {
     this.$el.addEventListener("keydown", (e) => {
       if (e.key === "Escape") this.draw(null);
       if (e.key === "Enter" && this.drawing) this.finish();
-      if (e.key === "Delete" && this.selected) this.$emit("removed", { key: this.selected });
+      if (e.key === "Delete") this.remove_selected();
     });
     this.watching = new ResizeObserver(() => this.map.invalidateSize());
     this.watching.observe(this.$el);
@@ -96,12 +104,13 @@ export default {
       if (focused) this.$el.querySelector(`[title="${CSS.escape(focused)}"]`)?.focus();
       this.shapes = zones;
       this.show_zones();
+      this.show_key();
       if (fit && stations.length) this.map.fitBounds(L.latLngBounds(stations.map((s) => s.at)).pad(0.35));
     },
     show_zones() {
       this.zones.clearLayers();
       for (const zone of this.shapes) {
-        const style = { className: zone.inclusion ? "zone-in" : "zone-out", bubblingMouseEvents: false, fill: !zone.inclusion };
+        const style = { className: zone_class(zone.inclusion), bubblingMouseEvents: false, fill: !zone.inclusion };
         const shape = zone.center ? L.circle(zone.center, { ...style, radius: zone.radius }) : L.polygon(zone.corners, style);
         shape.on("click", (e) => (this.drawing ? this.corner(e.latlng) : this.select(zone.key))).addTo(this.zones);
         zone.shape = shape;
@@ -141,8 +150,11 @@ export default {
         }).addTo(this.handles),
       );
     },
+    // Keys count zones: with this one gone, its key is that of the next, which nobody has chosen.
     remove_selected() {
-      if (this.selected) this.$emit("removed", { key: this.selected });
+      const key = this.selected;
+      this.select(null);
+      if (key) this.$emit("removed", { key });
     },
     // Begin to draw a "polygon" or a "circle" to stay in or out of; null ends without one.
     draw(kind, inclusion) {
@@ -169,13 +181,15 @@ export default {
         this.$emit("zone", { key: null, inclusion, corners: points.map(pair), done: true });
       }
     },
-    // The flight: planned route coloured by speed, predicted track, waypoints, margin of the fence.
-    flight({ places, speeds, top, track, waypoints, margin, fixed }) {
+    // The flight: planned route coloured by speed, predicted track, waypoints, the fence's margin and
+    // the zones of its file.
+    flight({ places, speeds, top, track, waypoints, margin, zones }) {
       this.route.clearLayers();
+      this.top = top;
       const line = (points, className, more = {}) =>
         L.polyline(points, { className, interactive: false, ...more }).addTo(this.route);
       for (const ring of margin) line(ring, "margin");
-      for (const ring of fixed) line(ring, "zone-file");
+      for (const [inclusion, ring] of zones) line(ring, zone_class(inclusion), { fill: !inclusion, smoothFactor: 0.2 });
       const shade = (k) => Math.round((SHADES * (speeds[k] + speeds[k + 1])) / (2 * top));
       for (let k = 0, from = 0; k + 1 < places.length; k++) {
         if (k + 2 < places.length && shade(k + 1) === shade(k)) continue;
@@ -183,8 +197,6 @@ export default {
         from = k + 1;
       }
       if (track.length) line(track, "track");
-      const shades = VIRIDIS.map((_, k) => colour(k / (VIRIDIS.length - 1)));
-      this.speeds.innerHTML = `0<b style="background: linear-gradient(to right, ${shades})"></b>${Number(top).toFixed(1)} m/s`;
       const labelled = [];
       for (const [number, at] of waypoints) {
         const here = this.map.latLngToContainerPoint(at);
@@ -193,12 +205,24 @@ export default {
         const html = `<b></b>${apart ? `<i>${Number(number)}</i>` : ""}`;
         L.marker(at, { icon: L.divIcon({ className: "waypoint", html, iconSize: [0, 0] }), interactive: false, keyboard: false }).addTo(this.route);
       }
+      this.show_key();
       this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;
     },
     clear_flight() {
       this.route.clearLayers();
-      this.speeds.innerHTML = "";
+      this.top = null;
+      this.show_key();
       this.aircraft.remove();
+    },
+    // What the lines on the map are: the speeds of the route, and each kind of line that is there.
+    show_key() {
+      const shades = VIRIDIS.map((_, k) => colour(k / (VIRIDIS.length - 1)));
+      const speeds = `0<b style="background: linear-gradient(to right, ${shades})"></b>${Number(this.top).toFixed(1)} m/s`;
+      const there = (name) => (name === "flown" ? this.track.getLatLngs().length : this.$el.querySelector(`.leaflet-pane path.${name}`));
+      const lines = Object.entries(LINES).filter(([name]) => there(name));
+      const row = ([name, text]) => `<svg><path class="${name}" d="M0 4H22"/></svg>${text}`;
+      const rows = [...(this.top ? [speeds] : []), ...lines.map(row)];
+      this.key.innerHTML = rows.map((each) => `<div>${each}</div>`).join("");
     },
     place_aircraft(at) {
       if (at) this.aircraft.setLatLng(at).addTo(this.map);
@@ -208,10 +232,12 @@ export default {
     flown(places) {
       this.vehicle.remove();
       this.track.setLatLngs(places).addTo(this.map);
+      this.show_key();
     },
     flies(at) {
       this.track.addLatLng(at);
       this.vehicle.setLatLng(at).addTo(this.map);
+      this.show_key();
     },
     focus(at) {
       this.map.setView(at, Math.max(this.map.getZoom(), 17));

@@ -30,6 +30,9 @@ _HINTS = {
     "polygon": "Click the corners, the last one twice; Esc ends.",
 }
 
+_OTHER_SHADE = "() => emit(!document.body.classList.contains('body--dark'))"
+"""Tells whether the page is to be dark, where it is now light."""
+
 _STATES = {
     "computing": "computing",
     "rough": "rough, computing",
@@ -88,7 +91,10 @@ class Page:
                 )
                 for wanted, (label, _) in FILES.items():
                     ui.menu_item(label, partial(self._download, wanted))
-            _button("dark_mode", "Light or dark", self._dark.toggle)
+            # only the browser knows which of both it shows until one is chosen
+            _button("dark_mode", "Light or dark").on(
+                "click", lambda e: self._dark.set_value(e.args), js_handler=_OTHER_SHADE
+            )
 
     def _map_part(self) -> None:
         self._map = PlannerMap()
@@ -129,7 +135,7 @@ class Page:
             with ui.tab_panel("Plan"):
                 self._form.build()
             self._results = Results(partial(self._map.run_method, "focus"))
-            self._fly = Fly(self._workers, self._map.run_method)
+            self._fly = Fly(self._workers, self._map.run_method, self._download)
 
     def _ready(self) -> None:
         self._draw_scene(fit=True)
@@ -146,6 +152,7 @@ class Page:
         self._redo.set_enabled(document.can_redo)
         self._save_button.set_enabled(document.path is not None and not document.saved)
         self._fly.stale()
+        self._results.stale()
         self._say("computing")
         self._planner.ask(document.text, document.source, soon=soon)
 
@@ -163,12 +170,15 @@ class Page:
         self._failed.text = answer.failed or "\n".join(
             f"{path}: {problem}" if path else problem for path, problem in problems.items()
         )
+        self._answer = answer
         if not answer.drawing:
             self._rate.text = ""
             self._say("refused" if problems else "failed")
             self._map.run_method("clear_flight")
+            self._chart.run_chart_method("clear")
+            self._results.clear()
+            self._at_time()
             return
-        self._answer = answer
         data = "" if answer.megabytes is None else f", {answer.megabytes:,.1f} MB"
         self._rate.text = f"{answer.delivered:.4f} bit/s/Hz{data}"
         self._rate.props["data-delivered"] = repr(answer.delivered)
@@ -189,7 +199,7 @@ class Page:
         self._at_time()
         if answer.result is not None:
             self._results.show(answer.result)
-            self._fly.show(answer.result)
+            self._fly.show(answer.result, self._plan_file)
 
     def _draw_scene(self, *, fit: bool = False) -> None:
         scene = Scene(self._document)
@@ -228,6 +238,7 @@ class Page:
         series, k = self._answer.series, int(self._slider.value)
         if not k or k >= len(series.get("t", ())):
             self._map.run_method("place_aircraft", None)
+            self._now.text = ""
             return
         self._map.run_method("place_aircraft", self._answer.drawing["places"][k])
         tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
@@ -274,7 +285,14 @@ class Page:
             _complain(error)
             return
         self._save_button.set_enabled(False)
+        if self._answer.result is not None:
+            self._fly.show(self._answer.result, self._plan_file)
         ui.notify(f"{self._document.path.name} saved", type="positive")
+
+    @property
+    def _plan_file(self) -> Path | None:
+        """The file that has the plan as it is now, or None."""
+        return self._document.path if self._document.saved else None
 
     async def _download(self, wanted: str) -> None:
         if self._answer.result is None:

@@ -21,15 +21,25 @@ class Results:
         with ui.tab_panel("Findings"):
             self._findings = ui.column().classes("findings")
 
+    def stale(self) -> None:
+        """Mark what is shown as of the plan before."""
+        for shown in (self._facts, self._findings):
+            shown.classes("stale")
+
+    def clear(self) -> None:
+        """Show nothing."""
+        for shown in (self._facts, self._findings):
+            shown.classes(remove="stale")
+            shown.clear()
+
     def show(self, result: Result) -> None:
         """Show what is to be said of `result` in the place of what was."""
-        self._facts.clear()
+        self.clear()
         with self._facts:
             for line in result_lines(result):
                 for tag, words in zip(("dt", "dd"), line, strict=True):
                     with ui.element(tag):
                         ui.label(str(words))
-        self._findings.clear()
         with self._findings:
             if result.no_mission is not None:
                 ui.label(str(result.no_mission)).classes("finding error")

@@ -63,12 +63,19 @@ class Scene:
         return found
 
     def move(self, kind: str, at: list[float], gesture: object) -> None:
-        """Write the place of a station or end."""
+        """Write the place of a station or end, where there is an origin to count from."""
+        if self.frame is None:
+            return
         path = STATIONS[kind][0]
         self._document.put(path, self._as_before(path, at), gesture)
 
     def change(self, told: dict[str, Any], gesture: object) -> None:
-        """Write a zone that was moved, or with the key None a new one."""
+        """Write a zone that was moved, or with the key None a new one.
+
+        A zone that is no longer there, undone while it was dragged, stays away.
+        """
+        if self.frame is None or not (told["key"] is None or self._has(told["key"])):
+            return
         name = "inclusion" if told["inclusion"] else "exclusion"
         value: Any
         if told.get("center"):
@@ -81,16 +88,19 @@ class Scene:
             old = self._document.value(path)
             self._document.put(path, value["polygon"] if isinstance(old, list) else value, gesture)
             return
-        zones = self._document.value(path) or []
+        held = self._document.value(path)
+        zones = held if isinstance(held, list) else []
         if path == ("fence", "inclusion") and zones and not self._are_zones(zones):
             zones = [{"polygon": zones}]  # the short form holds one polygon only
-        if len(zones) and zones == self._document.value(path):
+        if zones and zones == held:
             self._document.put((*path, len(zones)), value)
         else:
             self._document.put(path, [*zones, value])
 
     def remove(self, key: str) -> None:
-        """Take a zone out, and the whole fence with its last."""
+        """Take a zone out, if it is there, and the whole fence with its last."""
+        if not self._has(key):
+            return
         path = _path(key)
         rest = [each for each, _, _ in self._listed() if each != path]
         if not rest and self._document.value(("fence", "file")) is None:
@@ -124,6 +134,9 @@ class Scene:
     def _metres(self, at: list[float]) -> list[float]:
         assert self.frame is not None
         return [round(x, _METRES) + 0.0 for x in self.frame.to_local(*at).tolist()]
+
+    def _has(self, key: str) -> bool:
+        return any(path == _path(key) for path, _, _ in self._listed())
 
     def _listed(self) -> Iterator[tuple[Path, bool, Any]]:
         for name in ("inclusion", "exclusion"):

@@ -5,6 +5,7 @@ import contextlib
 import secrets
 import socket
 import tempfile
+import threading
 import webbrowser
 from collections.abc import Callable, Iterator
 from html import escape
@@ -20,13 +21,18 @@ from faao_mav.app.page import Page
 from faao_mav.app.tiles import OPEN_STREET_MAP, TileFile
 from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError, InputError
+from faao_mav.processes import apart_from_the_current_directory
 
 LOOPBACK = ("127.0.0.1", "localhost")
 """The names under which this machine reaches itself."""
 
 _TOKEN_BYTES = 24
 
+_GRACE = 2
+"""Seconds that a page which is open has to take its leave when the server ends. Chosen."""
 
+
+@apart_from_the_current_directory()
 def serve(
     begin: Callable[[], Document],
     *,
@@ -64,19 +70,33 @@ def serve(
             return Response(found, media_type=tiles.media_type)
 
     ui.run_with(inner, dark=None, show_welcome_message=False)
-    names = LOOPBACK if host in LOOPBACK else (host, *LOOPBACK)
-    guarded = Guard(inner, token, names, port)
-    config = uvicorn.Config(guarded, log_level="warning", server_header=False, lifespan="on")
-    server = uvicorn.Server(config)
-    address = f"http://{host}:{port}/?token={token}"
-    note(f"the page is at {address}")
-    try:
-        with _opened(address) if browser else contextlib.nullcontext():
-            asyncio.run(server.serve(sockets=[listening]))
-    except KeyboardInterrupt:
-        note("ended")
-    finally:
-        workers.stop()
+    here = f"[{host}]" if ":" in host else host
+    names = LOOPBACK if host in LOOPBACK else (here, *LOOPBACK)
+    config = uvicorn.Config(
+        Guard(inner, token, names, port),
+        log_level="warning",
+        server_header=False,
+        lifespan="on",
+        timeout_graceful_shutdown=_GRACE,
+    )
+
+    class Server(uvicorn.Server):
+        """Says where it is once it listens there."""
+
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            address = f"http://{here}:{port}/?token={token}"
+            note(f"the page is at {address}")
+            if browser:
+                opening.enter_context(_opened(address))
+
+    with contextlib.ExitStack() as opening:
+        try:
+            asyncio.run(Server(config).serve(sockets=[listening]))
+        except KeyboardInterrupt:
+            note("ended")
+        finally:
+            workers.stop()
 
 
 def _bound(host: str, port: int) -> socket.socket:
@@ -100,5 +120,6 @@ def _opened(address: str) -> Iterator[None]:
         page = Path(folder) / "open.html"
         page.touch(mode=0o600)
         page.write_text(f'<meta http-equiv="refresh" content="0;url={escape(address)}">')
-        webbrowser.open(page.as_uri())
+        # a browser of the terminal ends when its user does, who wants to be served meanwhile
+        threading.Thread(target=webbrowser.open, args=[page.as_uri()], daemon=True).start()
         yield

@@ -1,11 +1,13 @@
 """What the page does with a vehicle and its logs: upload, watch, debrief, as the command line does.
 
-Everything here takes and returns what can be sent between processes.
+It arms and starts nothing: a page that is closed takes its processes along, which must not be those
+that fly. Everything here takes and returns what can be sent between processes.
 """
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,19 +18,32 @@ from faao_mav.report.lines import joined
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle
 from faao_mav.workflow import Result
 
+MISSION = "mission.plan"
+"""The file, of those that are downloaded, that `fly_command` flies: it has fence and vehicle in it,
+and what is not of the mission that a vehicle holds is not started."""
 
-class Interrupt(Protocol):
-    """What the page sets to interrupt a job, as Ctrl-C does a command: an `Event`."""
+Tell = Callable[[dict[str, Any]], object]
+"""What a job tells the page: a `note`, what it is `doing`, or how a flight stands."""
 
-    def is_set(self) -> bool:
-        """Whether it is set."""
 
-    def clear(self) -> None:
-        """Take note of it."""
+def fly_command(connection: str, plan: Path | None) -> str:
+    """Return the line of a shell that arms the vehicle at `connection` and starts `MISSION`.
+
+    `plan` is the file of the plan, where it has one. Returns nothing for a connection that is none.
+
+    >>> fly_command("udpout:127.0.0.1:14550", None)
+    'faao-mission fly mission.plan --to udpout:127.0.0.1:14550 --arm'
+    """
+    if not connection.strip() or not connection.isprintable():
+        return ""
+    words = ["faao-mission", "fly", MISSION, "--to", connection]
+    if plan is not None and str(plan).isprintable():
+        words += ["--plan", str(plan.resolve())]
+    return shlex.join([*words, "--arm"])
 
 
 def _to_fly(result: Result) -> Conversion:
-    """Return the mission of `result`, to be put on a vehicle or started.
+    """Return the mission of `result`, to be put on a vehicle.
 
     What the command line would not upload is not returned: `PlanError` for a mission with errors,
     and for that of a plan beyond its vehicle.
@@ -40,35 +55,44 @@ def _to_fly(result: Result) -> Conversion:
     return result.conversion
 
 
-def uploaded(result: Result, connection: str) -> str:
+def uploaded(tell: Tell, interrupted: Callable[[], bool], result: Result, connection: str) -> str:
     """Upload the mission of `result` to `connection`, read it back, compare; return what to tell.
 
-    Nothing is armed or started.
+    Nothing is armed or started. `interrupted` is asked for Ctrl-C, which cancels the upload.
+    Raises what `upload` raises.
     """
     from faao_mav.mavlink.client import upload
     from faao_mav.mavlink.flying.seen import Flight
     from faao_mav.mavlink.upload_text import upload_text
 
-    try:
-        flight = Flight.planned(_to_fly(result), result.solution)
-        report = upload(flight.mission, connection, made_for=flight.made_for, note=lambda _: None)
-    except FaaoError as error:
-        return f"failed       {error}"
+    said = ""
+
+    def look(what: str, done: int, total: int) -> None:
+        nonlocal said
+        before, said = said, f"{what}, {done} of {total}" if total else what
+        if said != before:
+            tell({"doing": said})
+        if interrupted():
+            raise KeyboardInterrupt
+
+    flight = Flight.planned(_to_fly(result), result.solution)
+    report = upload(
+        flight.mission,
+        connection,
+        made_for=flight.made_for,
+        observe=look,
+        note=lambda text: tell({"note": text}),
+    )
+    tell({"doing": ""})
     told = upload_text(report)
     return told if report.verified else f"{told}\nthe mission is not verified; do not fly it"
 
 
-def watched(
-    tell: Callable[[dict[str, Any]], object],
-    interrupt: Interrupt,
-    result: Result,
-    connection: str,
-    arm: bool,
-) -> str:
+def watched(tell: Tell, interrupted: Callable[[], bool], result: Result, connection: str) -> str:
     """Watch the vehicle at `connection` fly the mission of `result`; return what became of it.
 
-    It is `faao-mission fly`, with `arm` its --arm: see `faao_mav.mavlink.flying.fly`. `tell` is
-    given what a `Telling` says; `interrupt`, once set, is Ctrl-C. Raises what `fly` raises.
+    It is `faao-mission fly` without --arm: see `faao_mav.mavlink.flying.fly`, and what that
+    raises. `tell` is given what a `Telling` says; `interrupted` is asked for Ctrl-C.
     """
     from faao_mav.mavlink.flying.fly import fly
     from faao_mav.mavlink.flying.seen import Flight
@@ -77,8 +101,7 @@ def watched(
     from faao_mav.report.debrief import flight_lines
 
     def look(*_: object) -> None:
-        if interrupt.is_set():
-            interrupt.clear()
+        if interrupted():
             raise KeyboardInterrupt
 
     def watching(watch: Watch) -> None:
@@ -91,7 +114,6 @@ def watched(
     report = fly(
         Flight.planned(conversion, result.solution),
         connection,
-        arm=arm,
         lands=track is None or track.lands,
         watching=watching,
         observe=look,

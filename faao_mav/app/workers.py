@@ -4,9 +4,11 @@ import asyncio
 import multiprocessing
 import os
 import signal
+import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
@@ -20,7 +22,28 @@ _PRELOADED = ("faao_mav.app.answers", "faao_mav.report", "scipy.interpolate", "s
 _NICE = 10
 """By how much long jobs give way to the page and to short ones. Chosen."""
 
+_GRACE = 2.0
+"""Seconds that a talk has to end by itself, as an upload that tells the vehicle that it is
+cancelled. A job looks once a second."""
+
 _ENDED = "the process that computes has ended; change the plan again"
+
+
+class Interrupt:
+    """What ends a talk early: once `set`, its job finds itself interrupted, as by Ctrl-C."""
+
+    def __init__(self) -> None:
+        self._end: Connection | None = None
+
+    def begin(self, end: Connection) -> None:
+        """Belong to the talk at the other `end`."""
+        self._end = end
+
+    def set(self) -> None:
+        """Interrupt the talk, if one goes on."""
+        if self._end is not None:
+            with suppress(OSError):
+                self._end.send(None)
 
 
 class Workers:
@@ -28,7 +51,7 @@ class Workers:
 
     Setup, once: `Workers()`, which begins to load what jobs need; per job: `short`, `long` or
     `talk`; at the end: `stop`. A job of a process of its own ends with its wait: cancelled, the
-    process is killed.
+    process is killed, that of a talk after `_GRACE` seconds in which it is interrupted.
     """
 
     def __init__(self) -> None:
@@ -56,40 +79,49 @@ class Workers:
     async def long(self, work: Callable[..., T], *arguments: Any) -> T:
         """Return what `work` returns, or raise what it raises, of a process of its own."""
         async with self._free:
-            return await self._run(work, arguments, None)
+            return await self._run(work, arguments)
 
     async def talk(
-        self, work: Callable[..., T], hear: Callable[[Any], object], *arguments: Any
+        self,
+        work: Callable[..., T],
+        hear: Callable[[Any], object],
+        interrupt: Interrupt,
+        *arguments: Any,
     ) -> T:
         """Do the same, but at once and giving way to nothing: what cannot wait for its turn.
 
-        The first argument of `work` is a function; what that is given is given to `hear`.
+        The first arguments of `work` are two functions: what the one is given is given to `hear`,
+        the other returns whether `interrupt` was set since it was last asked.
         """
-        return await self._run(work, arguments, hear)
-
-    def event(self) -> Any:
-        """Return an `Event` that can be an argument of a job."""
-        return self._context.Event()
+        return await self._run(work, arguments, hear, interrupt)
 
     async def _run(
         self,
         work: Callable[..., T],
         arguments: tuple[object, ...],
-        hear: Callable[[Any], object] | None,
+        hear: Callable[[Any], object] | None = None,
+        interrupt: Interrupt | None = None,
     ) -> T:
-        receiver, sender = self._context.Pipe(duplex=False)
-        told = (sender, work, arguments, hear is not None)
+        here, there = self._context.Pipe()
+        told = (there, work, arguments, interrupt is not None)
         process = self._context.Process(target=_job, args=told)
         process.daemon = True
         process.start()
-        sender.close()
+        there.close()
+        if interrupt is not None:
+            interrupt.begin(here)
         try:
             # a process that is killed closes its end: the thread that waits ends too
-            while (message := await asyncio.to_thread(receiver.recv))[0] == "tells":
+            while (message := await asyncio.to_thread(here.recv))[0] == "tells":
                 if hear is not None:
                     hear(message[1])
         except EOFError:
             raise FaaoError(_ENDED) from None
+        except asyncio.CancelledError:
+            if interrupt is not None:
+                interrupt.set()
+                await _ended(process)
+            raise
         finally:
             process.kill()
         if message[0] == "fails":
@@ -98,21 +130,39 @@ class Workers:
         return value
 
     def stop(self) -> None:
-        """End the process that stays; those of long jobs end with their waits."""
+        """End all processes, whatever they do."""
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
+        for process in multiprocessing.active_children():
+            process.kill()
+
+
+async def _ended(process: Any) -> None:
+    """Wait for the end of `process`, `_GRACE` seconds at most."""
+    last = time.monotonic() + _GRACE
+    while process.is_alive() and time.monotonic() < last:
+        await asyncio.sleep(0.05)
 
 
 def _job(
-    sender: Connection, work: Callable[..., object], arguments: tuple[object, ...], talks: bool
+    end: Connection, work: Callable[..., object], arguments: tuple[object, ...], talks: bool
 ) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the page, which ends its jobs
     if talks:
-        arguments = (lambda told: sender.send(("tells", told)), *arguments)
+        arguments = (lambda told: end.send(("tells", told)), lambda: _interrupted(end), *arguments)
     elif hasattr(os, "nice"):
         os.nice(_NICE)
     try:
         outcome: tuple[str, object] = "returns", work(*arguments)
     except Exception as error:  # told to whom has asked
         outcome = "fails", error
-    sender.send(outcome)
+    end.send(outcome)
+
+
+def _interrupted(end: Connection) -> bool:
+    """Return whether the page has asked to end, or has itself ended."""
+    if not end.poll():
+        return False
+    with suppress(EOFError):
+        end.recv()
+    return True

@@ -12,6 +12,7 @@ import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from conftest import FLYABLE, PATIENCE, free_port
+from planted import plant
 from served import running
 from test_tiles import mbtiles
 from typer.testing import CliRunner
@@ -27,6 +29,7 @@ from faao_mav.arrays import Real
 from faao_mav.cli.main import app
 from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.item import Home
@@ -49,7 +52,12 @@ PIXEL = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
 """A picture of one pixel."""
-RUN = "from faao_mav.cli.main import run\nif __name__ == '__main__':\n    run()\n"
+COMMAND = Path(sys.executable).with_name("faao-mission")
+CURVES = """() => {
+  const { series = [], color } = getElement(document.querySelector('.charts')).chart.getOption();
+  return series.map(({ name }, k) => [name, color[k]]);
+}"""
+"""Name and colour of each curve of the charts."""
 WAIT = 1000 * PATIENCE
 """Milliseconds until something on the page has happened: the machine may be busy."""
 MAP = (
@@ -90,29 +98,43 @@ class Served:
             self.troubles.append(f"request: {url}")
 
 
+@contextmanager
+def server(folder: Path, *options: object) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
+    """Serve the page from within `folder`; give its address, and the process.
+
+    Whoever opened it, it ends in seconds, says no more than that, and has run nothing of `folder`.
+    """
+    ran = plant(folder)
+    process = subprocess.Popen(
+        [COMMAND, "app", *map(str, options), "--no-browser"],
+        stderr=subprocess.PIPE, text=True, cwd=folder, env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )  # fmt: skip
+    try:
+        assert process.stderr is not None
+        found = re.search(r"http://\S+", process.stderr.readline())
+        assert found is not None
+        yield found[0], process
+    finally:
+        process.terminate()
+        _, said = process.communicate(timeout=15)
+    assert said == "faao-mission: ended\n"
+    assert not ran.exists()
+
+
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     folder = tmp_path_factory.mktemp("app")
-    plan, script = folder / "plan.yaml", folder / "run.py"
+    plan = folder / "a plan.yaml"
     plan.write_text(PLAN)
-    script.write_text(RUN)
     tiles = mbtiles(folder / "field.mbtiles", ((0, 0, 0, PIXEL),))
-    server = subprocess.Popen(
-        [sys.executable, str(script), "app", str(plan), "--no-browser", "--mbtiles", str(tiles)],
-        stderr=subprocess.PIPE, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"},
-    )  # fmt: skip
-    try:
-        assert server.stderr is not None
-        found = re.search(r"http://\S+", server.stderr.readline())
-        assert found is not None
-        with playwright.sync_playwright() as driver:
-            browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            yield (here := Served(plan, found[0], browser.new_context()))
-            browser.close()
-        assert here.troubles == []
-    finally:
-        server.terminate()
-        server.communicate(timeout=PATIENCE)
+    with (
+        server(folder, plan, "--mbtiles", tiles) as (address, _),
+        playwright.sync_playwright() as driver,
+    ):
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield (here := Served(plan, address, browser.new_context()))
+        browser.close()
+    assert here.troubles == []
 
 
 @pytest.fixture
@@ -174,8 +196,7 @@ def saved(page: "Page", served: Served) -> str:
 
 
 def command_line(*arguments: object) -> dict[str, Any]:
-    program = "from faao_mav.cli.main import run; run()"
-    command = [sys.executable, "-c", program, *map(str, arguments), "--json"]
+    command = [str(COMMAND), *map(str, arguments), "--json"]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
     told: dict[str, Any] = json.loads(result.stdout)
@@ -244,18 +265,21 @@ def test_the_route_goes_round_a_zone_that_is_drawn(
     with np.load(tmp_path / "r.npz") as archive:
         away = np.hypot(*(archive["w"] - zone.disc[:2]).T)
     assert away.min() >= zone.disc[2] + 5 - 1e-6  # the margin
-    assert window.locator("path.margin").count() == 1
+    assert window.locator(".leaflet-pane path.margin").count() == 1
     assert downloaded(window, "Fence")
-    window.locator("path.zone-out").click(position={"x": 3, "y": 40})
+    window.locator(".leaflet-pane path.zone-out").click(position={"x": 3, "y": 40})
     window.locator('.mark[title="Radius"]').wait_for()
     window.locator('[aria-label^="Delete the chosen zone"]').click()
     assert saved(window, served) == PLAN
-    assert window.locator("path.zone-out").count() == 0
+    assert window.locator(".leaflet-pane path.zone-out").count() == 0
 
 
 def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
     window: "Page",
 ) -> None:
+    window.get_by_role("tab", name="Result").click()
+    window.locator(".facts dt").first.wait_for()
+    window.get_by_role("tab", name="Plan").click()
     window.get_by_text("vehicle", exact=True).click()
     entry = window.locator('[data-key="vehicle.max_speed"]')
     box = window.get_by_label("max_speed, m/s")
@@ -267,42 +291,126 @@ def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
     said = str(error.value).removeprefix("plan.yaml: vehicle.max_speed: ")
     assert said in window.locator(".q-field--error").inner_text()
     assert entry.count() == 1
+    # what was found for the plan before is not shown as if it were of this one
+    assert window.evaluate(CURVES) == []
+    assert window.locator(".facts dt").count() == 0
+    assert window.locator(".command").is_hidden()
     box.fill("9.9")
     box.press("Enter")
     finished(window)
     assert window.locator(".q-field--error").count() == 0
+    hops = [["base station to UAV", "#3b7ddd"], ["UAV to user", "#d9731a"]]
+    assert window.evaluate(CURVES)[:2] == hops
 
 
-def test_a_mission_is_uploaded_watched_and_started_once_that_is_confirmed(window: "Page") -> None:
-    port = free_port()
+@contextmanager
+def vehicle(**options: Any) -> Iterator[tuple[str, MockAutopilot]]:
+    """A vehicle that flies twenty times as fast as real ones, and the connection to it."""
     mock = MockAutopilot(
         behaviour_of("ardupilot"), home=HOME, fly=predicted(), beat=0.1, speedup=20.0
     )
-    with running(mock, f"udpin:127.0.0.1:{port}"):
+    port = free_port()
+    with running(mock, f"udpin:127.0.0.1:{port}", **options):
+        yield f"udpout:127.0.0.1:{port}", mock
+
+
+def test_what_is_uploaded_and_watched_flies_by_the_command_that_is_shown(
+    window: "Page", served: Served, tmp_path: Path
+) -> None:
+    with vehicle() as (connection, mock):
         window.get_by_role("tab", name="Fly").click()
-        window.get_by_label("Connection").fill(f"udpout:127.0.0.1:{port}")
+        window.get_by_label("Connection").fill(connection)
         window.get_by_role("button", name="Upload and verify").click()
         told = window.locator(".uploaded", has_text="verified")
         told.wait_for()
         assert "read back and compared" in told.inner_text()
+        command = window.locator(".command", has_text=connection).inner_text()
+        assert command.endswith(f" --plan '{served.plan}' --arm")
+        with window.expect_download() as waiting:
+            window.get_by_role("button", name="Download mission.plan").click()
+        waiting.value.save_as(tmp_path / "mission.plan")
 
-        arm = window.get_by_role("button", name="Arm and start")
-        assert arm.is_disabled()
         window.get_by_role("button", name="Watch").click()
         window.locator(".stands", has_text="waiting").wait_for()
-        arm.click()
-        window.get_by_role("button", name="Cancel").click()
-        window.locator(".q-dialog").wait_for(state="detached")
-        arm.click()
         assert not mock.armed
-        window.get_by_role("button", name="Yes, arm it").click()
-        window.locator(".stands", has_text="flying").wait_for()
-        assert mock.armed
+        path = f"{COMMAND.parent}{os.pathsep}{os.environ['PATH']}"
+        flight = subprocess.run(
+            command, shell=True, capture_output=True, text=True, cwd=tmp_path,
+            env=os.environ | {"PATH": path},
+        )  # fmt: skip
+        assert flight.returncode == 0, flight.stderr
         told = window.locator(".uploaded", has_text="landed and disarmed")
         told.wait_for()
-    assert re.search(r"^flown +delivers .* % of the plan", told.inner_text(), re.MULTILINE)
+    for said in (told.inner_text(), flight.stdout):
+        assert re.search(r"^flown +delivers .* % of the plan", said, re.MULTILINE)
     assert window.locator(".mark-vehicle").count() == 1
     window.locator("path.flown[d*=L]").wait_for()
+    window.locator(".key", has_text="flown").wait_for()
+
+
+def test_the_server_ends_in_seconds_in_the_middle_of_an_upload(
+    served: Served, tmp_path: Path
+) -> None:
+    (tmp_path / "plan.yaml").write_text(PLAN)
+    with (
+        vehicle(faults=Faults(loss=0.2, rate=300)) as (connection, _),
+        server(tmp_path, "plan.yaml") as (address, _),
+    ):
+        page = served.context.new_page()
+        page.set_default_timeout(WAIT)
+        page.goto(address)
+        finished(page)
+        page.get_by_role("tab", name="Fly").click()
+        page.get_by_label("Connection").fill(connection)
+        page.get_by_role("button", name="Upload and verify").click()
+        page.locator(".stands", has_text="mission").wait_for()
+    page.close()
+
+
+def test_zones_of_a_file_are_red_or_green_and_the_key_says_so(
+    window: "Page", served: Served
+) -> None:
+    places = [(-300, -300), (400, -300), (400, 400), (-300, 400)], [(90, 90), (120, 90), (90, 120)]
+    frame = LocalFrame(-35.363262, 149.165237)
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"name": name},
+            "geometry": {
+                "type": "Polygon",
+                "coordinates": [[*map(list, zip(*frame.to_geodetic(ring)[::-1], strict=True))]],
+            },
+        }
+        for name, ring in zip(("inclusion", "no-fly"), places, strict=True)
+    ]
+    zones = served.plan.with_name("site.geojson")
+    zones.write_text(json.dumps({"type": "FeatureCollection", "features": features}, default=float))
+    text = PLAN + "fence: {file: site.geojson, exclusion: [{center: [-100, 80], radius: 20}]}\n"
+    served.plan.write_text(text)
+    page = served.window()
+    colours = page.evaluate(
+        """() => [...document.querySelectorAll('.leaflet-pane path')].map(
+             (line) => [line.getAttribute('class').split(' ')[0], getComputedStyle(line).stroke])"""
+    )
+    drawn = [(name, colour) for name, colour in colours if name.startswith("zone")]
+    red, green = "rgb(194, 59, 59)", "rgb(42, 138, 74)"
+    assert sorted(drawn) == [("zone-in", green), ("zone-out", red), ("zone-out", red)]
+    key = page.locator(".key").inner_text().split("\n")
+    assert key[1:] == ["stay in", "stay out", "margin of the fence", "predicted flight"]
+    page.close()
+
+
+def test_light_and_dark_change_places_with_each_click(served: Served) -> None:
+    page = served.window()
+    button = page.locator('[aria-label="Light or dark"]')
+    for scheme, dark in (("light", False), ("dark", True)):
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.reload()
+        finished(page)
+        for now in (dark, not dark, dark, not dark):
+            page.locator("body.body--dark" if now else "body:not(.body--dark)").wait_for()
+            button.click()
+    page.close()
 
 
 def test_a_log_that_is_dropped_is_told_as_the_command_line_tells_it(window: "Page") -> None:

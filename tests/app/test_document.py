@@ -139,6 +139,18 @@ def test_zones_are_drawn_changed_and_removed() -> None:
     for _ in range(5):
         document.undo()
     assert document.text == SMALL
+    # what was dragged or chosen when it was undone is not there any more
+    for key in ("fence/inclusion/0", "fence/exclusion/7"):
+        scene.change({**shown[1], "key": key}, None)
+        scene.remove(key)
+    assert document.text == SMALL
+    odd = Document(f"{SMALL}fence: {{exclusion: 3}}\n")
+    Scene(odd).change(circle, None)
+    assert odd.value(("fence", "exclusion")) == [{"center": [20.0, 30.0], "radius": 4.0}]
+    nowhere = Document("site: {}\n")
+    Scene(nowhere).change(circle, None)
+    Scene(nowhere).move("user", [1.0, 2.0], None)
+    assert nowhere.text == "site: {}\n"
 
 
 def test_the_short_form_of_an_inclusion_becomes_a_list_with_a_second_one() -> None:

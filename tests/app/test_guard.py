@@ -4,6 +4,8 @@ import asyncio
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 pytest.importorskip("starlette", reason="the extra app is not installed")
 from faao_mav.app.guard import Guard
@@ -21,14 +23,19 @@ async def behind(scope: Any, receive: Any, send: Any) -> None:
 
 
 def ask(
-    path: str = "/", *, kind: str = "http", method: str = "GET", query: str = "", **headers: str
+    path: str = "/",
+    *,
+    kind: str = "http",
+    method: str = "GET",
+    query: str | bytes = "",
+    **headers: str | bytes,
 ) -> list[dict[str, Any]]:
     scope = {
         "type": kind,
         "method": method,
         "path": path,
-        "query_string": query.encode(),
-        "headers": [(k.encode(), v.encode()) for k, v in {"host": HOST, **headers}.items()],
+        "query_string": _bytes(query),
+        "headers": [(k.encode(), _bytes(v)) for k, v in {"host": HOST, **headers}.items()],
     }
     sent: list[dict[str, Any]] = []
 
@@ -41,6 +48,10 @@ def ask(
     guard = Guard(behind, TOKEN, ("127.0.0.1", "localhost"), 8000)
     asyncio.run(guard(scope, receive, send))
     return sent
+
+
+def _bytes(value: str | bytes) -> bytes:
+    return value.encode() if isinstance(value, str) else value
 
 
 def status(*answer: Any, **asked: Any) -> int:
@@ -85,8 +96,10 @@ def test_the_page_itself_is_served_with_its_policy() -> None:
 
 
 @pytest.mark.parametrize(
-    "origin", ["http://evil.org", "null", "http://127.0.0.1:8001", f"http://{HOST}.evil.org"]
-)
+    "origin",
+    ["http://evil.org", "null", "http://127.0.0.1:8001", f"http://{HOST}.evil.org", "http://[",
+     "http://[::1", f"http://u@{HOST}", f"//{HOST}", f"x://{HOST}", HOST, ""],
+)  # fmt: skip
 def test_a_page_from_elsewhere_can_neither_post_nor_open_a_websocket(origin: str) -> None:
     assert status(method="POST", origin=origin, cookie=COOKIE) == 403
     assert status(origin=origin, cookie=COOKIE) == 403
@@ -102,3 +115,31 @@ def test_a_post_without_an_origin_is_refused() -> None:
 def test_no_other_name_leads_to_the_page() -> None:
     assert status(host="evil.org:8000", cookie=COOKIE) == 403
     assert status(host="127.0.0.1:1", query=f"token={TOKEN}") == 403
+
+
+ODD = st.one_of(
+    st.binary(max_size=60),
+    st.text(alphabet="[]@:/?#%;=,&\\\"' \t\r\n\0\x7f", max_size=30),
+    st.text(max_size=30),
+    st.sampled_from([HOST, f"http://{HOST}", f"token={TOKEN[:-1]}", COOKIE[:-1], "http://["]),
+)
+
+
+@given(
+    path=st.text(alphabet=st.characters(exclude_categories=["Cs"]), max_size=20),
+    kind=st.sampled_from(["http", "websocket"]),
+    method=st.sampled_from(["GET", "HEAD", "POST", "PUT", "OPTIONS", "X"]),
+    query=ODD,
+    headers=st.dictionaries(st.sampled_from(["host", "origin", "cookie", "x"]), ODD),
+)
+def test_whatever_is_sent_without_the_token_is_refused_cleanly(
+    path: str, kind: str, method: str, query: str | bytes, headers: dict[str, str | bytes]
+) -> None:
+    answer = ask(path, kind=kind, method=method, query=query, **headers)
+    if kind == "websocket":
+        assert answer == [{"type": "websocket.close", "code": 1008, "reason": ""}]
+    else:
+        assert answer[0]["status"] == 403
+    for other in ("http", "websocket"):  # nor is there a traceback for who has it
+        ask(path, kind=other, method=method, query=query, **{**headers, "cookie": COOKIE})
+    ask(path, query=f"token={TOKEN}&".encode() + _bytes(query))

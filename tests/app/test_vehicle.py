@@ -1,17 +1,26 @@
-"""What the page does with a vehicle, without the page: a flight that is held and left; refusals."""
+"""What the page does with a vehicle, without the page: it starts nothing, and leaves in peace."""
 
-import re
+import asyncio
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from threading import Event
+from pathlib import Path
 from typing import Any
 
 import pytest
 from conftest import FLYABLE, free_port
+from hypothesis import given
+from hypothesis import strategies as st
 from served import running
 
 from faao_mav import plan_mission
-from faao_mav.app.vehicle import uploaded, watched
-from faao_mav.errors import PlanError
+from faao_mav.app.vehicle import fly_command, uploaded, watched
+from faao_mav.app.workers import Interrupt, Workers
+from faao_mav.errors import FaaoError, PlanError
+from faao_mav.mavlink.faults import Faults
+from faao_mav.mavlink.flying.fly import fly
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.item import Home
@@ -27,15 +36,9 @@ def result() -> Result:
     return plan_mission(parse_plan(text, "plan.yaml"))
 
 
-def test_a_flight_that_the_page_has_started_is_held_then_left(result: Result) -> None:
-    port, interrupt, told = free_port(), Event(), list[dict[str, Any]]()
-    connection = f"udpout:127.0.0.1:{port}"
-
-    def tell(each: dict[str, Any]) -> None:
-        told.append(each)
-        if each.get("phase") == "flying" or "it holds" in each.get("note", ""):
-            interrupt.set()
-
+@contextmanager
+def vehicle(result: Result, faults: Faults | None = None) -> Iterator[tuple[str, MockAutopilot]]:
+    port = free_port()
     assert result.conversion is not None
     mock = MockAutopilot(
         behaviour_of("ardupilot"),
@@ -45,20 +48,77 @@ def test_a_flight_that_the_page_has_started_is_held_then_left(result: Result) ->
         beat=0.1,
         speedup=8.0,
     )
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        assert watched(tell, interrupt, result, connection, arm=True).startswith("different")
-        assert told == []
-        assert not mock.armed
-        assert "verified" in uploaded(result, connection)
-        said = watched(tell, interrupt, result, connection, arm=True)
-        assert mock.armed
-    left = r"left         no longer watched: it is armed, in mode BRAKE, \d+ m above home"
-    assert re.search(rf"{left}$", said)
-    assert any("asking the vehicle to hold" in each.get("note", "") for each in told)
+    with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
+        yield f"udpout:127.0.0.1:{port}", mock
+
+
+def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
+    phases: list[str] = []
+    seen = asyncio.Event()
+
+    def hear(told: dict[str, Any]) -> None:
+        phases.append(told.get("phase", ""))
+        if phases[-1] == "flying":
+            seen.set()
+
+    async def run(connection: str, mock: MockAutopilot) -> str:
+        workers, asked = Workers(), (result, connection)
+        try:
+            before = await workers.talk(watched, hear, Interrupt(), *asked)
+            assert before.startswith("different")
+            assert "verified" in await workers.talk(uploaded, hear, Interrupt(), *asked)
+            watch = asyncio.create_task(workers.talk(watched, hear, Interrupt(), *asked))
+            while "waiting" not in phases:
+                await asyncio.sleep(0.05)
+            assert not mock.armed
+            assert result.conversion is not None
+            flight = Flight.planned(result.conversion, result.solution)
+            flown = asyncio.create_task(asyncio.to_thread(fly, flight, connection, arm=True))
+            await seen.wait()
+            watch.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await watch
+            report = await flown
+            assert report.ending is not None
+            return report.ending.kind
+        finally:
+            workers.stop()
+
+    with vehicle(result) as (connection, mock):
+        assert asyncio.run(run(connection, mock)) == "finished"
+
+
+def test_an_upload_that_is_left_is_cancelled_on_the_vehicle(result: Result) -> None:
+    async def run(connection: str) -> None:
+        workers, interrupt = Workers(), Interrupt()
+        try:
+            asyncio.get_running_loop().call_later(3, interrupt.set)
+            await workers.talk(uploaded, print, interrupt, result, connection)
+        finally:
+            workers.stop()
+
+    slow = Faults(loss=0.2, rate=300)
+    with (
+        vehicle(result, slow) as (connection, _),
+        pytest.raises(FaaoError, match=r"interrupted .*cancelled"),
+    ):
+        asyncio.run(run(connection))
 
 
 def test_what_does_not_pass_validation_is_neither_uploaded_nor_watched(result: Result) -> None:
     useless = replace(result, conversion=None)
-    assert "does not pass validation" in uploaded(useless, "udpout:127.0.0.1:1")
-    with pytest.raises(PlanError, match="does not pass validation"):
-        watched(print, Event(), useless, "udpout:127.0.0.1:1", arm=True)
+    for act in (uploaded, watched):
+        with pytest.raises(PlanError, match="does not pass validation"):
+            act(print, lambda: False, useless, "udpout:127.0.0.1:1")
+
+
+@given(st.text(), st.text(min_size=1).filter(lambda name: "\0" not in name and "/" not in name))
+def test_the_command_is_quoted_for_a_shell(connection: str, name: str) -> None:
+    line = fly_command(connection, Path("/tmp") / name)
+    if not connection.strip() or not connection.isprintable():
+        assert line == ""
+        return
+    assert line.isprintable()
+    words = shlex.split(line)
+    file = ["--plan", str((Path("/tmp") / name).resolve())] if name.isprintable() else []
+    assert words == ["faao-mission", "fly", "mission.plan", "--to", connection, *file, "--arm"]
