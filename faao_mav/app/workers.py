@@ -68,7 +68,9 @@ class Workers:
 
     async def short(self, work: Callable[..., T], *arguments: Any) -> T:
         """Return what `work` returns of the process that stays; where that died, of a new one."""
-        pool = self._pool = self._pool or ProcessPoolExecutor(1, mp_context=self._context)
+        pool = self._pool = self._pool or ProcessPoolExecutor(
+            1, mp_context=self._context, initializer=_prepare
+        )
         try:
             return await asyncio.get_running_loop().run_in_executor(pool, work, *arguments)
         except BrokenProcessPool:
@@ -144,10 +146,15 @@ async def _ended(process: Any) -> None:
         await asyncio.sleep(0.05)
 
 
+def _prepare() -> None:
+    """Leave Ctrl-C to the page, which ends its jobs."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _job(
     end: Connection, work: Callable[..., object], arguments: tuple[object, ...], talks: bool
 ) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the page, which ends its jobs
+    _prepare()
     if talks:
         arguments = (lambda told: end.send(("tells", told)), lambda: _interrupted(end), *arguments)
     elif hasattr(os, "nice"):
