@@ -143,8 +143,8 @@ class Fly:
         self._debriefing.text = f"reading {event.file.name}"
         with tempfile.TemporaryDirectory() as folder:
             log = Path(folder) / f"log{Path(event.file.name).suffix}"
-            await event.file.save(log)
             try:
+                await event.file.save(log)
                 told = await self._workers.long(debriefed, result, log, event.file.name)
             except Exception as error:
                 self._debriefing.text = _failure(error)
@@ -154,7 +154,7 @@ class Fly:
 
 
 def _failure(error: Exception) -> str:
-    said = str(error) if isinstance(error, FaaoError) else mistake(error)
+    said = str(error) if isinstance(error, FaaoError | OSError) else mistake(error)
     return f"failed       {said}"
 
 

@@ -19,8 +19,8 @@ from faao_mav.schedule.conversion import Conversion, beyond_vehicle
 from faao_mav.workflow import Result
 
 MISSION = "mission.plan"
-"""The file, of those that are downloaded, that `fly_command` flies: it has fence and vehicle in it,
-and what is not of the mission that a vehicle holds is not started."""
+"""The downloaded file that `fly_command` names: the fence and the kind of vehicle are in it. `fly`
+starts nothing on a vehicle that holds another mission."""
 
 Tell = Callable[[dict[str, Any]], object]
 """What a job tells the page: a `note`, what it is `doing`, or how a flight stands."""
