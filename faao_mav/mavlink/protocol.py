@@ -45,6 +45,30 @@ class MavResult(IntEnum):
     OPERATION_CANCELLED = 15
 
 
+_COMMAND_RESULTS = {
+    0: "ACCEPTED",
+    1: "TEMPORARILY_REJECTED (not now: one of its checks does not pass)",
+    2: "DENIED (not as it was asked, or in the state that it is in)",
+    3: "UNSUPPORTED (it does not know the command)",
+    4: "FAILED (it tried, or checked, and it did not work)",
+    5: "IN_PROGRESS",
+    6: "CANCELLED (by somebody else)",
+    7: "COMMAND_LONG_ONLY (it takes the command in another message)",
+    8: "COMMAND_INT_ONLY (it takes the command in another message)",
+    9: "COMMAND_UNSUPPORTED_MAV_FRAME (it does not take the command's frame)",
+    10: "NOT_IN_CONTROL (another station is in control of it)",
+}
+
+
+def command_result(result: int) -> str:
+    """Return a MAV_RESULT by its name, and what it says.
+
+    >>> command_result(3), command_result(99)
+    ('UNSUPPORTED (it does not know the command)', 'MAV_RESULT 99')
+    """
+    return _COMMAND_RESULTS.get(result, f"MAV_RESULT {result}")
+
+
 class MavSeverity(IntEnum):
     """MAV_SEVERITY of status texts."""
 

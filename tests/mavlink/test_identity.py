@@ -26,6 +26,7 @@ from faao_mav.mavlink.codec import Codec
 from faao_mav.mavlink.discover import Discovery, FoundVehicle, choose
 from faao_mav.mavlink.flying.fly import fly
 from faao_mav.mavlink.flying.round_trips import RoundTrips
+from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.mavlink.framing import message_id, sender_of
 from faao_mav.mavlink.messages import (
     Envelope,
@@ -169,7 +170,7 @@ def test_two_vehicles_of_one_number_are_not_one(system: int | None) -> None:
     with two_of_one_number() as (connection, mocks):
         for job in (
             lambda: upload(a_mission(5), connection, system=system),
-            lambda: fly(a_mission(5), connection, arm=True, system=system),
+            lambda: fly(Flight(a_mission(5)), connection, arm=True, system=system),
             lambda: download(connection, system=system),
         ):
             with pytest.raises(LinkError, match=told):
@@ -360,11 +361,11 @@ def test_only_who_flies_is_a_ground_station(sent: list[bytes]) -> None:
         def stop(_: object) -> None:
             raise KeyboardInterrupt
 
-        watched = fly(mission, connection, watching=stop)
+        watched = fly(Flight(mission), connection, watching=stop)
         assert watched.ending is not None
         assert watched.ending.kind == "left"
         assert beats(sent) == []
-        flown = fly(mission, connection, arm=True)
+        flown = fly(Flight(mission), connection, arm=True)
         assert flown.ending is not None
         assert flown.ending.kind == "finished"  # our own heartbeats come back: they are no other's
     assert {sender_of(packet) for packet in sent} == {GROUND_STATION}
@@ -436,7 +437,7 @@ def test_only_transfers_knock(monkeypatch: pytest.MonkeyPatch) -> None:
         for job in (
             lambda to: upload(a_mission(5), to, **options),
             lambda to: holdings(to, **options),
-            lambda to: fly(a_mission(5), to, **options),
+            lambda to: fly(Flight(a_mission(5)), to, **options),
         ):
             with pytest.raises(LinkError, match="no heartbeat"):
                 job(connection)

@@ -218,11 +218,15 @@ def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
     scene.mock._why_not_armed = lambda: "Compass not healthy"
     assert scene.run() == "refused"
     assert [order.command for order in scene.orders if isinstance(order, CommandLong)] == [400]
+    answer = "the vehicle answers ARM with FAILED (it tried, or checked, and it did not work)"
+    assert scene.watch.outcome.text == f"{answer}. It says: Arm: Compass not healthy"
     scene = Scene("px4", arm=True)
     scene.mock._problem = lambda: "no valid mission"
     assert scene.run() == "refused"
     orders = [each for each in scene.orders if isinstance(each, CommandLong)]
     assert [(each.command, each.param1) for each in orders] == [(400, 1.0), (300, 0.0), (400, 0.0)]
+    denied = "answers START with DENIED (not as it was asked, or in the state that it is in)"
+    assert scene.watch.outcome.text == f"the vehicle {denied}; it is disarmed"
 
 
 def test_a_vehicle_that_arms_without_a_word_is_asked_to_disarm(
@@ -270,8 +274,10 @@ def test_what_does_not_start_is_disarmed_whatever_is_lost(
     refuses_to_start(scene, lambda now: now < until)
     assert scene.run(Faults(loss=loss, seed=5)) == "refused"
     assert not scene.mock.armed
-    why = "does not answer" if loss and kind == "px4" else "answers START with MAV_RESULT 4"
-    assert scene.watch.outcome.text == f"the vehicle {why}; it is disarmed"
+    told = scene.watch.outcome.text
+    denied = "the vehicle answers START with FAILED (it tried, or checked, and it did not work)"
+    mute = ["the vehicle does not answer; it is disarmed"] if loss else []
+    assert told in (f"{denied}; it is disarmed", *mute)
     if not loss:
         assert disarmings(scene) == (1 if until == 0 else pytest.approx((until - 2) / 1.5, abs=1))
 
@@ -303,7 +309,9 @@ def test_what_keeps_refusing_to_disarm_or_falls_silent_is_told() -> None:
     arm = scene.mock._arm
     scene.mock._arm = lambda wanted, now: arm(True, now) if wanted else 4
     assert scene.run() == "refused"
-    assert scene.watch.outcome.text.endswith("it may still be armed: it answers MAV_RESULT 4")
+    assert scene.watch.outcome.text.endswith(
+        "it may still be armed: it answers FAILED (it tried, or checked, and it did not work)"
+    )
     assert disarmings(scene) == 5
     scene = Scene("ardupilot", arm=True)
     refuses_to_start(scene, lambda _: True)

@@ -6,7 +6,7 @@ from faao_mav.mavlink.flying.telemetry import Ending
 from faao_mav.mavlink.machine import Machine
 from faao_mav.mavlink.messages import CommandAck, CommandLong, Envelope, Heartbeat, Message
 from faao_mav.mavlink.modes import mode_name
-from faao_mav.mavlink.protocol import MavCommand
+from faao_mav.mavlink.protocol import MavCommand, command_result
 from faao_mav.mavlink.transfer.exchange import Peer
 
 _AGAIN = 1.5
@@ -66,7 +66,7 @@ class Disarm(Machine[Ending]):
                 self._agrees = self._agrees or result == _ACCEPTED
                 self._refusals += result not in (_ACCEPTED, _IN_PROGRESS)
                 if self._refusals == _REFUSALS:
-                    self.leave(f"it answers MAV_RESULT {result}")
+                    self.leave(f"it answers {command_result(result)}")
             # An answer may be a late one to arming, and a first heartbeat from before that.
             case Heartbeat(armed=False) if self._agrees or self._armed or self._sent > 1:
                 self.outcome = Ending(self._then.kind, f"{self._then.text}; it is disarmed")

@@ -18,7 +18,13 @@ from faao_mav.mavlink.messages import (
     WireItem,
 )
 from faao_mav.mavlink.modes import mode_command, modes_of
-from faao_mav.mavlink.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, MissionType
+from faao_mav.mavlink.protocol import (
+    LOCAL_POSITION,
+    MISSION_COMPLETE,
+    MavCommand,
+    MissionType,
+    command_result,
+)
 from faao_mav.mavlink.transfer.exchange import Peer
 from faao_mav.mavlink.wire_items import home_items
 from faao_mav.validate.rule import Finding
@@ -41,6 +47,9 @@ heartbeats."""
 _AGAIN, _TRIES = 1.5, 5
 """Seconds after which a command without an answer is repeated, and how often it is sent: as the
 MAVLink guide has it for missions."""
+
+_WORDS = 1.0
+"""Seconds for which what the vehicle says of a denial is waited for; chosen."""
 
 _REBOOT = 1.5
 """Seconds in which a vehicle that is not armed any more can show that it has rebooted; chosen."""
@@ -117,6 +126,7 @@ class Watch(Machine[Ending]):
         self._mode_before = -1
         self._command: Callable[[], Message] | None = None
         self._sent, self._next_try, self._no = 0, 0.0, ""
+        self._said_before, self._denied_at = 0, math.inf
         self._unattended = False
         self._disarming: Disarm | None = None
         self._ready = readiness
@@ -154,7 +164,7 @@ class Watch(Machine[Ending]):
             return self._disarm(Ending("left", "interrupted before the start"), now)
         if self._disarming is not None:
             self._disarming.leave("interrupted again")
-            self.outcome = self._disarming.outcome
+            self._disarmed_by((), self._disarming)
         self._end("left", f"no longer watched: {self._left_behind(now)}")
         return () if self._ready is None else self._ready.cancel(now)
 
@@ -190,9 +200,7 @@ class Watch(Machine[Ending]):
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self.seen.hear(envelope, now)
         if self._disarming is not None:
-            out = self._disarming.on(envelope, now)
-            self.outcome = self._disarming.outcome
-            return out
+            return self._disarmed_by(self._disarming.on(envelope, now), self._disarming)
         if self.seen.ending is not None:
             return self._end_early(self.seen.ending, now)
         if envelope.sender != self._peer.address:
@@ -214,9 +222,7 @@ class Watch(Machine[Ending]):
         self._due = now + _TICK
         questions = self.seen.tick(now)
         if self._disarming is not None:
-            out = self._disarming.tick(now)
-            self.outcome = self._disarming.outcome
-            return [*questions, *out]
+            return [*questions, *self._disarmed_by(self._disarming.tick(now), self._disarming)]
         if self.seen.ending is not None:
             return self._end_early(self.seen.ending, now)
         over = self.phase in ("holding", "ending", "aside") and self._command is None
@@ -226,6 +232,8 @@ class Watch(Machine[Ending]):
         if self._disarmed_at is not None and now >= self._disarmed_at + _REBOOT:
             self._disarmed_at = None
             return self._on_disarmed()
+        if now >= self._denied_at + _WORDS and self.phase == "arming":
+            return self._refused(self._no, now)
         if self._ready is not None and self.phase in ("checking", "waiting"):
             self._ready.look(self.seen, now)
         if self.phase == "checking":
@@ -293,8 +301,12 @@ class Watch(Machine[Ending]):
         return self._say(self._starting, now)
 
     def _denied(self, command: int, result: int, now: float) -> Sequence[Message]:
-        """End, now that arming or starting has been denied."""
-        return self._refused(_answer(command, result), now)
+        """End, now that arming or starting has been denied; what it says of it may come later."""
+        self._no = _answer(command, result)
+        if self.phase == "starting":
+            return self._refused(self._no, now)
+        self._command, self._denied_at = None, now
+        return ()
 
     def _on_disarmed(self) -> Sequence[Message]:
         match self.phase:
@@ -308,7 +320,7 @@ class Watch(Machine[Ending]):
             case "aside":
                 self._end("taken over", "disarmed; it was not the mission that flew it last")
             case "arming" | "starting":
-                self._end("refused", self._why("disarmed before the mission began"))
+                self._end("refused", f"the vehicle disarmed before the mission began{self._words}")
         return ()
 
     def _over(self) -> None:
@@ -396,7 +408,7 @@ class Watch(Machine[Ending]):
     def _say(self, command: Callable[[], Message], now: float) -> Sequence[Message]:
         """Send `command`, and repeat it until it is answered."""
         self._command, self._sent, self._next_try = command, 0, now
-        self._no = "does not answer"
+        self._no, self._said_before = "does not answer", len(self.seen.said)
         return self._repeat(now)
 
     def _repeat(self, now: float) -> Sequence[Message]:
@@ -415,13 +427,15 @@ class Watch(Machine[Ending]):
     def _refused(self, why: str, now: float, *, unsure: bool = False) -> Sequence[Message]:
         """End before the start; an aircraft that is armed, or may be (`unsure`), disarms first."""
         if unsure or self._armed or self.phase == "starting":
-            return self._disarm(Ending("refused", self._why(why)), now)
-        self._end("refused", self._why(why))
+            return self._disarm(Ending("refused", f"the vehicle {why}"), now)
+        self._end("refused", f"the vehicle {why}{self._words}")
         return ()
 
-    def _why(self, why: str) -> str:
-        said = f": {'; '.join(dict.fromkeys(self.seen.said))}" if self.seen.said else ""
-        return f"the vehicle {why}{said}"
+    @property
+    def _words(self) -> str:
+        """What it has said since the last command, as the end of a sentence."""
+        said = dict.fromkeys(self.seen.said[self._said_before :])
+        return f". It says: {'; '.join(said)}" if said else ""
 
     def _disarm(self, then: Ending, now: float) -> Sequence[Message]:
         """Have it disarm, and end with `then`."""
@@ -432,6 +446,12 @@ class Watch(Machine[Ending]):
         modes = (mode, self._modes.mission, self._modes.guided)
         self._disarming = Disarm(self._peer, then, self._armed, modes, self._patience)
         return self._disarming.start(now)
+
+    def _disarmed_by(self, out: Sequence[Message], disarming: Disarm) -> Sequence[Message]:
+        """Return `out`; end once `disarming` has, with what the vehicle says of it."""
+        if (ending := disarming.outcome) is not None:
+            self._end(ending.kind, f"{ending.text}{self._words}")
+        return out
 
     def _end_early(self, ending: Ending, now: float) -> Sequence[Message]:
         """End as what was heard says, disarmed where it was about to start another mission."""
@@ -446,4 +466,4 @@ class Watch(Machine[Ending]):
 
 
 def _answer(command: int, result: int) -> str:
-    return f"answers {MavCommand(command).name} with MAV_RESULT {result}"
+    return f"answers {MavCommand(command).name} with {command_result(result)}"
