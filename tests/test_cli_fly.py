@@ -49,7 +49,7 @@ def mission(tmp_path: Path) -> Path:
         (("fly", "{mission}", "--to", "a", "--stream", "--arm"), "--stream: needs --plan"),
         (("fly", "{mission}", "--to", "a", "--radio", "udp:h:1"), "--radio: needs --plan"),
         (("debrief", LOG), "--plan or --solution: give the plan that was flown"),
-        (("debrief", "flight.txt", "--plan", "a.yaml"), "give a flight log: .bin, .tlog, .ulg"),
+        (("debrief", "{mission}", "--plan", "a.yaml"), "give a flight log: .bin, .tlog, .ulg"),
         (("debrief", LOG, "--plan", "a.yaml", "--report", "page.txt"), "--report"),
     ],
 )

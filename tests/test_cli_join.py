@@ -59,7 +59,7 @@ def out(tmp_path: Path) -> Path:
 def test_a_mission_is_checked_when_it_is_written(plan: Path, out: Path) -> None:
     result = run(plan, "--out", out)
     assert result.exit_code == 0, result.output
-    assert re.search(r"^checked      no errors or warnings, \d+ note", result.stdout, re.M)
+    assert re.search(r"^checks       no errors or warnings, \d+ note", result.stdout, re.M)
     found = json.loads(run(plan, "--json").stdout)
     assert {each["level"] for each in found["validation"]} == {"note"}
     assert {"rule", "item", "message", "action"} <= found["validation"][0].keys()
@@ -70,7 +70,7 @@ def test_warnings_are_in_the_summary(plan: Path, out: Path) -> None:
     plan.write_text(edited(GENTLE, {"mission.takeoff": False}))
     result = run(plan, "--out", out)
     assert result.exit_code == 0
-    assert "checked      0 errors, 1 warning" in result.stdout
+    assert "checks       1 warning" in result.stdout
     assert "             warning: there is no take-off" in result.stdout
     assert result.stderr == ""
 
@@ -92,7 +92,7 @@ def test_a_mission_with_errors_is_kept_but_not_called_good(
         assert found["validation"][0]["level"] == "error"
         assert found["upload"] is None
     else:
-        assert ("checked      1 error" in result.stdout) is not ("--quiet" in options)
+        assert ("checks       1 error" in result.stdout) is not ("--quiet" in options)
 
 
 def test_upload_after_writing(plan: Path, out: Path) -> None:
@@ -211,7 +211,7 @@ def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:
         refused = run(plan, "--out", out, "--upload", connection)
         assert refused.exit_code == 1
         assert "--allow-armed" in refused.stderr
-        assert "written" in refused.stdout
+        assert "files  " in refused.stdout
         assert run(plan, "--upload", connection, "--allow-armed", "--quiet").exit_code == 0
 
 
@@ -324,7 +324,7 @@ def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
     paper.write_text(edited((MISSIONS / "paper_fig3.yaml").read_text(), brief))
     told = run(paper, "--save", save, "--report", page)
     assert (told.exit_code, told.stderr) == (0, "")
-    assert re.search(r"^checked      0 errors, \d+ warnings, ", told.stdout, re.M)
+    assert re.search(r"^checks       \d+ warnings, ", told.stdout, re.M)
     assert "warning: predicted to deliver" in told.stdout
     assert save.exists()
     assert page.exists()

@@ -67,8 +67,8 @@ def test_without_a_bandwidth_there_are_no_megabytes(small_plan: MakePlan) -> Non
 
 
 def test_the_summary_leads_with_what_was_maximised(result: Result) -> None:
-    text, solution = summary(result), result.solution
-    first, *rest = text.splitlines()
+    text, solution = summary(result, verbose=True), result.solution
+    _, first, *rest = text.splitlines()
     label = "delivered" if solution.plan.radio.causal else "rate"
     assert first.startswith(f"{label:<13}{solution.history[-1]:.4f} bit/s/Hz (")
     assert f"{20 * solution.delivered_rate:.4g} Mbit/s" in text
@@ -147,7 +147,7 @@ def test_fresh_fading_is_forwarded_too(small_plan: MakePlan, duplex: str, csi: s
     error = 0.1 + 4 * fresh.delivered_error
     assert fresh.delivered == pytest.approx(solution.delivered_rate, abs=error)
     assert fresh.delivered <= fresh.average + 1e-9
-    assert f"{fresh.delivered:.4f} +- " in summary(Result(solution, fresh=fresh))
+    assert f"{fresh.delivered:.4f} +- " in summary(Result(solution, fresh=fresh), verbose=True)
 
 
 def test_saturation_is_of_the_rate_that_is_planned_for(small_plan: MakePlan) -> None:

@@ -54,7 +54,7 @@ def test_the_first_line_is_for_who_flies(result: Result) -> None:
     kept = 100 * result.prediction.delivered_rate / rate
     assert first == (
         f"over the hill: delivers {rate:.4f} bit/s/Hz for {duration:g} s; the mission keeps "
-        f"{kept:.2f} % of it; 4 warnings"
+        f"{kept:.2f} % of it; 2 warnings"
     )
     plan = result.solution.plan.changed({"radio.bandwidth_mhz": 20, "name": ""})
     told = summary(replace(result, solution=replace(result.solution, plan=plan)))

@@ -184,9 +184,14 @@ def test_a_creep_is_short_ways_and_waits() -> None:
     assert lengths(at - w).max() <= 2.5
 
 
+def slow(speed: float) -> Plan:
+    """Return a plan of a vehicle of so many m/s, which has nowhere to go."""
+    return plan_with().changed({"vehicle.max_speed": speed, "flight.end": [0, 350]})
+
+
 def test_a_slow_vehicle_flies() -> None:
     t = np.arange(0, 60, STEP)
-    route = check(t, np.outer(0.8 * t, [0.0, 1.0]), plan_with(max_speed=1.0))
+    route = check(t, np.outer(0.8 * t, [0.0, 1.0]), slow(1.0))
     assert len(route.positions) == 2
     assert route.waits.sum() == 0
 
@@ -248,7 +253,7 @@ def test_a_speed_is_rounded_down_at_the_limit() -> None:
     t = np.arange(0, 20, STEP)
     route = initial_route(t, np.outer(7.9999 * t, [1.0, 0.0]), plan_with(max_speed=7.9999))
     assert route.speeds == pytest.approx([7.999], abs=1e-12)
-    route = initial_route(t, np.outer(2 * t, [1.0, 0.0]), plan_with(max_speed=0.0004))
+    route = initial_route(t, np.outer(2 * t, [1.0, 0.0]), slow(0.0004))
     assert route.speeds == pytest.approx([0.0004])
 
 

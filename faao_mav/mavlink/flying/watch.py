@@ -330,11 +330,13 @@ class Watch(Machine[Ending]):
             self._end("finished", f"the mission is over; the vehicle is in mode {self.seen.mode}")
 
     def _step_aside(self) -> None:
+        at_end = self.phase == "flying" and not self.streams and self._furthest >= self._last - 1
+        who = "the pilot or a failsafe has the aircraft"
+        if at_end:  # as PX4's return is a mode of its own
+            who = "the mission is at its end, or the pilot or a failsafe has the aircraft"
         self.phase, self._command = "aside", None
         self.seen.patience = self._patience
-        self.seen.told.append(
-            f"mode {self.seen.mode}: the pilot or a failsafe has the aircraft; nothing more is sent"
-        )
+        self.seen.told.append(f"mode {self.seen.mode}: {who}; nothing more is sent")
 
     # ---- what it is told
 
