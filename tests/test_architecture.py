@@ -92,28 +92,43 @@ def test_every_public_name_can_be_had() -> None:
         faao_mav.missing  # noqa: B018
 
 
-@pytest.mark.parametrize(
-    ("statement", "absent"),
-    [
-        ("import faao_mav.cli.main", {"numpy", "cvxpy", "pyproj", "pydantic", "rich.progress"}),
-        ("import faao_mav.plan", {"scipy", "cvxpy", "pyproj", "pymavlink"}),
-        ("import faao_mav.radio.mutual_information, faao_mav.radio.precoder", {"scipy", "cvxpy"}),
-        ("import faao_mav.validate", {"scipy", "cvxpy", "pyproj", "pymavlink", "shapely"}),
-        ("import faao_mav.cli.validate", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
-        ("import faao_mav.mavlink.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
-        ("import faao_mav.cli.upload, faao_mav.cli.download", {"numpy", "pymavlink"}),
-        ("import faao_mav.cli.fly, faao_mav.cli.debrief", {"numpy", "pymavlink", "pydantic"}),
-        ("import faao_mav.cli.autopilot", {"numpy", "pymavlink"}),
-        ("import faao_mav.cli.app", {"numpy", "nicegui", "ruamel", "pydantic"}),
-        ("import faao_mav.app.guard, faao_mav.app.document", {"nicegui", "scipy", "pyproj"}),
-        ("import faao_mav.app.planner, faao_mav.app.vehicle", {"nicegui", "cvxpy", "pymavlink"}),
-        ("import faao_mav.cli.study", {"numpy", "joblib", "matplotlib"}),
-        ("import faao_mav.study", {"scipy", "cvxpy", "joblib", "matplotlib", "pyproj"}),
-        ("import faao_mav.report", {"scipy", "cvxpy", "matplotlib"}),
-        ("import faao_mav.mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
-    ],
-)  # fmt: skip
-def test_costly_imports_wait(statement: str, absent: set[str]) -> None:
-    code = f"{statement}; import sys; print(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert absent & set(run.stdout.split()) == set()
+WAITING = (
+    ("cli.main", {"numpy", "cvxpy", "pyproj", "pydantic", "rich.progress"}),
+    ("cli.validate", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
+    ("cli.upload", {"numpy", "pymavlink"}),
+    ("cli.download", {"numpy", "pymavlink"}),
+    ("cli.fly", {"numpy", "pymavlink", "pydantic"}),
+    ("cli.debrief", {"numpy", "pymavlink", "pydantic"}),
+    ("cli.autopilot", {"numpy", "pymavlink"}),
+    ("cli.study", {"numpy", "joblib", "matplotlib"}),
+    ("cli.app", {"numpy", "nicegui", "ruamel", "pydantic"}),
+    ("mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
+    ("validate", {"scipy", "cvxpy", "pyproj", "pymavlink", "shapely"}),
+    ("radio.mutual_information", {"scipy", "cvxpy"}),
+    ("radio.precoder", {"scipy", "cvxpy"}),
+    ("plan", {"scipy", "cvxpy", "pyproj", "pymavlink"}),
+    ("study", {"scipy", "cvxpy", "joblib", "matplotlib", "pyproj"}),
+    ("report", {"scipy", "cvxpy", "matplotlib"}),
+    ("app.guard", {"nicegui", "scipy", "pyproj"}),
+    ("app.document", {"nicegui", "scipy", "pyproj"}),
+    ("mavlink.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
+    ("app.planner", {"nicegui", "cvxpy", "pymavlink"}),
+    ("app.vehicle", {"nicegui", "cvxpy", "pymavlink"}),
+)
+"""Modules in an order in which one process can import them, and what is absent after each."""
+
+
+def test_costly_imports_wait() -> None:
+    code = (
+        "import importlib, sys\n"
+        "for name in sys.argv[1:]:\n"
+        "    importlib.import_module('faao_mav.' + name)\n"
+        "    print(*sys.modules)"
+    )
+    command = [sys.executable, "-c", code, *(name for name, _ in WAITING)]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert len(told) == len(WAITING)
+    loaded = {
+        name: absent & set(line.split()) for (name, absent), line in zip(WAITING, told, strict=True)
+    }
+    assert loaded == {name: set() for name in loaded}

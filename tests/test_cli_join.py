@@ -315,6 +315,7 @@ def test_the_mock_flies_by_its_parameters(
     assert "WPNAV_ACCEL" in refused.stderr
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
     plan: Path, out: Path, tmp_path: Path
 ) -> None:
@@ -334,6 +335,7 @@ def test_what_cannot_be_flown_is_information_where_nobody_flies_it(
     assert run(paper, "--out", out, "--force").exit_code == 0
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_without_a_mission_there_is_a_result_where_none_is_asked_for(
     plan: Path, out: Path, tmp_path: Path
 ) -> None:

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,9 +23,26 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.plan import parse_plan, read_plan, reference
+from faao_mav.plan import Plan, parse_plan, read_plan, reference
+from faao_mav.workflow import Result, plan_mission
 
 COMMAND = Path(sys.executable).with_name("faao-mission")
+
+
+_PLANNED: dict[tuple[object, ...], Result] = {}
+
+
+@pytest.fixture(autouse=True)
+def planned_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What several pages plan is planned for the first of them."""
+
+    def plan_once(plan: Plan, **options: Any) -> Result:
+        asked = (plan.text, plan.source, *sorted(options.items()))
+        if asked not in _PLANNED:
+            _PLANNED[asked] = plan_mission(plan, **options)
+        return _PLANNED[asked]
+
+    monkeypatch.setattr("faao_mav.workflow.plan_mission", plan_once)
 
 
 @pytest.fixture
@@ -158,7 +176,13 @@ def test_the_plan_that_is_shown_has_every_default() -> None:
 
 
 @pytest.mark.figures
-@pytest.mark.parametrize("row", re.findall(r"^\| `(missions/.*) \|$", PAGES["README.md"], re.M))
+@pytest.mark.parametrize(
+    "row",
+    [
+        pytest.param(row, marks=[pytest.mark.slow] if float(row.split()[-2]) > 3 else [])
+        for row in re.findall(r"^\| `(missions/.*) \|$", PAGES["README.md"], re.M)
+    ],
+)
 def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
     name, _, start, best, _ = re.split(r" *\| ", row)
     plan = read_plan(ROOT / name.split("`")[0])

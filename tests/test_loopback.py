@@ -22,12 +22,12 @@ HOME = Home(-35.363262, 149.165237, 584.0)
 SPEEDUP = 20.0
 
 SHORTER: dict[str, Any] = {
-    "flight.start": [0, 100],
-    "flight.end": [100, 0],
-    "flight.altitude": 40,
-    "flight.duration": 40,
+    "flight.start": [0, 60],
+    "flight.end": [60, 0],
+    "flight.altitude": 20,
+    "flight.duration": 30,
     "flight.time_step": 1,
-    "radio.ground_user.position": [120, 120],
+    "radio.ground_user.position": [80, 80],
     "radio.base_station.power_dbm": 0,
     "radio.relay.power_dbm": 0,
     "radio.fading_samples": 8,
@@ -79,5 +79,5 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
     stands = [line["plan"] for line in lines if line.get("plan")]
     assert stands
     for each in stands:
-        assert each["expected"] == pytest.approx(40 * told["delivered_rate"], rel=0.02)
+        assert each["expected"] == pytest.approx(30 * told["delivered_rate"], rel=0.02)
         assert abs(each["late"]) < 2

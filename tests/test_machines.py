@@ -8,7 +8,7 @@ from conftest import FLYABLE, edited
 from processors import NARROW, SAME_RATE, planned
 
 
-@pytest.fixture(params=["direct", "algorithm1"])
+@pytest.fixture(params=["direct", pytest.param("algorithm1", marks=pytest.mark.slow)])
 def plan_file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     of_each: dict[str, dict[str, Any]] = {
         "direct": {"radio.fading": "ergodic", "radio.causal": True},

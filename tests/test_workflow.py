@@ -1,16 +1,11 @@
 """From a plan to a result, and what it writes."""
 
-import doctest
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from conftest import MISSIONS, SMALL, MakePlan, edited, free_port
 from served import running
 
-import faao_mav.study.sweep
-import faao_mav.validate.check
-import faao_mav.workflow
 from faao_mav import (
     Vehicle,
     check,
@@ -18,7 +13,6 @@ from faao_mav import (
     plan_mission,
     read_mission,
     read_parameters,
-    read_plan,
     upload,
 )
 from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
@@ -214,20 +208,10 @@ def test_another_method_is_in_the_plan_of_the_result(paper_plan: MakePlan) -> No
 
 
 def test_flyable_is_without_errors(result: Result) -> None:
-    paper = plan_mission(read_plan(MISSIONS / "paper_fig3.yaml"))
+    brief = {"flight.duration": 20, "flight.time_step": 1}
+    paper = plan_mission(parse_plan(edited((MISSIONS / "paper_fig3.yaml").read_text(), brief)))
     assert paper.conversion is not None
     assert not paper.flyable
     slow = {"vehicle.max_speed": 8, "vehicle.max_acceleration": 1.5, "flight.duration": 16}
     gentle = plan_mission(parse_plan(edited(SMALL, QUICK | slow)))
     assert gentle.flyable
-
-
-@pytest.mark.parametrize(
-    "module", [faao_mav.workflow, faao_mav.validate.check, faao_mav.study.sweep]
-)
-def test_the_examples_run(module: ModuleType, small_plan: MakePlan) -> None:
-    slow = {"vehicle.max_speed": 8, "vehicle.max_acceleration": 1.5, "flight.duration": 16}
-    plan = small_plan(QUICK | slow)
-    done = doctest.testmod(module, extraglobs={"plan": plan})
-    assert done.attempted
-    assert not done.failed

@@ -15,6 +15,7 @@ from faao_mav.plan import read_plan
 from faao_mav.radio.precoder import SCHEMES
 
 COARSE = {"flight.time_step": 1}
+BRIEF = COARSE | {"optimizer.max_iterations": 1}
 
 
 @pytest.fixture(scope="module")
@@ -23,9 +24,10 @@ def best_rate(paper_plan: MakePlan) -> float:
     return optimize(paper_plan(COARSE)).rates.R_avg
 
 
-@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
-@pytest.mark.parametrize("fading", ["realization", "none"])
-def test_a_solution_proves_itself(paper_plan: MakePlan, line_of_sight: str, fading: str) -> None:
+@pytest.mark.parametrize(
+    ("fading", "line_of_sight"), [("realization", "ula"), ("none", "all_ones")]
+)
+def test_a_solution_proves_itself(paper_plan: MakePlan, fading: str, line_of_sight: str) -> None:
     plan = paper_plan({"radio.line_of_sight": line_of_sight, "radio.fading": fading})
     solution = optimize(plan)
     assert solution.converged
@@ -39,7 +41,7 @@ def test_a_solution_proves_itself(paper_plan: MakePlan, line_of_sight: str, fadi
 
 
 def test_rates_are_7_to_10_by_brute_force(paper_plan: MakePlan) -> None:
-    solution = optimize(paper_plan())
+    solution = optimize(paper_plan(BRIEF))
     radio, altitude = solution.plan.radio, solution.plan.flight.altitude
     x = np.array([[a, b] for a in (1, -1) for b in (1, -1)])
     rates = []
@@ -55,7 +57,7 @@ def test_rates_are_7_to_10_by_brute_force(paper_plan: MakePlan) -> None:
                 np.exp(-(np.linalg.norm(H @ P @ (m - k)) ** 2) / (4 * noise)) for m in x for k in x
             )
             bits.append(2 * 2 - np.log2(total))
-        rates.append(np.sum(bits) * 0.5 / solution.plan.flight.duration)
+        rates.append(np.sum(bits) / solution.plan.flight.duration)
     assert solution.rates.R_U == pytest.approx(rates[0], abs=1e-9)
     assert solution.rates.R_G == pytest.approx(rates[1], abs=1e-9)
     assert solution.rates.R_avg == min(solution.rates.R_U, solution.rates.R_G)
@@ -69,23 +71,31 @@ def test_the_paper_plan_is_saturated_and_flies_straight() -> None:
 
 
 def test_same_seed_same_bytes_and_other_seed_other_draw(paper_plan: MakePlan) -> None:
-    brief = COARSE | {"optimizer.max_iterations": 3}
-    first, again = optimize(paper_plan(brief)), optimize(paper_plan(brief))
+    first, again = optimize(paper_plan(BRIEF)), optimize(paper_plan(BRIEF))
     for name in ("w", "v", "a", "P_B", "P_U", "H_rB", "I_U", "history"):
         assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
-    other = optimize(paper_plan(brief | {"radio.seed": 1}))
+    other = optimize(paper_plan(BRIEF | {"radio.seed": 1}))
     assert not np.allclose(first.H_rB, other.H_rB)
 
 
 def test_ula_fading_belongs_to_the_final_positions(paper_plan: MakePlan) -> None:
-    solution = optimize(paper_plan({"radio.line_of_sight": "ula", "radio.fading": "none"}))
-    d = np.column_stack([solution.w, np.full(20, 40.0)])
+    known = {"radio.line_of_sight": "ula", "radio.fading": "none"}
+    solution = optimize(paper_plan(BRIEF | known))
+    d = np.column_stack([solution.w, np.full(10, 40.0)])
     u = d[:, 0] / np.linalg.norm(d, axis=1)
     assert solution.H_rB[:, 1, 0] == pytest.approx(np.exp(-1j * np.pi * u))
     assert np.abs(solution.H_rU) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("scheme", sorted(SCHEMES))
+@pytest.mark.parametrize(
+    "scheme",
+    [
+        "mrt",
+        "zf",
+        pytest.param("mmse", marks=pytest.mark.slow),
+        pytest.param("waterfilling", marks=pytest.mark.slow),
+    ],
+)
 def test_schemes_keep_their_precoder_fly_for_it_and_are_beaten_by_faao(
     paper_plan: MakePlan, best_rate: float, scheme: str
 ) -> None:
@@ -116,7 +126,7 @@ def test_schemes_keep_their_precoder_fly_for_it_and_are_beaten_by_faao(
     ],
 )
 def test_unusual_plans_are_solved(paper_plan: MakePlan, changes: dict[str, Any]) -> None:
-    solution = optimize(paper_plan(COARSE | changes))
+    solution = optimize(paper_plan(BRIEF | {"optimizer.max_iterations": 2} | changes))
     assert max(solution.residuals().values()) < 1e-6
     assert np.isfinite(solution.history).all()
     assert solution.rates.R_avg >= solution.history[0]
@@ -141,7 +151,7 @@ def test_a_solver_failure_keeps_the_best_so_far(
         return optimize_precoders(*arguments, **options)
 
     monkeypatch.setattr(module, "optimize_precoders", failing)
-    solution = optimize(paper_plan())
+    solution = optimize(paper_plan(COARSE))
     assert not solution.converged
     assert solution.ending == "stopped in iteration 2, the best so far is kept: no progress"
     assert solution.iterations == 1
@@ -151,7 +161,7 @@ def test_a_solver_failure_keeps_the_best_so_far(
 
 def test_progress_is_told(paper_plan: MakePlan) -> None:
     told: list[Progress] = []
-    solution = optimize(paper_plan(), observe=told.append)
+    solution = optimize(paper_plan(COARSE), observe=told.append)
     assert {p.iteration for p in told} == set(range(1, solution.iterations + 1))
     assert {p.stage for p in told} == {"trajectory (27)", "precoders (35)"}
     assert [p.best_rate for p in told] == sorted(p.best_rate for p in told)

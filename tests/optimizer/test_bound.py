@@ -42,19 +42,19 @@ def best_rate(problem: Problem, w: Real) -> float:
 @settings(max_examples=40)
 @given(seed=st.integers(0, 2**31))
 def test_no_flight_is_above_the_bound(
-    small_plan: MakePlan, bounds: dict[str, float], line_of_sight: str, seed: int
+    bounds: dict[str, tuple[Problem, float]], line_of_sight: str, seed: int
 ) -> None:
-    problem = build_problem(small_plan(FAINT | {"radio.line_of_sight": line_of_sight}))
+    problem, bound = bounds[line_of_sight]
     flight = random_flight(problem.kinematics, seed)
-    assert best_rate(problem, flight.w) <= bounds[line_of_sight]
+    assert best_rate(problem, flight.w) <= bound
 
 
 @pytest.fixture(scope="module")
-def bounds(small_plan: MakePlan) -> dict[str, float]:
-    return {
-        kind: relaxed_bound(build_problem(small_plan(FAINT | {"radio.line_of_sight": kind})))
-        for kind in ("ula", "all_ones")
-    }
+def bounds(small_plan: MakePlan) -> dict[str, tuple[Problem, float]]:
+    kinds = ("ula", "all_ones")
+    plans = (small_plan(FAINT | {"radio.line_of_sight": kind}) for kind in kinds)
+    problems = [build_problem(plan) for plan in plans]
+    return {k: (each, relaxed_bound(each)) for k, each in zip(kinds, problems, strict=True)}
 
 
 @pytest.mark.usefixtures("coarse_map")
@@ -112,14 +112,15 @@ def test_lines_lie_above_the_curve(seed: int) -> None:
     assert above.max() <= 1.2 * curve.max() + 1e-3
 
 
-@settings(max_examples=40)
-@given(seed=st.integers(0, 2**31))
-def test_flights_keep_to_the_reachable_distances(small_plan: MakePlan, seed: int) -> None:
-    for changes in (
-        {},
-        {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
-    ):
-        problem = build_problem(small_plan(changes))
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"flight.start_velocity": "free", "flight.bound_first_acceleration": False}],
+)
+def test_flights_keep_to_the_reachable_distances(
+    small_plan: MakePlan, changes: dict[str, Any]
+) -> None:
+    problem = build_problem(small_plan(changes))
+    for seed in range(40):
         flight = random_flight(problem.kinematics, seed)
         for link in problem.links:
             nearest, farthest = reachable_distances(problem.kinematics, link.station)

@@ -29,17 +29,19 @@ def faint_plan(small_plan: MakePlan) -> MakePlan:
     return make
 
 
-@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
 @pytest.mark.parametrize(
-    ("fading", "csi"),
+    ("line_of_sight", "fading", "csi", "modulation"),
     [
-        ("none", "statistical"),
-        ("realization", "statistical"),
-        ("ergodic", "statistical"),
-        ("ergodic", "instantaneous"),
+        ("ula", "none", "statistical", "bpsk"),
+        ("all_ones", "none", "statistical", "qpsk"),
+        ("all_ones", "realization", "statistical", "bpsk"),
+        ("ula", "realization", "statistical", "qpsk"),
+        ("ula", "ergodic", "statistical", "bpsk"),
+        ("all_ones", "ergodic", "statistical", "qpsk"),
+        ("all_ones", "ergodic", "instantaneous", "bpsk"),
+        ("ula", "ergodic", "instantaneous", "qpsk"),
     ],
 )
-@pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
 def test_a_solution_proves_itself(
     faint_plan: MakePlan, line_of_sight: str, fading: str, csi: str, modulation: str
 ) -> None:
@@ -89,7 +91,7 @@ def test_precoders_are_as_good_as_a_search_from_all_starts(
     "changes",
     [
         {"radio.line_of_sight": "all_ones"},
-        {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0},
+        pytest.param({}, marks=pytest.mark.slow),
         {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
     ],
 )
@@ -139,8 +141,15 @@ def test_a_symmetric_plan_has_equal_rates(faint_plan: MakePlan) -> None:
     assert rates.R_U == pytest.approx(rates.R_G, abs=1e-4)
 
 
-@pytest.mark.parametrize("scheme", ["mmse", "mrt", "zf", "waterfilling"])
-@pytest.mark.parametrize("fading", ["realization", "ergodic"])
+@pytest.mark.parametrize(
+    ("scheme", "fading"),
+    [
+        ("mmse", "realization"),
+        ("mrt", "ergodic"),
+        ("zf", "realization"),
+        ("waterfilling", "ergodic"),
+    ],
+)
 def test_schemes_fly_their_own_route_and_stay_below_faao(
     faint_plan: MakePlan, scheme: str, fading: str
 ) -> None:

@@ -32,7 +32,7 @@ from faao_mav.workflow import Result
 COPTER = parse_plan("""
 site: {origin: {latitude: 47, longitude: 8}}
 vehicle: {max_speed: 14, max_acceleration: 4, power: {}}
-flight: {start: [0, 60], end: [60, 0], altitude: 40, duration: 32, time_step: 1}
+flight: {start: [0, 60], end: [60, 0], altitude: 40, duration: 24, time_step: 1}
 radio:
   fading: none
   bandwidth_mhz: 10
@@ -209,12 +209,12 @@ def test_less_energy_never_delivers_more() -> None:
 
 
 def test_the_best_duration_is_that_of_trying_all() -> None:
-    found = within(0.9)
+    found = within(0.5)
     tried = []
     for slots in range(len(found.w) - 1, len(found.w) + 2):
         problem = build_problem(COPTER.changed({"flight.duration": slots}))
         with suppress(InfeasibleError):
-            each = direct(replace(problem, energy=0.9 * 3600))
+            each = direct(replace(problem, energy=0.5 * 3600))
             tried.append(slots * each.delivered_rate)
     assert len(tried) > 1
     assert len(found.w) * found.delivered_rate >= max(tried) * (1 - 1e-3)
@@ -222,7 +222,7 @@ def test_the_best_duration_is_that_of_trying_all() -> None:
 
 def test_the_least_energy_is_below_that_of_other_ways() -> None:
     most = direct(build_problem(COPTER))
-    asked = 0.6 * (COPTER.megabytes(most.delivered_rate) or 0.0)
+    asked = 0.7 * (COPTER.megabytes(most.delivered_rate) or 0.0)
     found, quickest = (
         optimize(COPTER.changed({"goal": {"deliver_mbytes": asked, "minimise": quantity}}))
         for quantity in ("energy", "duration")

@@ -113,7 +113,18 @@ QUICK = {
 }
 
 
-@pytest.mark.parametrize("name", [name for name in FENCES if "forty" not in name])
+DEARER = ("a wall between the stations", "two ways round of different worth")
+"""Fences whose flights take longest to find."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in DEARER else [])
+        for name in FENCES
+        if "forty" not in name
+    ],
+)
 def test_the_whole_path_keeps_the_margin(name: str) -> None:
     plan = fenced(name, **QUICK)
     solution = optimize(plan)

@@ -49,7 +49,7 @@ def test_rate_and_data_grow_with_the_duration(by_duration: dict[int, float]) -> 
     assert (np.diff(rates * list(by_duration)) > 0).all()
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(st.integers(20, 100), st.integers(12, 18), st.integers(0, 4), st.floats(0.0, 6.0))
 def test_more_time_and_more_power_never_deliver_less(
     north: int, slots: int, more: int, db: float

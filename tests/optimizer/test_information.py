@@ -146,7 +146,7 @@ def test_more_than_two_modes(small_plan: MakePlan) -> None:
     three = {f"radio.{end}.antennas": 3 for end in ("base_station", "relay", "ground_user")}
     few = {
         "flight.time_step": 2,
-        "optimizer.max_iterations": 2,
+        "optimizer.max_iterations": 1,
         "radio.modulation": "bpsk",
         "radio.fading": "realization",
         "power": -3,

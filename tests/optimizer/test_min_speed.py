@@ -44,7 +44,7 @@ def heading(speed: float, degrees: float) -> Any:
     st.one_of(st.none(), st.floats(-180, 180)),
     st.booleans(),
 )
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_every_start_keeps_the_least_speed(
     least: float, slots: int, first: float | None, last: float | None, closed: bool
 ) -> None:
@@ -109,7 +109,7 @@ def test_back_to_the_start_is_no_refusal_where_a_circle_does(
 )
 @example([0, 1, 1], [7.0, 21.0, 8.0], 0.0, False, False)
 @example([1, 1, -1], [16.0, 16.0, 6.0], 0.0, True, False)
-@settings(max_examples=6)
+@settings(max_examples=3)
 def test_no_refusal_where_a_dubins_path_keeps_every_limit(
     sides: list[int], seconds: list[float], first: float, begins_free: bool, ends_free: bool
 ) -> None:
@@ -169,7 +169,10 @@ def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it(wind: Vector) -
     assert kkt_residual(kin, stage, best.trajectory) < 2e-3 * gradient
 
 
-def test_too_little_room_for_a_turn_is_refused_with_the_reason() -> None:
+def test_too_little_room_for_a_turn_is_refused_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("faao_mav.optimizer.search.cruise._REPAIRS", 1)  # more are as hopeless
     kin = cruiser(5, 20.0)
     kin = replace(kin, end=kin.start)
     with pytest.raises(InfeasibleError, match=r"at least 20 m/s \(vehicle\.min_speed\) for 5 s"):
@@ -188,7 +191,7 @@ def test_the_optimum_keeps_the_least_speed(
     least: float, ends: tuple[float | None, float | None]
 ) -> None:
     speeds = [None if d is None else heading(max(least, 10.0), d) for d in ends]
-    kin = cruiser(150, least, start_velocity=speeds[0], end_velocity=speeds[1], time_step=1.0)
+    kin = cruiser(100, least, start_velocity=speeds[0], end_velocity=speeds[1], time_step=1.0)
     stage = links(bpsk, 4e4, 4e4)
     best, hovering = 0.0, 0.0
     for flight in starts(kin, ["straight", "bs-user", "user-bs"], PLACES).values():
@@ -240,30 +243,37 @@ PLANE = {"AIRSPEED_CRUISE": 22, "NAVL1_PERIOD": 5}
 """Its guidance follows any turn of the plans here."""
 
 
-@pytest.mark.parametrize("kind", ["copter", "plane"])
-def test_both_methods_solve_plans_with_it(
-    small_plan: MakePlan, paper_plan: MakePlan, kind: str
-) -> None:
+@pytest.mark.parametrize(
+    ("kind", "method"),
+    [
+        ("copter", "direct"),
+        ("plane", "direct"),
+        ("plane", "algorithm1"),
+        pytest.param("copter", "algorithm1", marks=pytest.mark.slow),
+    ],
+)
+def test_both_methods_solve_plans_with_it(small_plan: MakePlan, kind: str, method: str) -> None:
     changes = {
         "vehicle.min_speed": 9.0,
         "vehicle.type": kind,
         "vehicle.parameters": PLANE if kind == "plane" else {},
         "flight.duration": 20,
+        "radio.base_station.power_dbm": 0,
+        "radio.relay.power_dbm": 0,
+        "radio.fading": "ergodic" if method == "direct" else "realization",
+        "optimizer.method": method,
+        "optimizer.max_iterations": 15 if method == "direct" else 2,
         **FREE,
     }
-    powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
-    for plan in (small_plan(changes | powers), paper_plan(changes | powers)):
-        plan = plan.changed({"optimizer.max_iterations": 15})
-        solution = optimize(plan)
-        residuals = solution.residuals()
-        assert residuals.pop("minimum speed") < 1e-6
-        assert ("fall of airspeed" in residuals) == (kind == "plane")
-        told = [line for label, line in result_lines(Result(solution)) if label == "airspeed"]
-        assert bool(told) == (kind == "plane")
-        assert all(line.startswith("falls by at most 0.8 m/s^2") for line in told)
-        assert max(residuals.values()) < 1e-6
-        assert solution.rates.R_avg >= solution.history[0]
-        assert solution.rates.R_avg > 1.05 * solution.history[0]
+    solution = optimize(small_plan(changes))
+    residuals = solution.residuals()
+    assert residuals.pop("minimum speed") < 1e-6
+    assert ("fall of airspeed" in residuals) == (kind == "plane")
+    told = [line for label, line in result_lines(Result(solution)) if label == "airspeed"]
+    assert bool(told) == (kind == "plane")
+    assert all(line.startswith("falls by at most 0.8 m/s^2") for line in told)
+    assert max(residuals.values()) < 1e-6
+    assert solution.rates.R_avg > 1.05 * solution.history[0]
 
 
 @pytest.mark.parametrize(

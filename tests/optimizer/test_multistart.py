@@ -62,7 +62,7 @@ def test_a_block_has_the_mean_of_its_slots() -> None:
     assert moved == pytest.approx(np.einsum("cjn,cn->jn", found.gradient, shift))
 
 
-@pytest.mark.parametrize("power", [0, 10])
+@pytest.mark.parametrize("power", [0, pytest.param(10, marks=pytest.mark.slow)])
 def test_what_is_rejected_would_not_have_won(power: int) -> None:
     plan = long_plan(power, NAMED)
     solution = optimize(plan)

@@ -72,8 +72,8 @@ def test_the_global_optimum_of_concave_rates(buffer: float) -> None:
     ("kin", "stage"),
     [
         (copter(100, time_step=0.5), ACTIVE),
-        (copter(70, time_step=0.5), links(bpsk, 4e3, 4e3)),
-        (plane(15), ACTIVE),
+        pytest.param(copter(70, time_step=0.5), links(bpsk, 4e3, 4e3), marks=pytest.mark.slow),
+        pytest.param(plane(15), ACTIVE, marks=pytest.mark.slow),
         (plane(20, min_speed=12.0, max_speed=25.0, start=np.array([0.0, 100.0])), ACTIVE),
     ],
 )
@@ -132,7 +132,7 @@ class Known:
 @pytest.mark.parametrize(
     "known",
     [
-        Known(120, "full", 2.243),
+        pytest.param(Known(120, "full", 2.243), marks=pytest.mark.slow),  # README's plan
         Known(120, "half", 1.4117),
         Known(70, "full", 2.0358),
         Known(70, "half", 1.0851),
@@ -171,14 +171,15 @@ def test_what_a_queue_adds_to_the_matrix_grows_linearly() -> None:
                 "copter_relay",
                 {
                     "flight.duration": duration,
+                    "flight.time_step": step,
                     "radio.bandwidth_mhz": 20,
                     "radio.relay.buffer_mbytes": buffer,
                     "radio.duplex": "half",
                 },
             )
-            for duration, buffer in ((120, 5), (70, 2))
+            for duration, step, buffer in ((120, 1, 5), (70, 0.5, 2))
         ),
-        ("plane_relay", {"flight.duration": 100}),
+        ("plane_relay", {"flight.duration": 100, "flight.time_step": 1}),
     ],
 )
 def test_small_buffers_and_planes_converge(name: str, changes: dict[str, Any]) -> None:

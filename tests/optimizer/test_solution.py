@@ -20,7 +20,7 @@ from faao_mav.optimizer.solution import Solution, load_solution, save_solution
 
 @pytest.fixture(scope="module")
 def solution(paper_plan: MakePlan) -> Solution:
-    return optimize(paper_plan({"optimizer.max_iterations": 2}))
+    return optimize(paper_plan({"optimizer.max_iterations": 1}))
 
 
 def test_saved_keys_and_shapes(solution: Solution, tmp_path: Path) -> None:

@@ -237,7 +237,7 @@ def test_other_formats_are_refused_before_the_work(tmp_path: Path, option: str, 
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium to show the page with")
-@pytest.mark.parametrize("width", [320, 1200])
+@pytest.mark.parametrize("width", [320, pytest.param(1200, marks=pytest.mark.slow)])
 def test_a_browser_shows_it_without_scrolling_sideways(
     tmp_path: Path, full: str, width: int
 ) -> None:

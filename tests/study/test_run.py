@@ -410,7 +410,8 @@ def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> 
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
         "from faao_mav.cli.main import run; run()"
     )
-    command = [sys.executable, "-c", code, "study", plan, "--power", "0:20:0.1", "--out", out]
+    command = [sys.executable, "-c", code, "study", plan, "--power", "0:20:0.1", "--jobs", 2,
+               "--out", out]  # fmt: skip
     process = subprocess.Popen(
         [*map(str, command)], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
