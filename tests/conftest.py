@@ -112,18 +112,14 @@ def paper_plan(small_plan: MakePlan) -> MakePlan:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
-    """Share tests out by their rooms: one process makes a room's flights, browser or autopilots.
+    """Share tests out one by one; real autopilots fly one after the other, in one process."""
 
-    The tests of the optimiser and those of no room take longest: they are shared out by files.
-    """
-
-    class ByRoom(LoadScopeScheduling):  # type: ignore[misc]
+    class OneFlightAtATime(LoadScopeScheduling):  # type: ignore[misc]
         def _split_scope(self, nodeid: str) -> str:
-            file = nodeid.partition("::")[0]
-            room = file.rpartition("/")[0]
-            return file if room in ("tests", "tests/optimizer") else room
+            folder = "tests/autopilots/"
+            return folder if nodeid.startswith(folder) else nodeid
 
-    return ByRoom(config, log)
+    return OneFlightAtATime(config, log)
 
 
 @pytest.fixture

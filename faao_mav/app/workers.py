@@ -132,11 +132,12 @@ class Workers:
         return value
 
     def stop(self) -> None:
-        """End all processes, whatever they do."""
+        """End all processes, whatever they do; those of others, as of joblib, go on."""
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
         for process in multiprocessing.active_children():
-            process.kill()
+            if isinstance(process, self._context.Process):
+                process.kill()
 
 
 async def _ended(process: Any) -> None:

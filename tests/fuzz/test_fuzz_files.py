@@ -21,8 +21,8 @@ NAMES = (
     "ulg",
     "vary",
 )
-CASES = 100
-"""Cases of each target in the suite; chosen: a fifth of a second."""
+CASES = 300
+"""Cases of each target in the suite; chosen: half a second."""
 
 
 # pymavlink leaves a log open that it does not understand

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing, suppress
 
 import pytest
-from conftest import PATIENCE, free_port
+from conftest import free_port
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
@@ -143,10 +143,6 @@ def test_a_tcp_client_that_does_not_read_is_dropped(tcp: Port) -> None:
     for _ in range(4000):
         tcp.transport.write(bytes(2000))
         busy.recv(1 << 20)
-    idle.settimeout(PATIENCE)
-    with suppress(ConnectionResetError):
-        while idle.recv(1 << 20):
-            pass
     busy.send(packet_of())
     assert tcp.received() == [packet_of()]
 
