@@ -435,6 +435,17 @@ def test_positions_that_come_late_at_once_are_not_answered(kind: str) -> None:
 
 
 @KINDS
+def test_where_all_positions_are_late_nothing_is_started(kind: str) -> None:
+    scene = Scene(kind, solution=low())
+    scene.tells(
+        during(0.0, 1e9, lambda told: replace(told, time_boot_ms=max(0, told.time_boot_ms - 5000)))
+    )
+    assert scene.run() == "refused"
+    assert "its positions come 5 s late" in scene.watch.outcome.text
+    assert scene.orders == []
+
+
+@KINDS
 def test_positions_that_overtake_each_other_are_answered_in_order(kind: str) -> None:
     flown = Flown.of(kind, swift(), parameters={"COM_OBL_RC_ACT": 5})
     assert flown.scene.run(Faults(reordering=0.3, delay=0.8, seed=2)) == "finished"

@@ -48,9 +48,9 @@ _MODE_AGAIN = 0.5
 _EARLY = 0.8
 """The share of a period after which the next setpoint may go: they come irregularly; chosen."""
 
-_OLD = 1.0
+_OLD, _ALWAYS_OLD = 1.0, 10.0
 """From so many seconds of the world on a position is too old to be answered by a setpoint: a link
-may have held it back. Chosen."""
+may have held it back; and seconds after which nothing is started where all of them are. Chosen."""
 
 _SLOW_CLIMB = 0.5
 """The least speed, m/s, at which it has to take off by itself; chosen: a third of the defaults."""
@@ -164,7 +164,14 @@ class Stream(Watch):
         return out
 
     def _set_out(self, now: float) -> Sequence[Message]:
-        if self.seen.position is None or self._frame.origin is None:
+        position = self.seen.position
+        if position is None or self._frame.origin is None:
+            return ()
+        age = self._round_trips.age(position.time_boot_ms / 1000, now)
+        if age > _OLD:
+            if now >= self._begun + _ALWAYS_OLD:
+                text = f"its positions come {age:.0f} s late, by the clock that TIMESYNC tells"
+                self._end("refused", f"nothing was started: {text}")
             return ()
         lean = beyond_lean(self._solution, vehicle_of(self._solution.plan))
         if lean is not None:
