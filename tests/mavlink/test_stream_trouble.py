@@ -17,8 +17,10 @@ from faao_mav.arrays import Real
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.flying.gate import LEVEL, NEAR
 from faao_mav.mavlink.messages import (
+    CurrentMode,
     Envelope,
     GlobalPositionInt,
+    Heartbeat,
     Message,
     SetPositionTargetLocalNed,
 )
@@ -175,6 +177,10 @@ def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> 
     flown.scene.mock._guided.hear = heard
     come_back = flown.scene.mock._come_back
     flown.scene.mock._come_back = lambda: [] if deaf[0] else come_back()
+    modes = Heartbeat | CurrentMode  # which come after positions, when the link is back
+    flown.scene.tells(
+        lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :]
+    )
     events = [
         (44.0, lambda _: deaf.__setitem__(0, True)),
         (48.0, flown.scene.sets(HOLD["px4"])),
