@@ -216,6 +216,9 @@ def test_parameters_that_cannot_be_read_are_named() -> None:
     assert errors(findings) == {"timing-unread"}
     assert "WP_ACC or WPNAV_ACCEL" in findings["timing-unread"].message
     assert errors(found(flight, mute, untimed=True)) == set()
+    assert "parameters-unread" not in findings
+    del mute.parameters.values["FENCE_RADIUS"]
+    assert found(flight, mute)["parameters-unread"].message.endswith("defaults: FENCE_RADIUS")
     assert findings["on-rc-lost"].level is Level.WARNING
     assert "FS_THR_ENABLE not read" in findings["on-rc-lost"].message
 
@@ -260,7 +263,6 @@ def test_a_plan_tells_what_the_flight_takes_of_the_battery() -> None:
     assert errors(findings) == {"battery-low"}
     assert f"takes {takes:.0f} %, and is to leave 20 %" in findings["battery-low"].message
     assert errors(found(flight, mock, battery=int(takes) + 22)) == set()
-    # timed for others, it delivers less: that too is what --untimed allows
     slow = holding(conversion.mission)
     assert errors(found(flight, slow)) >= {"timing-other"}
     assert errors(found(flight, slow, untimed=True)) == set()

@@ -36,12 +36,8 @@ Chosen: twice what PX4 takes for low by default."""
 
 _ORDER = {Level.ERROR: 0, Level.WARNING: 1, Level.NOTE: 2}
 
-_PLACE, _TIMING = ("place-",), ("timing-", "link-")
-"""How the rules begin that --elsewhere and --untimed overrule: who flies a mission late does not
-deliver its link."""
-
-_OF_THE_PLAN = ("link-", "speed-above-limit")
-"""How the rules begin that hold a mission against its plan."""
+_PLACE, _TIMING = "place-", "timing-"
+"""How the rules begin that --elsewhere and --untimed overrule."""
 
 _AT_FENCE: dict[FenceAction, str] = {
     "nothing": "flies on",
@@ -95,8 +91,8 @@ def _note(rule: str, message: str) -> Finding:
     return Finding(Level.NOTE, rule, None, message, "")
 
 
-def _overruled(found: Finding, rules: tuple[str, ...], option: str) -> Finding:
-    """Return what was `found`, an error by one of `rules` as a warning that names the `option`."""
+def _overruled(found: Finding, rules: str, option: str) -> Finding:
+    """Return what was `found`; an error by one of the `rules` as a warning that names `option`."""
     if found.level is not Level.ERROR or not found.rule.startswith(rules):
         return found
     return replace(found, level=Level.WARNING, action=f"{option}: flown all the same")
@@ -117,9 +113,14 @@ def _judged(flight: Flight, seen: Seen, *, elsewhere: bool) -> Check:
     found = check(mission, vehicle, limits=limits, solution=flight.solution)
     if not flight.streamed:
         return found
-    # It is not the mission that keeps the plan, but the setpoints.
-    kept = tuple(each for each in found.findings if not each.rule.startswith(_OF_THE_PLAN))
+    kept = tuple(each for each in found.findings if not _of_the_mission(each))
     return replace(found, findings=kept)
+
+
+def _of_the_mission(found: Finding) -> bool:
+    """Tell whether it is about how a mission keeps its plan, which a stream does by setpoints."""
+    late = found.rule.startswith("link-") and found.level is Level.WARNING
+    return late or found.rule == "speed-above-limit"
 
 
 def _state(flight: Flight, seen: Seen) -> Iterator[Finding]:
@@ -202,7 +203,8 @@ def _lists(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
         elif held:
             idle = part is MissionType.FENCE and own.type.at_fence(own).action == "nothing"
             told = _warning if idle else _error
-            message = f"it holds {part.title} ({counted(len(held), 'item')}) that the file has not"
+            what = "a fence" if part is MissionType.FENCE else part.title
+            message = f"it holds {what} ({counted(len(held), 'item')}) that the file has not"
             yield told(
                 rule,
                 f"{message}, and does nothing about it" if idle else message,
@@ -213,13 +215,13 @@ def _lists(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
 def _timing(flight: Flight, seen: Seen, judged: Check) -> Iterator[Finding]:
     """Yield where its parameters are not those that the mission is timed for."""
     given, values = flight.vehicle.parameters, seen.held.reading.values
-    other, unread = [], []
+    other, unread, assumed = list[str](), list[str](), list[str]()
     for parameter in seen.vehicle.parameters.values():
-        if parameter.name_in(given) is None:
-            continue
+        timed = parameter.motion and parameter.name_in(given) is not None
         name = next((each for each in parameter.names if each in values), None)
         if name is None:
-            unread.append(" or ".join(parameter.names))
+            (unread if timed else assumed).append(" or ".join(parameter.names))
+        if name is None or not timed:
             continue
         wanted = number_in(parameter, name, given)
         if wanted is not None and not close(values[name], wanted):
@@ -233,6 +235,9 @@ def _timing(flight: Flight, seen: Seen, judged: Check) -> Iterator[Finding]:
     if unread:
         message = f"not read, though the mission is timed for them: {', '.join(unread)}"
         yield told("timing-unread", message, "try again, or --untimed flies it all the same")
+    if assumed:
+        message = f"not read, and taken for their defaults: {', '.join(assumed)}"
+        yield _note("parameters-unread", message)
     if not given:
         yield _note("timing-unknown", "nothing tells which parameters the mission is timed for")
 
