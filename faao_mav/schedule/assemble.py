@@ -61,8 +61,9 @@ def assemble(route: Route, plan: Plan) -> Mission:
         if speed != commanded:
             items.append(_change_speed(speed, axis))
             commanded = speed
-        command = Command.NAV_SPLINE_WAYPOINT if route.splines[k] else Command.NAV_WAYPOINT
-        items.append(_at(command, place, altitude, float(holds[k]), float(route.radii[k])))
+        items.append(
+            _at(Command.NAV_WAYPOINT, place, altitude, float(holds[k]), float(route.radii[k]))
+        )
         if delays[k] > 0:
             params = (float(delays[k]), -1.0, -1.0, -1.0)
             items.append(MissionItem(Command.NAV_DELAY, Frame.MISSION, params))

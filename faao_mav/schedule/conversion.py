@@ -1,9 +1,8 @@
 """From a trajectory to the mission whose predicted flight keeps it, in space and time."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import floor, inf
-from typing import TypeAlias
 
 import numpy as np
 
@@ -15,9 +14,8 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
-from faao_mav.schedule.initial_route import Splines, initial_route, slowest_leg, with_ramps
+from faao_mav.schedule.initial_route import initial_route, slowest_leg
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
-from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import GOOD_COST, WORTHWHILE, Scheduler
 from faao_mav.schedule.transit import check_transit
@@ -25,18 +23,9 @@ from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
 from faao_mav.vehicle.vehicle import candidates
 
-# Chosen; what a change costs is not measured.
-_SPLINE_SPACING = 10.0  # the least distance of spline waypoints, m
-_SPLINE_TIMES = (2.0, 3.0)  # least times between spline waypoints to try, s
-_BRAKING = 1.1  # the last leg of splines over v²/a: they use half of the acceleration
 _PLANE_SHARE = 0.8  # of the path tolerance for the initial route of a plane, which is then split
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
-_GOOD = (0.0, GOOD_COST)  # the rank, m, from which nothing better is looked for
-
-_Scheduled: TypeAlias = tuple[Schedule, Scheduler]
-_Rank: TypeAlias = tuple[float, float]
-"""How far a schedule gets out of the fence, m, and its `Schedule.cost`, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,43 +153,30 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
 
     The sets of parameters that are recommended for the vehicle are compared by the error of the
     first schedule, and refined in that order until one is good, or hardly better than the best
-    before. If none is good, copters get legs of their own for where the plan speeds up and slows
-    down. If that is not good either, a vehicle that flies splines may do so with the liveliest:
-    everywhere, or where legs are too short for their speed.
+    before.
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     t, w = solution.t, np.round(solution.w, _DECIMALS)
-    given, sets = vehicle_of(plan), candidates(plan)
+    hovers = vehicle_of(plan).type.hovers
+    route = initial_route(t, w, plan, share=1.0 if hovers else _PLANE_SHARE)
     schedulers = [_scheduler(plan, t, w, vehicle) for vehicle in _vehicles(plan)]
-    straight = initial_route(t, w, plan, share=1.0 if given.type.hovers else _PLANE_SHARE)
-
-    def rank(scheduled: _Scheduled) -> _Rank:
-        """Order schedules: inside the fence first, then by cost."""
-        return _outside(scheduled[0], plan.keep_in), scheduled[0].cost
-
-    def better(best: _Scheduled, trials: Iterable[tuple[Route, Scheduler]]) -> _Scheduled:
-        """Return `best`, or what is better of `trials` if all of these are flown to their end."""
-        try:
-            return _refined(trials, rank, best)
-        except InputError:
-            return best
-
-    best = _refined(((straight, scheduler) for scheduler in schedulers), rank)
-    if rank(best) > _GOOD and given.type.hovers:
-        ramped = with_ramps(straight, t, w, given.legs.least)
-        best = better(best, ((ramped, scheduler) for scheduler in schedulers))
-    if rank(best) > _GOOD and given.type.dialect.splines:
-        liveliest = schedulers[-1]
-        bent = [initial_route(t, w, plan, splines=splines) for splines in _splines(liveliest)]
-        new = {route.positions.tobytes(): route for route in bent if route.splines.any()}
-        best = better(best, ((route, liveliest) for route in new.values()))
-    schedule, scheduler = best
+    firsts = [scheduler.first(route) for scheduler in schedulers]
+    order = sorted(range(len(firsts)), key=lambda k: firsts[k].error)
+    chosen, best, rank = order[0], firsts[order[0]], (inf, inf)
+    for k in order:
+        tried = schedulers[k].refined(firsts[k])
+        new = _outside(tried, plan.keep_in), tried.cost  # inside the fence first
+        worthwhile = new <= (rank[0], WORTHWHILE * rank[1])
+        if new < rank:
+            chosen, best, rank = k, tried, new
+        if not worthwhile or rank <= (0.0, GOOD_COST):
+            break
     return Conversion(
-        mission=assemble(schedule.route, plan),
-        schedule=schedule,
-        vehicle=scheduler.vehicle,
-        parameters=sets[schedulers.index(scheduler)],
+        mission=assemble(best.route, plan),
+        schedule=best,
+        vehicle=schedulers[chosen].vehicle,
+        parameters=candidates(plan)[chosen],
     )
 
 
@@ -237,37 +213,3 @@ def _true_over_commanded(plan: Plan) -> float:
     """Return true over commanded airspeed at the height of the flight."""
     vehicle = vehicle_of(plan)
     return vehicle.type.true_over_commanded(vehicle, _altitude(plan))
-
-
-def _refined(
-    trials: Iterable[tuple[Route, Scheduler]],
-    rank: Callable[[_Scheduled], _Rank],
-    best: _Scheduled | None = None,
-) -> _Scheduled:
-    """Return the best of `best` and the schedules of the trials, refined.
-
-    They are refined one after the other, the most promising first, up to one that is good, or
-    hardly better than the best before it.
-    """
-    firsts = [(scheduler.first(route), scheduler) for route, scheduler in trials]
-    for first, scheduler in sorted(firsts, key=lambda each: each[0].error):
-        tried = scheduler.refined(first), scheduler
-        if best is not None:
-            outside, cost = rank(best)
-            if rank(tried) > (outside, WORTHWHILE * cost):
-                return min(best, tried, key=rank)
-        best = tried
-        if rank(best) <= _GOOD:
-            break
-    assert best is not None, "no trials"
-    return best
-
-
-def _splines(scheduler: Scheduler) -> Iterator[Splines]:
-    """Yield what may be splines on a flight at the greatest speed: all legs, or some."""
-    vehicle, speed = scheduler.vehicle, scheduler.max_speed
-    braking = _BRAKING * speed**2 / vehicle.value("acceleration")
-    for seconds in _SPLINE_TIMES:
-        spacing = max(_SPLINE_SPACING, seconds * speed)
-        yield Splines(spacing, braking)
-        yield Splines(spacing, braking, vehicle.legs)

@@ -58,10 +58,7 @@ class CopterScheduler(Scheduler):
             best = self.fitted(best.route, top_speed, begun=best)
         for changes in (self._splits, self._moves):
             for _ in range(_ROUNDS):
-                tried = (
-                    min((self.fitted(route, top_speed) for route in beginnings), key=_cost)
-                    for beginnings in changes(best)
-                )
+                tried = (self.fitted(route, top_speed) for route in changes(best))
                 good = (each for each in tried if each.cost <= WORTHWHILE * best.cost)
                 better = next(good, None)
                 if better is None:
@@ -69,12 +66,11 @@ class CopterScheduler(Scheduler):
                 best = better
         return self.rounded(self.shared(best, top_speed), top_speed)
 
-    def _splits(self, schedule: Schedule) -> Iterator[list[Route]]:
+    def _splits(self, schedule: Schedule) -> Iterator[Route]:
         """Yield the route with all legs split that are off by too much, with half, with one.
 
         A leg may become too short for its speed: then fewer splits can be better than all. The
-        fit begins with the speed of the leg for both its parts; unless the schedule is good, it
-        also begins with parts whose speeds differ as the plan's do, from where it may end better.
+        fit begins with parts whose speeds differ as the plan's do.
         """
         route, times = schedule.route, self._split_times(schedule)
         for count in dict.fromkeys((len(times), len(times) // 2, 1)):
@@ -83,12 +79,9 @@ class CopterScheduler(Scheduler):
                 at = np.searchsorted(route.arrivals, chosen)
                 positions = positions_at(chosen, self.t, self.w)
                 split = route.insert(at, positions, chosen, route.speeds[at - 1])
-                beginnings = [split]
-                if schedule.cost > GOOD_COST:
-                    planned = _planned_speeds(route)
-                    shares = _planned_speeds(split) / np.insert(planned, at, planned[at - 1])
-                    beginnings.append(replace(split, speeds=shares * split.speeds))
-                yield beginnings
+                planned = _planned_speeds(route)
+                shares = _planned_speeds(split) / np.insert(planned, at, planned[at - 1])
+                yield replace(split, speeds=shares * split.speeds)
 
     def _split_times(self, schedule: Schedule) -> list[float]:
         """Return the plan's times, s, at which legs that are off by too much are best split.
@@ -99,8 +92,6 @@ class CopterScheduler(Scheduler):
         off = lengths(schedule.positions(self.t - self.t[0]) - self.w)
         splits = []
         for k in range(route.first, route.last):
-            if route.splines[k + 1]:
-                continue
             inside = np.flatnonzero(
                 (self.t > route.departures[k]) & (self.t < route.arrivals[k + 1])
             )
@@ -130,21 +121,16 @@ class CopterScheduler(Scheduler):
             result &= length >= np.maximum(legs.shortest_leg(speed), legs.least)
         return result
 
-    def _moves(self, schedule: Schedule) -> Iterator[list[Route]]:
-        """Yield the route with waypoints moved, if the path is too far off or has splines.
+    def _moves(self, schedule: Schedule) -> Iterator[Route]:
+        """Yield the route with waypoints moved, if the path is too far off.
 
-        ArduPilot's aircraft swings wide in splines, for it is not told what turning takes; PX4's
-        cuts corners with wide acceptance radii.
+        PX4's aircraft cuts corners with wide acceptance radii.
         """
         route = schedule.route
-        if schedule.deviation.path > self.tolerance or route.splines.any():
-            movable = (route.splines | (route.radii > 0)) & (route.waits == 0)
-            points = np.arange(route.first + 1, route.last)
-            yield [self.moved(schedule, points[movable[points]], _MOVE_SHARE)]
-
-
-def _cost(schedule: Schedule) -> float:
-    return schedule.cost
+        points = np.arange(route.first + 1, route.last)
+        movable = points[(route.radii[points] > 0) & (route.waits[points] == 0)]
+        if schedule.deviation.path > self.tolerance and len(movable):
+            yield self.moved(schedule, movable, _MOVE_SHARE)
 
 
 def _planned_speeds(route: Route) -> Real:

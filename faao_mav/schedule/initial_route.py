@@ -4,7 +4,6 @@ Nothing in it knows how the vehicle speeds up or turns: the schedulers fit it to
 flight.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +16,6 @@ from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.waypoints import (
     LEG_SHARE,
     Waypoint,
-    along_spline,
     fits,
     hovers_and_ends,
     simplify,
@@ -27,31 +25,12 @@ from faao_mav.vehicle import LegLimits, vehicle_of
 
 _MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
 
-# The share of the plan's greatest speed on a leg up to which it is a leg of its own: of 0.6 to 0.9
-# the one with which four hard plans were kept best.
-_RAMPED = 0.6
-
-
-@dataclass(frozen=True, slots=True)
-class Splines:
-    """Which legs become splines, and how far apart their waypoints are.
-
-    Spline waypoints are `spacing` m apart in bends. The last one before a stop is at least
-    `braking` m before it: an autopilot brakes on the last leg alone. All legs become splines, or
-    with `straight` only those that are too short to reach their speed if flown straight.
-    """
-
-    spacing: float
-    braking: float = 0.0
-    straight: LegLimits | None = None
-
 
 def initial_route(
     t: ArrayLike,
     w: ArrayLike,
     plan: Plan,
     *,
-    splines: Splines | None = None,
     share: float = 1.0,
 ) -> Route:
     """Return waypoints, waits and speeds that follow the trajectory.
@@ -69,19 +48,15 @@ def initial_route(
     legs, slowest = vehicle_of(plan).legs, slowest_leg(plan)
     tolerance = share * plan.mission.path_tolerance
     fixed = hovers_and_ends(times, positions, tolerance, slowest)
-    waypoints, curved = [fixed[0]], [False]
+    waypoints = [fixed[0]]
     for start, stop in pairwise(fixed):
         stretch = slice(start.last, stop.first + 1)
         path = positions[stretch].copy()
         path[0], path[-1] = start.position, stop.position
         inner = _apart(path, simplify(path, LEG_SHARE * tolerance), legs.least, tolerance)
-        marked = [False] * (len(inner) + 1)
-        if splines is not None:
-            inner, marked = _with_splines(times[stretch], path, inner, splines)
         waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
-        curved += marked
-    return _timed(times, waypoints, curved, slowest, plan.max_ground_speed)
+    return _timed(times, waypoints, slowest, plan.max_ground_speed)
 
 
 def slowest_leg(plan: Plan) -> float:
@@ -113,27 +88,6 @@ def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: floa
             np.array([speed]),
         )
     return route
-
-
-def with_ramps(route: Route, t: Real, w: Real, least: float) -> Route:
-    """Return `route` with legs of their own for where the plan speeds up and slows down.
-
-    A vehicle that is quicker to change its speed keeps the plan's time at the end of a leg, not on
-    the way there. A leg is split where the plan first and last has 0.6 of its greatest speed on it,
-    if both parts are `least` m long. `t` (n,) s, `w` (n, 2) m.
-    """
-    pace = lengths(np.gradient(w, t, axis=0))
-    splits: list[int] = []
-    for k in range(len(route.speeds)):
-        inside = np.flatnonzero((t > route.departures[k]) & (t < route.arrivals[k + 1]))
-        if len(inside) == 0:
-            continue
-        fast = inside[pace[inside] >= _RAMPED * pace[inside].max()]
-        ends = route.positions[k : k + 2]
-        splits += [i for i in {fast[0], fast[-1]} if min(lengths(ends - w[i])) >= least]
-    chosen = np.array(sorted(splits), dtype=int)
-    at = np.searchsorted(route.arrivals, t[chosen])
-    return route.insert(at, w[chosen], t[chosen], route.speeds[at - 1])
 
 
 def set_out(t: Real, w: Real, plan: Plan) -> float:
@@ -178,40 +132,7 @@ def _apart(path: Real, inner: list[int], least: float, tolerance: float) -> list
     return ends[1:-1]
 
 
-def _with_splines(
-    t: Real, path: Real, inner: list[int], splines: Splines
-) -> tuple[list[int], list[bool]]:
-    """Return indices of waypoints, and for each and the end whether it is a spline's.
-
-    Runs of legs between the points `inner` that become splines get points of their own.
-    """
-    ends = [0, *inner, len(path) - 1]
-    bent = np.ones(len(inner) + 1, dtype=bool)
-    if splines.straight is not None:
-        length = lengths(np.diff(path[ends], axis=0))
-        bent = length < splines.straight.shortest_leg(length / np.diff(t[ends]))
-        bent &= len(bent) > 1
-    points: list[int] = []
-    marked: list[bool] = []
-    first = 0
-    for k, is_bent in enumerate(bent):
-        is_last = k + 1 == len(bent)
-        if is_bent and not is_last and bent[k + 1]:
-            continue
-        added: list[int] = []
-        if is_bent:
-            run = path[ends[first] : ends[k + 1] + 1]
-            spaced = along_spline(run, splines.spacing, splines.braking if is_last else 0.0)
-            added = [ends[first] + i for i in spaced]
-        points += [*added, ends[k + 1]]
-        marked += [bool(is_bent)] * (len(added) + 1)
-        first = k + 1
-    return points[:-1], marked
-
-
-def _timed(
-    t: Real, waypoints: list[Waypoint], curved: list[bool], slowest: float, max_speed: float
-) -> Route:
+def _timed(t: Real, waypoints: list[Waypoint], slowest: float, max_speed: float) -> Route:
     """Return the route with the speeds and waits that keep the plan's times without ramps."""
     positions = np.array([waypoint.position for waypoint in waypoints])
     arrivals = t[[waypoint.first for waypoint in waypoints]]
@@ -237,7 +158,6 @@ def _timed(
         speeds=speeds,
         waits=waits,
         radii=np.zeros(len(waypoints)),
-        splines=np.array(curved),
         first=0,
         last=len(waypoints) - 1,
     )

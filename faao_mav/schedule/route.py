@@ -27,8 +27,7 @@ class Route:
     `positions` (m, 2) are local east-north metres. The plan reaches waypoint k at `arrivals[k]`
     and leaves it at `departures[k]`, s; the two differ at hovers. The mission commands a speed for
     each leg, `speeds` (m - 1,), m/s, and for each waypoint how long to wait there, `waits` (m,), s,
-    and an acceptance radius, `radii` (m,), m, 0 for the autopilot's own. `splines` (m,) marks the
-    spline waypoints.
+    and an acceptance radius, `radii` (m,), m, 0 for the autopilot's own.
 
     The plan's flight begins at waypoint `first`, w_I, and ends at waypoint `last`, w_F. A waypoint
     before `first` lets the aircraft reach w_I at speed, one after `last` lets it leave w_F at
@@ -41,7 +40,6 @@ class Route:
     speeds: Real
     waits: Real
     radii: Real
-    splines: Flags
     first: int
     last: int
     lead: float = 0.0
@@ -100,7 +98,7 @@ class Route:
             speeds=self.speeds,
             holds=holds,
             delays=delays,
-            splines=self.splines,
+            splines=np.zeros(len(self.positions), dtype=bool),
             radii=self.radii,
             elevation=altitude,
             wind=wind,
@@ -120,7 +118,6 @@ class Route:
             "speeds": speeds,
             "waits": 0.0,
             "radii": 0.0,
-            "splines": False,
         }
         arrays = {name: getattr(self, name) for name in values}
         longer = {

@@ -28,7 +28,6 @@ GOOD_COST = 1.5  # the cost of a schedule, m, from which nothing costlier is tri
 _PASSING_WINDOW = 6.0  # s before and after a waypoint counts as reached, in which it is passed
 _ALIKE = (0.1, 0.03)  # relative differences of neighbours' speeds that are tried as one, in turn
 _SHARED_COST = 1.05  # the largest ratio of the costs with and without shared speeds to accept
-_SPLINE_GROUP = 3  # spline legs in a row that share a speed while it is fitted
 _WAIT_DIGITS = (
     2  # decimals of a commanded wait in s: with one, 8 of 77 schedules became a third worse
 )
@@ -91,11 +90,10 @@ class Scheduler(ABC):
         route = self._with_radii(route)
         free = (route.waits > 0) & (np.arange(len(route.waits)) != 0)
         free[-1] = False
-        free &= ~route.splines  # their waits are whole seconds: no delay may follow a spline
         return fit(
             self.flight,
             route,
-            groups=_spline_groups(route) if groups is None else groups,
+            groups=np.arange(len(route.speeds)) if groups is None else groups,
             free=free,
             min_speed=self.min_speed,
             max_speed=top_speed,
@@ -107,9 +105,8 @@ class Scheduler(ABC):
     def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:
         """Return what `schedule` becomes at other commands."""
         route, known = schedule.route, self.vehicle.type.leg_durations
-        if known is None or route.splines.any():
-            return LegRetimed(schedule, times)
-        return LegRetimed(schedule, times, known(self.vehicle, route.leg_lengths, route.joined))
+        durations = known and known(self.vehicle, route.leg_lengths, route.joined)
+        return LegRetimed(schedule, times, durations)
 
     def moved(self, schedule: Schedule, points: Integers, share: float) -> Route:
         """Return the route with the waypoints `points` (k,) moved against the flight's offset.
@@ -185,17 +182,6 @@ class Scheduler(ABC):
             tolerance=self.tolerance,
             lead=route.lead,
         )
-
-
-def _spline_groups(route: Route) -> Integers:
-    """Number the groups of legs that share a speed: each leg, or a few splines in a row."""
-    groups = np.zeros(len(route.speeds), dtype=int)
-    run = 1
-    for k in range(1, len(groups)):
-        goes_on = route.splines[k] and route.splines[k + 1] and not route.waits[k]
-        run = run + 1 if goes_on and run < _SPLINE_GROUP else 1
-        groups[k] = groups[k - 1] + (run == 1)
-    return groups
 
 
 def _speed_groups(speeds: Real, alike: float) -> Integers:

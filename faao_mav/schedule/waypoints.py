@@ -1,4 +1,4 @@
-"""Where waypoints go on a trajectory: at hovers, at the ends of long legs, along splines.
+"""Where waypoints go on a trajectory: at hovers and at the ends of long legs.
 
 Constants that name no source are chosen; what a change costs is not measured.
 """
@@ -34,9 +34,6 @@ _NEARLY = 1e-3  # or beyond it by this share
 _SPEED_WINDOW = 1.0  # s, over which a speed is averaged first: it hides a trajectory's chatter
 _SAME_POINT = 1e-3  # the distance, m, within which both ends of a trajectory are one waypoint
 _BISECTIONS = 8  # halvings of the tolerance that evens out legs: it is found to 1/256
-_BEND_SAMPLING = 1.0  # the distance of the points, m, at which a path's bends are measured
-_SPLINE_TURN = 0.3  # the largest turn between spline waypoints, rad, where their spacing allows
-_SPARSEST = 2.0  # the largest distance of spline waypoints as a multiple of their spacing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,27 +157,6 @@ def simplify(w: Real, tolerance: float) -> list[int]:
     return best
 
 
-def along_spline(path: Real, spacing: float, end_spacing: float) -> list[int]:
-    """Return the indices between first and last sample that become spline waypoints.
-
-    They are `spacing` m apart in bends of `path` (n, 2), m, and up to twice as far on straight
-    parts. The last one is at least `end_spacing` m before the end, if there is one then.
-    """
-    way = np.concatenate([[0.0], np.cumsum(lengths(np.diff(path, axis=0)))])
-    end = float(way[-1]) - max(0.0, end_spacing - spacing)
-    if end <= 2 * _BEND_SAMPLING:
-        return []
-    fine = np.linspace(0.0, end, math.ceil(end / _BEND_SAMPLING) + 1)
-    x, y = (np.interp(fine, way, axis) for axis in path.T)
-    heading = np.unwrap(np.arctan2(*(np.gradient(_smooth(axis, spacing / 4)) for axis in (y, x))))
-    bend = np.abs(np.gradient(heading)) / _BEND_SAMPLING
-    per_metre = np.clip(bend / _SPLINE_TURN, 1 / (_SPARSEST * spacing), 1 / spacing)
-    count = np.cumsum(_smooth(per_metre, spacing)) * _BEND_SAMPLING
-    parts = max(1, round(float(count[-1])))
-    places = np.interp(np.linspace(count[0], count[-1], parts + 1)[1:-1], count, fine)
-    return [int(k) for k in np.unique(np.searchsorted(way, places)) if 0 < k < len(path) - 1]
-
-
 def _speeds(t: Real, w: Real, window: float) -> Real:
     """Return the magnitude of the mean velocity over `window` s about each sample, (n,), m/s."""
     before = np.maximum(t - window / 2, t[0])
@@ -279,10 +255,3 @@ def fits(w: Real, first: int, last: int, tolerance: float) -> bool:
     return bool(
         len(passed) == 0 or distances_to_segment(passed, w[first], w[last]).max() <= tolerance
     )
-
-
-def _smooth(values: Real, reach: float) -> Real:
-    """Return the means of `values`, one for each metre, over `reach` m to both sides."""
-    half = min(round(reach / _BEND_SAMPLING), (len(values) - 1) // 2)
-    padded = np.pad(values, half, mode="edge")
-    return np.convolve(padded, np.full(2 * half + 1, 1 / (2 * half + 1)), mode="valid")

@@ -57,7 +57,6 @@ class Dialect:
         fence_rows, rally_rows: how many vertices and circles, and how many rally points, fit on
             the smallest boards in common use.
         atomic: a refused upload leaves the old mission as it was.
-        splines: NAV_SPLINE_WAYPOINT is flown.
         unset_is_zero: it refuses most parameters that are not set (NaN), and is sent 0 instead.
         zero_means_here: latitude and longitude 0, 0 stand for the place where the vehicle is.
         placed_in_mission_frame: items in frame 2 (MISSION) have a place too, above sea level.
@@ -80,7 +79,6 @@ class Dialect:
     fence_rows: int
     rally_rows: int
     atomic: bool
-    splines: bool
     unset_is_zero: bool
     zero_means_here: bool
     placed_in_mission_frame: bool

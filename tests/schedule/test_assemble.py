@@ -67,7 +67,6 @@ def test_a_speed_is_commanded_where_it_changes() -> None:
         speeds=np.array([8.0, 5.5, 5.5, 3.0, 8.0]),
         waits=still,
         radii=still,
-        splines=still > 0,
     )
     mission = assemble(route, plan)
     commanded = [i.params[1] for i in mission.items if i.command == Command.DO_CHANGE_SPEED]
@@ -98,12 +97,3 @@ def test_acceptance_radii_are_passed_on() -> None:
     mission = assemble(replace(route, radii=np.array([0.0, 3.5, 0.0])), plan)
     waypoints = [item for item in mission.items if item.command == Command.NAV_WAYPOINT]
     assert [item.params[1] for item in waypoints] == [0.0, 3.5, 0.0]
-
-
-def test_spline_points_are_spline_waypoints() -> None:
-    plan = plan_with()
-    route = initial_route(*dash_hover_dash(), plan)
-    mission = assemble(replace(route, splines=np.array([False, True, False])), plan)
-    placed = [item for item in mission.items if item.command in (16, 82)]
-    assert [item.command for item in placed] == [16, 82, 16]
-    assert all(item.frame == Frame.GLOBAL_RELATIVE_ALT for item in placed)

@@ -10,11 +10,10 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
-from faao_mav.schedule.initial_route import Splines, initial_route, with_ramps
+from faao_mav.schedule.initial_route import initial_route
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.waypoints import find_hovers
 from faao_mav.vector import distances_to_segment, lengths
-from faao_mav.vehicle import Vehicle
 
 STEP = 0.2
 
@@ -111,31 +110,6 @@ def test_dash_hover_dash() -> None:
     assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1)
     assert route.distance == pytest.approx(500, abs=1)
     assert route.positions == pytest.approx(np.array([w[0], [150.0, 150.0], w[-1]]), abs=0.05)
-
-
-def test_ramps_are_legs_of_their_own() -> None:
-    t, w = dash_hover_dash(hover=40.0)  # at 8 m/s and 1.5 m/s²
-    route = initial_route(t, w, plan_with())
-    ramped = with_ramps(route, t, w, 5.0)
-    assert len(ramped.positions) == len(route.positions) + 4
-    pace = lengths(np.gradient(w, t, axis=0))
-    assert np.interp(ramped.arrivals[[1, 4]], t, pace) == pytest.approx(0.6 * 8, abs=1.5 * STEP)
-    assert ramped.leg_lengths[0] == pytest.approx((0.6 * 8) ** 2 / 3, abs=2)
-    assert path_error(w, ramped.positions) <= path_error(w, route.positions) + 1e-9
-    assert len(with_ramps(route, t, w, 20.0).positions) == len(route.positions)
-
-
-@STEADY
-@given(trajectories(), st.floats(0.1, 20))
-def test_ramps_of_any_flight_are_passed_in_its_order(flight: Trajectory, least: float) -> None:
-    t, w = flight
-    route = initial_route(t, w, plan_with())
-    ramped = with_ramps(route, t, w, least)
-    assert (ramped.arrivals[1:] > ramped.departures[:-1]).all()
-    assert set(map(tuple, route.positions)) <= set(map(tuple, ramped.positions))
-    at = np.searchsorted(t, ramped.arrivals)
-    new = ~np.isin(ramped.arrivals, route.arrivals)
-    assert (ramped.positions[new] == w[at[new]]).all()
 
 
 @pytest.mark.parametrize("far", [1.0, 2.1, 2.6])
@@ -295,52 +269,3 @@ def test_a_plan_that_dithers_about_a_place_waits_there() -> None:
     assert t[hover.last] == pytest.approx(22.5, abs=1.5)
     creep = np.stack([np.clip(5 * (t - 16), None, 0) + np.clip(1.3 * (t - 16), 0, 10), 0 * t], -1)
     assert not find_hovers(t[t < 23], creep[t < 23], 1.5, slowest=0.75)
-
-
-def bent_at_45_degrees() -> Trajectory:
-    """300 m east, a bend of 50 m radius, 300 m north-east; at 6 m/s throughout."""
-    s = np.arange(0.0, 640.0, 1.0)
-    turn = np.clip((s - 300) / 50, 0, np.pi / 4)
-    x = np.cumsum(np.cos(turn))
-    y = np.cumsum(np.sin(turn))
-    return s / 6, np.stack([x, y], axis=-1)
-
-
-def test_splines_everywhere_are_closer_in_bends() -> None:
-    t, w = bent_at_45_degrees()
-    route = initial_route(t, w, plan_with(), splines=Splines(15.0, 40.0))
-    assert route.splines.tolist() == [False] + [True] * (len(route.positions) - 1)
-    middle = (route.positions[1:, 0] + route.positions[:-1, 0]) / 2
-    in_bend = (middle > 300) & (middle < 336)
-    assert route.leg_lengths[in_bend].max() < route.leg_lengths[middle < 200].min()
-    assert route.leg_lengths[in_bend].min() > 10
-    assert route.leg_lengths[-1] >= 40
-    assert path_error(w, route.positions) < 1
-
-
-def test_splines_only_where_legs_are_too_short() -> None:
-    t, w = bent_at_45_degrees()
-    route = initial_route(t, w, plan_with(), splines=Splines(15.0, 40.0, Vehicle().legs))
-    assert route.splines.any()
-    assert not route.splines.all()
-    straight = ~route.splines[1:]
-    assert route.leg_lengths[straight].min() > 200
-    curved = route.positions[route.splines]
-    assert curved[:, 0].min() > 280
-    assert curved[:, 0].max() < 360
-
-
-@given(trajectories(), st.floats(5, 60), st.floats(0, 100), st.booleans())
-@STEADY
-def test_any_flight_can_have_splines(
-    trajectory: Trajectory, spacing: float, braking: float, everywhere: bool
-) -> None:
-    t, w = trajectory
-    straight = None if everywhere else Vehicle().legs
-    route = initial_route(t, w, plan_with(), splines=Splines(spacing, braking, straight))
-    assert len(route.splines) == len(route.positions)
-    assert not route.splines[0]
-    assert route.positions[0] == pytest.approx(w[0])
-    assert route.positions[-1] == pytest.approx(w[-1])
-    assert (route.arrivals[1:] > route.departures[:-1]).all()
-    assert everywhere <= route.splines[1:].all()

@@ -31,7 +31,6 @@ def route_with(speeds: Real, waits: Real) -> Route:
         speeds=speeds,
         waits=waits,
         radii=np.zeros(count),
-        splines=np.zeros(count, dtype=bool),
         first=0,
         last=count - 1,
     )

@@ -94,7 +94,6 @@ COPTER = VehicleType(
         fence_rows=10,
         rally_rows=1,
         atomic=True,
-        splines=False,
         unset_is_zero=False,
         zero_means_here=False,
         placed_in_mission_frame=False,

@@ -210,8 +210,6 @@ def _dialect(
     own: dict[int, Codecs],
     most: int,
     speed_change: Callable[[MissionItem], SpeedChange | None],
-    *,
-    splines: bool,
 ) -> Dialect:
     known = _COMMON | own
     return Dialect(
@@ -221,7 +219,6 @@ def _dialect(
         fence_rows=84,
         rally_rows=10,
         atomic=False,
-        splines=splines,
         unset_is_zero=True,
         zero_means_here=True,
         placed_in_mission_frame=True,
@@ -236,5 +233,5 @@ def _dialect(
     )
 
 
-COPTER_DIALECT = _dialect("ArduCopter", _COPTER, 718, _copter_speed, splines=True)
-PLANE_DIALECT = _dialect("ArduPlane", _PLANE, 724, _plane_speed, splines=False)
+COPTER_DIALECT = _dialect("ArduCopter", _COPTER, 718, _copter_speed)
+PLANE_DIALECT = _dialect("ArduPlane", _PLANE, 724, _plane_speed)

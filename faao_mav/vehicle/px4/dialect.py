@@ -135,7 +135,6 @@ DIALECT = Dialect(
     fence_rows=64,
     rally_rows=8,
     atomic=True,
-    splines=False,
     unset_is_zero=False,
     zero_means_here=False,
     placed_in_mission_frame=False,
