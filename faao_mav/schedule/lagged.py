@@ -39,9 +39,6 @@ class LaggedRetimed(Retimed):
         share = ratio * airspeed * np.sqrt(square) / along
         self._gains = share[:, None] * (heeded[:, :-1] - heeded[:, 1:])
 
-    def learn(self, after: Schedule) -> None:
-        """Take in nothing: the next flight to retime tells all."""
-
     def _later(self, speeds: Real) -> Real:
         longer = self._ways / self._flown(speeds) - self._durations
         return np.concatenate([[0.0], np.cumsum(longer)])

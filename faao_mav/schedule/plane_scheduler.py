@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.schedule.lagged import LaggedRetimed
-from faao_mav.schedule.retimed import LegTimes, Retimed
+from faao_mav.schedule.retimed import Retimed
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import Scheduler
@@ -114,7 +114,7 @@ class PlaneScheduler(Scheduler):
         best = min(tried, key=lambda each: each.cost)
         return self.rounded(self.shared(best, self.max_speed), self.max_speed)
 
-    def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:  # noqa: ARG002
+    def retimed(self, schedule: Schedule) -> Retimed:
         """Return what `schedule` becomes at other commands, which take effect with a lag."""
         ratio = self.vehicle.type.true_over_commanded(self.vehicle, self.altitude)
         return LaggedRetimed(schedule, ratio, self.wind)

@@ -30,61 +30,11 @@ _REACHED = 1.03  # the largest ratio of a command and the speed flown for which 
 _LEAST_PEAK = 0.1  # the least speed, m/s, that a leg is taken to reach
 _RESTLESS = 0.02  # the share with which every instant of a leg counts, on the command or not
 
-# How far the time of a leg may be from its guess: standard deviations of what its own speed does,
-# s for a change by the whole speed, and as a share of its cruise; of what the speed before it does;
-# and of what else changes its duration, s.
-_OWN, _OWN_SHARE, _ENTRY, _NOISE = 0.3, 0.3, 1.0, 0.1
-
-
 # How far speeds are moved to see what they do, m/s: beyond the kinks of what legs come to. With
 # 0.15 to 0.4 schedules of 105 plans for ArduCopter are as good; with 0.01 fits end at kinks.
 _MOVE = 0.2
 _NUDGE = 1e-5  # the same where nothing is known but that commands are not reached; downwards only
 _NEAR = 4  # the speed of a leg tells on how long these take: it, one before, two behind
-
-
-class LegTimes:
-    """How much longer the legs of a flight take than is told, s, when speeds v_k become v'_k.
-
-    With q_k = v_k / v'_k - 1 that is own_k q_k + entry_k q_{k-1} for leg k. Both are 0 at first,
-    and found by a Kalman filter for each leg.
-
-    >>> times, q = LegTimes(2), np.array([0.1, 0.0])
-    >>> for _ in range(50):
-    ...     times.learn(np.array([10.0, 20.0]), q, np.array([-0.1, 0.2]) - times.beyond(q))
-    >>> times.beyond(q).round(2)
-    array([-0.1,  0.2])
-    """
-
-    def __init__(self, legs: int) -> None:
-        self._corrections = np.zeros((legs, 2))
-        self._covariance: Real | None = None
-
-    def beyond(self, q: Real) -> Real:
-        """Return by how much longer legs take than is told, s; the shape of `q` (..., m - 1)."""
-        own, entry = self._corrections.T
-        return own * q + entry * _before(q)
-
-    def learn(self, cruise: Real, q: Real, surprise: Real) -> None:
-        """Take in by how much longer, (m - 1,), s, the legs took than `beyond` and what is told.
-
-        `cruise` (m - 1,), s, is how long they were flown at their commands.
-        """
-        if self._covariance is None:
-            own = _OWN**2 + (_OWN_SHARE * cruise) ** 2
-            self._covariance = np.stack([own, np.full(len(own), _ENTRY**2)])[:, None].T * np.eye(2)
-        row = np.stack([q, _before(q)], axis=-1)[:, :, None]
-        told = self._covariance @ row
-        weight = told / (row.swapaxes(1, 2) @ told + _NOISE**2)
-        self._corrections += weight[:, :, 0] * surprise[:, None]
-        self._covariance = self._covariance - weight @ told.swapaxes(1, 2)
-
-
-def _before(q: Real) -> Real:
-    """Return the q of the leg before each, 0 for the first."""
-    before = np.zeros_like(q)
-    before[..., 1:] = q[..., :-1]
-    return before
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,10 +78,6 @@ class Retimed(ABC):
         over = self._start + clock.t[-1] + self._late
         found = np.searchsorted(self._t, [meeting, over])
         self._met, self._over = np.minimum(found, len(self._t) - 1).tolist()
-
-    @abstractmethod
-    def learn(self, after: Schedule) -> None:
-        """Take in how the flight `after` really is."""
 
     @abstractmethod
     def _later(self, speeds: Real) -> Real:
@@ -184,15 +130,13 @@ class LegRetimed(Retimed):
     D = sum_k d_k(t) T_k(v'), T_k being by how much longer leg k takes, and d_k(t), from 0 to 1, the
     share of it that has come up by t: it grows while the leg is flown at its command. What is
     `known` of the vehicle tells T_k; without that it is c_k (v_k / v'_k - 1), c_k being how long
-    the leg is flown at its command. What `times` has learned comes on top.
+    the leg is flown at its command.
     """
 
-    def __init__(
-        self, schedule: Schedule, times: LegTimes, known: LegDurations | None = None
-    ) -> None:
+    def __init__(self, schedule: Schedule, known: LegDurations | None = None) -> None:
         super().__init__(schedule)
         route, flown, leg = schedule.route, schedule.flown, self._leg
-        self._times, self._known, self._taken = times, known, flown.leg_durations
+        self._known = known
         speed = lengths(flown.velocity[::_STRIDE])
         under_way = (self._t >= flown.departures[leg]) & (self._t < flown.arrivals[leg + 1])
         peaks = np.full(len(route.speeds), _LEAST_PEAK)
@@ -210,12 +154,7 @@ class LegRetimed(Retimed):
         steps[at] += _RESTLESS * lasting
         done = np.cumsum(steps, axis=0)
         self._done = done / np.maximum(done[-1], 1e-9)
-        self._told = self._legs(route.speeds)[1]
-
-    def learn(self, after: Schedule) -> None:
-        """Tell `times` how long the legs really take on the flight `after`."""
-        speeds, longer = after.route.speeds, after.flown.leg_durations - self._taken
-        self._times.learn(self._cruise, self._slower(speeds), longer - self._longer(speeds))
+        self._told = self._durations(route.speeds)
 
     def _later(self, speeds: Real) -> Real:
         later: Real = self._done @ self._longer(speeds)
@@ -237,17 +176,11 @@ class LegRetimed(Retimed):
 
     def _longer(self, speeds: Real) -> Real:
         """Return T_k, s, at other `speeds` (..., m - 1), m/s; same shape."""
-        tops, durations = self._legs(speeds)
-        return durations - self._told + self._times.beyond(self._speeds / tops - 1)
+        return self._durations(speeds) - self._told
 
-    def _slower(self, speeds: Real) -> Real:
-        """Return q_k = v_k / v'_k - 1, (m - 1,), at other `speeds`."""
-        return self._speeds / self._legs(speeds)[0] - 1
-
-    def _legs(self, speeds: Real) -> tuple[Real, Real]:
-        """Return what legs come to, m/s, and how long they take, s, but for what stays as it is."""
+    def _durations(self, speeds: Real) -> Real:
+        """Return how long the legs take, s, but for what stays as it is."""
         if self._known is not None:
-            tops, durations = self._known.flown(speeds)
-            return np.minimum(tops, self._peaks), durations
-        tops = np.minimum(speeds, self._peaks)
-        return tops, self._cruise * self._speeds / tops
+            return self._known.flown(speeds)[1]
+        durations: Real = self._cruise * self._speeds / np.minimum(speeds, self._peaks)
+        return durations

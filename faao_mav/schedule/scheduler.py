@@ -11,7 +11,7 @@ import numpy as np
 from faao_mav.arrays import Integers, Real
 from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
-from faao_mav.schedule.retimed import LegRetimed, LegTimes, Retimed
+from faao_mav.schedule.retimed import LegRetimed, Retimed
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Clock, Schedule, positions_at
 from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
@@ -102,11 +102,11 @@ class Scheduler(ABC):
             begun=begun,
         )
 
-    def retimed(self, schedule: Schedule, times: LegTimes) -> Retimed:
+    def retimed(self, schedule: Schedule) -> Retimed:
         """Return what `schedule` becomes at other commands."""
         route, known = schedule.route, self.vehicle.type.leg_durations
         durations = known and known(self.vehicle, route.leg_lengths, route.joined)
-        return LegRetimed(schedule, times, durations)
+        return LegRetimed(schedule, durations)
 
     def moved(self, schedule: Schedule, points: Integers, share: float) -> Route:
         """Return the route with the waypoints `points` (k,) moved against the flight's offset.

@@ -3,9 +3,8 @@
 minimise sum_i |p(t_i) - w(t_i)|² over the speeds commanded for the legs, the waits at the hovers
 and the lead, p being the predicted flight. A Levenberg-Marquardt method with bounds minimises this
 of the last predicted flight `retimed`; what it finds is then flown. Where that is better it is the
-next flight to retime, else it tells how much its legs really differ, and a step that is shorter is
-tried. A few flights do. An error early in the flight shows in everything that follows: later legs
-and waits make up for earlier ones.
+next flight to retime, else a shorter step is tried. A few flights do. An error early in the flight
+shows in everything that follows: later legs and waits make up for earlier ones.
 
 Constants that name no source are chosen; what a change costs is not measured.
 """
@@ -17,7 +16,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.errors import InputError
-from faao_mav.schedule.retimed import LegRetimed, LegTimes, Retimed, Retiming
+from faao_mav.schedule.retimed import LegRetimed, Retimed, Retiming
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import LATE_WEIGHT, Clock, Schedule
 
@@ -56,7 +55,7 @@ def fit(
     min_speed: float,
     max_speed: float,
     flights: int = MOST_FLIGHTS,
-    retime: Callable[[Schedule, LegTimes], Retimed] = LegRetimed,
+    retime: Callable[[Schedule], Retimed] = LegRetimed,
     begun: Schedule | None = None,
 ) -> Schedule:
     """Return the `flight` of `route` with the speeds, the waits and the lead that fit best.
@@ -75,10 +74,9 @@ def fit(
     best = begun or flight(unknowns.commanded(x))
     goal = _Goal(best.clock)
     cost = goal.cost(best, unknowns.pull(x))
-    times, leash = LegTimes(len(groups)), 0.0
+    leash = 0.0
     for _ in range(flights - 1):
-        retimed = retime(best, times)
-        tried, foreseen = _stepped(goal, unknowns, retimed, x, leash)
+        tried, foreseen = _stepped(goal, unknowns, retime(best), x, leash)
         if foreseen > (1 - _LEAST_GAIN) * cost:
             break
         try:
@@ -86,7 +84,6 @@ def fit(
         except InputError:  # it is not followed to its end
             break
         new = goal.cost(flown, unknowns.pull(tried))
-        retimed.learn(flown)
         gain = 1 - new / cost
         if gain > 0:
             x, best, cost, leash = tried, flown, new, leash / 4
