@@ -6,9 +6,9 @@ How the aircraft leans and what the air takes are fitted to six flights over pla
 rest follows from the autopilot's parameters. Nine more flights over plain waypoints and all three
 over splines are held out: no constant was fitted to them, but their errors were seen while the
 model was built, so they are no blind test. That the drag acts along the nose and across by
-itself is fitted to the flights in wind; its last digit to those in 9 m/s from 300 degrees, and to
-all in 9 m/s how the aircraft leans at the end of its take-off. How its nose drifts in a hover is
-measured in the log of one flight from 210 degrees.
+itself is fitted to the flights in wind; its last digit to those in 9 m/s from 300 degrees. The nose
+is taken to point along the way: it lags behind there, and drifts in a hover, which tells beyond the
+lean limit.
 """
 
 import math

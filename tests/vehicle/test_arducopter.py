@@ -251,15 +251,6 @@ def test_an_error_counts_as_far_as_it_asks_for_the_commanded_speed(
     assert asked == pytest.approx(speed)
 
 
-def test_in_wind_it_matters_how_soon_the_nose_turns() -> None:
-    corner = replace(path_of([0, 80j, 80 + 80j], 6.0), wind=(-4.0, -4.0))
-    soon, late = (ArduCopter(turn_rate=rate).fly(corner) for rate in (0.0, 0.5))
-    size = min(len(soon.t), len(late.t))
-    apart = np.linalg.norm(soon.position[:size] - late.position[:size], axis=1)
-    before = soon.t[:size] < soon.departures[1] - 1.0
-    assert apart[before].max() < 0.01 < apart.max() < 3.0
-
-
 def test_limits_come_from_parameters_of_either_generation() -> None:
     older = {"WPNAV_ACCEL": 400, "WPNAV_JERK": 10, "WPNAV_SPEED_UP": 300, "WPNAV_SPEED": 700}
     newer = {"WP_ACC": 4, "WP_JERK": 10, "WP_SPD_UP": 3, "WP_SPD": 7}

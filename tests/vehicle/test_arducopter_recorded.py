@@ -32,10 +32,11 @@ def test_splines_are_predicted_more_roughly() -> None:
 @pytest.mark.parametrize(
     ("wind", "number", "arrival", "position"),
     [
-        ("wind3", 4, 0.25, 1.2),
-        ("wind6", 4, 0.25, 1.0),
-        ("wind8", 1, 0.2, 0.6),
-        ("wind9", 12, 0.35, 1.6),
+        ("wind3", 4, 0.2, 0.7),
+        ("wind5", 1, 0.2, 0.7),
+        ("wind6", 4, 0.4, 1.5),
+        ("wind8", 1, 0.3, 0.8),
+        ("wind9", 12, 1.2, 7.0),
     ],
 )
 def test_flights_in_wind_beyond_the_lean_limit_too(

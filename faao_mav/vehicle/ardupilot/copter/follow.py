@@ -10,7 +10,6 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.plan import Vector
-from faao_mav.power import GRAVITY
 from faao_mav.vehicle.ardupilot.copter.course import GRID, Course, Stop, TargetRow
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 
@@ -24,24 +23,8 @@ until a hold is over. Chosen: ten times more changed arrivals by up to 0.1 s aft
 m/s."""
 
 _HEADED = 0.5
-"""The speed of the target, m/s, above which the aircraft turns its nose along the target's way.
-Chosen; what a change costs is not measured."""
-
-_CLIMB_ENDS = 1.09
-"""The integral at the end of a take-off, over what the air takes.
-
-It is told from the lean, which is greater there, for a climb ends with less thrust; the aircraft is
-as far downwind of its target as asks for the rest. One of the autopilot's logs, in 9 m/s of wind,
-has 1.08 and 0.14 m; twelve flights in as much are nearest with 1.09 to 1.1, four in 3 m/s with
-less.
-"""
-
-_ASTRAY = 3.2
-"""How fast the nose of an aircraft that hovers turns, rad/s, over the tangents of pitch and roll.
-
-The autopilot holds the heading that it has, which drifts until the lean is to the side alone.
-Measured in one of its logs, over 7 s of a hover in 9 m/s of wind: between 3.1 and 3.8.
-"""
+"""The speed of the target, m/s, above which the aircraft's nose is along the target's way. Chosen;
+what a change costs is not measured."""
 
 _NONE = (math.inf, 0.0)
 """After the last commanded speed: when there is another one."""
@@ -82,9 +65,8 @@ def pursue(
     call for, up to the lean limit, where the integral stands still. The air, which moves
     at `wind`, m/s, drags at it along its nose and across, each as k v + q v |v|. (Measured in the
     simulator: with the lean limit at 10.3 m/s the air comes from ahead, at 10.8 and 11.0 m/s 21 and
-    25 degrees from there.) It begins in a hover at the end of a take-off, nose to the north, held
-    against the wind by the integral, which is `_CLIMB_ENDS` of what that takes. In a hover the nose
-    turns as `_ASTRAY` says.
+    25 degrees from there.) It begins in a hover, nose to the north, held against the wind by the
+    integral. The nose points where the target moves to, in a hover where it did before.
     """
     kp, kv, ki = limits.position_gain, limits.velocity_gain, limits.velocity_integral
     body, lean = limits.body, limits.lean
@@ -92,9 +74,6 @@ def pursue(
     patience = limits.acceleration / limits.jerk
     leaning, adapting = 1 - math.exp(-GRID / body.lag), 1 - math.exp(-GRID / patience)
     hypot, sqrt, most = math.hypot, math.sqrt, lean * lean
-    turning = limits.turn_rate * GRID or math.pi
-    least_cosine, most_sine = math.cos(turning), math.sin(turning)
-    astray = _ASTRAY * GRID / GRAVITY**2
     commands = iter([*zip(course.passed[:-1].tolist(), course.speeds, strict=True), _NONE])
     farthest, (told, speed) = math.inf, next(commands)
     last = math.ceil(course.end / GRID)
@@ -109,8 +88,7 @@ def pursue(
     nx, ny, vx, vy = 0.0, 1.0, 0.0, 0.0
     ax = -east * (linear + quadratic * abs(east))
     ay = -north * (linear + quadratic * abs(north))
-    ix, iy = _CLIMB_ENDS * ax, _CLIMB_ENDS * ay
-    px, py = px + (ax - ix) / (kp * kv), py + (ay - iy) / (kp * kv)
+    ix, iy = ax, ay
     log = array("d", (clock, s, px, py, vx, vy))
     count, now = 0, 0.0
     while stop is not None or now < resume:
@@ -159,18 +137,8 @@ def pursue(
         ax += (fx - ax) * leaning
         ay += (fy - ay) * leaning
         headed = sqrt(ux * ux + uy * uy)
-        if headed > _HEADED:  # the nose turns to where the target goes
-            towards, sine = nx * ux + ny * uy, nx * uy - ny * ux
-            if towards > least_cosine * headed:
-                nx, ny = ux / headed, uy / headed
-            else:
-                turn = most_sine if sine > 0 else -most_sine
-                nx, ny = least_cosine * nx - turn * ny, least_cosine * ny + turn * nx
-        else:  # the nose goes astray with the lean
-            turn = astray * (nx * ax + ny * ay) * (ny * ax - nx * ay)
-            nx, ny = nx - turn * ny, ny + turn * nx
-            size = sqrt(nx * nx + ny * ny)
-            nx, ny = nx / size, ny / size
+        if headed > _HEADED:
+            nx, ny = ux / headed, uy / headed
         rx, ry = vx - east, vy - north
         along, across = nx * rx + ny * ry, nx * ry - ny * rx
         along *= linear + quadratic * abs(along)

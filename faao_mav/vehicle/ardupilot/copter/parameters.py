@@ -55,7 +55,6 @@ TABLE = table(
     Parameter("input_time", "s", 0.15, {"ATC_INPUT_TC": 1.0}, 0.0, source=SOURCE),
     _attitude("roll_acceleration", "rad/s^2", 1100, "ATC_ACC_R_MAX", "ATC_ACCEL_R_MAX"),
     _attitude("pitch_acceleration", "rad/s^2", 1100, "ATC_ACC_P_MAX", "ATC_ACCEL_P_MAX"),
-    _attitude("turn_rate", "rad/s", 60, "ATC_RATE_WPY_MAX", "ATC_SLEW_YAW"),
     _parameter("position_gain", "1/s", 1.0, "PSC_NE_POS_P", "PSC_POSXY_P", 1.0),
     _parameter("velocity_gain", "1/s", 2.0, "PSC_NE_VEL_P", "PSC_VELXY_P", 1.0),
     _parameter("velocity_integral", "1/s^2", 1.0, "PSC_NE_VEL_I", "PSC_VELXY_I", 1.0, 0.0),
@@ -95,7 +94,6 @@ class ArduCopterLimits(ParameterRecord, table=TABLE):
     input_time: float = TABLE["input_time"].default
     roll_acceleration: float = TABLE["roll_acceleration"].default
     pitch_acceleration: float = TABLE["pitch_acceleration"].default
-    turn_rate: float = TABLE["turn_rate"].default
     position_gain: float = TABLE["position_gain"].default
     velocity_gain: float = TABLE["velocity_gain"].default
     velocity_integral: float = TABLE["velocity_integral"].default
