@@ -18,16 +18,23 @@ from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.channel import rayleigh
-from faao_mav.radio.mutual_information import pooled_mutual_information
+from faao_mav.radio.mutual_information import mutual_information
 from faao_mav.radio.rate import cutoff_rate
 
 SATURATED = 0.999
 """Share of N log2(rho) from which a link counts as saturated. Chosen."""
 
-# Chosen: with these, where slots and draws are sampled, the stated error is 1 to 4e-3 bit/s/Hz.
-_MOST_PAIRS = 1000  # pairs of slot and draw up to which all are averaged
-_SAMPLED_PAIRS = 200  # pairs of the sample beyond
-_COARSER = 3.0  # tolerance of the noise average of a sample, in that of the result
+_SAMPLED_PAIRS, _NOISES_PER_PAIR = 256, 64
+"""Pairs of slot and draw of which the mutual information is averaged over noises, at most, and the
+noises that each then has."""
+
+_SEEDS = 4
+"""Sets of noises, whose spread is the standard error of the average over them. Chosen."""
+
+_MOST_NOISES, _FEWEST_NOISES, _LIKELIHOODS = 1 << 15, 1 << 11, 1 << 24
+"""Noises of a set for all pairs: those that take so many likelihoods, within these bounds. Chosen:
+beside 2^20 noises the means of the samples err by 1e-3 bit, with 64-QAM by 5e-3."""
+
 _DEGREE = 5  # of the polynomial from cutoff rates to mutual information
 _DECIMALS = 9  # of the cutoff rates, bit, by which the sample is ordered; chosen
 _FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
@@ -59,16 +66,14 @@ class MutualInformation:
         return min(self.bs_uav, self.uav_user)
 
 
-def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
+def price(solution: Solution) -> MutualInformation:
     """Return the mutual information of both links along `solution`, bit/s/Hz.
 
-    The error is at most `tolerance`. Where fading is averaged over, slots and draws are sampled,
-    and the error is that of the sample, some 5e-3. The noise is drawn with the plan's seed: the
-    same plan gives the same value.
+    The noises are fixed: the same plan gives the same value.
     """
-    problem, rng = build_problem(solution.plan), np.random.default_rng(solution.plan.radio.seed)
+    problem = build_problem(solution.plan)
     (bs_uav, I_U, first), (uav_user, I_G, second) = (
-        _information(link, link.channel(solution.w, H_r), P, rng, tolerance)
+        _information(link, link.channel(solution.w, H_r), P)
         for link, H_r, P in zip(
             problem.links,
             (solution.H_rB, solution.H_rU),
@@ -80,37 +85,38 @@ def price(solution: Solution, *, tolerance: float = 1e-3) -> MutualInformation:
     return MutualInformation(bs_uav, uav_user, delivered, max(first, second))
 
 
-def _information(
-    link: Link, H: Complex, P: Complex, rng: np.random.Generator, tolerance: float
-) -> tuple[float, Real, float]:
+def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float]:
     """Return the mean of (5) or (6) over slots and draws, that of each slot (n,), and the error.
 
-    Many pairs of slot and draw are sampled evenly in the order of their cutoff rates. The mutual
+    The pairs of slot and draw are sampled evenly in the order of their cutoff rates. The mutual
     information is nearly a function of the cutoff rate: a polynomial through the sample, by least
-    squares, stands for all pairs, and the error of the mean, bits, is that of its residuals.
+    squares, stands for all pairs. The standard error of the mean, bits, is that of the residuals,
+    which is left out where all pairs are in the sample, and that of the noises.
     """
     pairs = H.shape[:-2]
-    wide = np.broadcast_to(P, (*H.shape[:-2], *P.shape[-2:]))
+    wide = np.broadcast_to(P, (*pairs, *P.shape[-2:]))
     H, P = H.reshape(-1, *H.shape[-2:]), wide.reshape(-1, *P.shape[-2:])
-    if len(H) <= _MOST_PAIRS:
-        all_pairs = pooled_mutual_information(
-            H, P, link.modulation, link.noise, rng=rng, tolerance=tolerance
-        )
-        each = np.maximum(0.0, all_pairs.value).reshape(-1, pairs[-1]).mean(axis=0)
-        return float(np.mean(all_pairs.value)), each, all_pairs.mean_error
     cutoff = cutoff_rate(H, P, link.classes, link.noise)
-    evenly = np.linspace(0, len(H) - 1, _SAMPLED_PAIRS).astype(np.intp)  # both ends among them
+    noises = min(_MOST_NOISES, max(_FEWEST_NOISES, _LIKELIHOODS // link.classes.symbols))
+    count = min(len(H), _SAMPLED_PAIRS, noises // _NOISES_PER_PAIR)
+    evenly = np.linspace(0, len(H) - 1, count).astype(np.intp)
     # Rounded: the order of equal rates, and so the sample, is the same whoever sums them.
     part = np.argsort(np.round(cutoff, _DECIMALS), kind="stable")[evenly]
-    sample = pooled_mutual_information(
-        H[part], P[part], link.modulation, link.noise, rng=rng, tolerance=_COARSER * tolerance
+    sets = np.array(
+        [
+            mutual_information(H[part], P[part], link.modulation, link.noise, nodes=noises, seed=k)
+            for k in range(_SEEDS)
+        ]
     )
+    sample = sets.mean(axis=0)
     powers = np.vander(cutoff / link.classes.bits, _DEGREE + 1)
-    fit, *_ = np.linalg.lstsq(powers[part], sample.value)
-    missed = sample.value - powers[part] @ fit
-    error = float(np.sqrt(np.sum(missed**2) / (len(part) - _DEGREE - 1) / len(part)))
-    each = np.clip(powers @ fit, 0.0, link.classes.bits).reshape(-1, pairs[-1]).mean(axis=0)
-    return float(each.mean()), each, max(error, sample.mean_error)
+    fit, *_ = np.linalg.lstsq(powers[part], sample)
+    fitted = np.clip(powers @ fit, 0.0, link.classes.bits)
+    variance = sets.mean(axis=1).var(ddof=1) / _SEEDS
+    if len(part) < len(H):
+        variance += np.sum((sample - fitted[part]) ** 2) / (len(part) - _DEGREE - 1) / len(part)
+    each = fitted.reshape(-1, pairs[-1]).mean(axis=0)
+    return float(each.mean()), each, float(np.sqrt(variance))
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from faao_mav.radio.constellation import (
     difference_vector_count,
     lattice,
 )
-from faao_mav.radio.real_channel import MAX_INPUTS
+from faao_mav.radio.mutual_information import MAX_INPUTS
 
 _Value = TypeVar("_Value", int, float, str)
 

@@ -4,8 +4,7 @@
 - ``channel``: path gain, line of sight, fading, (1) and (2);
 - ``rate``: the cutoff rate, (7) and (8), from the sums of ``class_sum``, which
   ``lattice_sum`` forms for square alphabets;
-- ``mutual_information``: the mutual information, (5) and (6): ``real_channel`` reduces the link,
-  ``noise_average`` averages over the noise;
+- ``mutual_information``: the mutual information, (5) and (6), at fixed noises;
 - ``precoder``: the classical linear precoders and the optimum for BPSK on two antennas;
 - ``best_precoder``: the precoders of highest cutoff rate, one per channel or one for many draws;
   ``precoder_search`` finds them, ``precoder_objective`` has the derivatives.

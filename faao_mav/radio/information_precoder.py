@@ -15,7 +15,7 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
 from faao_mav.radio.best_precoder import best_mean_precoders
-from faao_mav.radio.fixed_noise import information_and_errors
+from faao_mav.radio.mutual_information import information_and_errors
 from faao_mav.radio.precoder import with_power
 
 _STEPS = 15

@@ -11,8 +11,8 @@ import numpy as np
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.radio.best_precoder import best_mean_precoders
 from faao_mav.radio.constellation import difference_classes
-from faao_mav.radio.fixed_noise import fixed_noise_information
 from faao_mav.radio.information_precoder import best_information_precoders
+from faao_mav.radio.mutual_information import mutual_information
 from faao_mav.radio.rate import cutoff_rate
 
 Measure: TypeAlias = Literal["cutoff", "mutual_information"]
@@ -24,7 +24,7 @@ def draw_rates(
     """Return the rate of every draw of a channel, (..., S) bit/s/Hz.
 
     Of the mutual information the mean over the S draws is accurate. Arguments and errors are those
-    of ``fixed_noise_information``.
+    of ``mutual_information``.
 
     >>> one = np.ones((1, 1, 1))
     >>> for measure in ("cutoff", "mutual_information"):
@@ -33,7 +33,7 @@ def draw_rates(
     [0.721]
     """
     if measure == "mutual_information":
-        return fixed_noise_information(H, P, modulation, noise)
+        return mutual_information(H, P, modulation, noise)
     return cutoff_rate(H, P, difference_classes(modulation, np.shape(P)[-1]), noise)
 
 
