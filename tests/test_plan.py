@@ -202,7 +202,10 @@ def test_a_body_is_numbers_over_those_of_the_autopilots_simulator() -> None:
         ({"vehicle.body": "mine"}, ["vehicle.body", "'mine'", "give sitl, the airframe"]),
         ({"vehicle.body": {"lga": 0.2}}, ["vehicle.body.lga: unknown key; did you mean lag?"]),
         ({"vehicle.body": {"lag": 3}}, ["vehicle.body.lag", "3", "seconds, 0.05 to 1"]),
-        ({"vehicle.body": {"thrust": 6}}, ["vehicle.body: thrust is not of a copter's", "lag"]),
+        (
+            {"vehicle.body": {"sideslip": 0.2}},
+            ["vehicle.body: sideslip is not of a copter's", "lag"],
+        ),
         ({"vehicle.parameters": {"WPNAV_JERK": "x"}}, ["vehicle.parameters.WPNAV_JERK", "number"]),
         ({"radio.base_station.power_dbm": 1e6}, ["radio.base_station.power_dbm", "100 dBm"]),
         ({"optimizer.tolerance": 0}, ["optimizer.tolerance", "above 0"]),

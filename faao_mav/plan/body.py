@@ -57,41 +57,23 @@ which a fit finds 0.19."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlaneBody(Section):
-    """A plane's airframe: by default that of ArduPilot's simulator, at sea level's density.
+    """A plane's airframe: by default that of ArduPilot's simulator.
 
     A log of 12 m/s showed `sideslip_airspeed`: less sideslip, and tighter turns. Up to July 2026
     the simulator's airspeed sensor takes the density out twice (ArduPilot's issue 31004), and it
     flies 3 % faster for it at 584 m.
     """
 
-    thrust: Annotated[
-        Number, key("Plane: acceleration by full throttle.", "m/s^2", gt=0, le=100)
-    ] = 6.28
-    parasitic_drag: Annotated[
-        Number, key("Plane: drag over mass and airspeed squared.", "1/m", gt=0, le=1)
-    ] = 0.00532
-    induced_drag: Annotated[
-        Number, key("Plane: drag over mass, times airspeed squared.", "m^3/s^4", ge=0, le=1e4)
-    ] = 67.1
-    lift_angle: Annotated[
+    airspeed_lag: Annotated[
         Number,
-        key("Plane: angle of attack times airspeed squared.", "rad m^2/s^2", ge=0, le=1000),
-    ] = 25.3
-    no_lift_angle: Annotated[
-        Number, key("Plane: what is taken off the angle of attack.", "rad", ge=0, le=0.5)
-    ] = 0.0573
-    pitch_lag: Annotated[
-        Number, key("Plane: time constant from pitch to the path's slope.", "s", ge=0.05, le=10)
-    ] = 1.05
+        key("Plane: time constant from the airspeed told to that flown.", "s", ge=0.05, le=10),
+    ] = 1.5
     sideslip: Annotated[
         Number, key("Plane: share of a turn's acceleration that sideslip takes.", ge=0, le=0.9)
     ] = 0.286
     sideslip_airspeed: Annotated[
         Number, key("Plane: airspeed below which `sideslip` falls.", "m/s", gt=0, le=1000)
     ] = 13.0
-    roll_turn: Annotated[
-        Number, key("Plane: turn of the course while it banks, over the bank.", ge=0, le=1)
-    ] = 0.01
     airspeed_exponent: Annotated[
         Number,
         key(

@@ -18,10 +18,7 @@ DRAGS = {"linear_drag": st.floats(0, 2), "quadratic_drag": st.floats(0, 0.1)}
 COPTERS = st.builds(CopterBody, lag=st.floats(0.05, 1), **DRAGS)
 PLANES = st.builds(
     PlaneBody,
-    thrust=st.floats(2, 20),
-    parasitic_drag=st.floats(1e-3, 0.02),
-    induced_drag=st.floats(0, 200),
-    pitch_lag=st.floats(0.05, 5),
+    airspeed_lag=st.floats(0.05, 5),
     sideslip=st.floats(0, 0.9),
     airspeed_exponent=st.floats(0, 2),
 )

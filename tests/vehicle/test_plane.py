@@ -172,17 +172,3 @@ def test_limits_come_from_parameters_of_either_generation() -> None:
 def test_a_useless_parameter_is_named(name: str, value: float, least: str) -> None:
     with pytest.raises(InputError, match=rf"plane\.parm: {name}: {value}; .*at least {least}"):
         ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", {name: value}, "plane.parm"))
-
-
-def test_energy_is_held_as_the_vehicles_own_parameters_say() -> None:
-    """A shorter time constant and more damping keep the height better while the speed changes."""
-    slowing = replace(path_of([0, 150, 600], 18.0), speeds=np.array([18.0, 13.0]))
-
-    def strays(parameters: dict[str, float]) -> float:
-        plane = ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", parameters))
-        height = plane.fly(slowing).position[:, 2]
-        return float(abs(height - height[0]).max())
-
-    own = [{"TECS_TIME_CONST": 3.0}, {"TECS_THR_DAMP": 1.0}, {"TECS_PTCH_DAMP": 0.6}]
-    assert max(map(strays, own)) < strays({}) < strays({"TECS_TIME_CONST": 8.0})
-    assert strays({"TECS_PITCH_MAX": 0.0}) == strays({"TECS_PITCH_MAX": 20.0})  # PTCH_LIM_MAX_DEG

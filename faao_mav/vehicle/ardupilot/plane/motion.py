@@ -1,10 +1,9 @@
-"""An aeroplane with the guidance that banks it and the energy that carries it."""
+"""An aeroplane with the guidance that banks it, and how it holds airspeed and height."""
 
 import cmath
 import math
 
 from faao_mav.power import GRAVITY
-from faao_mav.vehicle.ardupilot.plane.energy import Energy
 from faao_mav.vehicle.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.vehicle.atmosphere import density_ratio
 
@@ -13,6 +12,21 @@ STEP = 0.1
 
 _INTERCEPT = math.sin(math.radians(45))
 """The sine of the steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
+
+
+_THROTTLE = 1.5
+"""How much faster the airspeed rises than `speed_rates` says: throttle goes beyond them. Of 1, 1.5
+and 2 the one nearest to recorded flights."""
+
+_HEIGHT_TIME = 2.0
+"""The time constant with which a height is approached, s. Chosen."""
+
+_CLIMB_LAG = 1.0
+"""The time constant with which a climb follows what the height asks for, s. Chosen."""
+
+
+_SLOWEST = 1.0
+"""The least airspeed with which a flight begins, m/s. Chosen: nothing is divided by 0."""
 
 
 class Track:
@@ -42,9 +56,11 @@ class Motion:
     acceleration 4 ζ² V² / L sin η, η the angle from its course to that point. It banks for that
     as in a coordinated turn.
 
-    Speed and height are held by total energy control: see `energy`.
+    The airspeed follows with the lag of `limits.body` a demand, which goes to what is commanded
+    within `limits.speed_rates`, upwards faster by `_THROTTLE`. The height is
+    approached within the greatest climb and descent.
 
-    Banks and energy turn and speed up the flight through the air, which moves steadily at `wind`;
+    Banks and throttle turn and speed up the flight through the air, which moves steadily at `wind`;
     guidance sees the flight over ground, the sum of both.
 
     Places and horizontal velocities are complex, east + i north, m and m/s; `climb` is m/s, angles
@@ -71,26 +87,21 @@ class Motion:
         self.place, self.heading = place, cmath.phase(airspeed)
         self._limits, self._wind, self._ahead = limits, wind, limits.look_ahead
         self._gain = 4 * limits.damping**2 / limits.look_ahead
-        self._bank, density, flown = 0.0, density_ratio(altitude), math.hypot(abs(airspeed), climb)
-        demand = flown if speed is None else speed
-        self._energy = Energy(limits, density, height, flown, climb, demand)
-        self._body, self._sideslip = limits.body, limits.body.sideslip * density
-        self._look(self._airspeed())
+        self._bank, self._height, self._climb = 0.0, height, climb
+        self._flown, self._rates = max(abs(airspeed), _SLOWEST), limits.speed_rates
+        self._demand = self._flown if speed is None else speed
+        self._sideslip = limits.body.sideslip * density_ratio(altitude)
+        self._look()
 
     def sample(self) -> tuple[float, ...]:
         """Return time, place (east, north, up) and velocity, SI."""
         velocity = self._velocity
-        place = (self.place.real, self.place.imag, self._energy.height)
-        return (self.time, *place, velocity.real, velocity.imag, self._energy.climb)
+        place = (self.place.real, self.place.imag, self._height)
+        return (self.time, *place, velocity.real, velocity.imag, self._climb)
 
-    def _airspeed(self) -> float:
-        """Return the horizontal part of the airspeed, m/s."""
-        square = self._energy.speed**2 - self._energy.climb**2
-        return math.sqrt(square) if square > 1.0 else 1.0
-
-    def _look(self, airspeed: float) -> None:
-        """Take in the velocity over ground, and L of it; `airspeed` is its horizontal part, m/s."""
-        self._velocity = cmath.rect(airspeed, self.heading) + self._wind
+    def _look(self) -> None:
+        """Take in the velocity over ground, and L of it."""
+        self._velocity = cmath.rect(self._flown, self.heading) + self._wind
         self._speed = abs(self._velocity)
         self.look_ahead = self._ahead * self._speed
 
@@ -147,20 +158,31 @@ class Motion:
 
     def _go(self, lateral: float, height: float, speed: float, step: float) -> None:
         """Move on with `lateral` acceleration to the left, m/s², as far as it goes."""
-        energy, limits = self._energy, self._limits
-        before, most = energy.climb, limits.roll_limit
-        energy.hold(height, speed, 1 / math.cos(self._bank), step)
-        bank = math.atan2(lateral, GRAVITY)
-        bank = -most if bank < -most else most if bank > most else bank
-        change = (bank - self._bank) * -math.expm1(-step / limits.roll_time)
-        self._bank += change
-        airspeed = self._airspeed()
-        lift = GRAVITY + (energy.climb - before) / step
-        slow = self._body.sideslip_airspeed
-        turning = 1 - self._sideslip * (1.0 if airspeed > slow else airspeed / slow)
-        turn = turning * lift * math.tan(self._bank) / airspeed * step
-        turn += self._body.roll_turn * change
-        self.place += (cmath.rect(airspeed, self.heading + turn / 2) + self._wind) * step
+        limits, body = self._limits, self._limits.body
+        self._speed_up(speed, step)
+        self._rise(height, step)
+        bank, most = math.atan2(lateral, GRAVITY), limits.roll_limit
+        bank = min(max(bank, -most), most)
+        self._bank += (bank - self._bank) * -math.expm1(-step / limits.roll_time)
+        slipping = self._sideslip * min(self._flown / body.sideslip_airspeed, 1.0)
+        turn = (1 - slipping) * GRAVITY * math.tan(self._bank) / self._flown * step
+        self.place += (cmath.rect(self._flown, self.heading + turn / 2) + self._wind) * step
         self.heading += turn
         self.time += step
-        self._look(airspeed)
+        self._look()
+
+    def _speed_up(self, speed: float, step: float) -> None:
+        """Let the airspeed go towards a commanded `speed`, m/s, for `step` seconds."""
+        rise = _THROTTLE * self._rates.power / self._flown * step
+        fall = self._rates.fall * step
+        self._demand += min(max(speed - self._demand, -fall), rise)
+        heeded = -math.expm1(-step / self._limits.body.airspeed_lag)
+        self._flown += (self._demand - self._flown) * heeded
+
+    def _rise(self, height: float, step: float) -> None:
+        """Let the height go towards `height`, m, for `step` seconds."""
+        limits = self._limits
+        climb = (height - self._height) / _HEIGHT_TIME
+        climb = min(max(climb, -limits.descent_speed), limits.climb_speed)
+        self._climb += (climb - self._climb) * -math.expm1(-step / _CLIMB_LAG)
+        self._height += self._climb * step

@@ -40,20 +40,6 @@ TABLE = table(
     _parameter("descent_speed", "m/s", 2.0, {"TECS_SINK_MIN": 1.0}, 0.1),
     _parameter("period", "s", 17.0, {"NAVL1_PERIOD": 1.0}, 1.0),
     _parameter("damping", "", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1),
-    _parameter("energy_time", "s", 5.0, {"TECS_TIME_CONST": 1.0}, 0.5),
-    _parameter("throttle_damping", "", 0.5, {"TECS_THR_DAMP": 1.0}, 0.0),
-    _parameter("pitch_damping", "", 0.3, {"TECS_PTCH_DAMP": 1.0}, 0.0),
-    _parameter("energy_integral", "1/s", 0.3, {"TECS_INTEG_GAIN": 1.0}, 0.0),
-    _parameter("turn_power", "", 10.0, {"TECS_RLL2THR": 1.0}, 0.0),
-    _parameter("climb_pitch", "rad", radians(15), {"TECS_PITCH_MAX": radians(1)}, 0.0),
-    Parameter(
-        "pitch_limit",
-        "rad",
-        radians(20),
-        {"PTCH_LIM_MAX_DEG": radians(1), "LIM_PITCH_MAX": radians(0.01)},
-        0.0,
-        source=SOURCE,
-    ),
     Parameter(
         "return_height",
         "m",
@@ -70,8 +56,7 @@ TABLE = table(
     *rally_parameters(limit=5000.0, home=0),
 )
 """ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate
-with an idling engine; `turn_power` is per unit of load factor squared beyond 1; a `climb_pitch`
-of 0 is the `pitch_limit`; a `return_height` below 0 keeps the height at which the return begins.
+with an idling engine; a `return_height` below 0 keeps the height at which the return begins.
 """
 
 
@@ -101,13 +86,6 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
     descent_speed: float = TABLE["descent_speed"].default
     period: float = TABLE["period"].default
     damping: float = TABLE["damping"].default
-    energy_time: float = TABLE["energy_time"].default
-    throttle_damping: float = TABLE["throttle_damping"].default
-    pitch_damping: float = TABLE["pitch_damping"].default
-    energy_integral: float = TABLE["energy_integral"].default
-    turn_power: float = TABLE["turn_power"].default
-    climb_pitch: float = TABLE["climb_pitch"].default
-    pitch_limit: float = TABLE["pitch_limit"].default
     body: PlaneBody = ARDUPLANE_BODY
 
     @property
