@@ -23,7 +23,6 @@ from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
     feasible,
-    maximize,
     maximize_all,
     objectives,
 )
@@ -38,11 +37,10 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate
-from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
+from faao_mav.optimizer.rates.slot_rate import BestRate
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts, stretched
-from faao_mav.optimizer.search.routes import global_flights
 from faao_mav.optimizer.search.sparing import sparing_starts
-from faao_mav.optimizer.search.starts import split_names, starts
+from faao_mav.optimizer.search.starts import by_name, starts
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
@@ -50,12 +48,6 @@ LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded where there is a least speed, or a
 queue has a buffer or shares. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300
 steps."""
-
-_EXACT_ITERATIONS = 12
-"""The largest number of iterations at exact rates, after those in a table.
-
-Chosen; what a change costs is not measured.
-"""
 
 ROUGH = 1e-3
 """The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared.
@@ -111,15 +103,12 @@ def direct(
     field = rate_field(problem, scheme)
     stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
     kept, fenced = problem.constraints(kin), problem.fenced(kin)
-    names, over_the_map = split_names(kin, ("straight",) if alone else options.starts)
+    names = ("straight",) if alone else by_name(options.starts)
     routes = (
         starts_inside(kin, names, stations, problem.free_area, fenced)
         if problem.free_area
         else starts(kin, names, stations)
     )
-    if over_the_map:
-        first = next(iter(routes.values()))
-        routes |= global_flights(kin, field, relay, first, free=problem.free_area, kept=fenced)
     if before is not None:
         routes[CUTOFF] = before.trajectory
     if known is not None:
@@ -173,13 +162,7 @@ def direct(
     if values.max() > max(optimum.value for optimum in optima):
         optima += optimized([flights[int(values.argmax())]])
     best = _best(problem, field, optima)
-    final, rates_there = _at_exact_rates(problem, scheme, field, best)
-    for other in optima:  # where rates come from a table another may be the best in truth
-        if other is not best and other.value > final.value + _EQUAL:
-            exact, rates_elsewhere = _at_exact_rates(problem, scheme, field, other)
-            if exact.value > final.value + _EQUAL:
-                final, rates_there = exact, rates_elsewhere
-    solution = _solution(problem, scheme, rates_there, final, history, by_start)
+    solution = _solution(problem, scheme, field, best, history, by_start)
     if before is None:
         return solution
     return replace(solution, gain=float(solution.history[-1]) - _worth(problem, before))
@@ -209,37 +192,6 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
     rates = field.value(np.stack([optimum.trajectory.w.T for optimum in equal], axis=1))
     delivered = objectives(rates, problem.kinematics, problem.relay)
     return equal[int(np.argmax(np.round(delivered / _EQUAL)))]
-
-
-def _at_exact_rates(
-    problem: Problem, scheme: Design, field: RateField, optimum: LocalOptimum
-) -> tuple[LocalOptimum, RateField]:
-    """Return `optimum`, taken a little further where it was found in an approximate table.
-
-    With the precoders held, the rates are exact, and whatever they gain the best ones gain too. The
-    rates are returned with it.
-    """
-    if problem.plan.optimizer.rate != "cutoff":
-        return optimum, field
-    if not any(isinstance(rate, ModeRate) and not rate.exact for rate in field.rates):
-        return optimum, field
-    w = optimum.trajectory.w
-    held = []
-    for link, rate in zip(field.links, field.rates, strict=True):
-        H = link.channel(w, link.small_scale(w))
-        held.append(FixedRate(link, _precoders(link, rate, scheme, w, H)))
-    exact = RateField(field.links, tuple(held))
-    further = maximize(
-        problem.kinematics,
-        exact,
-        optimum.trajectory,
-        constraints=problem.constraints(problem.kinematics),
-        tolerance=problem.plan.optimizer.tolerance,
-        max_iterations=_EXACT_ITERATIONS,
-        strategy=NEAR_START if problem.kinematics.min_speed > 0 else None,
-        relay=problem.maximised_queue,
-    )
-    return replace(optimum, trajectory=further.trajectory, value=further.value), exact
 
 
 def _rates(scheme: Design, field: RateField, w: Real) -> Real:
@@ -294,8 +246,6 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex)
     From a table of two modes they are searched afresh too, and the better kept; from one of a
     single mode that gained 2e-6 bit in the mean, on twelve random plans.
     """
-    if isinstance(rate, FixedRate):
-        return scheme.precoders(link, H, start=rate.P)
     where = link_coordinates(link, w.T)
     at = where.gain_log, where.cosine
     if not scheme.optimal or not isinstance(rate, CurveRate | BestRate | ModeRate):

@@ -213,7 +213,7 @@ class Optimizer(Section):
     ] = "cutoff"
     starts: Annotated[
         tuple[Start, ...], key("Routes that the direct method starts from.", min_length=1)
-    ] = ("straight", "bs", "user", "bs-user", "user-bs", "global")
+    ] = ("straight", "bs", "user", "bs-user", "user-bs")
     tolerance: Annotated[
         Number,
         key(

@@ -60,7 +60,7 @@ def test_a_solution_proves_itself(
     assert (np.diff(solution.history) >= 0).all()
     assert solution.history[-1] == solution.rates.R_avg
     assert solution.rates.R_avg > solution.history[0] + 0.02
-    assert set(solution.starts) <= {"straight", "global 1", "global 2", "global 3"}
+    assert set(solution.starts) <= {"straight", "bs", "user", "bs-user", "user-bs"}
     draws = (6,) if fading == "ergodic" else ()
     assert solution.H_rB.shape == (*draws, 20, 2, 2)
     assert solution.P_B.shape == (*(draws if csi == "instantaneous" else ()), 20, 2, 2)

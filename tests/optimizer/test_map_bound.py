@@ -19,7 +19,6 @@ from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.bound import radial_rates
 from faao_mav.optimizer.search.map_bound import MapBound, RadialRates, map_bound
-from faao_mav.optimizer.search.routes import best_paths
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.search.sweep import Sweep, sweep_over
 from faao_mav.plan import parse_plan
@@ -157,7 +156,7 @@ def test_no_optimised_flight_is_above_the_map_s_bound(
     bounded: dict[str, Bounded], kind: str
 ) -> None:
     one = bounded[kind]
-    for starts in (["global"], ["user-bs"]):
+    for starts in (["straight"], ["user-bs"]):
         plan = parse_plan(edited(one.problem.plan.text, {"optimizer.starts": starts}))
         reached = one.value(optimize(plan).w)
         assert reached <= one.bound <= 1.6 * reached
@@ -184,37 +183,3 @@ def test_the_copter_s_plan_is_within_three_hundredths_of_the_bound() -> None:
     plan = parse_plan((MISSIONS / "copter_relay.yaml").read_text())
     problem, reached = build_problem(plan), optimize(plan).delivered_rate
     assert reached < map_bound(problem, radial_rates(problem)[0], cells=15_000) < 1.03 * reached
-
-
-def test_paths_visit_the_stations_in_an_order_and_keep_out_of_the_fence(
-    small_plan: MakePlan,
-) -> None:
-    problem = build_problem(
-        small_plan(WALL | {"flight.duration": 40, "radio.causal": True, "radio.fading": "none"})
-    )
-    field = rate_field(problem, design(problem.plan))
-    free = problem.free_area
-    assert free is not None
-    paths = best_paths(problem.kinematics, field, problem.relay, free=free)
-    assert paths
-    for path in paths:
-        assert path[0] == pytest.approx(problem.kinematics.start)
-        assert path[-1] == pytest.approx(problem.kinematics.end)
-        assert (
-            free.clearance(path) > -10
-        )  # corners are cut between instants; through the zone it would be -17
-        near = [np.hypot(*(path - link.station).T).argmin() for link in problem.links]
-        assert near[0] < near[1]  # what is forwarded has been received
-
-
-def test_the_global_start_finds_what_named_ones_find() -> None:
-    text = (MISSIONS / "paper_active.yaml").read_text()
-    changes = {
-        "flight.duration": 100,
-        "radio.base_station.power_dbm": 10,
-        "radio.relay.power_dbm": 10,
-        "optimizer.method": "direct",
-    }
-    named = {"optimizer.starts": ["straight", "bs", "user", "bs-user", "user-bs"]}
-    best = optimize(parse_plan(edited(text, changes | named))).rates.R_avg
-    assert optimize(parse_plan(edited(text, changes))).rates.R_avg >= best - 1e-4

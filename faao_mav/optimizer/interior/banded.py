@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.optimizer.lapack import lapack
 
 SIZE = 8
 """Unknowns per slot without those of constraints."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,11 +25,6 @@ from faao_mav.radio.relay import RelayQueue
 
 _ALLOWED = 1e-9
 """The violation of a limit, relative to it, that a flight may have: rounding of 1,000s of slots."""
-
-
-_REPEATED = 50
-"""The steps allowed from which a search with a least speed that has not converged is repeated, in
-another way. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,41 +96,10 @@ def maximize_all(
     max_iterations: int = 100,
     strategy: StartStrategy | None = None,
     relay: RelayQueue | None = None,
-    race: bool = False,
 ) -> list[LocalOptimum]:
-    """Return what `maximize` finds from each of the `starts`; the searches run side by side.
-
-    In a `race` those are given up that fall behind the best.
-    """
-    kept = (*constraints_of(kin), *constraints)
-    slow = kin.min_speed > 0
-    strategy = strategy or (SLOW_START if slow else COLD_START)
-    optima = _optima(kin, stage, starts, kept, tolerance, max_iterations, strategy, relay, race)
-    left = [k for k, optimum in enumerate(optima) if not optimum.converged]
-    again = slow and max_iterations >= _REPEATED and len(left) > (len(optima) - 1) * race
-    if left and again:
-        near = [optima[k].trajectory for k in left]
-        other = SLOW_START if strategy == COLD_START else COLD_START
-        ends = _optima(kin, stage, near, kept, tolerance, max_iterations, other, relay)
-        for k, end in zip(left, ends, strict=True):
-            taken = optima[k].iterations + end.iterations
-            further = end.converged or end.value > optima[k].value
-            optima[k] = replace(end if further else optima[k], iterations=taken)
-    return optima
-
-
-def _optima(
-    kin: Kinematics,
-    stage: Stage,
-    starts: Sequence[Trajectory],
-    kept: Sequence[Constraint],
-    tolerance: float,
-    max_iterations: int,
-    strategy: StartStrategy,
-    relay: RelayQueue | None,
-    race: bool = False,
-) -> list[LocalOptimum]:
-    """Return what one search from each of the `starts` within the limits `kept` finds."""
+    """Return what `maximize` finds from each of the `starts`; the searches run side by side."""
+    kept: Sequence[Constraint] = (*constraints_of(kin), *constraints)
+    strategy = strategy or (SLOW_START if kin.min_speed > 0 else COLD_START)
     w, v = (np.stack(each, axis=1) for each in zip(*((s.w.T, s.v.T) for s in starts), strict=True))
     if relay is None:
         rewards = ScaledRewards(stage, w)
@@ -143,7 +107,7 @@ def _optima(
         rewards = QueueRewards(stage, w)
         kept = (*kept, Queue(rewards, relay.half, relay.buffer / kin.time_step))
     first = objectives(rewards.base, kin, relay)
-    search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy, race=race)
+    search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy)
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
         results = search.run(max_iterations)
     flights = [

@@ -119,11 +119,6 @@ _MU_PER_TOLERANCE = 1 / 20
 """The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
 
 
-_HOPELESS = 0.97
-"""In a race, the share of the best converged value that a flight's value and gap together have to
-reach. Half-duplex flights that creep along a ridge end where others are already, or lower: without
-it the last of seven takes 96 iterations with T = 200 s, where the first takes 11. Chosen."""
-
 _MOST_PER_SLOT = 10.0
 """The inequalities per slot from which the least mu is smaller: the gap is their sum. Chosen."""
 
@@ -208,11 +203,9 @@ class Search:
         *,
         tolerance: float,
         strategy: StartStrategy,
-        race: bool = False,
     ) -> None:
-        """Begin at the starts; a `race` gives up flights that fall behind the best: `_HOPELESS`."""
-        self.rewards, self.tolerance, self.race = rewards, tolerance, race
-        self.best = -np.inf
+        """Begin at the starts."""
+        self.rewards, self.tolerance = rewards, tolerance
         self.flight = ScaledFlight(kin, constraints)
         self.turning = any(constraint.turns for constraint in constraints)
         self.bilinear = any(constraint.bilinear for constraint in constraints)
@@ -251,8 +244,6 @@ class Search:
             lost = control.iterations >= max_iterations
             lost |= control.centrings > _MAX_CENTRINGS
             over = converged | ~np.isfinite(residual) | (lost & (control.attempts == 0))
-            if self.race:
-                over |= self._hopeless(converged)
             for k in np.flatnonzero(over).tolist():
                 results[int(self.rows[k])] = self._result(k, residual[k, 0], converged[k, 0])
             if over.all():
@@ -260,13 +251,6 @@ class Search:
             self._keep(~over)
             self._advance(slope[~over[:, 0]])
         return results
-
-    def _hopeless(self, converged: Flags) -> Flags:
-        """Tell which flights are unlikely to get past the best that has converged, (flights, 1)."""
-        value, mean = self.at.value(), self.rewards.mean
-        self.best = max(self.best, float(mean(value)[converged].max(initial=-np.inf)))
-        gap = reduce(np.add, [state.gap() for state in self.at.states])
-        return np.asarray(mean(value + gap) < _HOPELESS * self.best)
 
     def _result(self, k: int, residual: float, converged: bool) -> SearchResult:
         """Return the best flight within the limits so far, else the last one."""

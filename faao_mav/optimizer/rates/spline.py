@@ -154,7 +154,7 @@ def cubic_pieces(step: float, y: Real) -> Real:
     >>> cubic_pieces(1.0, np.arange(4.0) ** 2)[:, 1].round(6).tolist()  # (1 + t)²
     [0.0, 1.0, 2.0, 1.0]
     """
-    from faao_mav.optimizer.lapack import lapack  # with the optimiser, not before
+    from scipy.linalg import lapack  # with the optimiser, not before
 
     secant = np.diff(y, axis=0) / step
     right = np.empty_like(y, dtype=float)

@@ -2,8 +2,7 @@
 
 The problem is not concave: the interior-point method finds the local optimum near its start.
 
-- `sweep`: dynamic programming over the map, by position alone; `routes`: the flights that it finds,
-  the start `global`.
+- `sweep`: dynamic programming over the map, by position alone.
 - `starts`: feasible flights to start from, straight and by way of the stations; `cruise` makes them
   for aircraft with a least speed. A new start is a name in the plan's `optimizer.starts` and a
   branch of `starts.starts`.

@@ -108,7 +108,6 @@ def improve_starts(
         tolerance=tolerance,
         max_iterations=max_iterations,
         relay=relay,
-        race=True,
     )
     optima = dict(zip(flights, solved, strict=True))
     best = max(optimum.value for optimum in solved)
