@@ -14,7 +14,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import DifferenceClasses, difference_classes
-from faao_mav.radio.precoder import SCHEMES, bpsk_two_antennas, check_positive, with_power
+from faao_mav.radio.precoder import bpsk_two_antennas, check_positive, with_power
 from faao_mav.radio.precoder_search import search
 from faao_mav.radio.rate import cutoff_rate
 
@@ -69,12 +69,6 @@ def _checked(
     return H
 
 
-def _known(H: Complex, power: float, noise: float) -> Complex:
-    """Return the identity and the classical schemes, (k, b, N_t, N_t), for H (b, N_r, N_t)."""
-    schemes = [scheme(H, power, noise) for scheme in SCHEMES.values()]
-    return np.stack([np.broadcast_to(np.eye(H.shape[-1]), schemes[0].shape), *schemes])
-
-
 def best_precoders(
     H: RealOrComplex,
     power: float,
@@ -87,7 +81,7 @@ def best_precoders(
     """Return the precoders of highest cutoff rate, max R_0(H, P) of (7) or (8) per slot.
 
     BPSK on two antennas and any alphabet on one have a closed form. For the others Newton's method
-    runs from several starts; the rate is never below that of the classical schemes in ``precoder``.
+    runs from several starts, to the `tolerance`.
 
     Args:
         H: (..., N_r, N_t) channels, one problem each.
@@ -141,12 +135,10 @@ def best_mean_precoders(
     elif not exact:
         scale = np.sqrt(power) / (2.0 * np.sqrt(noise))
         given = None if start is None else np.reshape(start, (-1, N, N)).astype(np.complex128)
-        mean = np.mean(flat, axis=1)
         step = max(1, _CHUNK // (S * 2 * N**4 * (_STARTS if start is None else 1)))
         for first in range(0, len(flat), step):
             part = slice(first, first + step)
-            known = None if given is not None else _known(mean[part], power, noise)
             begin = None if given is None else given[part]
-            P[part] = search(flat[part] * scale, classes, tolerance, begin, known)
+            P[part] = search(flat[part] * scale, classes, tolerance, begin)
     P = with_power(P, power)
     return BestPrecoders(P.reshape(*shape, N, N), exact, H, classes, noise)

@@ -168,5 +168,4 @@ SCHEMES: Mapping[str, Scheme] = MappingProxyType(
         "waterfilling": waterfilling,
     }
 )
-"""The classical schemes by name, each called with (H, power, noise); also where the search for the
-best precoder compares its result."""
+"""The classical schemes by name, each called with (H, power, noise)."""

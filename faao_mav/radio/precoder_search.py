@@ -2,8 +2,8 @@
 
 P = V Q with V the directions that the channel, or its draws, respond to: whatever P sends outside
 them is lost power. The problem is not concave in Q. Newton's method on the sphere ||Q||_F = 1 runs
-from a few starts that cover the known kinds of optimum (streams on separate modes, streams spread
-over the modes, all streams superposed on the strongest mode), and the best result is kept.
+from a few starts (streams on separate modes, streams spread over the modes, random ones), and the
+best result is kept.
 
 The constants below were chosen; unless one says so, what a change costs is not measured.
 """
@@ -25,17 +25,9 @@ _FAINT = 1e-4
 """Trace of the gain matrix G below which the rate is proportional to the power: the best P is then
 the same at any lower power, and is searched at this one."""
 
-_SATURATED, _DEEPEST, _POWER_STEP = 40.0, 1000.0, 4.0
-"""-ln δ beyond which no rate can tell precoders apart, -ln δ up to which the optimum is followed,
-and the factor of the power from one search to the next in between. The region in which Newton's
-method converges shrinks as the SNR grows, so the search is done at the power where -ln δ is the
-first, and its result is followed upwards. At the second, P is within a fraction of a per cent (in
-power) of the precoder of largest least distance, its limit."""
-
-_RATIO_BANDS = np.array([[1.0, 0.85], [0.7, 0.6], [0.5, 0.4], [0.25, 0.125]])
-_RATIO_ANGLES = np.array([0.0, 11.25, 22.5, 45.0, 67.5, 90.0])
-"""Moduli (in bands, of each of which the best is kept) and angles in degrees of the ratio r in the
-superposition [1, r, r², ...] of all streams on one mode."""
+_SATURATED = 40.0
+"""-ln δ beyond which no rate can tell precoders apart: of stronger links the search is done at the
+power where it is this, since the region in which Newton's method converges shrinks with the SNR."""
 
 _RANDOM_STARTS, _MORE_RANDOM_STARTS, _FEW_CHANNELS = 4, 8, 12
 """Random starts per channel; the larger number for draws of a channel, whose optima have less
@@ -80,19 +72,6 @@ def _starts(gains: Real, antennas: int, random: int) -> Complex:
     return np.concatenate([starts + 0.05 * points[0], others])
 
 
-def _superposed(rows: int, antennas: int) -> Complex:
-    """Return all streams on the strongest mode, [1, r, r², ...]: (bands of |r|, points, q, N).
-
-    QPSK with |r| = 1/2 makes 16-QAM of two streams, BPSK with r = j makes QPSK.
-    """
-    r = _RATIO_BANDS[:, :, None] * np.exp(1j * np.deg2rad(_RATIO_ANGLES))
-    Q = np.zeros((len(r), r[0].size, rows, antennas), dtype=np.complex128)
-    Q[:, :, 0] = r.reshape(len(r), -1)[..., None] ** np.arange(antennas)
-    # Without a small share of the other modes their gradient is zero and none is ever tried.
-    Q[:, :, 1:] = 0.03
-    return _unit(Q)
-
-
 def _unit(Q: Complex) -> Complex:
     """Return each matrix scaled to ||Q||_F = 1; zero matrices become a scaled identity."""
     norm = np.linalg.norm(Q, axis=(-2, -1), keepdims=True)
@@ -110,16 +89,6 @@ def _raised(G: Complex) -> Real:
     return np.maximum(1.0, _FAINT / np.where(largest > 0.0, largest, 1.0))
 
 
-def _best_superposed(sums: ClassSum, G: Complex) -> Complex:
-    """Return the best point of each band of ``_superposed`` for each channel, (bands, b, q, N)."""
-    Q = _superposed(G.shape[-1], sums.antennas)
-    bands, points = Q.shape[:2]
-    flat = Q.reshape(-1, *Q.shape[2:])
-    F = np.stack([value(sums, G, np.broadcast_to(M, (len(G), *M.shape))) for M in flat])
-    best = np.argmin(F.reshape(bands, points, len(G)), axis=1)
-    return np.asarray(Q[np.arange(bands)[:, None], best])
-
-
 def _from_starts(sums: ClassSum, G: Complex, starts: Complex, tolerance: float) -> Complex:
     """Return the best point (b, q, N) that is reached from the starts (K, b, q, N)."""
     K, b = starts.shape[:2]
@@ -127,14 +96,9 @@ def _from_starts(sums: ClassSum, G: Complex, starts: Complex, tolerance: float) 
     owner = np.tile(np.arange(b), K)
     F = value(sums, G[owner, draws], _unit(starts.reshape(K * b, *starts.shape[2:])))
     depth = -np.min(F.reshape(K, b), axis=0)
-    factor = _raised(G) * np.minimum(1.0, _SATURATED / np.maximum(depth, _SATURATED))
-    scaled = _scaled(G, factor)
+    scaled = _scaled(G, _raised(G) * _SATURATED / np.maximum(depth, _SATURATED))
     few = scaled[:, draws]
-    starts = np.concatenate([starts, _best_superposed(sums, few)])
-    K = len(starts)
-    owner = np.tile(np.arange(b), K)
-    flat = starts.reshape(K * b, *starts.shape[2:])
-    Q, F = minimise(sums, few[owner], flat, _COARSE)
+    Q, F = minimise(sums, few[owner], starts.reshape(K * b, *starts.shape[2:]), _COARSE)
     if few.shape != G.shape:
         F = value(sums, scaled[owner], Q)
         kept = np.argsort(F.reshape(K, b), axis=0)[:_KEPT]
@@ -143,21 +107,13 @@ def _from_starts(sums: ClassSum, G: Complex, starts: Complex, tolerance: float) 
         Q, F = minimise(sums, np.concatenate([scaled] * K), flat, _COARSE)
     winner = np.argmin(F.reshape(K, b), axis=0)
     Q = Q.reshape(K, b, *Q.shape[1:])[winner, np.arange(b)]
-    Q, F = minimise(sums, scaled, Q, tolerance)
-
-    target = np.minimum(1.0, factor * _DEEPEST / np.maximum(-F, 1.0))
-    while np.any(rising := factor < target):
-        factor[rising] = np.minimum(target, _POWER_STEP * factor)[rising]
-        Q[rising], _ = minimise(
-            sums, _scaled(G[rising], factor[rising]), Q[rising], max(tolerance, _COARSE)
-        )
-    return Q
+    return minimise(sums, scaled, Q, tolerance)[0]
 
 
 def _improved(sums: ClassSum, G: Complex, Q: Complex, tolerance: float) -> tuple[Complex, Real]:
     """Return the local optimum that Newton's method reaches from Q, and its F; never worse."""
     before = value(sums, G, Q)
-    factor = _raised(G) * np.minimum(1.0, _DEEPEST / np.maximum(-before, _DEEPEST))
+    factor = _raised(G) * _SATURATED / np.maximum(-before, _SATURATED)
     fine = np.where(before < -_SATURATED, max(tolerance, _COARSE), tolerance)
     better, F = minimise(sums, _scaled(G, factor), Q, fine)
     other = factor != 1.0
@@ -195,13 +151,11 @@ def search(
     classes: DifferenceClasses,
     tolerance: float,
     start: Complex | None,
-    known: Complex | None = None,
 ) -> Complex:
     """Return P (b, N_t, N_t), of any power, that maximises the mean cutoff rate over the draws.
 
     `A` (b, S, N_r, N_t) is H √W / (2 σ), `classes` are the differences of the alphabet, `tolerance`
-    is that of ``minimise``. `start` (b, N_t, N_t) is the only start if given; the result is not
-    worse than any of the precoders `known` (k, b, N_t, N_t).
+    is that of ``minimise``. `start` (b, N_t, N_t) is the only start if given.
 
     >>> from faao_mav.radio.constellation import difference_classes
     >>> H = np.diag([1.0, 2.0])[None, None] + 0j
@@ -222,13 +176,6 @@ def search(
     Q = _from_starts(sums, G, starts, tolerance)
     if S == 1 and b > 1:
         Q = _exchanged(sums, G, s[:, 0], Q, tolerance)
-    F = value(sums, G, Q)
-    for P in () if known is None else known:
-        # The part of P outside the modes is lost power: without it the rest may be scaled up.
-        other = _unit(Vh @ P)
-        better = value(sums, G, other) < F - 1e-12 * np.abs(F)
-        if np.any(better):
-            Q[better], F[better] = _improved(sums, G[better], other[better], tolerance)
     return np.where(s[:, :1, None] > 0.0, V @ Q, np.eye(N))
 
 
