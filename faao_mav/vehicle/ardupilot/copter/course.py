@@ -1,9 +1,8 @@
 """The course: where the target that the aircraft follows is, on the target's own clock."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -13,10 +12,6 @@ from faao_mav.vehicle.ardupilot.copter.spline import CurvedLeg
 
 GRID = 0.1
 """The step of the target's clock and of the pursuit, s."""
-
-TargetRow: TypeAlias = tuple[float, ...]
-"""What the target does at a sample, each value with its change up to the next sample: position
-east, north; speed east, north; climb rate squared; acceleration east, north."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,13 +83,6 @@ def motion_of(course: Course, clock: Real) -> Real:
     if straight:
         _add_straight(motion, clock, straight)
     return motion
-
-
-def rows_of(motion: Real) -> Iterator[TargetRow]:
-    """Yield the rows of `motion` (n, 9) across the ground, n - 1 of them."""
-    values = np.vstack([motion.T[[0, 1, 3, 4]], motion[:, 5] ** 2, motion.T[6:8]])
-    columns = np.stack([values[:, :-1], np.diff(values)], axis=1).reshape(-1, len(motion) - 1)
-    return zip(*columns.tolist(), strict=True)
 
 
 def grid_of(course: Course) -> Real:

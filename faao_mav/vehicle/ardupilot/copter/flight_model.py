@@ -7,7 +7,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
-from faao_mav.vehicle.ardupilot.copter.course import Course, grid_of, motion_of, rows_of
+from faao_mav.vehicle.ardupilot.copter.course import Course, grid_of, motion_of
 from faao_mav.vehicle.ardupilot.copter.follow import pursue
 from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.vehicle.ardupilot.copter.route import Router
@@ -57,7 +57,7 @@ class ArduCopter(ArduCopterLimits):
         target = motion_of(course, grid)
         pursuit = pursue(
             course,
-            rows_of(target),
+            target,
             self,
             wind=path.wind,
             longest=path.longest,
