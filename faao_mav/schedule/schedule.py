@@ -10,8 +10,9 @@ from faao_mav.schedule.route import Route
 from faao_mav.vector import distances_to_path, lengths
 from faao_mav.vehicle import Flown
 
-# Metres of position error that one second too late or too early at the end costs. Raised from 3
-# when two plans of benchmarks/missions.py ended 0.6 and 0.7 s off.
+# Metres of position error that one second too late or too early at the end costs. Chosen between
+# punctual and near: with 2, 5 and 8 the means over 28 conversions are 0.11, 0.06 and 0.05 s, and
+# 1.44, 1.57 and 1.59 m rms.
 LATE_WEIGHT = 5.0
 
 # Metres of position error that one metre of path error costs beyond a share of the path tolerance.
