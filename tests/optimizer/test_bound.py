@@ -12,13 +12,8 @@ from random_flights import random_flight
 from faao_mav.arrays import Real
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.search.best_rates import best_rates
 from faao_mav.optimizer.search.bound import upper_bound
-from faao_mav.optimizer.search.relaxation import (
-    best_rates,
-    majorant_lines,
-    reachable_distances,
-    relaxed_bound,
-)
 from faao_mav.plan import read_plan
 from faao_mav.radio.best_precoder import best_precoders
 
@@ -54,7 +49,7 @@ def bounds(small_plan: MakePlan) -> dict[str, tuple[Problem, float]]:
     kinds = ("ula", "all_ones")
     plans = (small_plan(FAINT | {"radio.line_of_sight": kind}) for kind in kinds)
     problems = [build_problem(plan) for plan in plans]
-    return {k: (each, relaxed_bound(each)) for k, each in zip(kinds, problems, strict=True)}
+    return {k: (each, upper_bound(each).value) for k, each in zip(kinds, problems, strict=True)}
 
 
 @pytest.mark.usefixtures("coarse_map")
@@ -80,13 +75,13 @@ def test_a_known_plan_tightens_it_and_stays_below(
 
 
 @pytest.mark.usefixtures("coarse_map")
-def test_within_a_hundredth_of_the_active_paper_plan() -> None:
+def test_within_a_fortieth_of_the_active_paper_plan() -> None:
     plan = read_plan(MISSIONS / "paper_active.yaml")
     plan = plan.changed({"flight.duration": 20, "optimizer.method": "direct"})
     found = optimize(plan).rates.R_avg
     limit = upper_bound(build_problem(plan), found)
     assert limit.exact
-    assert found <= limit.value <= 1.01 * found
+    assert found <= limit.value <= 1.025 * found
 
 
 @pytest.mark.usefixtures("coarse_map")
@@ -94,39 +89,6 @@ def test_it_is_almost_reached_without_fading(small_plan: MakePlan) -> None:
     plan = small_plan(FAINT | {"radio.fading": "none", "flight.duration": 20})
     found = optimize(plan).rates.R_avg
     assert found <= upper_bound(build_problem(plan), found).value <= 1.4 * found
-
-
-@given(st.integers(0, 2**31))
-def test_lines_lie_above_the_curve(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    r = np.sort(rng.uniform(0, 300, (3, 2)), axis=1)
-    grid = r[:, :1] + (r[:, 1:] - r[:, :1]) * np.linspace(0, 1, 200)
-    width, middle = rng.uniform(5, 100), rng.uniform(0, 200)
-    curve = 1 / (1 + np.exp((grid - middle) / width))
-    slope, offset = majorant_lines(grid, curve)
-    fine = r[:, :1] + (r[:, 1:] - r[:, :1]) * np.linspace(0, 1, 999)
-    true = 1 / (1 + np.exp((fine - middle) / width))
-    above = (slope[:, :, None] * fine[:, None] + offset[:, :, None]).min(axis=1)
-    assert (slope <= 0).all()
-    assert (above >= true - 1e-9).all()
-    assert above.max() <= 1.2 * curve.max() + 1e-3
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [{}, {"flight.start_velocity": "free", "flight.bound_first_acceleration": False}],
-)
-def test_flights_keep_to_the_reachable_distances(
-    small_plan: MakePlan, changes: dict[str, Any]
-) -> None:
-    problem = build_problem(small_plan(changes))
-    for seed in range(40):
-        flight = random_flight(problem.kinematics, seed)
-        for link in problem.links:
-            nearest, farthest = reachable_distances(problem.kinematics, link.station)
-            away = np.linalg.norm(flight.w - link.station, axis=1)
-            assert (nearest - 1e-6 <= away).all()
-            assert (away <= farthest + 1e-6).all()
 
 
 def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> None:

@@ -61,27 +61,6 @@ def test_separation_is_the_distance_of_shapely(
         assert 0 < apart <= distance + 1e-9
 
 
-@given(outline=outlines, a=places, b=places, room=st.floats(0.1, 10))
-def test_centred_half_planes_part_what_can_be_parted(
-    outline: shapely.Polygon, a: tuple[float, float], b: tuple[float, float], room: float
-) -> None:
-    if outline.geom_type != "Polygon" or outline.area < 1:
-        return
-    corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
-    obstacles = ConvexObstacles.of([corners], [0.0])
-    ends = np.array([a, b]).T[:, None]
-    nearest, centred = (
-        [float(u[:, 0, 0, 0] @ end) - float(h[0, 0, 0]) - room for end in (a, b)]
-        for u, h in (
-            obstacles.separation(ends[..., :-1], ends[..., 1:]),
-            obstacles.separation(ends[..., :-1], ends[..., 1:], np.array([room])),
-        )
-    )
-    assert (min(nearest) > 0) == (min(centred) > 0)
-    if min(nearest) > 0:
-        assert np.prod(centred) >= np.prod(nearest) * (1 - 1e-9)
-
-
 @given(
     outline=outlines,
     way=st.lists(places, min_size=4, max_size=8),

@@ -64,7 +64,7 @@ class KeepOut(HalfPlanes):
 
     def slack(self, x: Real) -> tuple[Real, Real]:
         """Return u . w - h(u) - room (2 P, flights, n) and u."""
-        u, h = self.obstacles.separation(x[..., :-1], x[..., 1:], self.room)
+        u, h = self.obstacles.separation(x[..., :-1], x[..., 1:])
         least = h + self.room
         pieces, slots = len(self.obstacles), x.shape[-1]
         g = np.ones((2 * pieces, *x.shape[1:]))

@@ -20,16 +20,9 @@ from faao_mav.arrays import Integers, Real
 _SHORTEST = 1e-12
 """The least length that a direction is divided by; far below a rounding error of positions."""
 
-_FAR, _CLOSE = 30.0, 20.0
-"""The distance, m, from which an obstacle is the disc about it, and that below which the direction
-is that of the barrier. Chosen: forces of obstacles so far away are next to nothing."""
-
-_ROUNDS, _SHORTER = 5, 4
-"""Newton steps to the direction of the barrier, enough for five digits, and how often a step that
-leads away from it is quartered. Chosen."""
-
-_TURN, _STILL = 0.5, 1e-6
-"""The largest turn of such a step, and the one below which none is taken, radians. Chosen."""
+_FAR = 30.0
+"""The distance, m, from which an obstacle is the disc about it. Chosen: forces of obstacles so far
+away are next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +69,11 @@ class ConvexObstacles:
         radius = np.hypot(*(self.corners - center[:, None]).transpose(2, 0, 1)).max(axis=1)
         return center.T[..., None, None], (radius + self.radius)[:, None, None]
 
-    def separation(self, a: Real, b: Real, room: Real | float | None = None) -> tuple[Real, Real]:
+    def separation(self, a: Real, b: Real) -> tuple[Real, Real]:
         """Return directions u (2, P, flights, n) and h(u) there, of the straights from a to b.
 
-        a and b are (2, flights, n). The directions are those of the greatest distance; with `room`
-        (n,), where both ends are farther than that, those that maximise the product of what both
-        have beyond it. Of obstacles farther than `_FAR` both are those of a disc about them.
+        a and b are (2, flights, n). The directions are those of the greatest distance; of obstacles
+        farther than `_FAR` both are those of a disc about them.
         """
         center, size = self._discs
         away = (a + b)[:, None] / 2 - center
@@ -91,8 +83,6 @@ class ConvexObstacles:
         near = np.nonzero(least < _FAR / self.unit)
         piece, a, b = near[0], a[:, near[1], near[2]], b[:, near[1], near[2]]
         best = self._best(piece, a, b)
-        if room is not None:
-            best = self._centred(piece, a, b, np.broadcast_to(room, least.shape)[near], best)
         u[0][near], u[1][near] = best
         h[near] = self._support(piece, best)[0]
         return u, h
@@ -130,44 +120,6 @@ class ConvexObstacles:
         farthest, every = along.argmax(axis=0), np.arange(len(piece))
         return along[farthest, every] + self.radius[piece], corners[:, farthest, every]
 
-    def _centred(self, piece: Integers, a: Real, b: Real, room: Real, u: Real) -> Real:
-        """Return u with log(u . a - h - room) + log(u . b - h - room) at its maximum, (2, m).
-
-        It is concave in the angle of u; where an end has no room u stays.
-        """
-        some = np.minimum(_dot(u, a), _dot(u, b)) - self._support(piece, u)[0] - room
-        close = np.flatnonzero((some > 0) & (some < _CLOSE / self.unit))
-        piece, a, b, room, own = piece[close], a[:, close], b[:, close], room[close], u[:, close]
-        now = self._logs(piece, a, b, room, own)
-        for _ in range(_ROUNDS):
-            _, slope, bend = now
-            step = np.clip(-slope / np.minimum(bend, -_SHORTEST), -_TURN, _TURN)
-            if not (np.abs(step) > _STILL).any():
-                break
-            for _ in range(_SHORTER):
-                then = self._logs(piece, a, b, room, _turned(own, step))
-                better = then[0] >= now[0]
-                if better.all():
-                    break
-                step = np.where(better, step, step / 4)
-            own, now = np.where(better, _turned(own, step), own), np.where(better, then, now)
-        turned = u.copy()
-        turned[:, close] = own
-        return turned
-
-    def _logs(self, piece: Integers, a: Real, b: Real, room: Real, u: Real) -> Real:
-        """Return the sum of the logarithms (m,) and its first two derivatives by the angle of u."""
-        h, p = self._support(piece, u)
-        value, slope, bend = np.zeros((3, len(piece)))
-        for end in (a, b):
-            left = _dot(u, end) - h - room
-            with np.errstate(divide="ignore", invalid="ignore"):
-                value += np.where(left > 0, np.log(left), -np.inf)
-                rate = _dot(_across(u), end - p) / left
-                slope += rate
-                bend -= _dot(u, end - p) / left + rate * rate
-        return np.stack([value, slope, bend])
-
 
 def _unit(vectors: Real) -> Real:
     """Return `vectors` (2, ...) divided by their lengths, and east for those without one."""
@@ -181,10 +133,6 @@ def _unit(vectors: Real) -> Real:
 def _across(u: Real) -> Real:
     """Return u, turned left by a right angle."""
     return np.stack([-u[1], u[0]])
-
-
-def _turned(u: Real, angle: Real) -> Real:
-    return np.asarray(np.cos(angle) * u + np.sin(angle) * _across(u))
 
 
 def _dot(x: Real, y: Real) -> Real:

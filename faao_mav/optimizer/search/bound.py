@@ -1,7 +1,6 @@
 """An upper bound on what a plan maximises, over all flights and precoders: the certificate.
 
-Each of three bounds holds for every flight; which are computed is said by the plan. `relaxation`
-knows accelerations, and R_avg alone: it is tight where the rate is near its ceiling. `map_bound`
+Each of two bounds holds for every flight; which are computed is said by the plan. `map_bound`
 knows the queue, half duplex and fences, and flights by their greatest speed alone. `axis_bound`
 knows accelerations along the line through the stations, for aircraft that these limit.
 """
@@ -12,8 +11,8 @@ import numpy as np
 
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.axis_bound import axis_bound
+from faao_mav.optimizer.search.best_rates import best_rates
 from faao_mav.optimizer.search.map_bound import RadialRates, map_bound
-from faao_mav.optimizer.search.relaxation import best_rates, relaxed_bound
 from faao_mav.optimizer.solution import Observer, Progress
 
 _DISTANCES, _KNOWN_DISTANCES = 2_000, 300
@@ -22,10 +21,6 @@ _DISTANCES, _KNOWN_DISTANCES = 2_000, 300
 _TIGHT = 0.03
 """How far above the known plan, as a share of it, a bound may be without another being tried.
 Chosen."""
-
-_SATURATED = 0.75
-"""Share of its ceiling from which a known rate is near it. Chosen between the plans of the paper at
-10 and at 20 dBm, with 0.4 and 0.9."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +40,6 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
 
     That is the delivered rate, or with `radio.causal: false` R_avg. `known` is that rate of any
     plan for it, bit/s/Hz: the better it is, the tighter the bound. `observe` is told the progress.
-    Raises `SolverError` where Clarabel fails.
     """
 
     def tell(number: int, stage: str, best: float) -> None:
@@ -58,9 +52,6 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
     relay, kin = problem.maximised_queue, problem.kinematics
     half = relay is not None and relay.half
     value = ceiling
-    if known > _SATURATED * ceiling and not half:
-        tell(1, "the bound by accelerations", value)
-        value = relaxed_bound(problem, known)
     if value > (1 + _TIGHT) * known:
         corners = np.vstack([kin.start, kin.end, *(link.station for link in problem.links)])
         extent = float(np.ptp(corners, axis=0).max())
@@ -92,7 +83,8 @@ def radial_rates(problem: Problem) -> tuple[RadialRates, bool]:
         best, is_exact = best_rates(
             problem, link, np.broadcast_to(r, (kin.slots if known else 1, len(r)))
         )
-        # chords: see `relaxation.majorant_lines`
+        # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being
+        # known on the grid only.
         between = np.abs(np.diff(best, 2, axis=1)).max(axis=1, keepdims=True) / 4
         values.append(np.maximum.accumulate((best + between)[:, ::-1], axis=1)[:, ::-1])
         exact &= is_exact

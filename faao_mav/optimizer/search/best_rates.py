@@ -1,0 +1,72 @@
+"""The best rate of a link over its distance: what every bound rests on."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rates
+from faao_mav.optimizer.rates.rate_model import best_curves
+from faao_mav.radio.best_precoder import best_precoders, has_closed_form
+from faao_mav.radio.rate import cutoff_rate
+
+_SEARCHED = 25
+"""Distances at which precoders are searched where there is no table of modes. Chosen."""
+
+_DIRECTIONS = 257
+"""Directions u over which the largest singular values are taken. Chosen."""
+
+
+def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
+    """Return the best rate of every slot at distances r (n, m), bits, and whether it is exact.
+
+    Where a draw is known for every slot and the channel depends on the direction, the result is an
+    upper bound: each singular value of H_r is the largest over all directions.
+    """
+    optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
+    exact = has_closed_form(link.modulation, link.transmit) and link.measure == "cutoff"
+    gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
+    if link.nlos is None or optimal.averaged:
+        span = np.array([gain_log.min(), gain_log.max()])
+        curve = best_curves([link], optimal, [span])[0]
+        return curve.value(gain_log, gain_log), not optimal.averaged and exact
+    singular = _largest_singular_values(link, len(r))
+    H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
+    k = np.arange(singular.shape[1])
+    H_r[:, k, k] = singular
+    if exact:
+        # a path gain scales H and leaves the singular vectors, and with them P, as they are
+        best = best_precoders(H_r, link.power, link.modulation, link.noise)
+        H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
+        return cutoff_rate(H, best.P[:, None], link.classes, link.noise), True
+    diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
+    if has_few_modes(link):
+        (rate,) = mode_rates([diagonal], [np.array([gain_log.min(), gain_log.max()])])
+        return np.stack([rate.value(column, column) for column in gain_log.T], axis=1), False
+    # One distance after the other, each search starting from the precoders of the last.
+    from scipy.interpolate import CubicSpline
+
+    columns = np.linspace(0, r.shape[1] - 1, _SEARCHED).astype(np.intp)
+    rates, P = [], None
+    for column in columns:
+        H = np.exp(gain_log[:, column] / 2)[:, None, None] * H_r
+        P = link.best(H[:, None], P)
+        rates.append(link.draw_rates(H, P))
+    spline = CubicSpline(columns, np.stack(rates, axis=1), axis=1)
+    return np.asarray(spline(np.arange(r.shape[1]))), False
+
+
+def _largest_singular_values(link: Link, slots: int) -> Real:
+    """Return upper bounds on the singular values of H_r over all directions, (slots, modes)."""
+    directions = np.linspace(-1, 1, _DIRECTIONS) if link.follows_position else np.zeros(1)
+    largest = np.zeros((slots, min(link.receive, link.transmit)))
+    for u in directions:
+        H_r = link.fade(link.line_of_sight_at(np.full(slots, u)))
+        largest = np.maximum(largest, np.linalg.svd(H_r, compute_uv=False))
+    # Between two directions of the grid a singular value changes by less than the norm of the
+    # change of H_r, in which no phase changes by more than pi (antennas - 1) du.
+    du = 1 / (len(directions) - 1) if len(directions) > 1 else 0.0
+    phase = np.pi * (max(link.receive, link.transmit) - 1) * du
+    return np.asarray(largest + phase * link.los_share * np.sqrt(link.receive * link.transmit))
