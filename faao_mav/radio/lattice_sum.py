@@ -13,7 +13,7 @@ out: the results differ from those over the classes by rounding only.
 """
 
 from collections.abc import Iterator
-from itertools import combinations, combinations_with_replacement, product
+from itertools import combinations_with_replacement, product
 
 import numpy as np
 
@@ -55,26 +55,20 @@ class LatticeSum:
         self._rest, counts = _quarter(lattice, antennas - 1)
         self._weights = counts / symbols
         self._rest_features = features(self._rest).T
-        self._swaps = [_swapped(antennas, stream) for stream in range(antennas)]
         self._kept: dict[bool, list[tuple[tuple[int, int], Integers, Real]]] = {}
 
     def sums(self, z: Real, derivatives: bool) -> Real:
         """Return the sums, (b, 1 + N² + N² (N² + 1) / 2) or without `derivatives` (b, 1)."""
-        # Of the largest Z_ii, so that w is short and rounding errors are those of Z.
-        first = np.argmax(z[:, : self._antennas], axis=1)
         step = max(1, _BLOCK // (2 * len(self._lattice.values) * len(self._rest)))
-        width = 1 + derivatives * (z.shape[1] * (z.shape[1] + 3) // 2)
-        result = np.empty((len(z), width))
-        for stream, (order, sign, columns, signs) in enumerate(self._swaps):
-            of_stream = np.flatnonzero(first == stream)
-            for start in range(0, len(of_stream), step):
-                rows = of_stream[start : start + step]
-                sums = self._block(z[rows][:, order] * sign, derivatives)
-                result[rows] = sums[:, columns[:width]] * signs[:width]
-        return result
+        parts = (z[start : start + step] for start in range(0, max(1, len(z)), step))
+        return np.concatenate([self._block(part, derivatives) for part in parts])
 
     def _block(self, z: Real, derivatives: bool) -> Real:
-        """Return the sums at few z (b, N²) whose first stream is the strongest."""
+        """Return the sums at few z (b, N²).
+
+        Z is positive semidefinite, |Z_1j|² <= Z_11 Z_jj: however weak the first stream is, no term
+        is larger than those of u^H Z u itself, and rounding errors are those of Z.
+        """
         N = self._antennas
         own = z[:, :1]
         # Of streams without power w is 0 / 0, and any will do.
@@ -149,28 +143,6 @@ def _columns(rest: Complex, derivatives: bool) -> Iterator[_Polynomial]:
             power = p[0] + q[0], p[1] + q[1]
             term[power] = term.get(power, 0.0) + a[p] * b[q]
         yield term
-
-
-def _swapped(antennas: int, stream: int) -> tuple[Integers, Real, Integers, Real]:
-    """Return where the coordinates are after the first stream changed places with `stream`.
-
-    The order and the signs (N²,) of z and φ, and those of the columns [1, φ, φ φ].
-    """
-    place = np.arange(antennas)
-    place[[0, stream]] = stream, 0
-    order, sign = [*place], [1.0] * antennas
-    pairs = list(combinations(range(antennas), 2))
-    for i, j in pairs:
-        at = antennas + 2 * pairs.index((min(place[i], place[j]), max(place[i], place[j])))
-        order += [at, at + 1]
-        sign += [1.0, 1.0 if place[i] < place[j] else -1.0]
-    phi, signs = np.array(order), np.array(sign)
-    width = antennas**2
-    a, b = np.triu_indices(width)
-    column = np.empty((width, width), dtype=np.intp)
-    column[a, b] = column[b, a] = 1 + width + np.arange(len(a))
-    columns = np.concatenate([[0], 1 + phi, column[phi[a], phi[b]]])
-    return phi, signs, columns, np.concatenate([[1.0], signs, signs[a] * signs[b]])
 
 
 def _schur(z: Real, share: Real, antennas: int) -> Real:
