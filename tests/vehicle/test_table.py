@@ -30,10 +30,8 @@ PARAMETERS = [(each, parameter) for each in TYPES for parameter in each.paramete
 UNITS = {"", "m", "s", "rad", "m/s", "m/s^2", "m/s^3", "1/s", "1/s^2", "rad/s", "rad/s^2"}
 
 
-def label(value: object) -> str:
-    if isinstance(value, VehicleType):
-        return f"{value.family.key}-{value.kind}"
-    return value.key if isinstance(value, Parameter) else str(value)
+def label(each: VehicleType) -> str:
+    return f"{each.family.key}-{each.kind}"
 
 
 def bare(each: VehicleType, parameters: dict[str, float] | None = None) -> Vehicle:
@@ -46,42 +44,41 @@ def another(parameter: Parameter) -> float:
     return value if value >= parameter.least else parameter.default * 1.25
 
 
-@pytest.mark.parametrize(("each", "parameter"), PARAMETERS, ids=label)
-def test_a_record_is_whole(each: VehicleType, parameter: Parameter) -> None:
-    assert parameter.unit in UNITS
-    assert parameter.source
-    assert parameter.least <= parameter.default <= parameter.greatest
-    low, high = parameter.documented
-    assert low <= parameter.default <= high
-    assert all(name.isupper() and len(name) <= 16 for name in parameter.names)
-    assert all(factor > 0 for factor in parameter.names.values())
-    assert not parameter.capped_by or parameter.capped_by in each.parameters
-    assert bare(each).value(parameter.key) == pytest.approx(parameter.default)
+def test_every_record_is_whole() -> None:
+    for each, parameter in PARAMETERS:
+        said = f"{label(each)} {parameter.key}"
+        assert parameter.unit in UNITS, said
+        assert parameter.source, said
+        assert parameter.least <= parameter.default <= parameter.greatest, said
+        low, high = parameter.documented
+        assert low <= parameter.default <= high, said
+        assert all(name.isupper() and len(name) <= 16 for name in parameter.names), said
+        assert all(factor > 0 for factor in parameter.names.values()), said
+        assert not parameter.capped_by or parameter.capped_by in each.parameters, said
+        assert bare(each).value(parameter.key) == pytest.approx(parameter.default), said
 
 
-@pytest.mark.parametrize(("each", "parameter"), PARAMETERS, ids=label)
-def test_every_name_sets_the_value_and_is_named(each: VehicleType, parameter: Parameter) -> None:
-    value = another(parameter)
-    for name, factor in parameter.names.items():
-        vehicle = bare(each, {name: value / factor})
-        assert vehicle.value(parameter.key) == pytest.approx(value)
-        assert vehicle.name_of(parameter.key) == name
+def test_every_name_sets_the_value_and_is_named() -> None:
+    for each, parameter in PARAMETERS:
+        value = another(parameter)
+        for name, factor in parameter.names.items():
+            vehicle = bare(each, {name: value / factor})
+            assert vehicle.value(parameter.key) == pytest.approx(value), name
+            assert vehicle.name_of(parameter.key) == name
 
 
-@pytest.mark.parametrize(("each", "parameter"), PARAMETERS, ids=label)
-def test_models_and_rules_take_the_same_value(each: VehicleType, parameter: Parameter) -> None:
-    value, name = another(parameter), parameter.newest_name
-    vehicle = bare(each, {name: value / parameter.names[name]})
-    judged = ValidationContext(Mission(()), vehicle).vehicle
-    assert judged.value(parameter.key) == vehicle.value(parameter.key) == pytest.approx(value)
-    if each.flight_model is None:
-        return
-    model = vehicle.flight_model()
-    if hasattr(model, parameter.key):
-        assert getattr(model, parameter.key) == pytest.approx(value)
-    vertical = vehicle.vertical
-    if parameter.key in {field.name for field in fields(vertical)} - {"acceleration"}:
-        assert getattr(vertical, parameter.key) == pytest.approx(value)
+def test_models_and_rules_take_the_same_value() -> None:
+    for each, parameter in PARAMETERS:
+        value, name = another(parameter), parameter.newest_name
+        vehicle = bare(each, {name: value / parameter.names[name]})
+        judged = ValidationContext(Mission(()), vehicle).vehicle
+        assert judged.value(parameter.key) == vehicle.value(parameter.key) == pytest.approx(value)
+        if each.flight_model is None:
+            continue
+        model, vertical = vehicle.flight_model(), vehicle.vertical
+        assert getattr(model, parameter.key, value) == pytest.approx(value), name
+        if parameter.key in {field.name for field in fields(vertical)} - {"acceleration"}:
+            assert getattr(vertical, parameter.key) == pytest.approx(value), name
 
 
 @pytest.mark.parametrize("each", [each for each in TYPES if each.flight_model], ids=label)

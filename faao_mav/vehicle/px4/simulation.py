@@ -14,12 +14,7 @@ from faao_mav.vehicle.px4.parameters import Px4Limits
 from faao_mav.vehicle.px4.step import FlightState, at_rest, moved
 
 STEP = 0.1
-"""The longest step of the simulation, s, while the trajectory changes its velocity: the one that
-was calibrated."""
-
-_CRUISING_STEP = 4 * STEP
-"""The longest step while the trajectory keeps its velocity, s. Chosen: it changes arrivals of the
-recorded flights by 0.01 s rms."""
+"""The longest step of the simulation, s: the one that was calibrated."""
 
 SWITCH_DELAY = 0.065
 """How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
@@ -32,10 +27,6 @@ flights."""
 _SETTLED = 2e-3
 """The speed, m/s, below which a holding aircraft is taken to stand. Chosen; what a change costs is
 not measured."""
-
-_STEADY = 1e-5
-"""The deviation of a velocity, m/s, below which it is taken to stay as it is along a leg: a few
-millimetres in minutes."""
 
 _LEAST_SHARE = 0.01
 """The least share of a step that is flown before it is asked anew what the aircraft heads for."""
@@ -121,7 +112,7 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState, longest: float) 
     """Fly along `leg` until its end is left, or until it has taken more than `longest` s."""
     times: list[float] = []
     states: list[FlightState] = []
-    time, due, arrival, longest_step = 0.0, inf, inf, STEP
+    time, due, arrival = 0.0, inf, inf
     near = _distances(limits, leg, state)
     kind = heading(leg, state.level[0])
     aim = headed(limits, leg, kind, state.level[0])
@@ -132,7 +123,7 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState, longest: float) 
         before, far = state, near
         dt = due - time
         if due == inf or not _stands(state):
-            dt = min(longest_step, dt)
+            dt = min(STEP, dt)
             state = moved(limits, aim, before, dt)
         now = heading(leg, state.level[0])
         if now is not kind:
@@ -148,18 +139,8 @@ def _fly(limits: Px4Limits, leg: GuidedLeg, state: FlightState, longest: float) 
         time += dt
         times.append(time)
         states.append(state)
-        longest_step = STEP
         if now is not kind or now is Heading.ONTO:
             kind, aim = now, headed(limits, leg, now, state.level[0])
-        elif due == inf and now is Heading.END and (steps := _cruising_steps(leg, before, state)):
-            longest_step = _CRUISING_STEP if steps * dt >= _CRUISING_STEP else STEP
-            if _is_steady(before, state, dt):
-                state = _carried_on(before, state, steps)
-                time += steps * dt
-                times.append(time)
-                states.append(state)
-                near = _distances(limits, leg, state)
-                longest_step = STEP
     return FlownLeg(arrival, due, np.array(times), _motion(states), state)
 
 
@@ -171,34 +152,6 @@ def _share_before(
     begun, ended = (excess(which, leg, each.level[0]) for each in (before, after))
     share = begun / (begun - ended) if begun != ended else 1.0
     return min(max(share, _LEAST_SHARE), 1.0)
-
-
-def _cruising_steps(leg: GuidedLeg, before: FlightState, state: FlightState) -> int:
-    """Return how many more steps like the last a level trajectory keeps its velocity at least.
-
-    None unless it did so in the last one, and none close to the target.
-    """
-    _, _, _, _, origin, wanted, _ = before.level
-    position, _, _, _, place, wants, push = state.level
-    if push or wants != wanted or state.climb is not None or not wants:
-        return 0
-    way = min(abs(leg.target - position), abs(leg.target - place)) - max(leg.braking, leg.radius)
-    return max(int(way / abs(place - origin)) - 1, 0)
-
-
-def _is_steady(before: FlightState, state: FlightState, dt: float) -> bool:
-    """Tell whether an aircraft flew like its trajectory in the last `dt` s, and will go on so."""
-    velocity = state.level[1]
-    shift = state.level[4] - before.level[4]
-    return abs(velocity - before.level[1]) <= _STEADY * dt and abs(velocity - shift / dt) <= _STEADY
-
-
-def _carried_on(before: FlightState, state: FlightState, steps: int) -> FlightState:
-    """Return `state` after `steps` like the one that led to it."""
-    position, velocity, thrust, integral, place, wanted, push = state.level
-    way = steps * (place - before.level[4])
-    level = (position + way, velocity, thrust, integral, place + way, wanted, push)
-    return FlightState(level, state.climb, state.remembered)
 
 
 def _stay(limits: Px4Limits, leg: GuidedLeg, state: FlightState, duration: float) -> FlownLeg:
