@@ -57,8 +57,8 @@ class Motion:
     as in a coordinated turn.
 
     The airspeed follows with the lag of `limits.body` a demand, which goes to what is commanded
-    within `limits.speed_rates`, upwards faster by `_THROTTLE`. The height is
-    approached within the greatest climb and descent.
+    within `limits.speed_rates`, upwards faster by `_THROTTLE`. The height is approached within the
+    greatest climb and descent.
 
     Banks and throttle turn and speed up the flight through the air, which moves steadily at `wind`;
     guidance sees the flight over ground, the sum of both.
