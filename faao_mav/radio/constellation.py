@@ -192,18 +192,6 @@ def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     )
 
 
-def levels(modulation: str) -> Real | None:
-    """Return the values of either part of a symbol where sums are formed by parts: 16-, 64-QAM.
-
-    Raises `InputError` for an unknown modulation.
-    """
-    grid, scale = _grid(modulation)
-    found = np.unique(grid.real)
-    if len(found) < _FEWEST_LEVELS or len(found) ** 2 != len(grid):
-        return None
-    return np.asarray(found * scale)
-
-
 def lattice(modulation: str, antennas: int) -> Lattice | None:
     """Return the differences by their parts where sums are formed by them: ``lattice_sum``.
 
@@ -213,9 +201,9 @@ def lattice(modulation: str, antennas: int) -> Lattice | None:
     >>> lattice("16qam", 2).counts.tolist(), lattice("8psk", 2)
     ([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0], None)
     """
-    parts = levels(modulation)
-    if antennas == 1 or parts is None:
+    grid, scale = _grid(modulation)
+    levels = np.unique(grid.real)
+    if antennas == 1 or len(levels) < _FEWEST_LEVELS or len(levels) ** 2 != len(grid):
         return None
-    _, scale = _grid(modulation)
-    steps, counts = np.unique(np.rint((parts[:, None] - parts) / scale), return_counts=True)
+    steps, counts = np.unique(np.rint(levels[:, None] - levels), return_counts=True)
     return Lattice(steps * scale, counts.astype(np.float64))

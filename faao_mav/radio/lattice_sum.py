@@ -19,7 +19,6 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.radio.constellation import Lattice
-from faao_mav.radio.level_sum import level_sum
 from faao_mav.radio.quadratic_form import coordinates, features
 
 _BLOCK = 1 << 18
@@ -76,14 +75,11 @@ class LatticeSum:
         real, imaginary = z[:, N : 3 * N - 2 : 2], z[:, N + 1 : 3 * N - 2 : 2]
         r = self._rest.T
         row = np.stack([real @ r.real - imaginary @ r.imag, real @ r.imag + imaginary @ r.real])
-        if derivatives:
-            # Z_11 (u + w)² of either part of u_1, by powers of it.
-            D = np.stack([-share * row**2, -2.0 * row, np.broadcast_to(-own, row.shape)])
-            D = self._squares.T @ D.reshape(3, -1)
-            moments = self._powers @ np.exp(D, out=D)
-            x, y = moments.reshape(len(moments), *row.shape).swapaxes(0, 1)
-        else:
-            x, y = level_sum(share * row, self._lattice.values, self._lattice.counts, own)[:, None]
+        # Z_11 (u + w)² of either part of u_1, by powers of it.
+        D = np.stack([-share * row**2, -2.0 * row, np.broadcast_to(-own, row.shape)])
+        D = self._squares.T @ D.reshape(3, -1)
+        moments = self._powers[: 1 + 4 * derivatives] @ np.exp(D, out=D)
+        x, y = moments.reshape(len(moments), *row.shape).swapaxes(0, 1)
         schur = _schur(z, share, N)
         x *= np.exp(-(schur @ self._rest_features))
 
