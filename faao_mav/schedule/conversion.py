@@ -25,6 +25,7 @@ from faao_mav.vehicle.vehicle import candidates
 
 _PLANE_SHARE = 0.8  # of the path tolerance for the initial route of a plane, which is then split
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's
+_ROUNDING = 0.02  # m beside the fence that rounding takes: places are sent in 1e-7 degrees, 11 mm
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
 
 
@@ -143,9 +144,14 @@ def convert(solution: Solution) -> Conversion:
 
 
 def _outside(schedule: Schedule, area: FreeArea | None) -> float:
-    """Return how far, m, legs and predicted flight get out of the fence; 0 inside or without."""
-    paths = (schedule.route.positions, schedule.track()["predicted_w"])
-    return 0.0 if area is None else max(0.0, *(-area.clearance(path) for path in paths))
+    """Return how far, m, legs and predicted flight get out of the fence; 0 inside or without.
+
+    A leg that is not inside by `_ROUNDING` may be outside as sent.
+    """
+    if area is None:
+        return 0.0
+    legs = area.clearance(schedule.route.positions) - _ROUNDING
+    return max(0.0, -legs, -area.clearance(schedule.track()["predicted_w"]))
 
 
 def _convert(solution: Solution, plan: Plan) -> Conversion:
