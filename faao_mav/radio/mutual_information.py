@@ -26,8 +26,9 @@ MAX_INPUTS = 1 << 16
 NODES = 2048
 """Pairs of a vector sent and a noise, each used with both signs, for all draws of a channel.
 
-Measured beside 2^17: rates of single channels err by 0.001 bit, means over 32 draws by up to 0.004
-bit with BPSK and 0.007 bit with QPSK and 16-QAM, and all rates of a plan alike.
+Measured on 30 sets beside 2^17 nodes: rates of single channels err by up to 0.004 bit, with 8-PSK
+0.011; means over 32 draws by 0.0035 bit with BPSK, 0.008 with QPSK and 16-QAM, 0.013 with 8-PSK;
+all rates of a plan err alike.
 """
 
 SEED = 4
