@@ -8,9 +8,8 @@ from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
 
 from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.flying.held import Held
 from faao_mav.mavlink.flying.readiness import Readiness
-from faao_mav.mavlink.flying.seen import Flight
+from faao_mav.mavlink.flying.seen import Flight, Held
 from faao_mav.mavlink.flying.stream import Stream
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Machine

@@ -13,9 +13,8 @@ from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, v
 from faao_mav import parse_plan, plan_mission
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.flying.held import Held
 from faao_mav.mavlink.flying.preflight import LEAST_BATTERY, preflight
-from faao_mav.mavlink.flying.seen import Flight, Seen
+from faao_mav.mavlink.flying.seen import Flight, Held, Seen
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.messages import CommandLong, Envelope, ParamSet
 from faao_mav.mavlink.mock import MockAutopilot

@@ -18,9 +18,8 @@ from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mavlink.faults import Faults
 from faao_mav.mavlink.flying.course import Course
-from faao_mav.mavlink.flying.held import Held
 from faao_mav.mavlink.flying.readiness import Readiness
-from faao_mav.mavlink.flying.seen import Flight
+from faao_mav.mavlink.flying.seen import Flight, Held
 from faao_mav.mavlink.flying.stream import Stream
 from faao_mav.mavlink.local_frame import frame_of
 from faao_mav.mavlink.messages import CommandLong, Envelope, SetPositionTargetLocalNed

@@ -7,9 +7,8 @@ from typing import Unpack
 from faao_mav.errors import LinkError
 from faao_mav.mavlink.client import LinkOptions, Session
 from faao_mav.mavlink.discover import FoundVehicle
-from faao_mav.mavlink.flying.held import read_held
 from faao_mav.mavlink.flying.readiness import Readiness
-from faao_mav.mavlink.flying.seen import Flight
+from faao_mav.mavlink.flying.seen import Flight, read_held
 from faao_mav.mavlink.flying.telemetry import POSITION_RATE, Ending, Samples
 from faao_mav.mavlink.flying.watch import Watch
 from faao_mav.mavlink.machine import Script

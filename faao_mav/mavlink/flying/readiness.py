@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from faao_mav.mavlink.flying.held import Held, read_held
 from faao_mav.mavlink.flying.preflight import preflight
-from faao_mav.mavlink.flying.seen import Flight, Seen
+from faao_mav.mavlink.flying.seen import Flight, Held, Seen, read_held
 from faao_mav.mavlink.flying.telemetry import Telemetry
 from faao_mav.mavlink.machine import Script
 from faao_mav.mavlink.messages import Envelope, Message, ParamValue

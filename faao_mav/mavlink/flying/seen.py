@@ -1,9 +1,22 @@
-"""What is to be flown, and what is seen of the vehicle before: what the gate compares."""
+"""What is to be flown, and what a vehicle holds and shows before: what the gate compares."""
 
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from faao_mav.mavlink.flying.held import Held
+from faao_mav.errors import InputError
+from faao_mav.mavlink.machine import Machine
+from faao_mav.mavlink.messages import HomePosition, WireItem
+from faao_mav.mavlink.modes import modes_of
+from faao_mav.mavlink.parameters import Names, Reading, ReadParameters
+from faao_mav.mavlink.protocol import HOME_POSITION, MavResult, MissionType
+from faao_mav.mavlink.questions import AskFor
+from faao_mav.mavlink.setpoints import setpoint_rules
+from faao_mav.mavlink.transfer.exchange import Outcome, Peer
+from faao_mav.mavlink.transfer.pace import Timeouts
+from faao_mav.mavlink.transfer.session import download_lists
+from faao_mav.mavlink.whereabouts import home_in
+from faao_mav.mavlink.wire_items import home_items, mission_of
 from faao_mav.mission.item import Home, Mission
 from faao_mav.vehicle import Vehicle, VehicleType
 from faao_mav.vehicle.files import MadeFor
@@ -11,6 +24,73 @@ from faao_mav.vehicle.files import MadeFor
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
     from faao_mav.schedule.conversion import Conversion
+
+_HAS_NONE = (MavResult.UNSUPPORTED, MavResult.INVALID)
+"""What a vehicle answers that has no such list at all."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Held:
+    """What a vehicle holds: `lists` as downloaded, its home row included, `reading` of parameters.
+
+    `missing` says why a list is not there; `home` is where it returns to, None where that is not
+    known.
+    """
+
+    lists: Mapping[MissionType, tuple[WireItem, ...]]
+    reading: Reading
+    missing: Mapping[MissionType, Outcome] = field(default_factory=dict)
+    home: Home | None = None
+
+    def rows(self, part: MissionType, vehicle: VehicleType) -> tuple[WireItem, ...]:
+        """Return the items of one list, without the home row; none where it was not read."""
+        return tuple(self.lists.get(part, ()))[home_items(vehicle, part) :]
+
+    def beside(self, mission: Mission, vehicle: VehicleType) -> Mission:
+        """Return `mission` with the fence and the rally points that are held."""
+        try:
+            held = mission_of(self.lists, vehicle)
+        except InputError:  # told as another list than the file's
+            return mission
+        return replace(mission, fence=held.fence, rally=held.rally)
+
+
+def names_of(vehicle: VehicleType) -> tuple[Names, ...]:
+    """Return the parameters of `vehicle` that a flight depends on, each with all of its names."""
+    flown = [tuple(each.names) for each in vehicle.parameters.values()]
+    decided = [(name,) for each in vehicle.failsafes for name in each.defaults]
+    rules = setpoint_rules(vehicle.family)
+    streamed = [(name,) for name in rules.defaults if modes_of(vehicle).guided is not None]
+    return tuple(dict.fromkeys([*flown, *decided, *streamed]))
+
+
+def read_held(
+    peer: Peer,
+    timeouts: Timeouts | None = None,
+    parts: Sequence[MissionType] = tuple(MissionType),
+    *,
+    parameters: bool = True,
+) -> Generator[Machine[Any], Any, "Held"]:
+    """Read what the vehicle of `peer`, which has to be one that is known, holds.
+
+    That are the lists `parts`, and with `parameters` these and its home.
+    """
+    assert peer.vehicle is not None
+    lists = yield from download_lists(parts, peer, timeouts)
+    if MissionType.MISSION in lists.missing or not parameters:
+        return Held(lists.items, Reading({}), lists.missing)
+    reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle), timeouts)
+    told: list[HomePosition] = yield AskFor(peer.address, HOME_POSITION, HomePosition)
+    try:
+        home = home_in(told[0]) if told else None
+    except InputError:
+        home = None
+    missing = {
+        part: outcome
+        for part, outcome in lists.missing.items()
+        if part is MissionType.MISSION or outcome.result not in _HAS_NONE
+    }
+    return Held(lists.items, reading, missing, home)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
