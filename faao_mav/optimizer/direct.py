@@ -13,6 +13,7 @@ starts, and several times quicker.
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
     feasible,
+    maximize,
     maximize_all,
     objectives,
 )
@@ -37,7 +39,7 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate
-from faao_mav.optimizer.rates.slot_rate import BestRate
+from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
@@ -48,6 +50,10 @@ LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded where there is a least speed, or a
 queue has a buffer or shares. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300
 steps."""
+
+_EXACT_ITERATIONS = 12
+"""Iterations at exact rates, after those in a table, at most. Chosen. Measured with QPSK on 2, 3
+and 3 antennas and known draws, three seeds: without them the rates are 1 % lower."""
 
 ROUGH = 1e-3
 """The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared.
@@ -161,8 +167,8 @@ def direct(
         by_start |= {name: end.value for name, end in zip(rough.promising, optima, strict=True)}
     if values.max() > max(optimum.value for optimum in optima):
         optima += optimized([flights[int(values.argmax())]])
-    best = _best(problem, field, optima)
-    solution = _solution(problem, scheme, field, best, history, by_start)
+    best, held = _at_exact_rates(problem, scheme, field, _best(problem, field, optima))
+    solution = _solution(problem, scheme, field, best, history, by_start, held)
     if before is None:
         return solution
     return replace(solution, gain=float(solution.history[-1]) - _worth(problem, before))
@@ -194,6 +200,39 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
     return equal[int(np.argmax(np.round(delivered / _EQUAL)))]
 
 
+def _at_exact_rates(
+    problem: Problem, scheme: Design, field: RateField, optimum: LocalOptimum
+) -> tuple[LocalOptimum, list[Complex]]:
+    """Return `optimum`, taken a little further where it was found in an approximate table.
+
+    With the precoders held, the rates are exact, and whatever they gain the best ones gain too. The
+    precoders are returned with it, none where the table is exact.
+    """
+    approximate = any(isinstance(rate, ModeRate) and not rate.exact for rate in field.rates)
+    if problem.plan.optimizer.rate != "cutoff" or not approximate:
+        return optimum, []
+    w, kin = optimum.trajectory.w, problem.kinematics
+    held = [
+        _precoders(link, rate, scheme, w, link.channel(w, link.small_scale(w)))
+        for link, rate in zip(field.links, field.rates, strict=True)
+    ]
+    exact = tuple(
+        DifferencedRate(link, partial(link.draw_rates, P=P))
+        for link, P in zip(field.links, held, strict=True)
+    )
+    further = maximize(
+        kin,
+        RateField(field.links, exact),
+        optimum.trajectory,
+        constraints=problem.constraints(kin),
+        tolerance=problem.plan.optimizer.tolerance,
+        max_iterations=_EXACT_ITERATIONS,
+        strategy=NEAR_START if kin.min_speed > 0 else None,
+        relay=problem.maximised_queue,
+    )
+    return replace(optimum, trajectory=further.trajectory, value=further.value), held
+
+
 def _rates(scheme: Design, field: RateField, w: Real) -> Real:
     """Return the rates (2, n) at positions w with precoders that are made for Gaussian inputs."""
     rates = []
@@ -210,14 +249,23 @@ def _solution(
     final: LocalOptimum,
     history: list[float],
     by_start: dict[str, float],
+    held: list[Complex],
 ) -> Solution:
-    """Return `final` with its precoders and rates, and how it came about."""
+    """Return `final` with its precoders and rates, and how it came about.
+
+    The precoders are searched from those that were `held` on the way, if any were.
+    """
     w = final.trajectory.w
     fading, precoders = [], []
-    for link, rate in zip(problem.links, field.rates, strict=True):
+    for k, (link, rate) in enumerate(zip(problem.links, field.rates, strict=True)):
         H_r = link.small_scale(w)
+        H = link.channel(w, H_r)
         fading.append(H_r)
-        precoders.append(_precoders(link, rate, scheme, w, link.channel(w, H_r)))
+        precoders.append(
+            scheme.precoders(link, H, start=held[k])
+            if held
+            else _precoders(link, rate, scheme, w, H)
+        )
     residual = f"stationary to {final.residual:.1e}"
     solution = make_solution(
         problem,
