@@ -33,7 +33,7 @@ from faao_mav.optimizer.interior.maximize import maximize, objectives
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.rates.slot_rate import DifferencedRate
+from faao_mav.optimizer.rates.slot_rate import FixedRate
 from faao_mav.optimizer.search.bound import Bound, upper_bound
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.plan import Plan, parse_plan
@@ -203,10 +203,7 @@ def fixed_precoders(quick: bool) -> None:
         def own(
             pairs: Any = pairs, kin: Any = kin, flight: Any = flight, problem: Any = problem
         ) -> Any:
-            field = RateField(
-                problem.links,
-                tuple(DifferencedRate(k, partial(k.draw_rates, P=P)) for k, P in pairs),
-            )
+            field = RateField(problem.links, tuple(FixedRate(k, P) for k, P in pairs))
             return maximize(kin, field, flight, tolerance=1e-6).trajectory
 
         def other(pairs: Any = pairs, kin: Any = kin, flight: Any = flight) -> Any:

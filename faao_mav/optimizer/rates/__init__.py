@@ -9,7 +9,7 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
 
 A rate model (``RateModel``) therefore works with l and u, and ``LinkCoordinates`` carries its
 derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
-five models:
+six models:
 
 ====================  ==================================  =========================================
 model                 fading, precoders                   method
@@ -23,6 +23,7 @@ model                 fading, precoders                   method
 ``BestRate``          known per slot, best precoders,     search in every slot, envelope theorem
                       more modes
 ``DifferencedRate``   known per slot, classical scheme    central differences
+``FixedRate``         given precoders                     closed-form derivatives
 ====================  ==================================  =========================================
 
 To change which model a plan gets, or to add one: write a class with ``value`` and ``partials`` and
