@@ -53,8 +53,8 @@ _FIRST_SPARE_DB = 5.0  # spare power that is tried first, then twice that; chose
 class MutualInformation:
     """The rates (10) with the mutual information (5), (6) in place of the cutoff rate, bit/s/Hz.
 
-    `delivered` is what the relay delivers of it. `error` is the larger of the errors of the two
-    means, a standard error where noise was sampled.
+    `delivered` is what the relay delivers of it. `error` is the larger of the standard errors of
+    the two means.
     """
 
     bs_uav: float

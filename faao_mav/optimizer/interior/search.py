@@ -78,7 +78,8 @@ _MAX_ATTEMPTS = 6
 """The directions tried at one iterate before its multipliers are centred; 3 to 12 do as well."""
 
 _FIRST_PROXIMAL = 1e-3
-"""The second attempt's proximal term, then eight times as much; 1e-4 to 1e-2 do as well."""
+"""The proximal term of the second direction tried at one iterate, then eight times as much; 1e-4 to
+1e-2 do as well."""
 
 _STEPS_CUT = 2
 """The steps for which the curvature stays cut once it had to be; 1 loses 0.1 % of the value."""
