@@ -109,7 +109,7 @@ def less(found: Solution) -> Problem:
         changes = {key: round(dbm(power) - LESS_DB, 6) for key, power in powers}
         return build_problem(plan.changed(changes))
     share = ENERGY_SHARE * found.least.limit * JOULES_PER_WH if goal == "energy" else 0.0
-    return replace(build_problem(plan), energy=found.energy_limit - share)
+    return replace(found.problem, energy=found.problem.energy - share)
 
 
 def from_random(problem: Problem, count: int) -> float:
@@ -174,7 +174,7 @@ def main() -> None:
         taken = time.process_time() - started
         assert found.least is not None
         started = time.process_time()
-        direct(replace(build_problem(found.plan), energy=found.energy_limit))
+        direct(found.problem)
         ratio = taken / (time.process_time() - started)
         shorter = less(found)
         reached = direct(shorter).delivered_rate
@@ -182,7 +182,7 @@ def main() -> None:
         answer, unit = {
             "duration": (found.plan.flight.duration, "s  "),
             "power": (dbm(found.plan.powers[1]), "dBm"),
-        }.get(plan.goal.minimise or "", (found.energy_limit / JOULES_PER_WH, "Wh "))
+        }.get(plan.goal.minimise or "", (found.problem.energy / JOULES_PER_WH, "Wh "))
         print(
             f"{name:30}  {answer:6.2f} {unit}  {found.least.optimizations:5} {ratio:5.1f}  "
             f"{shorter.plan.needed_rate:.4f}      {reached:.4f}  "

@@ -23,7 +23,6 @@ from faao_mav.optimizer.pricing import (
     price,
     saturation,
 )
-from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.autopilots import autopilots
@@ -322,7 +321,7 @@ def plan_mission(
         from faao_mav.optimizer.search.bound import upper_bound
 
         reached = solution.delivered_rate if plan.radio.causal else solution.rates.R_avg
-        ceiling = upper_bound(build_problem(plan), reached, observe=observe)
+        ceiling = upper_bound(solution.problem, reached, observe=observe)
     return replace(
         result,
         fresh=fresh_rates(solution),

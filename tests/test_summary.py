@@ -9,6 +9,7 @@ from conftest import MakePlan
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.pricing import MutualInformation
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import summary
 from faao_mav.schedule import Conversion
@@ -57,7 +58,7 @@ def test_the_first_line_is_for_who_flies(result: Result) -> None:
         f"{kept:.2f} % of it; 2 warnings"
     )
     plan = result.solution.plan.changed({"radio.bandwidth_mhz": 20, "name": ""})
-    told = summary(replace(result, solution=replace(result.solution, plan=plan)))
+    told = summary(replace(result, solution=replace(result.solution, problem=build_problem(plan))))
     megabytes = 20 * rate * duration / 8
     assert told.startswith(f"delivers {megabytes:.4g} megabytes in {duration:g} s ({20 * rate:.4g}")
 
@@ -103,7 +104,7 @@ def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) 
     plan = result.solution.plan
     wanted = plan.changed({"optimizer.rate": "mutual_information"})
     for gain, doubted in ((0.05, False), (0.0005, True)):
-        solution = replace(result.solution, plan=wanted, gain=gain)
+        solution = replace(result.solution, problem=build_problem(wanted), gain=gain)
         text = summary(replace(result, solution=solution), verbose=True)
         assert "of mutual information (base station to UAV" in text
         assert f"{gain:.4f} bit/s/Hz more than by the plan for the cutoff rate" in text

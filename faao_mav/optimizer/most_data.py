@@ -208,7 +208,7 @@ class WithinEnergy:
         return slots * found.delivered_rate
 
     def _energy(self, found: Solution) -> float:
-        energy = build_problem(found.plan).energy_of(found.trajectory)
+        energy = found.problem.energy_of(found.trajectory)
         assert energy is not None
         return energy
 

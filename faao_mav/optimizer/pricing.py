@@ -15,7 +15,7 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.problem import Link, build_problem
+from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.channel import rayleigh
 from faao_mav.radio.mutual_information import mutual_information
@@ -73,7 +73,7 @@ def price(solution: Solution) -> MutualInformation:
 
     The noises are fixed: the same plan gives the same value.
     """
-    problem = build_problem(solution.plan)
+    problem = solution.problem
     (bs_uav, I_U, first), (uav_user, I_G, second) = (
         _information(link, link.channel(solution.w, H_r), P)
         for link, H_r, P in zip(
@@ -151,7 +151,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     the mean over flights that have one of the draws in each slot, forwarded with the planned
     shares.
     """
-    problem, how = build_problem(solution.plan), design(solution.plan)
+    problem, how = solution.problem, design(solution.plan)
     if not how.averaged:
         return None
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
@@ -208,7 +208,7 @@ class Saturation:
 
 def saturation(solution: Solution) -> Saturation:
     """Return how far into saturation `solution` is, with its own route, precoders and shares."""
-    problem = build_problem(solution.plan)
+    problem = solution.problem
     full = [np.full(len(solution.w), float(link.classes.bits)) for link in problem.links]
 
     def maximised(I_U: Real, I_G: Real, shares: Real | None) -> float:

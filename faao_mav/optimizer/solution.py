@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -77,10 +76,11 @@ class Least:
 class Solution:
     '''A solved plan: SI units, local east-north metres, one row per time slot.
 
-    `t` (n,) s; `w`, `v`, `a` (n, 2); `P_B` (n, N_t, N_t) and `P_U` (n, N_u, N_u) in sqrt(W);
-    the fading `H_rB` (n, N_u, N_t) and `H_rU` (n, N_r, N_u) without path gain; `I_U`, `I_G`
-    (n,) of (7), (8) in bits; `history` the rate that is maximised (R_del, or R_avg where
-    the plan is not causal) of the start and after each iteration.
+    `problem` is what was solved, the limit on the energy with it; `t` (n,) s; `w`, `v`, `a` (n, 2);
+    `P_B` (n, N_t, N_t) and `P_U` (n, N_u, N_u) in sqrt(W); the fading `H_rB` (n, N_u, N_t) and
+    `H_rU` (n, N_r, N_u) without path gain; `I_U`, `I_G` (n,) of (7), (8) in bits; `history` the
+    rate that is maximised (R_del, or R_avg where the plan is not causal) of the start and after
+    each iteration.
     Fading that is averaged over has a leading axis of draws, and so have precoders that know it.
     `converged` tells whether the method's own stopping rule ended it, `ending` says in words
     what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
@@ -88,8 +88,7 @@ class Solution:
     half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
     `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
     by how much the rate that it maximises is above that of the plan for the cutoff rate. `least`
-    tells of a plan whose `goal` minimises, `energy_limit` is what flight and relay may take for a
-    `goal`, J; they are not saved.
+    tells of a plan whose `goal` minimises; it and the limit on the energy are not saved.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -108,7 +107,7 @@ class Solution:
     True
     '''
 
-    plan: Plan
+    problem: Problem
     t: Real
     w: Real
     v: Real
@@ -126,7 +125,11 @@ class Solution:
     shares: Real | None = None
     gain: float | None = None
     least: Least | None = None
-    energy_limit: float = math.inf
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that was solved."""
+        return self.problem.plan
 
     @property
     def rates(self) -> Rates:
@@ -140,8 +143,7 @@ class Solution:
 
     def relay(self, I_U: Real, I_G: Real, shares: Real | None = None) -> Relayed:
         """Return what the plan's relay makes of rates (n,), bits, with these or the best shares."""
-        queue, step = build_problem(self.plan).relay, self.plan.flight.time_step
-        return queue.relayed(I_U, I_G, step, shares)
+        return self.problem.relay.relayed(I_U, I_G, self.plan.flight.time_step, shares)
 
     @property
     def delivered_rate(self) -> float:
@@ -151,7 +153,7 @@ class Solution:
     @property
     def energy_wh(self) -> float | None:
         """The energy of the planned flight and its relay, Wh; None without `vehicle.power`."""
-        energy = build_problem(self.plan).energy_of(self.trajectory)
+        energy = self.problem.energy_of(self.trajectory)
         return None if energy is None else energy / JOULES_PER_WH
 
     @property
@@ -166,12 +168,12 @@ class Solution:
 
     def clearance(self) -> float | None:
         """Return the least distance of the continuous path from the fence, m; None without one."""
-        fence = build_problem(self.plan).fence
+        fence = self.problem.fence
         return None if fence is None else fence.clearance(self.trajectory, float(self.t[1]))
 
     def recomputed_slots(self, power: float = 1.0) -> tuple[Real, Real]:
         """Return I_U, I_G from w, the fading and the precoders alone, all powers times `power`."""
-        problem, scale = build_problem(self.plan), np.sqrt(power)
+        problem, scale = self.problem, np.sqrt(power)
         return (
             problem.bs_uav.rates(self.w, self.H_rB, scale * self.P_B),
             problem.uav_user.rates(self.w, self.H_rU, scale * self.P_U),
@@ -189,8 +191,7 @@ class Solution:
         limits (13b), (13c) relative to W, and `energy` to its limit; the fading relative to what
         the plan's seed draws at w; the rates in bit/s/Hz. 0 where a constraint holds.
         """
-        problem = replace(build_problem(self.plan), energy=self.energy_limit)
-        again = self.recomputed()
+        problem, again = self.problem, self.recomputed()
         found = problem.kinematics.residuals(self.trajectory)
         limit = problem.energy_limit(problem.kinematics)
         if limit is not None:
@@ -220,21 +221,19 @@ class Solution:
         slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
         found from the arrays by CVXPY, without the multipliers of the method that solved the plan.
         Raises `SolverError` where the trajectory breaks its limits.
-        The `energy_limit` counts where the solution has one.
         """
         from faao_mav.optimizer.design import design
         from faao_mav.optimizer.rates.field import rate_field
         from faao_mav.optimizer.scaled import kkt_residual
 
-        problem = replace(build_problem(self.plan), energy=self.energy_limit)
+        problem = self.problem
         rates = rate_field(problem, design(self.plan))
-        relay = problem.maximised_queue
         return kkt_residual(
             problem.kinematics,
             rates,
             self.trajectory,
             reach=reach,
-            relay=relay,
+            relay=problem.maximised_queue,
             fence=problem.fence,
             energy=problem.energy_limit(problem.kinematics),
         )
@@ -262,7 +261,7 @@ def make_solution(
         for link, H_r, P in zip(problem.links, fading, precoders, strict=True)
     )
     return Solution(
-        plan=problem.plan,
+        problem=problem,
         t=problem.kinematics.time_step * np.arange(len(flight.w), dtype=np.float64),
         w=flight.w,
         v=flight.v,
@@ -278,7 +277,6 @@ def make_solution(
         ending=ending,
         starts=starts or {},
         shares=problem.relay.best_shares(I_U, I_G, problem.kinematics.time_step),
-        energy_limit=problem.energy,
     )
 
 
@@ -330,7 +328,7 @@ def load_solution(path: str | Path) -> Solution:
         raise InputError(f"{path}: shares: expected a number of 0 to 1 per slot")
     arrays: dict[str, Any] = {name: found[name] for name in _ARRAYS}
     return Solution(
-        plan=plan,
+        problem=build_problem(plan),
         converged=bool(found["converged"]),
         ending=_text(found["ending"], f"{path}: ending"),
         starts=_starts(_text(found["starts"], f"{path}: starts"), f"{path}: starts"),

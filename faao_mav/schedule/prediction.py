@@ -6,7 +6,6 @@ import numpy as np
 
 from faao_mav.arrays import Integers, Real
 from faao_mav.errors import InputError
-from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Rates, Solution
 from faao_mav.radio.relay import Relayed
 from faao_mav.schedule.schedule import deviation, positions_at
@@ -90,10 +89,9 @@ def rates_along(
         raise InputError(f"positions {w.shape}; expected one per slot, {solution.w.shape}")
     at = np.arange(len(w)) if only is None else only
     of = at if slots is None else slots[at]
-    links = build_problem(solution.plan).links
     I_U, I_G = (
         link.rates(w[at], link.small_scale(w)[..., at, :, :], P[..., of, :, :])
-        for link, P in zip(links, (solution.P_B, solution.P_U), strict=True)
+        for link, P in zip(solution.problem.links, (solution.P_B, solution.P_U), strict=True)
     )
     return I_U, I_G
 

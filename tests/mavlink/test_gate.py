@@ -17,6 +17,7 @@ from faao_mav.mavlink.flying.belief import Belief
 from faao_mav.mavlink.flying.course import Setpoint
 from faao_mav.mavlink.flying.gate import LEVEL, NEAR, Gate
 from faao_mav.mavlink.flying.itinerary import Itinerary
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.transit import way_between
@@ -238,7 +239,7 @@ def test_an_aircraft_that_does_not_follow_is_given_up() -> None:
 
 def test_a_wind_that_drifts_it_off_again_and_again_is_given_up() -> None:
     solution = swift()
-    solution = replace(solution, plan=plan_with({}))
+    solution = replace(solution, problem=build_problem(plan_with({})))
     flight, t, place = Itinerary(solution, Gate(solution.plan), takes_off=True), 0.0, np.zeros(3)
     place = np.array([0.0, 0.0, 30.0])
     while flight.trouble is None and flight.part != "over" and t < 900:

@@ -27,6 +27,7 @@ from faao_mav.mavlink.modes import px4_mode
 from faao_mav.mavlink.parameters import Reading
 from faao_mav.mavlink.protocol import GROUND_STATION, MavCommand
 from faao_mav.mavlink.transfer.exchange import Peer
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.vehicle import vehicle_type
@@ -62,7 +63,7 @@ def solved(changes: dict[str, Any]) -> Solution:
 
 def under(changes: dict[str, Any]) -> Solution:
     """Return the same flight for a plan that has what does not change it otherwise."""
-    return replace(low(), plan=parse_plan(edited(FLYABLE, LOW | changes)))
+    return replace(low(), problem=build_problem(parse_plan(edited(FLYABLE, LOW | changes))))
 
 
 def flown(scene: Scene, solution: Solution) -> Prediction:

@@ -10,7 +10,6 @@ from conftest import MISSIONS, MakePlan, edited
 from faao_mav.errors import PlanError
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import fresh_rates, price
-from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Progress, load_solution, save_solution
 from faao_mav.plan import Plan, parse_plan, read_plan
 from faao_mav.radio.best_precoder import best_precoders
@@ -68,7 +67,7 @@ def test_a_solution_proves_itself(
 
 def test_the_closed_form_is_reached_in_every_slot(faint_plan: MakePlan) -> None:
     solution = optimize(faint_plan(KNOWN))
-    problem = build_problem(solution.plan)
+    problem = solution.problem
     for link, H_r, rates in zip(
         problem.links, (solution.H_rB, solution.H_rU), (solution.I_U, solution.I_G), strict=True
     ):
@@ -81,7 +80,7 @@ def test_precoders_are_as_good_as_a_search_from_all_starts(
     faint_plan: MakePlan, modulation: str
 ) -> None:
     solution = optimize(faint_plan(KNOWN | {"radio.modulation": modulation}))
-    link = build_problem(solution.plan).bs_uav
+    link = solution.problem.bs_uav
     H = link.channel(solution.w, solution.H_rB)
     found = best_precoders(H, link.power, modulation, link.noise).rate
     assert (solution.I_U >= found - 1e-6).all()  # the tolerance of either search

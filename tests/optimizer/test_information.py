@@ -104,7 +104,7 @@ def test_mutual_information_is_delivered_too(
     """Of a plan for the cutoff rate: all pairs of slot and draw, or a sample of them."""
     changes = {"radio.duplex": duplex, "optimizer.rate": "cutoff", "radio.causal": True}
     solution = optimize(plan_of(small_plan, fading | changes))
-    information, problem = price(solution), build_problem(solution.plan)
+    information, problem = price(solution), solution.problem
     I_U, I_G = (
         replace(link, measure="mutual_information").rates(solution.w, H_r, P)
         for link, H_r, P in zip(
@@ -126,7 +126,7 @@ def test_what_surrounds_a_plan_speaks_of_it(small_plan: MakePlan, tmp_path: Path
     assert fresh.delivered == pytest.approx(planned.delivered_rate, abs=0.3)
     assert fresh.delivered_error < 0.1
     assert not saturation(planned).saturated
-    bound = upper_bound(build_problem(planned.plan), planned.rates.R_avg)
+    bound = upper_bound(planned.problem, planned.rates.R_avg)
     assert planned.rates.R_avg <= bound.value < 1.1 * planned.rates.R_avg
     assert not bound.exact
     save_solution(planned, tmp_path / "result.npz")

@@ -11,7 +11,6 @@ from conftest import MakePlan
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.rate import cutoff_rate
 from faao_mav.schedule.precoder_table import precoder_table, taken_by
@@ -39,7 +38,7 @@ def test_the_planned_flight_delivers_the_planned_rate(solution: Solution) -> Non
 def test_a_displaced_flight_is_priced_slot_by_slot(solution: Solution) -> None:
     w = solution.w + np.random.default_rng(1).normal(size=solution.w.shape) * 5
     I_U, _ = rates_along(solution, w)
-    link = build_problem(solution.plan).bs_uav
+    link = solution.problem.bs_uav
     for n in (0, 7, len(w) - 1):
         d2 = np.sum((w[n] - link.station) ** 2) + link.altitude**2
         H_r = link.small_scale(w)[..., n, :, :]
