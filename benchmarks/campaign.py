@@ -16,7 +16,7 @@ from collections import Counter
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mavlink"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "wire"))
 
 from trials import Trial, flown
 

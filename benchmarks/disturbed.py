@@ -24,15 +24,15 @@ from conftest import MISSIONS, edited
 from simulators import simulated
 
 from faao_mav import Result, plan_mission
-from faao_mav.mavlink import link
-from faao_mav.mavlink.client import upload
-from faao_mav.mavlink.faults import Faults, FaultyTransport
-from faao_mav.mavlink.flying.fly import FlightReport, fly
-from faao_mav.mavlink.flying.seen import Flight
-from faao_mav.mavlink.flying.watch import Watch
-from faao_mav.mavlink.transport import Transport, open_transport
+from faao_mav.fly.fly import FlightReport, fly
+from faao_mav.fly.seen import Flight
+from faao_mav.fly.watch import Watch
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.prediction import price_flight
+from faao_mav.wire import link
+from faao_mav.wire.client import upload
+from faao_mav.wire.faults import Faults, FaultyTransport
+from faao_mav.wire.transport import Transport, open_transport
 
 SPEEDUP = 2
 BEGIN = 25.0

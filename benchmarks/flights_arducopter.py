@@ -18,9 +18,9 @@ from dataclasses import replace
 import numpy as np
 from recorded import FLIGHTS, Recorded, Row, compared, read, show
 
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.ardupilot.copter import ArduCopter
-from faao_mav.vehicle.flight_path import FlightPath
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.ardupilot.copter import ArduCopter
+from faao_mav.autopilot.flight_path import FlightPath
 
 FITTED = (
     "line-20m-8ms",

@@ -16,11 +16,11 @@ from record_plane import BODY, ELEVATIONS, PARAMETERS, PLACE
 from recorded import FLIGHTS, Row, compared, read, show, wind_of
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.ardupilot.plane import ArduPlane
+from faao_mav.autopilot.flight_path import FlightPath
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan.body import PlaneBody
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.ardupilot.plane import ArduPlane
-from faao_mav.vehicle.flight_path import FlightPath
 
 FOLDER = FLIGHTS / "arduplane"
 FITTED = (

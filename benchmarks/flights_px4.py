@@ -23,9 +23,9 @@ import numpy as np
 from recorded import FLIGHTS, Row, compared, mission_of, read, show
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.px4 import Px4
 from faao_mav.mission.formats.parameter_file import read_parameters
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.px4 import Px4
 
 FOLDER = FLIGHTS / "px4"
 

@@ -30,12 +30,12 @@ from simulators import simulated, start_log
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
+from faao_mav.fly.fly import fly
+from faao_mav.fly.seen import Flight
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mavlink.client import upload
-from faao_mav.mavlink.flying.fly import fly
-from faao_mav.mavlink.flying.seen import Flight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
+from faao_mav.wire.client import upload
 from missions import PLANS, plan_of, random_changes
 
 RUNNERS = {

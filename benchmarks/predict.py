@@ -7,10 +7,10 @@ import time
 
 import numpy as np
 
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.predict import predict
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.predict import predict
 
 HOME = Home(47.4, 8.5, 400.0)
 

@@ -22,6 +22,7 @@ import numpy as np
 from flights_px4 import FOLDER, HELD_OUT
 from simulators import usable
 
+from faao_mav.autopilot import PX4_COPTER
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
 from faao_mav.mission.formats.parameter_file import render_parameters
@@ -29,7 +30,6 @@ from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import Wind
 from faao_mav.schedule.conversion import convert
-from faao_mav.vehicle import PX4_COPTER
 from missions import PLANS, plan_of
 
 HOME = Home(-35.363262, 149.165237, 584.0)

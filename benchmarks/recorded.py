@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot.flight_path import FlightPath, Flown
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
 from faao_mav.mission.formats.wpl import read_wpl
 from faao_mav.plan import Wind
-from faao_mav.vehicle.flight_path import FlightPath, Flown
 
 FLIGHTS = Path(__file__).parents[1] / "tests" / "data" / "flights"
 

@@ -28,7 +28,7 @@ from random import Random
 from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mavlink"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "wire"))
 
 from joblib import Parallel, delayed
 from mavsdk.plugins.mission_raw import MissionRaw
@@ -37,18 +37,18 @@ from simulators import KINDS, simulated, usable
 from stations import HOME, a_mission, mock_of, peer_of
 from uploads import a_mavsdk
 
+from faao_mav.autopilot import VehicleType
 from faao_mav.errors import LinkError
-from faao_mav.mavlink import link, upload
-from faao_mav.mavlink.faults import Faults, FaultyTransport
-from faao_mav.mavlink.machine import Script
-from faao_mav.mavlink.messages import WireItem
-from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mavlink.transfer.session import upload_parts
-from faao_mav.mavlink.transport import open_transport
-from faao_mav.mavlink.wire_items import wire_items
 from faao_mav.mission import Mission
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
-from faao_mav.vehicle import VehicleType
+from faao_mav.wire import link, upload
+from faao_mav.wire.faults import Faults, FaultyTransport
+from faao_mav.wire.machine import Script
+from faao_mav.wire.messages import WireItem
+from faao_mav.wire.protocol import MissionType
+from faao_mav.wire.transfer.session import upload_parts
+from faao_mav.wire.transport import open_transport
+from faao_mav.wire.wire_items import wire_items
 
 LONGEST = 1200.0
 """Seconds after which a session counts as one without an end."""

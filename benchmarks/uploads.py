@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mavlink"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "wire"))
 
 from conftest import free_port
 from mavsdk.component_type import ComponentType
@@ -26,11 +26,11 @@ from served import running
 from stations import HOME, a_mission, places
 
 from faao_mav.errors import LinkError
-from faao_mav.mavlink import upload
-from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.protocol import MissionType
-from faao_mav.mavlink.wire_items import wire_items
+from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.wire import upload
+from faao_mav.wire.faults import Faults
+from faao_mav.wire.protocol import MissionType
+from faao_mav.wire.wire_items import wire_items
 
 KINDS: tuple[MockKind, ...] = ("px4", "ardupilot")
 

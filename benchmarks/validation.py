@@ -9,12 +9,12 @@ import time
 
 import numpy as np
 
+from faao_mav.autopilot import Track, Vehicle
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.validate import Finding, Limits, validate
-from faao_mav.vehicle import Track, Vehicle
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 FRAME = LocalFrame(HOME.latitude, HOME.longitude)

@@ -17,10 +17,10 @@ from pathlib import Path
 from flown import FLOWN, serving
 
 from faao_mav import Result, plan_mission
-from faao_mav.mavlink.flying.fly import fly
-from faao_mav.mavlink.flying.logs import read_log
-from faao_mav.mavlink.flying.seen import Flight
-from faao_mav.mavlink.flying.telling import Telling
+from faao_mav.fly.fly import fly
+from faao_mav.fly.logs import read_log
+from faao_mav.fly.seen import Flight
+from faao_mav.fly.telling import Telling
 from faao_mav.report.debrief import debriefed
 from faao_mav.validate.flown import Debriefing
 from missions import plan_of

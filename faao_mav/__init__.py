@@ -10,9 +10,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from faao_mav.autopilot import Track as Track
+    from faao_mav.autopilot import Vehicle as Vehicle
+    from faao_mav.autopilot.predict import predict as predict
     from faao_mav.errors import FaaoError as FaaoError
-    from faao_mav.mavlink import download as download
-    from faao_mav.mavlink import upload as upload
     from faao_mav.mission import Mission as Mission
     from faao_mav.mission import MissionItem as MissionItem
     from faao_mav.mission.formats import read_mission as read_mission
@@ -35,15 +36,14 @@ if TYPE_CHECKING:
     from faao_mav.validate import LinkCheck as LinkCheck
     from faao_mav.validate.check import Check as Check
     from faao_mav.validate.check import check as check
-    from faao_mav.vehicle import Track as Track
-    from faao_mav.vehicle import Vehicle as Vehicle
-    from faao_mav.vehicle.predict import predict as predict
+    from faao_mav.wire import download as download
+    from faao_mav.wire import upload as upload
     from faao_mav.workflow import Result as Result
     from faao_mav.workflow import plan_mission as plan_mission
 
 _HOMES = {
     "errors": "FaaoError",
-    "mavlink": "download upload",
+    "wire": "download upload",
     "mission": "Mission MissionItem",
     "mission.formats": "read_mission render_mission",
     "optimizer.optimize": "optimize",
@@ -53,9 +53,9 @@ _HOMES = {
     "schedule": "Conversion convert",
     "validate": "Finding Limits LinkCheck",
     "validate.check": "Check check",
-    "vehicle": "Track Vehicle",
+    "autopilot": "Track Vehicle",
     "mission.formats.parameter_file": "read_parameters render_parameters",
-    "vehicle.predict": "predict",
+    "autopilot.predict": "predict",
     "workflow": "Result plan_mission",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}

@@ -9,6 +9,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from faao_mav.autopilot.files import parameter_path, plan_target
+from faao_mav.autopilot.predict import predict
+from faao_mav.autopilot.vehicle import candidates
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_together
 from faao_mav.geodesy import LocalFrame
@@ -32,9 +35,6 @@ from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.validate.flown import Debriefing
-from faao_mav.vehicle.files import parameter_path, plan_target
-from faao_mav.vehicle.predict import predict
-from faao_mav.vehicle.vehicle import candidates
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.search.bound import Bound

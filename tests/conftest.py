@@ -116,7 +116,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
 
     class OneFlightAtATime(LoadScopeScheduling):  # type: ignore[misc]
         def _split_scope(self, nodeid: str) -> str:
-            folder = "tests/autopilots/"
+            folder = "tests/real_autopilots/"
             return folder if nodeid.startswith(folder) else nodeid
 
     return OneFlightAtATime(config, log)

@@ -14,7 +14,7 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from faao_mav.arrays import Real
-from faao_mav.mavlink.flying.record import FlightRecord
+from faao_mav.fly.record import FlightRecord
 
 HOME = 584.0
 """Altitude from which heights are, m."""

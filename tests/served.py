@@ -4,10 +4,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.mock import MockAutopilot
-from faao_mav.mavlink.mock.serve import serve
-from faao_mav.mavlink.transport import Transport, open_transport
+from faao_mav.sim import MockAutopilot
+from faao_mav.sim.serve import serve
+from faao_mav.wire.faults import Faults
+from faao_mav.wire.transport import Transport, open_transport
 
 
 @contextmanager

@@ -10,9 +10,9 @@ from served import running
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.main import app
-from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.formats import render_mission
+from faao_mav.sim import MockAutopilot, behaviour_of
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 LOG = Path(__file__).parent / "data" / "logs" / "arducopter.tlog"

@@ -12,15 +12,15 @@ from typer.testing import CliRunner
 
 from faao_mav import download, upload
 from faao_mav.cli.main import app
-from faao_mav.mavlink.messages import ParamRequestRead, ParamValue
-from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.protocol import Address, MavResult
-from faao_mav.mavlink.transport import Transport
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.plan.autopilots import autopilots, types
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.wire.messages import ParamRequestRead, ParamValue
+from faao_mav.wire.protocol import Address, MavResult
+from faao_mav.wire.transport import Transport
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 GENTLE = edited(
@@ -297,7 +297,7 @@ def test_the_mock_flies_by_its_parameters(
         transport.close()
         made.append(mock)
 
-    monkeypatch.setattr("faao_mav.mavlink.mock.serve.serve", serve)
+    monkeypatch.setattr("faao_mav.sim.serve.serve", serve)
     listen = ["--listen", f"udpin:127.0.0.1:{free_port()}"]
     slow = tmp_path / "slow.param"
     slow.write_text("WPNAV_ACCEL,50\nWPNAV_SPEED,300\n")

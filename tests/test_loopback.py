@@ -10,13 +10,13 @@ from served import running
 from typer.testing import CliRunner
 
 from faao_mav import download
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.files import parameter_path
 from faao_mav.cli.main import app
-from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.files import parameter_path
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.sim.serve import predicted
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 SPEEDUP = 20.0

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from faao_mav.autopilot import Track, Vehicle
 from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Mission
@@ -17,7 +18,6 @@ from faao_mav.plan.energy import PowerOptions
 from faao_mav.power import FixedWing, PowerModel, RotaryWing
 from faao_mav.validate import Finding, validate
 from faao_mav.validate.energy import EnergyUse, energy_use
-from faao_mav.vehicle import Track, Vehicle
 
 TABLE = cast("RotaryWing", PowerOptions().model(hovers=True))
 PLANE = cast("FixedWing", PowerOptions().model(hovers=False))

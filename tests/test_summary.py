@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from conftest import MakePlan
 
+from faao_mav.autopilot import ARDUCOPTER
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.pricing import MutualInformation
 from faao_mav.optimizer.problem import build_problem
@@ -14,7 +15,6 @@ from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import summary
 from faao_mav.schedule import Conversion
 from faao_mav.validate.check import check
-from faao_mav.vehicle import ARDUCOPTER
 from faao_mav.workflow import Result, plan_mission
 
 
@@ -43,7 +43,7 @@ def test_a_prediction_that_no_flight_has_confirmed_says_so(
 ) -> None:
     assert "not compared" not in summary(result, verbose=True)
     uncompared = replace(ARDUCOPTER, body=None)
-    monkeypatch.setattr("faao_mav.vehicle.vehicle.vehicle_type", lambda *_: uncompared)
+    monkeypatch.setattr("faao_mav.autopilot.vehicle.vehicle_type", lambda *_: uncompared)
     assert "not compared with recorded flights" in summary(result)
     assert "not compared" in result.as_dict()["predicted"]["assumption"]
 

@@ -16,8 +16,8 @@ from faao_mav import (
     upload,
 )
 from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
-from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
 from faao_mav.report.summary import result_lines
+from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.workflow import Result, mission_files, optimize_plan
 
 QUICK = {"radio.fading": "none", "optimizer.starts": ["straight"]}

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Track
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
@@ -24,7 +25,6 @@ from faao_mav.plan.zones import PolygonZone
 from faao_mav.report.parts import write_part
 from faao_mav.validate.energy import energy_use
 from faao_mav.vector import lengths
-from faao_mav.vehicle import Track
 from faao_mav.workflow import Result, plan_mission
 
 _MOST_DRAWN = 400

@@ -12,7 +12,7 @@ from faao_mav.app.planner import mistake
 from faao_mav.app.vehicle import MISSION, debriefed, fly_command, uploaded, watched
 from faao_mav.app.workers import Interrupt, Workers
 from faao_mav.errors import FaaoError
-from faao_mav.mavlink.flying.telling import as_text
+from faao_mav.fly.telling import as_text
 from faao_mav.workflow import Result
 
 _LARGEST_LOG = 2**30

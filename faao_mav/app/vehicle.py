@@ -61,9 +61,9 @@ def uploaded(tell: Tell, interrupted: Callable[[], bool], result: Result, connec
     Nothing is armed or started. `interrupted` is asked for Ctrl-C, which cancels the upload.
     Raises what `upload` raises.
     """
-    from faao_mav.mavlink.client import upload
-    from faao_mav.mavlink.flying.seen import Flight
-    from faao_mav.mavlink.upload_text import upload_text
+    from faao_mav.fly.seen import Flight
+    from faao_mav.wire.client import upload
+    from faao_mav.wire.upload_text import upload_text
 
     said = ""
 
@@ -91,13 +91,13 @@ def uploaded(tell: Tell, interrupted: Callable[[], bool], result: Result, connec
 def watched(tell: Tell, interrupted: Callable[[], bool], result: Result, connection: str) -> str:
     """Watch the vehicle at `connection` fly the mission of `result`; return what became of it.
 
-    It is `faao-mission fly` without --arm: see `faao_mav.mavlink.flying.fly`, and what that
+    It is `faao-mission fly` without --arm: see `faao_mav.fly.fly`, and what that
     raises. `tell` is given what a `Telling` says; `interrupted` is asked for Ctrl-C.
     """
-    from faao_mav.mavlink.flying.fly import fly
-    from faao_mav.mavlink.flying.seen import Flight
-    from faao_mav.mavlink.flying.telling import Telling
-    from faao_mav.mavlink.flying.watch import Watch
+    from faao_mav.fly.fly import fly
+    from faao_mav.fly.seen import Flight
+    from faao_mav.fly.telling import Telling
+    from faao_mav.fly.watch import Watch
     from faao_mav.report.debrief import flight_lines
 
     def look(*_: object) -> None:
@@ -131,7 +131,7 @@ def debriefed(result: Result, log: Path, name: str) -> tuple[str, list[list[floa
     The line is in [latitude, longitude]. Raises `FaaoError` where the plan's flight is not in the
     log, and `InputError` for a file that is none.
     """
-    from faao_mav.mavlink.flying.logs import read_log
+    from faao_mav.fly.logs import read_log
     from faao_mav.report import debrief
 
     try:

@@ -16,10 +16,10 @@ from faao_mav.cli.shared import (
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.messages import WireItem
-    from faao_mav.mavlink.mock import MockAutopilot
-    from faao_mav.mavlink.protocol import MissionType
     from faao_mav.mission.item import Home
+    from faao_mav.sim import MockAutopilot
+    from faao_mav.wire.messages import WireItem
+    from faao_mav.wire.protocol import MissionType
 
 _HIGHEST = 100_000.0
 """The greatest altitude of a home, m: chosen, where space begins; the wire carries millimetres."""
@@ -73,14 +73,14 @@ def autopilot(
     It ends with Ctrl-C. Exit status: 0 ended; 1 the other end of tcp: is not there; 2 unusable
     arguments, or it cannot listen there.
     """
-    from faao_mav.mavlink.faults import Faults
-    from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-    from faao_mav.mavlink.mock.serve import predicted, serve
-    from faao_mav.mavlink.protocol import Address
-    from faao_mav.mavlink.signing import read_signing
-    from faao_mav.mavlink.transport import open_transport
+    from faao_mav.autopilot import Vehicle
     from faao_mav.mission.formats.parameter_file import read_parameters
-    from faao_mav.vehicle import Vehicle
+    from faao_mav.sim import MockAutopilot, behaviour_of
+    from faao_mav.sim.serve import predicted, serve
+    from faao_mav.wire.faults import Faults
+    from faao_mav.wire.protocol import Address
+    from faao_mav.wire.signing import read_signing
+    from faao_mav.wire.transport import open_transport
 
     values = {} if parameters is None else read_parameters(parameters)
     check_known(None, aircraft)
@@ -130,7 +130,7 @@ class Diary:
 
     def __call__(self, mock: "MockAutopilot") -> None:
         """Print what is new since the last call."""
-        from faao_mav.mavlink.protocol import MissionType
+        from faao_mav.wire.protocol import MissionType
 
         lists = {part: mock.lists.items(part) for part in MissionType}
         if not self._told:

@@ -28,6 +28,8 @@ def convert(
 
     Exit status: 0 done; 2 unusable arguments or input.
     """
+    from faao_mav.autopilot import Vehicle, kind_by_number
+    from faao_mav.autopilot.files import plan_target
     from faao_mav.cli.vehicle import told_vehicle
     from faao_mav.mission.formats import (
         check_readable,
@@ -36,8 +38,6 @@ def convert(
         read_mission_file,
         write_mission,
     )
-    from faao_mav.vehicle import Vehicle, kind_by_number
-    from faao_mav.vehicle.files import plan_target
 
     check_known(autopilot, None)
     check_readable(mission_file)

@@ -40,8 +40,8 @@ def debrief(
         check_writable(report)
     read = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     check_apart({"--report": report}, read)
-    from faao_mav.mavlink.flying.logs import read_log
-    from faao_mav.mavlink.flying.radio import UdpRadio, replay, replayed
+    from faao_mav.fly.logs import read_log
+    from faao_mav.fly.radio import UdpRadio, replay, replayed
     from faao_mav.report.debrief import debriefed, other_parameters, remarks_on
     from faao_mav.report.flights import debriefing_lines
     from faao_mav.report.lines import joined

@@ -38,12 +38,12 @@ def download(
     Exit status: 0 done; 1 there is no such vehicle, or a list did not come whole; 2 unusable
     arguments.
     """
+    from faao_mav.autopilot import Vehicle
+    from faao_mav.autopilot.files import plan_target
     from faao_mav.cli.progress import transfer_progress
     from faao_mav.files import check_writable
-    from faao_mav.mavlink.client import holdings
     from faao_mav.mission.formats import check_suffix, losses_in, write_mission
-    from faao_mav.vehicle import Vehicle
-    from faao_mav.vehicle.files import plan_target
+    from faao_mav.wire.client import holdings
 
     check_suffix(out)
     check_writable(out)

@@ -25,10 +25,10 @@ from faao_mav.cli.shared import (
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.flying.seen import Flight
+    from faao_mav.autopilot import Track
+    from faao_mav.fly.seen import Flight
     from faao_mav.mission.formats import MissionFile
     from faao_mav.optimizer.solution import Solution
-    from faao_mav.vehicle import Track
 
 
 @exit_status()
@@ -74,9 +74,9 @@ def fly(
     Exit status: 0 the mission was flown to its end; 1 it was not, or that is not known; 2 unusable
     arguments or input.
     """
-    from faao_mav.mavlink.flying.fly import fly as run
-    from faao_mav.mavlink.flying.telemetry import POSITION_RATE
-    from faao_mav.mavlink.flying.telling import HEADER, Feed, Telling, as_text
+    from faao_mav.fly.fly import fly as run
+    from faao_mav.fly.telemetry import POSITION_RATE
+    from faao_mav.fly.telling import HEADER, Feed, Telling, as_text
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.lines import joined
@@ -149,10 +149,10 @@ def _flight(
     mission_file: Path, file: "MissionFile", solution: "Solution | None", *, streamed: bool
 ) -> "Flight":
     """Return what is to be flown, and what tells for whom and for which parameters it was made."""
+    from faao_mav.autopilot import vehicle_of
+    from faao_mav.autopilot.files import made_for
     from faao_mav.cli.vehicle import choose_vehicle
-    from faao_mav.mavlink.flying.seen import Flight
-    from faao_mav.vehicle import vehicle_of
-    from faao_mav.vehicle.files import made_for
+    from faao_mav.fly.seen import Flight
 
     plan = solution.plan if solution is not None else None
     vehicle, _ = choose_vehicle(mission_file, file, plan, (None, None, None))
@@ -162,8 +162,8 @@ def _flight(
 
 def _predicted(flight: "Flight") -> "Track | None":
     """Return the predicted flight of the mission; None, which is noted, if there is none."""
+    from faao_mav.autopilot.predict import predict
     from faao_mav.errors import FaaoError
-    from faao_mav.vehicle.predict import predict
 
     wind = flight.solution.plan.wind if flight.solution is not None else (0.0, 0.0)
     try:

@@ -14,8 +14,8 @@ from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.client import UploadReport
     from faao_mav.plan import Plan
+    from faao_mav.wire.client import UploadReport
     from faao_mav.workflow import Result
 
 
@@ -110,10 +110,10 @@ def _checked_plan(
     force: bool,
 ) -> "Plan":
     """Return the plan; what it asks for and where to is refused before the work if of no use."""
+    from faao_mav.autopilot import vehicle_of
     from faao_mav.plan import read_plan
     from faao_mav.report.style import FORMATS
     from faao_mav.schedule.conversion import beyond_vehicle, check_vehicle
-    from faao_mav.vehicle import vehicle_of
     from faao_mav.workflow import mission_files
 
     plan = read_plan(plan_file, method=method)
@@ -135,7 +135,7 @@ def _checked_plan(
     outputs = {"--out": out, **of_out, **files}
     check_apart(outputs, {"PLAN.yaml": plan_file})
     if upload is not None:
-        from faao_mav.mavlink.transport import parse_connection
+        from faao_mav.wire.transport import parse_connection
 
         parse_connection(upload)
     if to_fly and not force and (beyond := beyond_vehicle(plan)):
@@ -161,8 +161,8 @@ def _upload(
     result: "Result", connection: str, system: int | None, allow_armed: bool, shown: bool
 ) -> "UploadReport":
     from faao_mav.cli.progress import transfer_progress
-    from faao_mav.mavlink.client import upload
-    from faao_mav.mavlink.flying.seen import Flight
+    from faao_mav.fly.seen import Flight
+    from faao_mav.wire.client import upload
 
     assert result.conversion is not None
     flight = Flight.planned(result.conversion, result.solution)
@@ -198,6 +198,6 @@ def _show(
         return
     typer.echo(summary(result, written, precoders, verbose=verbose))
     if uploaded is not None:
-        from faao_mav.mavlink.upload_text import upload_text
+        from faao_mav.wire.upload_text import upload_text
 
         typer.echo(upload_text(uploaded))

@@ -6,10 +6,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.link import Observe
     from faao_mav.optimizer.solution import Observer, Progress
     from faao_mav.plan import Plan
     from faao_mav.study import StudyRow
+    from faao_mav.wire.link import Observe
 
 
 _WIDTH = 12

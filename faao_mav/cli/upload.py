@@ -25,7 +25,7 @@ from faao_mav.cli.shared import (
 )
 
 if TYPE_CHECKING:
-    from faao_mav.mavlink.client import UploadReport
+    from faao_mav.wire.client import UploadReport
 
 
 @exit_status()
@@ -57,13 +57,13 @@ def upload(
     Exit status: 0 it is on the vehicle, whole and equal; 1 it is not, or that is not known; 2
     unusable arguments or input.
     """
+    from faao_mav.autopilot.files import made_for
     from faao_mav.cli.progress import transfer_progress
-    from faao_mav.mavlink.client import upload as run
-    from faao_mav.mavlink.parameters import check_settable
-    from faao_mav.mavlink.upload_text import upload_text
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.mission.formats.parameter_file import read_parameters
-    from faao_mav.vehicle.files import made_for
+    from faao_mav.wire.client import upload as run
+    from faao_mav.wire.parameters import check_settable
+    from faao_mav.wire.upload_text import upload_text
 
     file = read_mission_file(mission_file)
     for line in file.warnings:

@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from faao_mav.autopilot import Vehicle, family, kind_by_number, vehicle_of
+from faao_mav.autopilot.files import autopilot_of, parameter_path, vehicle_in
 from faao_mav.errors import InputError
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
-from faao_mav.vehicle import Vehicle, family, kind_by_number, vehicle_of
-from faao_mav.vehicle.files import autopilot_of, parameter_path, vehicle_in
 
 if TYPE_CHECKING:
     from faao_mav.mission.formats import MissionFile

@@ -11,9 +11,9 @@ from functools import lru_cache
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import vehicle_of
 from faao_mav.plan import Plan, Vector
 from faao_mav.vector import chord
-from faao_mav.vehicle import vehicle_of
 
 LENGTH = 100.0
 """The unit of length inside the solvers, m: the extent of a mission is of the order of one.

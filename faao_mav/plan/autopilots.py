@@ -1,8 +1,8 @@
 """The vehicles that a plan can name: `vehicle.autopilot` and `vehicle.type`.
 
 The plan knows their names and the facts that decide whether a plan makes sense for them. What
-each vehicle is stands in `faao_mav.vehicle`, whose `register` adds to this table; a test holds both
-to the same facts.
+each vehicle is stands in `faao_mav.autopilot`, whose `register` adds to this table; a test holds
+both to the same facts.
 """
 
 import math

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 from faao_mav.errors import FaaoError
-from faao_mav.mavlink.flying.fly import FlightReport
-from faao_mav.mavlink.flying.record import FlightRecord
+from faao_mav.fly.fly import FlightReport
+from faao_mav.fly.record import FlightRecord
 from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import Line
 from faao_mav.validate import flown

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.autopilot import Track
 from faao_mav.optimizer.solution import Solution
 from faao_mav.report.maps import route_map
 from faao_mav.report.style import MUTED, SERIES, WIDTH, drawing, label, legend_above
@@ -12,7 +13,6 @@ from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate.energy import EnergyUse
 from faao_mav.vector import lengths
-from faao_mav.vehicle import Track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import FLOWN_TO, Command
 from faao_mav.mission.fence import Fence
@@ -28,7 +29,6 @@ from faao_mav.schedule.prediction import Prediction
 from faao_mav.schedule.schedule import positions_at
 from faao_mav.schedule.transit import way_home, way_out
 from faao_mav.vector import lengths
-from faao_mav.vehicle import Track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,6 +1,7 @@
 """From a route to mission items: take-off, the way to w_I, the route, the end."""
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import vehicle_of
 from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
@@ -8,7 +9,6 @@ from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.transit import check_run_in, way_home, way_out
-from faao_mav.vehicle import vehicle_of
 
 _DECIMALS = 9  # of a latitude or longitude in degrees: 0.1 mm
 _PITCH = 15.0  # the least pitch of a plane's climb after take-off, degrees; chosen

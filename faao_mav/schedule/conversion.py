@@ -7,6 +7,8 @@ from math import floor, inf
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Ceiling, Vehicle, vehicle_of
+from faao_mav.autopilot.vehicle import candidates
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
@@ -20,8 +22,6 @@ from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import GOOD_COST, WORTHWHILE, Scheduler
 from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
-from faao_mav.vehicle import Ceiling, Vehicle, vehicle_of
-from faao_mav.vehicle.vehicle import candidates
 
 _PLANE_SHARE = 0.8  # of the path tolerance for the initial route of a plane, which is then split
 _DECIMALS = 3  # of the positions in m: the last digits are another processor's

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, GOOD_COST, WORTHWHILE, Scheduler
 from faao_mav.vector import lengths
-from faao_mav.vehicle.vehicle_type import OVERSPEED
 
 # The shortest wait at the first waypoint, s. After a hold of 1 s ArduCopter is still drifting and
 # leaves 0.4 to 0.75 s late, measured in its simulator.

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import LegLimits, vehicle_of
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.waypoints import LEG_SHARE, Waypoint, fits, hovers_and_ends, simplify
 from faao_mav.vector import lengths
-from faao_mav.vehicle import LegLimits, vehicle_of
 
 _MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
 

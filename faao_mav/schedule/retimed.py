@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.autopilot.vehicle_type import LegDurations
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.vector import lengths
-from faao_mav.vehicle.vehicle_type import LegDurations
 
 _STRIDE = 3  # of so many samples of a predicted flight, 0.1 s apart, one is kept, for speed
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.autopilot import FlightPath
 from faao_mav.plan import Vector
 from faao_mav.vector import lengths
-from faao_mav.vehicle import FlightPath
 
 _SPEED_DIGITS = 3  # decimals of a commanded speed in m/s: with two, 300 s of flight end 0.25 s off
 

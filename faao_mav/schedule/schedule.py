@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Flown
 from faao_mav.schedule.route import Route
 from faao_mav.vector import distances_to_path, lengths
-from faao_mav.vehicle import Flown
 
 # Metres of position error that one second too late or too early at the end costs. Chosen between
 # punctual and near: with 2, 5 and 8 the means over 28 conversions are 0.11, 0.06 and 0.05 s, and

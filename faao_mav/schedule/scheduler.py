@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
+from faao_mav.autopilot import FlightModel, Vehicle
 from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.retimed import LegRetimed, Retimed
@@ -16,7 +17,6 @@ from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Clock, Schedule, positions_at
 from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
 from faao_mav.vector import lengths
-from faao_mav.vehicle import FlightModel, Vehicle
 
 # The position error at equal times, m, that is left as it is. Repeats of one flight in ArduCopter's
 # simulator differ by up to 0.4 m rms.

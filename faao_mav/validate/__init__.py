@@ -1,5 +1,6 @@
 """Whether an autopilot takes a mission, an aircraft can fly it, and it delivers the link."""
 
+from faao_mav.autopilot import Track, Vehicle
 from faao_mav.mission.item import Mission
 from faao_mav.validate import (
     ardupilot,
@@ -23,7 +24,6 @@ from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
-from faao_mav.vehicle import Track, Vehicle
 
 RULES: tuple[Rule, ...] = tuple(
     rule

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
+from faao_mav.autopilot import ARDUCOPTER, ARDUPLANE
+from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
 from faao_mav.validate.rule import Issue, Level, Rules
-from faao_mav.vehicle import ARDUCOPTER, ARDUPLANE
-from faao_mav.vehicle.dialect import name_of
 
 RULES = Rules(ARDUCOPTER.family)
 

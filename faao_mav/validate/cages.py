@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from faao_mav.autopilot import ARDUCOPTER, PX4_COPTER
 from faao_mav.mission.command import Command
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Issue, Level, Rule
-from faao_mav.vehicle import ARDUCOPTER, PX4_COPTER
 
 _ARDUPILOT, _PX4 = ARDUCOPTER.family, PX4_COPTER.family
 

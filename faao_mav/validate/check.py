@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from faao_mav.autopilot import Track, Vehicle
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
 from faao_mav.validate.energy import EnergyUse, energy_use
-from faao_mav.vehicle import Track, Vehicle
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
@@ -57,7 +57,7 @@ def check(
     alone; nothing is raised.
 
     >>> from faao_mav.mission import Mission, MissionItem
-    >>> from faao_mav.vehicle import Vehicle
+    >>> from faao_mav.autopilot import Vehicle
     >>> land = MissionItem(command=21, frame=3, x=47.4, y=8.5)
     >>> found = check(Mission(items=(land,)), Vehicle("px4"))
     >>> [finding.rule for finding in found.of(Level.ERROR)]
@@ -87,7 +87,7 @@ def check(
 
 def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:
     """Return the predicted flight, or None and why there is none."""
-    from faao_mav.vehicle.predict import predict
+    from faao_mav.autopilot.predict import predict
 
     try:
         track = predict(mission, vehicle, wind=wind)

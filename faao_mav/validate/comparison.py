@@ -7,6 +7,7 @@ it was edited in a ground station, as it was downloaded.
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.initial_route import begins_at_speed, set_out
@@ -15,7 +16,6 @@ from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LinkCheck, Stretch
 from faao_mav.vector import distances_to_path, lengths
-from faao_mav.vehicle import Track
 
 _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
 """Seconds by which the aircraft may set out before the plan, of which the best fit is taken.

@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Track, Vehicle
+from faao_mav.autopilot.orbit import Orbit
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
@@ -16,8 +18,6 @@ from faao_mav.validate.demands import Limits, LinkCheck
 from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.fence_map import FenceMap, fence_map
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
-from faao_mav.vehicle import Track, Vehicle
-from faao_mav.vehicle.orbit import Orbit
 
 NAV_LAST = 95
 """Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""

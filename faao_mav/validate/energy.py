@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Track
 from faao_mav.plan import Plan, Vector
 from faao_mav.plan.energy import Battery
 from faao_mav.power import JOULES_PER_WH
-from faao_mav.vehicle import Track
 
 _AIRSPEEDS = np.linspace(0.0, 100.0, 1001)
 """The airspeeds, m/s, of which one has the least power. Chosen: all that are flown."""

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from faao_mav.autopilot import ARDUCOPTER
 from faao_mav.mission.fence_area import Area
 from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME
 from faao_mav.vector import lengths
-from faao_mav.vehicle import ARDUCOPTER
 
 RULES = Rules()
 _ARDUPILOT = Rules(ARDUCOPTER.family)

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 
+from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, TAKEOFFS, Command
 from faao_mav.mission.jumps import JUMPS
 from faao_mav.validate.context import NAV_LAST, ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME
-from faao_mav.vehicle.dialect import name_of
 
 RULES = Rules()
 

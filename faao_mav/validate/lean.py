@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.ardupilot import ARDUPILOT
+from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.optimizer.solution import Solution
 from faao_mav.power import GRAVITY
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.ardupilot import ARDUPILOT
-from faao_mav.vehicle.ardupilot.copter.parameters import ArduCopterLimits
 
 _LEAST = 0.1
 """m/s that are missing from which on it is told: rounding is less. Chosen."""

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
+from faao_mav.autopilot import PX4_COPTER
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
 from faao_mav.validate.rule import Issue, Level, Rules
 from faao_mav.validate.straight import HOME, Straight
-from faao_mav.vehicle import PX4_COPTER
 
 RULES = Rules(PX4_COPTER.family)
 

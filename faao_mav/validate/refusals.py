@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 
+from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
 from faao_mav.mission.jumps import JUMPS
 from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
 from faao_mav.validate.rule import Issue, Rules
-from faao_mav.vehicle.dialect import name_of
 
 RULES = Rules()
 

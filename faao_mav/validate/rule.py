@@ -6,9 +6,9 @@ from enum import StrEnum
 from functools import partialmethod
 from typing import TYPE_CHECKING, TypeAlias
 
+from faao_mav.autopilot import AutopilotFamily, Vehicle
+from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.item import MissionItem
-from faao_mav.vehicle import AutopilotFamily, Vehicle
-from faao_mav.vehicle.dialect import name_of
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext

@@ -6,11 +6,11 @@ from itertools import groupby
 
 import numpy as np
 
+from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.mission.command import Command
 from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
 from faao_mav.validate.straight import HOME, Straight
-from faao_mav.vehicle.vehicle_type import OVERSPEED
 
 RULES = Rules()
 

@@ -30,11 +30,11 @@ from faao_mav.arrays import Real
 from faao_mav.cli.main import app
 from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import predicted
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.sim.serve import predicted
+from faao_mav.wire.faults import Faults
 
 if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page

@@ -18,13 +18,13 @@ from faao_mav import plan_mission
 from faao_mav.app.vehicle import fly_command, uploaded, watched
 from faao_mav.app.workers import Interrupt, Workers
 from faao_mav.errors import FaaoError, PlanError
-from faao_mav.mavlink.faults import Faults
-from faao_mav.mavlink.flying.fly import fly
-from faao_mav.mavlink.flying.seen import Flight
-from faao_mav.mavlink.mock import MockAutopilot, behaviour_of
-from faao_mav.mavlink.mock.serve import predicted
+from faao_mav.fly.fly import fly
+from faao_mav.fly.seen import Flight
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.sim.serve import predicted
+from faao_mav.wire.faults import Faults
 from faao_mav.workflow import Result
 
 HOME = Home(-35.363262, 149.165237, 584.0)

@@ -12,10 +12,10 @@ from typing import Any
 from pymavlink.dialects.v20 import common
 from pymavlink.generator.mavcrc import x25crc
 
-from faao_mav.mavlink.codec import Codec
-from faao_mav.mavlink.framing import message_id
-from faao_mav.mavlink.machine import Machine
-from faao_mav.mavlink.mock import MockAutopilot
+from faao_mav.sim import MockAutopilot
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.framing import message_id
+from faao_mav.wire.machine import Machine
 
 _HEADER = 10
 """Bytes of a MAVLink 2 packet before its payload."""

@@ -12,10 +12,10 @@ from harness import Target
 
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import InputError, MissionFileError
+from faao_mav.fly.log_flights import flights
+from faao_mav.fly.log_messages import messages
+from faao_mav.fly.record import FlightRecord
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mavlink.flying.log_flights import flights
-from faao_mav.mavlink.flying.log_messages import messages
-from faao_mav.mavlink.flying.record import FlightRecord
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.formats import losses_in, read_mission_file, render_mission
 from faao_mav.mission.formats.fence_file import read_fence

@@ -8,14 +8,20 @@ from typing import Any
 from harness import Target
 from tapes import answer, converse, datagrams, mutated, packed, recorded, tape_of
 
+from faao_mav.autopilot import vehicle_type
 from faao_mav.cli.upload import as_dict
 from faao_mav.errors import FaaoError
-from faao_mav.mavlink.client import UploadReport
-from faao_mav.mavlink.codec import Codec
-from faao_mav.mavlink.discover import Discovery, FoundVehicle, choose
-from faao_mav.mavlink.framing import Framer
-from faao_mav.mavlink.machine import Machine, Script
-from faao_mav.mavlink.messages import (
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission.formats import losses_in, render_mission
+from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim.serve import predicted
+from faao_mav.wire.client import UploadReport
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.discover import Discovery, FoundVehicle, choose
+from faao_mav.wire.framing import Framer
+from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.messages import (
     CommandLong,
     Heartbeat,
     HomePosition,
@@ -29,31 +35,25 @@ from faao_mav.mavlink.messages import (
     Statustext,
     Timesync,
 )
-from faao_mav.mavlink.mock import MockAutopilot, MockKind, behaviour_of
-from faao_mav.mavlink.mock.serve import predicted
-from faao_mav.mavlink.protocol import (
+from faao_mav.wire.protocol import (
     GROUND_STATION,
     HOME_POSITION,
     Address,
     MavCommand,
     MissionType,
 )
-from faao_mav.mavlink.questions import AskAlive, AskFor
-from faao_mav.mavlink.signing import Signing
-from faao_mav.mavlink.transfer.exchange import Peer
-from faao_mav.mavlink.transfer.session import (
+from faao_mav.wire.questions import AskAlive, AskFor
+from faao_mav.wire.signing import Signing
+from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer.session import (
     Lists,
     clear_lists,
     download_lists,
     explain,
     upload_parts,
 )
-from faao_mav.mavlink.upload_text import upload_text
-from faao_mav.mavlink.wire_items import mission_of, wire_items
-from faao_mav.mission import Home, Mission, MissionItem
-from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
-from faao_mav.mission.formats import losses_in, render_mission
-from faao_mav.vehicle import vehicle_type
+from faao_mav.wire.upload_text import upload_text
+from faao_mav.wire.wire_items import mission_of, wire_items
 
 _VEHICLE = Address(1, 1)
 _KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")

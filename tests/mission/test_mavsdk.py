@@ -14,11 +14,11 @@ from mavsdk.plugins.mission_raw import MissionRaw
 from pymavlink import mavutil
 from relay_flights import dash_hover_dash, mission_of, plan_with
 
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.files import plan_target
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import read_mission, write_qgc_plan, write_wpl
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.files import plan_target
 
 DATA = Path(__file__).parent.parent / "data" / "missions"
 

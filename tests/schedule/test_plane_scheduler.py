@@ -4,6 +4,10 @@ import numpy as np
 import pytest
 from relay_flights import Trajectory, converted, plan_with
 
+from faao_mav.autopilot import Track, vehicle_of
+from faao_mav.autopilot.ardupilot.plane import ArduPlane
+from faao_mav.autopilot.atmosphere import density_ratio
+from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
@@ -12,10 +16,6 @@ from faao_mav.schedule import Conversion
 from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.initial_route import initial_route, with_run_in
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
-from faao_mav.vehicle import Track, vehicle_of
-from faao_mav.vehicle.ardupilot.plane import ArduPlane
-from faao_mav.vehicle.atmosphere import density_ratio
-from faao_mav.vehicle.predict import predict
 
 STEP = 0.2
 RATIO = density_ratio(684.0) ** -0.5

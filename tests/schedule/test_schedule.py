@@ -17,13 +17,13 @@ from relay_flights import (
 )
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
 from faao_mav.schedule import Conversion
 from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.copter_scheduler import CopterScheduler
-from faao_mav.vehicle.predict import predict
 
 STEP = 0.2
 

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Flown
+from faao_mav.autopilot.ardupilot.copter import ArduCopter
 from faao_mav.errors import InputError
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Clock, Schedule, lateness
 from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD, fit
-from faao_mav.vehicle import Flown
-from faao_mav.vehicle.ardupilot.copter import ArduCopter
 
 MODEL = ArduCopter(acceleration=4, jerk=10)
 PLACES = np.array([[0.0, 0.0, 0.0], [120, 0, 0], [240, 60, 0], [240, 200, 0], [100, 200, 0]])

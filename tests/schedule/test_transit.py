@@ -9,6 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from faao_mav import Vehicle
+from faao_mav.autopilot import vehicle_of
+from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InfeasibleError, InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Mission
@@ -17,8 +19,6 @@ from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.initial_route import initial_route, with_run_in
 from faao_mav.schedule.transit import check_transit, way_home, way_out
-from faao_mav.vehicle import vehicle_of
-from faao_mav.vehicle.predict import predict
 
 WALL = {"polygon": [[-60, 15], [60, 15], [60, 30], [-60, 30]]}
 ROUND = {"center": [150, 25], "radius": 20}

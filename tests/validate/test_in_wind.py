@@ -8,13 +8,13 @@ import pytest
 from judged import COPTER, HOME, at
 from typer.testing import CliRunner
 
+from faao_mav.autopilot.predict import predict
 from faao_mav.cli.main import app
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.plan import Wind
 from faao_mav.validate.check import check
-from faao_mav.vehicle.predict import predict
 
 
 def there_and_back(speed: float) -> Mission:

@@ -6,8 +6,8 @@ import numpy as np
 from conftest import FLYABLE, edited
 
 from faao_mav import optimize, parse_plan
+from faao_mav.autopilot.vehicle import vehicle_of
 from faao_mav.validate.lean import beyond_lean
-from faao_mav.vehicle.vehicle import vehicle_of
 
 
 def test_drag_and_acceleration_add_up() -> None:

@@ -30,10 +30,10 @@ from judged import (
 )
 from shapely.geometry.base import BaseGeometry
 
+from faao_mav.autopilot import Vehicle
 from faao_mav.mission.command import Command
 from faao_mav.mission.fence_area import areas_of, free_area
 from faao_mav.validate.context import ValidationContext
-from faao_mav.vehicle import Vehicle
 
 metres = st.floats(-500, 500)
 places = st.tuples(metres, metres)

@@ -24,12 +24,12 @@ from judged import (
     track,
 )
 
+from faao_mav.autopilot import Vehicle
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.straight import HOME as HOME_INDEX
-from faao_mav.vehicle import Vehicle
 
 
 def ups(case: ValidationContext) -> list[float]:

@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 import faao_mav
 import faao_mav.validate
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.files import plan_target
 from faao_mav.cli.validate import validate
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.formats import render_mission
 from faao_mav.mission.item import Mission
 from faao_mav.validate import RULES
-from faao_mav.vehicle import Vehicle
-from faao_mav.vehicle.files import plan_target
 
 Run = Callable[..., Any]
 
@@ -42,7 +42,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
             raise InfeasibleError(f"no model of {len(mission.items)} items for {vehicle.autopilot}")
 
         fake = SimpleNamespace(predict=predict)
-        monkeypatch.setitem(sys.modules, "faao_mav.vehicle.predict", fake)
+        monkeypatch.setitem(sys.modules, "faao_mav.autopilot.predict", fake)
         return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
     return runner

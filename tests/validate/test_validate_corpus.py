@@ -9,11 +9,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from faao_mav.autopilot import Vehicle
 from faao_mav.cli.validate import validate as command
 from faao_mav.errors import InfeasibleError, MissionFileError
 from faao_mav.mission.formats import read_mission, read_mission_file
 from faao_mav.validate import Level, validate
-from faao_mav.vehicle import Vehicle
 
 DATA = Path(__file__).parent.parent / "data"
 CORPUS = DATA / "validate"
@@ -61,7 +61,7 @@ def test_the_command_never_shows_a_traceback(
         raise InfeasibleError("no model")
 
     fake = SimpleNamespace(predict=predict)
-    monkeypatch.setitem(sys.modules, "faao_mav.vehicle.predict", fake)
+    monkeypatch.setitem(sys.modules, "faao_mav.autopilot.predict", fake)
     app = typer.Typer()
     app.command()(command)
     name, autopilot, kind, _, expected = row

@@ -17,11 +17,11 @@ from judged import (
     track,
 )
 
+from faao_mav.autopilot import Track
 from faao_mav.mission.item import Home
 from faao_mav.plan.energy import Battery
 from faao_mav.validate import Limits
 from faao_mav.validate.energy import EnergyUse
-from faao_mav.vehicle import Track
 
 
 def flight(*points: tuple[float, float, float]) -> Track:

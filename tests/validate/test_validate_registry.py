@@ -7,8 +7,8 @@ from itertools import chain
 import pytest
 from judged import VEHICLES, Given, at, flown, having, mission, raw, speed
 
+from faao_mav.autopilot import Vehicle
 from faao_mav.validate import RULES, Finding, Level, validate
-from faao_mav.vehicle import Vehicle
 
 MODULES = (
     *("ardupilot", "extent", "fences", "flyability", "items", "link", "px4", "storage", "upload"),

@@ -1,6 +1,6 @@
 """The rules, held to what ArduCopter, ArduPlane and PX4 made of missions (tests/data/verdicts).
 
-The verdicts are recorded by `tests/autopilots/record_verdicts.py`, which says what each means.
+The verdicts are recorded by `tests/real_autopilots/record_verdicts.py`, which says what each means.
 """
 
 import json
@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from judged import HOME
 
+from faao_mav.autopilot import Vehicle
 from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.validate import Finding, Level, validate
-from faao_mav.vehicle import Vehicle
 
 FOLDER = Path(__file__).parents[1] / "data" / "verdicts"
 VEHICLES = {

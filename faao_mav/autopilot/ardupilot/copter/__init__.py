@@ -1,0 +1,131 @@
+"""ArduCopter: what it is, and how it flies a mission."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+from faao_mav.arrays import Flags, Real
+from faao_mav.autopilot.ardupilot import (
+    ARDUPILOT,
+    HOME_OUTSIDE_FENCE,
+    at_fence,
+    needs_one_inclusion,
+    rally_rule,
+)
+from faao_mav.autopilot.ardupilot.copter.durations import StraightDurations
+from faao_mav.autopilot.ardupilot.copter.flight_model import ArduCopter as ArduCopter
+from faao_mav.autopilot.ardupilot.copter.leg import ArduCopterLegs as ArduCopterLegs
+from faao_mav.autopilot.ardupilot.copter.parameters import TABLE, ArduCopterLimits
+from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
+from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
+from faao_mav.autopilot.flight_path import VerticalProfile
+from faao_mav.autopilot.orbit import Orbit
+from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
+from faao_mav.autopilot.vehicle_type import Ceiling, VehicleType
+from faao_mav.mission.command import Command
+from faao_mav.mission.item import MissionItem
+from faao_mav.plan.body import ARDUCOPTER_BODY
+
+_FASTEST = 20.0
+"""The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""
+
+_CURVED_ACCELERATION = 4.0
+"""The recommended acceleration for corners and short legs at speed, m/s². Measured: about 130
+flights."""
+
+_JERK = 10.0
+"""The recommended jerk, m/s³. Measured: about 130 flights."""
+
+_LIVELIEST_JERK = 20.0
+"""The jerk, m/s³, for bends at speed, with the greatest acceleration: its documented maximum.
+Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5, with a jerk of 10
+4.4."""
+
+
+def _vertical(vehicle: ParameterValues) -> VerticalProfile:
+    climb = vehicle.value("climb_speed")
+    return VerticalProfile(
+        take_off_speed=climb,
+        climb_speed=climb,
+        descent_speed=vehicle.value("descent_speed"),
+        acceleration=vehicle.value("climb_acceleration"),
+        landing_speed=vehicle.value("landing_speed"),
+        landing_height=10.0,
+        return_height=vehicle.value("return_height"),
+        spool=3.5,  # measured: 100 m of take-off take 46 s
+    )
+
+
+def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
+    """Yield sets with the names of both generations: a vehicle takes those that it knows."""
+    speed = min(max_speed, _FASTEST)
+    accelerations = accelerations_to_try(
+        TABLE["acceleration"], max_acceleration, _CURVED_ACCELERATION
+    )
+    tried = [(acceleration, _JERK) for acceleration in accelerations]
+    for acceleration, jerk in (*tried, (accelerations[-1], _LIVELIEST_JERK)):
+        values = {"cruise_speed": speed, "acceleration": acceleration, "jerk": jerk}
+        old = {TABLE[key].oldest_name: (key, value) for key, value in values.items()}
+        new = {TABLE[key].newest_name: (key, value) for key, value in values.items()}
+        yield {name: TABLE[key].written(value, name) for name, (key, value) in (old | new).items()}
+
+
+def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
+    limits = ArduCopterLimits.from_vehicle(vehicle)
+    return (
+        Ceiling("max_acceleration", limits.lean, "lean_angle"),
+        Ceiling("max_acceleration", limits.acceleration, "acceleration"),
+    )
+
+
+def _leg_durations(vehicle: ParameterValues, lengths: Real, joined: Flags) -> StraightDurations:
+    return StraightDurations(lengths, joined, ArduCopterLegs.from_vehicle(vehicle).bounds)
+
+
+def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
+    """Return how a NAV_LOITER_TURNS is flown (AC_Circle), turning by half of the acceleration.
+
+    Negative radii turn left, and without one a negative CIRCLE_RATE does.
+    """
+    if item.command != Command.NAV_LOITER_TURNS:
+        return None
+    given, rate = item.params[2], vehicle.value("circle_rate")
+    told = math.isfinite(given) and given != 0
+    radius = abs(given) if told else vehicle.value("circle_radius")
+    turns = item.params[0] if math.isfinite(item.params[0]) else 0.0
+    if radius <= 0 or rate == 0:
+        return None
+    most = math.sqrt(vehicle.value("acceleration") / (2 * radius))
+    return Orbit(
+        radius,
+        given > 0 if told else rate > 0,
+        turns=max(turns, 0.0),
+        turn_rate=min(abs(rate), most),
+    )
+
+
+ARDUCOPTER = VehicleType(
+    family=ARDUPILOT,
+    kind="copter",
+    name="ArduCopter",
+    mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
+    hovers=True,
+    parameters=TABLE,
+    dialect=COPTER_DIALECT,
+    vertical=_vertical,
+    whole_second_holds=True,
+    fastest=_FASTEST,
+    fence_needs_one_inclusion=needs_one_inclusion,
+    home_outside_fence=HOME_OUTSIDE_FENCE,
+    at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
+    failsafes=COPTER_FAILSAFES,
+    legs=ArduCopterLegs.from_vehicle,
+    flight_model=ArduCopter.from_vehicle,
+    recommended=lambda *limits: tuple(_recommended(*limits)),
+    ceilings=_ceilings,
+    body=ARDUCOPTER_BODY,
+    models_wind=True,
+    leg_durations=_leg_durations,
+    orbits=_orbit,
+    rally=rally_rule,
+)
+"""ArduCopter 4.1 and later; measured on 4.7."""

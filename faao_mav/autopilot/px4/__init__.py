@@ -1,0 +1,206 @@
+"""PX4: what its multicopters and planes are, and how a multicopter flies a mission.
+
+The flight model is PX4's own chain: `detour` says where it heads on a leg, `guidance` asks for a
+velocity, `smoothing` follows it within jerk and acceleration, `response` is the aircraft that
+follows the smoothed trajectory, `step` takes these a moment further, and `simulation` flies leg
+after leg. Source: behaviour of PX4's modules navigator and flight_mode_manager (FlightTaskAuto) and
+its library motion_planning, read at several revisions about 1.16; controller gains are PX4's
+documented defaults. Flights: PX4 1.16 in simulation.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from math import cos
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.orbit import RallyRule, plane_orbit
+from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
+from faao_mav.autopilot.px4.dialect import DIALECT
+from faao_mav.autopilot.px4.failsafes import FAILSAFES
+from faao_mav.autopilot.px4.flight_model import Px4 as Px4
+from faao_mav.autopilot.px4.guidance import corner_speed
+from faao_mav.autopilot.px4.legs import Px4Legs as Px4Legs
+from faao_mav.autopilot.px4.parameters import COPTER_TABLE, PLANE_TABLE
+from faao_mav.autopilot.vehicle_type import (
+    OVERSPEED,
+    AutopilotFamily,
+    Ceiling,
+    FenceAction,
+    FenceResponse,
+    VehicleType,
+    lean_acceleration,
+)
+from faao_mav.plan.body import PX4_BODY
+
+_HOME_OUTSIDE_FENCE = "PX4 says so (Geofence invalid), and flies the mission all the same"
+"""Measured on PX4 1.16.1."""
+
+PX4 = AutopilotFamily(
+    key="px4",
+    name="PX4",
+    mav_autopilot=12,
+    parameter_suffix=".params",
+    parameter_style="qgroundcontrol",
+    parameter_prefixes=("MPC_", "NAV_", "COM_", "EKF2_"),
+)
+"""PX4, whatever it flies."""
+
+_AT_FENCE: tuple[FenceAction, ...] = ("nothing", "report", "hold", "return", "terminate", "land")
+"""What each value of GF_ACTION means."""
+
+
+def _at_fence(vehicle: ParameterValues) -> FenceResponse:
+    number = int(vehicle.value("fence_action"))
+    action = _AT_FENCE[number] if number in range(len(_AT_FENCE)) else "nothing"
+    response = FenceResponse(action, "fence_action")
+    return response if response.keeps else replace(response, set_to="2 (hold) or 3 (return)")
+
+
+_FENCE_CHECKS = 0.2
+"""The time between two looks at the fence, s. PX4's own."""
+
+
+def _fence_ahead(vehicle: ParameterValues, speed: Real) -> Real:
+    """How far it is to a stop, by PX4's own estimate; 0 unless GF_PREDICT is set.
+
+    The aircraft is taken to accelerate as hard as it may: that ends by the jerk j, then it brakes.
+    At v = 7 m/s and defaults that is 33.6 m; in simulation it broke off 31.9 m before the fence.
+    """
+    if vehicle.value("fence_predict") == 0:
+        return 0 * speed
+    limit, jerk = vehicle.value("acceleration"), vehicle.value("jerk")
+    first = max(limit, vehicle.value("greatest_acceleration"))
+    fastest = speed + first**2 / (2 * jerk)
+    to_fastest = speed * first / jerk + first**3 / (3 * jerk**2)
+    peak = np.minimum(limit, np.sqrt(fastest * jerk))  # of the acceleration while it brakes
+    braking = fastest / 2 * (fastest / peak + peak / jerk)
+    return np.asarray(to_fastest + braking + _FENCE_CHECKS * speed)
+
+
+_FASTEST = 20.0
+"""The greatest speed that it can be told, m/s (the documented maximum of MPC_XY_CRUISE)."""
+
+_CURVED_ACCELERATION = 5.0
+"""The recommended acceleration for corners and short legs at speed, m/s². Measured: about 130
+flights."""
+
+_JERK = 20.0
+"""The recommended jerk, m/s³. Measured: about 130 flights."""
+
+_ERROR_LIMIT, _HEIGHT_RADIUS = 10.0, 3.0
+"""The recommended MPC_XY_ERR_MAX and NAV_MC_ALT_RAD, m. Measured: with the default of 2 m progress
+slows whenever the aircraft lags; with that of 0.8 m it missed waypoints for their altitude."""
+
+
+def _vertical(vehicle: ParameterValues) -> VerticalProfile:
+    return VerticalProfile(
+        take_off_speed=vehicle.value("take_off_speed"),
+        climb_speed=vehicle.value("climb_speed"),
+        descent_speed=vehicle.value("descent_speed"),
+        acceleration=vehicle.value("climb_acceleration"),
+        landing_speed=vehicle.value("landing_speed"),
+        landing_height=10.0,
+        return_height=vehicle.value("return_height"),
+        spool=2.0,
+    )
+
+
+def _plane_vertical(vehicle: ParameterValues) -> VerticalProfile:
+    """A return of a plane circles over home; what the rest would be is not known."""
+    climb = vehicle.value("climb_speed")
+    height = vehicle.value("return_height")
+    return VerticalProfile(climb, climb, climb, 1.0, climb, 0.0, height, 0.0, lands_on_return=False)
+
+
+def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # noqa: ARG001
+    return Px4.from_vehicle(vehicle)
+
+
+def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
+    speed = min(max_speed, _FASTEST)
+    top = round(min(OVERSPEED * speed, _FASTEST), 2)
+    table = COPTER_TABLE
+    for acceleration in accelerations_to_try(
+        table["acceleration"], max_acceleration, _CURVED_ACCELERATION
+    ):
+        values = {
+            "cruise_speed": speed,
+            **({"max_speed": top} if top > table["max_speed"].default else {}),
+            "acceleration": acceleration,
+            "jerk": _JERK,
+            "error_limit": _ERROR_LIMIT,
+            "height_radius": _HEIGHT_RADIUS,
+        }
+        yield {table[key].newest_name: value for key, value in values.items()}
+
+
+def _corner_speed(vehicle: ParameterValues, turn: float) -> float:
+    keys = ("corner_gain", "acceleration", "acceptance_radius")
+    gain, acceleration, radius = (vehicle.value(key) for key in keys)
+    return corner_speed(gain, acceleration, radius, cos(turn))
+
+
+def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
+    lean = lean_acceleration(vehicle.value("lean_angle"))
+    return (
+        Ceiling("max_speed", vehicle.value("max_speed"), "max_speed"),
+        Ceiling("max_acceleration", lean, "lean_angle"),
+        Ceiling("max_acceleration", vehicle.value("acceleration"), "acceleration"),
+    )
+
+
+def _rally(vehicle: ParameterValues) -> RallyRule:
+    """Return where a return goes, by RTL_TYPE (PX4 1.16).
+
+    0 and 3 take the nearest of home and rally points, 1 a rally point before home, others (by a
+    mission's landing, or back along it) none.
+    """
+    kind = int(vehicle.value("return_type"))
+    return RallyRule(math.inf if kind in (0, 1, 3) else -1.0, home=kind != 1)
+
+
+PX4_COPTER = VehicleType(
+    family=PX4,
+    kind="copter",
+    name="PX4",
+    mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
+    hovers=True,
+    parameters=COPTER_TABLE,
+    dialect=DIALECT,
+    vertical=_vertical,
+    home_outside_fence=_HOME_OUTSIDE_FENCE,
+    at_fence=_at_fence,
+    failsafes=FAILSAFES,
+    fence_ahead=_fence_ahead,
+    fastest=_FASTEST,
+    legs=Px4Legs.from_vehicle,
+    flight_model=_model,
+    recommended=lambda *limits: tuple(_recommended(*limits)),
+    ceilings=_ceilings,
+    body=PX4_BODY,
+    corner_speed=_corner_speed,
+    rally=_rally,
+)
+"""A multicopter with PX4 1.16."""
+
+PX4_PLANE = VehicleType(
+    family=PX4,
+    kind="plane",
+    name="PX4",
+    mav_types=(1,),
+    hovers=False,
+    parameters=PLANE_TABLE,
+    dialect=DIALECT,
+    vertical=_plane_vertical,
+    home_outside_fence=_HOME_OUTSIDE_FENCE,
+    at_fence=_at_fence,
+    failsafes=FAILSAFES,
+    unmodelled="there is no model of how PX4 flies planes",
+    orbits=plane_orbit,
+    rally=_rally,
+)
+"""A plane with PX4 1.16: its missions can be validated, not made."""

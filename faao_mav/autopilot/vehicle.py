@@ -1,0 +1,224 @@
+"""A vehicle: its type and the parameters that it is given; and the types that are known.
+
+Another vehicle is one folder with one `VehicleType` and one call of `register`.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.vehicle_type import AutopilotFamily, LegLimits, VehicleType
+from faao_mav.errors import InputError
+from faao_mav.plan import Plan
+from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.plan.body import Body, CopterBody
+
+_TYPES: dict[tuple[str, str], VehicleType] = {}
+"""The vehicle types that are known, by the names of autopilot and type."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """A vehicle, named as in a plan, with parameters by its autopilot's names and in its units.
+
+    Parameters that are not given have the autopilot's defaults. `source` says where the parameters
+    come from, for error messages. `body` is its airframe, None for the simulator's. Methods raise
+    `InputError` for a parameter that is no use, naming source, parameter and value; `usable`
+    returns the vehicle without those.
+
+    >>> vehicle = Vehicle("ardupilot", "copter", {"WPNAV_ACCEL": 400})
+    >>> vehicle.value("acceleration"), vehicle.value("jerk")
+    (4.0, 1.0)
+    >>> vehicle.name_of("acceleration"), vehicle.name_of("jerk")
+    ('WPNAV_ACCEL', 'WP_JERK, its default')
+    """
+
+    autopilot: str = "ardupilot"
+    kind: str = "copter"
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    source: str = "parameters"
+    body: Body | None = None
+
+    @property
+    def airframe(self) -> Body | None:
+        """The airframe that its flights are predicted with; None where its type has none."""
+        return self.body or self.type.body
+
+    @property
+    def assumption(self) -> str:
+        """What its predicted flights rest on, in words."""
+        if self.airframe is None:
+            return "by a model after the autopilot's documents, not compared with recorded flights"
+        if self.body is not None:
+            return "assumes the airframe of vehicle.body"
+        return "assumes the simulator's airframe (vehicle.body: sitl)"
+
+    @property
+    def top_airspeed(self) -> float:
+        """The airspeed, m/s, at which drag takes all of its lean limit; infinite if none does."""
+        body = self.airframe
+        if not isinstance(body, CopterBody) or "lean_angle" not in self.type.parameters:
+            return math.inf
+        return body.top_airspeed(self.value("lean_angle"))
+
+    @property
+    def type(self) -> VehicleType:
+        """What is true of all vehicles of this autopilot and type."""
+        return vehicle_type(self.autopilot, self.kind)
+
+    def value(self, key: str) -> float:
+        """Return the value of the parameter `key` in its table's unit: given, else the default."""
+        parameter = self.type.parameters[key]
+        name = parameter.name_in(self.parameters)
+        value = parameter.default
+        if name is not None:
+            number = self.parameters[name]
+            if not parameter.is_usable(number, name):
+                raise InputError(
+                    f"{self.source}: {name}: {number:g}; give {parameter.expected(name)}"
+                )
+            value = parameter.names[name] * number
+        if parameter.capped_by:
+            value = min(value, self.value(parameter.capped_by))
+        return value
+
+    def name_of(self, key: str) -> str:
+        """Return the name by which `value(key)` is set, and that it is a default if it is."""
+        parameter = self.type.parameters[key]
+        name = parameter.name_in(self.parameters)
+        if parameter.capped_by:
+            cap = self.type.parameters[parameter.capped_by]
+            own = (
+                parameter.default if name is None else parameter.names[name] * self.parameters[name]
+            )
+            if self.value(cap.key) < own:
+                return self.name_of(cap.key)
+        return name if name is not None else f"{parameter.newest_name}, its default"
+
+    def having(self, key: str, value: float) -> "Vehicle":
+        """Return the vehicle with another `value` of the parameter `key`, at least its least."""
+        parameter = self.type.parameters[key]
+        name = parameter.newest_name
+        number = max(value, parameter.least) / parameter.names[name]
+        return replace(self, parameters={**self.parameters, name: number})
+
+    def usable(self) -> "Vehicle":
+        """Return the vehicle without the parameters that are no use: those have their defaults."""
+        useless = {
+            name
+            for parameter in self.type.parameters.values()
+            for name in parameter.names
+            if name in self.parameters and not parameter.is_usable(self.parameters[name], name)
+        }
+        kept = {name: x for name, x in self.parameters.items() if name not in useless}
+        return replace(self, parameters=kept) if useless else self
+
+    @property
+    def legs(self) -> LegLimits:
+        """How it flies a leg between two waypoints."""
+        if self.type.legs is None:
+            raise InputError(f"missions are not made for {self.type.name}")
+        return self.type.legs(self)
+
+    @property
+    def vertical(self) -> VerticalProfile:
+        """How it takes off, climbs, returns and lands."""
+        return self.type.vertical(self)
+
+    def flight_model(self, latitude: float | None = None) -> FlightModel:
+        """Return how it flies a mission at `latitude`, degrees.
+
+        Raises `InputError` if there is no model of its type.
+        """
+        if self.type.flight_model is None:
+            raise InputError(self.type.unmodelled)
+        return self.type.flight_model(self, latitude)
+
+
+def vehicle_of(plan: Plan) -> Vehicle:
+    """Return the vehicle of `plan`."""
+    given = plan.vehicle
+    source = f"{plan.source}: vehicle.parameters"
+    return Vehicle(given.autopilot, given.type, given.parameters, source, given.body)
+
+
+def candidates(plan: Plan) -> tuple[Mapping[str, float], ...]:
+    """Return the sets of parameters to try for `plan`, the gentlest first.
+
+    An autopilot whose ramps take longer than the plan's falls behind at every one; one that turns
+    corners at a crawl does so in every curve. Few parameters decide that. One empty set if the plan
+    keeps its vehicle's own, or if they are tuned on each vehicle, as an aeroplane's are.
+    """
+    given = plan.vehicle
+    if plan.mission.parameters == "keep":
+        return ({},)
+    recommended = vehicle_type(given.autopilot, given.type).recommended
+    return tuple(recommended(given.max_speed, given.max_acceleration))
+
+
+def register(vehicle_type: VehicleType) -> VehicleType:
+    """Make `vehicle_type` known by its names, to plans as well, and return it."""
+    key = (vehicle_type.family.key, vehicle_type.kind)
+    _TYPES[key] = vehicle_type
+    planned = vehicle_type.legs is not None and vehicle_type.flight_model is not None
+    one = vehicle_type.fence_needs_one_inclusion(Vehicle(*key))
+    lean = vehicle_type.parameters.get("lean_angle")
+    VEHICLES[key] = PlannedVehicle(
+        *key, vehicle_type.hovers, planned, one, vehicle_type.body, lean.default if lean else 0.0
+    )
+    return vehicle_type
+
+
+def unregister(vehicle_type: VehicleType) -> None:
+    """Forget `vehicle_type`."""
+    key = (vehicle_type.family.key, vehicle_type.kind)
+    del _TYPES[key], VEHICLES[key]
+
+
+def vehicle_types() -> tuple[VehicleType, ...]:
+    """Return every vehicle type that is known."""
+    return tuple(_TYPES.values())
+
+
+def vehicle_type(autopilot: str, kind: str) -> VehicleType:
+    """Return the vehicle type with these names.
+
+    Raises `InputError` that lists the known names if there is none.
+
+    >>> vehicle_type("ardupilot", "copter").name
+    'ArduCopter'
+    """
+    try:
+        return _TYPES[autopilot, kind]
+    except KeyError:
+        known = ", ".join(" ".join(key) for key in _TYPES)
+        raise InputError(f"vehicle: {autopilot} {kind} is unknown; known are {known}") from None
+
+
+def families() -> tuple[AutopilotFamily, ...]:
+    """Return every autopilot that is known."""
+    return tuple({each.family.key: each.family for each in _TYPES.values()}.values())
+
+
+def family(autopilot: str) -> AutopilotFamily:
+    """Return the autopilot with this name; raises `InputError` if there is none."""
+    for each in families():
+        if each.key == autopilot:
+            return each
+    known = ", ".join(each.key for each in families())
+    raise InputError(f"autopilot: {autopilot} is unknown; known are {known}")
+
+
+def kind_by_number(mav_type: int | None) -> str | None:
+    """Return the type of vehicle with this MAV_TYPE number, whatever its autopilot, or None."""
+    return next((each.kind for each in _TYPES.values() if mav_type in each.mav_types), None)
+
+
+def vehicle_type_by_numbers(mav_autopilot: int, mav_type: int | None) -> VehicleType | None:
+    """Return the vehicle type with these MAV_AUTOPILOT and MAV_TYPE numbers.
+
+    Without a MAV_TYPE it is the first type of that autopilot; None for numbers that are unknown.
+    """
+    own = (each for each in _TYPES.values() if each.family.mav_autopilot == mav_autopilot)
+    return next((each for each in own if mav_type is None or mav_type in each.mav_types), None)

@@ -1,0 +1,100 @@
+"""Watch the flight of a mission that a vehicle holds: compare it with the file, then follow it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Unpack
+
+from faao_mav.errors import LinkError
+from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.seen import Flight, read_held
+from faao_mav.fly.telemetry import POSITION_RATE, Ending, Samples
+from faao_mav.fly.watch import Watch
+from faao_mav.validate.rule import Finding
+from faao_mav.wire.client import LinkOptions, Session
+from faao_mav.wire.discover import FoundVehicle
+from faao_mav.wire.machine import Script
+from faao_mav.wire.protocol import MissionType
+from faao_mav.wire.transfer.verify import Difference, compare
+from faao_mav.wire.wire_items import wire_items
+
+
+@dataclass(frozen=True, slots=True)
+class FlightReport:
+    """How a flight was watched: `ending` is None where the vehicle does not hold the mission.
+
+    `differences` are what it holds instead; `samples` is where it was. `relay_start` is when the
+    clock of a streamed plan read 0, s on the vehicle's. `findings` is what the gate before the
+    flight found last.
+    """
+
+    vehicle: FoundVehicle
+    differences: tuple[Difference, ...]
+    ending: Ending | None
+    samples: Samples
+    relay_start: float | None = None
+    findings: tuple[Finding, ...] = ()
+
+
+def fly(
+    flight: Flight,
+    connection: str,
+    *,
+    arm: bool = False,
+    lands: bool = True,
+    elsewhere: bool = False,
+    untimed: bool = False,
+    rate: float = POSITION_RATE,
+    watching: Callable[[Watch], object] = lambda _: None,
+    **options: Unpack[LinkOptions],
+) -> FlightReport:
+    """Watch the vehicle at `connection` fly the mission of `flight`, which it has to hold already.
+
+    It is armed and started only with `arm`, and only where `preflight` finds no error; for
+    `elsewhere` and `untimed` see there. `lands` tells whether the flight ends on the ground: see
+    `Watch`. A flight that is `streamed` is armed and flown by setpoints, `rate` a second, instead
+    of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
+    that it is asked for. `watching` is called after every step. `options` are those of
+    `LinkOptions`. Raises `LinkError` if there is no such vehicle, none that is known here, or its
+    mission cannot be read.
+    """
+    with Session(connection, options) as session:
+        vehicle, peer = session.found, session.peer
+        if peer.vehicle is None:
+            raise LinkError(f"{connection}: {vehicle}: flights of it are not watched")
+        lists = {part: wire_items(flight.mission, part, peer.vehicle) for part in MissionType}
+        # A vehicle that flies already is not judged, and not kept busy.
+        judged = arm or flight.streamed or not vehicle.armed
+        asked = tuple(part for part in MissionType if judged or lists[part])
+        held = session.run(Script(read_held(peer, session.timeouts, asked, parameters=judged)))
+        for part, outcome in held.missing.items():
+            if lists[part]:
+                raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
+        wrong = tuple(
+            each
+            for part in MissionType
+            if lists[part]
+            for each in compare(lists[part], held.lists.get(part, ()), part, peer.vehicle)
+            if each.kind == "wrong"
+        )
+        if wrong:
+            return FlightReport(vehicle, wrong, None, Samples())
+        ready = Readiness(
+            flight, held, peer, elsewhere=elsewhere, untimed=untimed, timeouts=session.timeouts
+        )
+        if flight.streamed and flight.solution is not None:
+            from faao_mav.fly.stream import Stream
+
+            watch: Watch = Stream(peer, flight.solution, ready, rate=rate)
+        else:
+            rows = held.lists[MissionType.MISSION]
+            gate = ready if judged else None
+            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate, readiness=gate)
+        watch.seen.strangers = session.link.strangers
+        try:
+            ending = session.link.watch(
+                watch, lambda: watching(watch), beats=arm or flight.streamed
+            )
+        except LinkError as error:
+            ending = Ending("lost", str(error))
+    found = watch.findings or ()
+    return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start, found)

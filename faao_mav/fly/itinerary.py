@@ -1,0 +1,231 @@
+"""A streamed flight from the ground to its end: which setpoint is due where and when."""
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InfeasibleError
+from faao_mav.fly.course import Course, Setpoint
+from faao_mav.fly.gate import CLIMB, CLIMB_ACCELERATION, NEAR, Gate
+from faao_mav.optimizer.solution import Solution
+from faao_mav.schedule.transit import way_between, way_home, way_out
+
+Part: TypeAlias = Literal["take-off", "out", "relay", "back", "over"]
+
+_BELOW, _LEVEL = 1.0, 0.5
+"""A take-off is over from so many metres below the planned height on, when it climbs slower than so
+many m/s. Chosen."""
+
+_SETTLED, _STILL, _REST = 0.6, 0.15, 2.0
+"""The relay flight begins when the aircraft has been within so many metres of its beginning, slower
+than so many m/s, for so many seconds: it then keeps the plan to 0.4 m rms in the simulator."""
+
+_UNSETTLED = 30.0
+"""Seconds at the end of a way after which the next part begins all the same, as in gusts; chosen.
+"""
+
+_LEAST = 1.0
+"""The least speed, m/s, of ways by setpoints, whatever the wind; chosen."""
+
+_GROUNDED = 0.5
+"""Metres above home below which an aircraft is not taken off again; chosen."""
+
+_STUCK = 60.0
+"""Seconds of waiting for an aircraft that does not follow, after which it is given up; chosen."""
+
+_WAYS = 10
+"""How many ways it is led in a row, none of which it follows to its end, until it is given up;
+chosen."""
+
+_MEETINGS, _MISSED = 4, 2.0
+"""How many places to meet the plan at are tried before its end is; and seconds after which the plan
+has passed by one. Chosen."""
+
+
+class Itinerary:
+    """The flight of `solution` in parts, on the vehicle's clock.
+
+    The parts: "take-off", which a vehicle that `takes_off` does by itself; "out" around the fence
+    to where the relay flight begins, and a rest there; "relay"; "back" around the fence, until the
+    way home is straight; "over". `relay_start` is when the plan's clock reads 0, None before that.
+
+    All but the relay flight waits for the aircraft. One that `gate` does not let follow its part is
+    led to it on a way of its own: up or down to the plan's height, and inside the fence to where
+    the part ends, or meets the plan, which goes on meanwhile. `told` is what happens, in words;
+    `trouble` why it cannot be led, None while it can.
+
+    Raises `InfeasibleError` where the flight would leave the plan's fence.
+    """
+
+    def __init__(self, solution: Solution, gate: Gate, *, takes_off: bool) -> None:
+        plan = solution.plan
+        self._plan, self._gate, self._takes_off = plan, gate, takes_off
+        self.relay = Course.of(solution)
+        self._first = self.relay.p[0]
+        self._corners, back = (
+            np.column_stack([way, np.full(len(way), plan.flight.altitude)])
+            for way in (
+                way_out(plan, self._first[:2]),
+                way_home(plan, self.relay.p[-1, :2]),
+            )
+        )
+        self._back = self._way(self.relay.p[-1], *back)
+        path = np.vstack([np.zeros(3), *self._corners, self.relay.p, *back])[:, :2]
+        if plan.keep_in is not None and not plan.keep_in.covers_path(path):
+            raise InfeasibleError(
+                "the streamed flight leaves the plan's fence where it speeds up before flight.start"
+                " or slows down after flight.end: give hover for both, or move them"
+            )
+        self.part: Part = "take-off"
+        self.relay_start: float | None = None
+        self.told: list[str] = []
+        self.trouble: str | None = None
+        self._time: float | None = None
+        self._ways, self._meets = 0, 0.0
+        self._follow(None)
+
+    def setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
+        """Return where an aircraft at `place` (3,), m, is to be at `t`, s; None: nowhere.
+
+        `velocity` (3,) is in m/s; all are east, north and up of the plan's origin.
+        """
+        passed = 0.0 if self._time is None else t - self._time
+        self._time = t
+        height = self._plan.flight.altitude
+        match self.part:
+            case "take-off" if not self._takes_off or (
+                place[2] > height - _BELOW and abs(velocity[2]) < _LEVEL
+            ):
+                self.part = "out"
+                self._follow(self._level_way(place, *self._corners, self._first))
+            case "take-off":
+                return None
+            case "out" if self._rests(t, place, velocity):
+                self.part, self.relay_start = "relay", t - self.relay.begin
+                self._follow(None)
+            case "relay" if t - self._start >= max(self.relay.end, self._plan.flight.duration):
+                self.part = "back"
+                self._follow(self._back)
+            case "back" if self._arrived is not None and (
+                np.linalg.norm(place - self._back.p[-1]) <= NEAR or self._is_late(t)
+            ):
+                self.part = "over"
+        return self._on_plan(t, place) or self._on_way(t, place, passed)
+
+    @property
+    def _start(self) -> float:
+        assert self.relay_start is not None
+        return self.relay_start
+
+    def _follow(self, way: Course | None) -> None:
+        """Follow `way` from its beginning; None: the plan."""
+        self._course, self._gone = way, 0.0
+        self._settled: float | None = None
+        self._arrived: float | None = None
+        self._waits_since: float | None = None
+
+    def _on_plan(self, t: float, place: Real) -> Setpoint | None:
+        """Return where the plan has it at `t`; None where it may not be sent there."""
+        if self.part != "relay":
+            return None
+        setpoint = self.relay.at(t - self._start)
+        if not self._gate.passes(t, place, setpoint):
+            return None
+        if self._course is not None:
+            self.told.append("it is on its plan again")
+            self._follow(None)
+        self._ways = 0
+        return setpoint
+
+    def _on_way(self, t: float, place: Real, passed: float) -> Setpoint | None:
+        """Return where it is to be on its way, `passed` s later than before, or on a new one."""
+        way, ahead = self._course, self._gone + passed
+        missed = self.part == "relay" and t - self._start > self._meets + _MISSED
+        if way is not None and not missed:
+            if self._gate.passes(t, place, way.at(ahead)):
+                self._gone, self._waits_since = ahead, None
+                if ahead >= way.end and self._arrived is None:
+                    self._arrived, self._ways = t, 0
+                return way.at(ahead)
+            waiting = Setpoint(way.at(self._gone).position, np.zeros(3), np.zeros(3))
+            if self._waits_since is None:
+                self._waits_since = t
+            if t < self._waits_since + _STUCK and self._gate.passes(t, place, waiting):
+                return waiting
+        return self._led(t, place)
+
+    def _led(self, t: float, place: Real) -> Setpoint | None:
+        """Return the beginning of a new way to the present part; None, and why, without one."""
+        stuck = self._waits_since is not None and t >= self._waits_since + _STUCK
+        if place[2] < _GROUNDED:
+            self.trouble = "it has come down to the ground"
+        elif stuck or self._ways >= _WAYS:
+            self.trouble = "it does not follow"
+        elif (way := self._leading(t, place)) is None:
+            self.trouble = "no way inside the fence leads it back"
+        else:
+            if not self._ways:
+                self.told.append("it is off its flight, and led back to it")
+            self._ways += 1
+            self._follow(way)
+            return way.at(0.0)
+        return None
+
+    def _leading(self, t: float, place: Real) -> Course | None:
+        """Return a way to the end of the part, or to the plan, that is there no sooner; or None."""
+        if self.part != "relay":
+            return self._way_to(place, self._first if self.part == "out" else self._back.p[-1])
+        now = t - self._start
+        times = np.arange(now, self.relay.end, 1.0)
+        east, north = (np.interp(times, self.relay.t, self.relay.p[:, axis]) for axis in (0, 1))
+        soonest = now + np.hypot(east - place[0], north - place[1]) / self._speed
+        for _ in range(_MEETINGS):
+            if not (soonest <= times).any():
+                break
+            self._meets = float(times[np.argmax(soonest <= times)])
+            way = self._way_to(place, self.relay.at(self._meets).position)
+            if way is None or now + way.end <= self._meets:
+                return way
+            soonest = np.maximum(soonest, now + way.end)
+        self._meets = self.relay.end
+        return self._way_to(place, self.relay.p[-1])
+
+    def _way_to(self, place: Real, end: Real) -> Course | None:
+        """Return the way from `place` (3,) to `end` (3,) inside the fence; None: there is none."""
+        corners = way_between(self._plan, place[:2], end[:2])
+        if corners is None:
+            return None
+        return self._level_way(place, *np.column_stack([corners, np.full(len(corners), end[2])]))
+
+    def _level_way(self, place: Real, *corners: Real) -> Course:
+        """Return the way from `place` up or down to the plan's height, and over `corners`."""
+        level = np.array([*place[:2], self._plan.flight.altitude])
+        leg = np.array([place, level])
+        climb = Course.through(leg, speed=CLIMB, acceleration=CLIMB_ACCELERATION)
+        return climb.then(self._way(level, *corners))
+
+    def _way(self, *places: Real) -> Course:
+        acceleration = self._plan.vehicle.max_acceleration
+        return Course.through(np.array(places), speed=self._speed, acceleration=acceleration)
+
+    @property
+    def _speed(self) -> float:
+        """The speed of ways, m/s: the plan's, or what the wind leaves of it."""
+        plan = self._plan
+        calm = plan.max_airspeed - plan.site.wind.speed
+        return max(_LEAST, min(plan.vehicle.max_speed, calm))
+
+    def _rests(self, t: float, place: Real, velocity: Real) -> bool:
+        """Tell whether the aircraft rests where the relay flight begins, or takes too long."""
+        away, speed = np.linalg.norm(place - self._first), np.linalg.norm(velocity)
+        if self._arrived is None or away > _SETTLED or speed > _STILL:
+            self._settled = None
+        elif self._settled is None:
+            self._settled = t
+        rested = self._settled is not None and t >= self._settled + _REST
+        return rested or self._is_late(t)
+
+    def _is_late(self, t: float) -> bool:
+        """Tell whether it has been at the end of its way for longer than it should take."""
+        return self._arrived is not None and t >= self._arrived + _UNSETTLED

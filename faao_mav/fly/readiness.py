@@ -1,0 +1,132 @@
+"""The gate of one flight while its vehicle is watched: what was read of it, and is heard now."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from faao_mav.fly.preflight import preflight
+from faao_mav.fly.seen import Flight, Held, Seen, read_held
+from faao_mav.fly.telemetry import Telemetry
+from faao_mav.validate.rule import Finding, Level
+from faao_mav.wire.machine import Script
+from faao_mav.wire.messages import Envelope, Message, ParamValue
+from faao_mav.wire.parameters import setting_in
+from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer.pace import Timeouts
+
+_STEADY = 5
+"""Digits of a degree within which a vehicle counts as standing still: a metre. Chosen."""
+
+_LOOK = 5.0
+"""Seconds after which it is told what stands against a flight, though its place is not known.
+Chosen."""
+
+_READ_BEFORE = 15.0
+"""Seconds for which what was read of a vehicle counts: later it is read again before it is armed.
+Chosen."""
+
+
+class Readiness:
+    """The gate of `flight` by the vehicle of `peer`, of which `held` was read just before.
+
+    For `elsewhere` and `untimed` see `preflight`. `findings` is what it found last, None before.
+    Setup, once: `start`; then `on` with what arrives, `look` now and then, and before the vehicle
+    is armed `settle`, until it is up to date.
+    """
+
+    def __init__(
+        self,
+        flight: Flight,
+        held: Held,
+        peer: Peer,
+        *,
+        elsewhere: bool = False,
+        untimed: bool = False,
+        timeouts: Timeouts | None = None,
+    ) -> None:
+        self._flight, self._held, self._peer, self._timeouts = flight, held, peer, timeouts
+        self._options = {"elsewhere": elsewhere, "untimed": untimed}
+        self.findings: tuple[Finding, ...] | None = None
+        self._known: tuple[object, ...] = ()
+        self._reading: Script[Held] | None = None
+        self._read_at = self._begun = 0.0
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Those of `findings` for which nothing is armed."""
+        return tuple(each for each in self.findings or () if each.level is Level.ERROR)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The vehicle's parameters that a flight depends on, by name."""
+        return self._held.reading.values
+
+    @property
+    def deadline(self) -> float | None:
+        """When `settle` is due, None: not by itself."""
+        return None if self._reading is None else self._reading.deadline
+
+    def start(self, now: float) -> None:
+        """Begin: what is held was read just now."""
+        self._read_at = self._begun = now
+
+    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        """Take note of what arrived, also of a parameter that somebody sets, and answer it."""
+        message = envelope.message
+        if isinstance(message, ParamValue) and envelope.sender == self._peer.address:
+            reading, name = self._held.reading, message.param_id
+            found = setting_in(message, self._peer.vehicle)
+            if name in reading.settings and reading.settings[name] != found:
+                settings = {**reading.settings, name: found}
+                self._held = replace(self._held, reading=replace(reading, settings=settings))
+        return () if self._reading is None else self._take(self._reading.on(envelope, now), now)
+
+    def look(self, seen: Telemetry, now: float) -> None:
+        """Judge what is heard, once enough is, and again when its place is known."""
+        beat, placed = seen.heartbeat, seen.place is not None
+        if beat is None or beat.armed or (self.findings is not None and not self._misses(placed)):
+            return
+        if (placed and seen.status is not None) or now >= self._begun + _LOOK:
+            self._judge(seen)
+
+    def settle(self, seen: Telemetry, now: float) -> Sequence[Message] | None:
+        """Return what is to be sent until the gate is up to date; None: `findings` is.
+
+        What was read too long ago is read again; without fresh news of the vehicle it waits.
+        """
+        if self._reading is not None:
+            return self._take(self._reading.tick(now), now)
+        if not seen.is_fresh(now):
+            return ()
+        if now > self._read_at + _READ_BEFORE:
+            self._reading = Script(read_held(self._peer, self._timeouts))
+            return self._take(self._reading.start(now), now)
+        self._judge(seen)
+        return None
+
+    def cancel(self, now: float) -> Sequence[Message]:
+        """Read no more."""
+        return () if self._reading is None else self._reading.cancel(now)
+
+    def _misses(self, placed: bool) -> bool:
+        """Tell whether a place was missing that is known now."""
+        return placed and any(each.rule == "position-unknown" for each in self.errors)
+
+    def _take(self, out: Sequence[Message], now: float) -> Sequence[Message]:
+        """Return `out`, and take what the vehicle holds once it is read."""
+        if self._reading is not None and self._reading.outcome is not None:
+            self._held, self._reading, self._read_at = self._reading.outcome, None, now
+        return out
+
+    def _judge(self, seen: Telemetry) -> None:
+        beat, place, vehicle = seen.heartbeat, seen.place, self._peer.vehicle
+        assert beat is not None
+        assert vehicle is not None
+        stands = None
+        if place is not None:
+            spot = (round(place.latitude, _STEADY), round(place.longitude, _STEADY))
+            stands = (*spot, round(place.altitude))
+        state = (seen.battery, beat.armed, beat.custom_mode, seen.mode, tuple(seen.stations))
+        if (known := (self._held, stands, *state)) != self._known:
+            self._known = known
+            now = Seen(vehicle, self._held, place, *state)
+            self.findings = preflight(self._flight, now, **self._options)

@@ -1,0 +1,145 @@
+"""What is to be flown, and what a vehicle holds and shows before: what the gate compares."""
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from faao_mav.autopilot import Vehicle, VehicleType
+from faao_mav.autopilot.files import MadeFor
+from faao_mav.errors import InputError
+from faao_mav.mission.item import Home, Mission
+from faao_mav.wire.machine import Machine
+from faao_mav.wire.messages import HomePosition, WireItem
+from faao_mav.wire.modes import modes_of
+from faao_mav.wire.parameters import Names, Reading, ReadParameters
+from faao_mav.wire.protocol import HOME_POSITION, MavResult, MissionType
+from faao_mav.wire.questions import AskFor
+from faao_mav.wire.setpoints import setpoint_rules
+from faao_mav.wire.transfer.exchange import Outcome, Peer
+from faao_mav.wire.transfer.pace import Timeouts
+from faao_mav.wire.transfer.session import download_lists
+from faao_mav.wire.whereabouts import home_in
+from faao_mav.wire.wire_items import home_items, mission_of
+
+if TYPE_CHECKING:
+    from faao_mav.optimizer.solution import Solution
+    from faao_mav.schedule.conversion import Conversion
+
+_HAS_NONE = (MavResult.UNSUPPORTED, MavResult.INVALID)
+"""What a vehicle answers that has no such list at all."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Held:
+    """What a vehicle holds: `lists` as downloaded, its home row included, `reading` of parameters.
+
+    `missing` says why a list is not there; `home` is where it returns to, None where that is not
+    known.
+    """
+
+    lists: Mapping[MissionType, tuple[WireItem, ...]]
+    reading: Reading
+    missing: Mapping[MissionType, Outcome] = field(default_factory=dict)
+    home: Home | None = None
+
+    def rows(self, part: MissionType, vehicle: VehicleType) -> tuple[WireItem, ...]:
+        """Return the items of one list, without the home row; none where it was not read."""
+        return tuple(self.lists.get(part, ()))[home_items(vehicle, part) :]
+
+    def beside(self, mission: Mission, vehicle: VehicleType) -> Mission:
+        """Return `mission` with the fence and the rally points that are held."""
+        try:
+            held = mission_of(self.lists, vehicle)
+        except InputError:  # told as another list than the file's
+            return mission
+        return replace(mission, fence=held.fence, rally=held.rally)
+
+
+def names_of(vehicle: VehicleType) -> tuple[Names, ...]:
+    """Return the parameters of `vehicle` that a flight depends on, each with all of its names."""
+    flown = [tuple(each.names) for each in vehicle.parameters.values()]
+    decided = [(name,) for each in vehicle.failsafes for name in each.defaults]
+    rules = setpoint_rules(vehicle.family)
+    streamed = [(name,) for name in rules.defaults if modes_of(vehicle).guided is not None]
+    return tuple(dict.fromkeys([*flown, *decided, *streamed]))
+
+
+def read_held(
+    peer: Peer,
+    timeouts: Timeouts | None = None,
+    parts: Sequence[MissionType] = tuple(MissionType),
+    *,
+    parameters: bool = True,
+) -> Generator[Machine[Any], Any, "Held"]:
+    """Read what the vehicle of `peer`, which has to be one that is known, holds.
+
+    That are the lists `parts`, and with `parameters` these and its home.
+    """
+    assert peer.vehicle is not None
+    lists = yield from download_lists(parts, peer, timeouts)
+    if MissionType.MISSION in lists.missing or not parameters:
+        return Held(lists.items, Reading({}), lists.missing)
+    reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle), timeouts)
+    told: list[HomePosition] = yield AskFor(peer.address, HOME_POSITION, HomePosition)
+    try:
+        home = home_in(told[0]) if told else None
+    except InputError:
+        home = None
+    missing = {
+        part: outcome
+        for part, outcome in lists.missing.items()
+        if part is MissionType.MISSION or outcome.result not in _HAS_NONE
+    }
+    return Held(lists.items, reading, missing, home)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flight:
+    """What is to be flown: `mission`, or, `streamed`, the plan of `solution` by setpoints.
+
+    `vehicle` has the parameters that the mission is timed for, whose `source` says where they come
+    from; `made_for` says what is known of whom it was made for. A `solution` tells what the flight
+    is to deliver, and may tell what it takes of the battery.
+    """
+
+    mission: Mission
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    made_for: MadeFor = field(default_factory=MadeFor)
+    solution: "Solution | None" = None
+    streamed: bool = False
+
+    @classmethod
+    def planned(
+        cls, conversion: "Conversion", solution: "Solution", *, streamed: bool = False
+    ) -> "Flight":
+        """Return the flight of the mission that `solution` was made into."""
+        vehicle = conversion.vehicle
+        made_for = MadeFor(vehicle.autopilot, vehicle.kind, "as the plan says")
+        return cls(conversion.mission, vehicle, made_for, solution, streamed)
+
+    @property
+    def placed(self) -> Mission:
+        """The mission with the home that its flight counts from: of a stream, its plan's."""
+        if not self.streamed or self.solution is None:
+            return self.mission
+        origin = self.solution.plan.origin
+        home = Home(origin.latitude, origin.longitude, origin.elevation)
+        return replace(self.mission, home=home)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What was seen of a vehicle before its flight.
+
+    `place` is where it stands, metres above mean sea level; `battery` is in percent. None: not
+    known. `stations` are other ground stations on the link.
+    """
+
+    vehicle: VehicleType
+    held: Held
+    place: Home | None = None
+    battery: int | None = None
+    armed: bool = False
+    mode: int = -1
+    mode_name: str = "unknown"
+    stations: tuple[str, ...] = ()

@@ -1,0 +1,301 @@
+"""What a vehicle tells of its flight, and asking it for what it does not tell by itself."""
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from faao_mav.wire.messages import (
+    BatteryStatus,
+    CommandLong,
+    CurrentMode,
+    Envelope,
+    GlobalPositionInt,
+    Heartbeat,
+    LocalPositionNed,
+    Message,
+    MissionCurrent,
+    MissionItemInt,
+    MissionRequestInt,
+    Statustext,
+    SysStatus,
+    WireItem,
+)
+from faao_mav.wire.modes import mode_name
+from faao_mav.wire.protocol import (
+    CURRENT_ITEM,
+    CURRENT_MODE,
+    GROUND_STATION_TYPE,
+    LOCAL_POSITION,
+    POSITION,
+    SYSTEM_STATUS,
+    MavCommand,
+    MavSeverity,
+    MissionType,
+)
+from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer.verify import compare
+from faao_mav.wire.whereabouts import place_in
+from faao_mav.wire.wire_items import home_items
+
+if TYPE_CHECKING:
+    from faao_mav.fly.record import FlightRecord
+    from faao_mav.mission.item import Home
+
+Kind: TypeAlias = Literal[
+    "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
+]
+
+_SILENT = 5.0
+"""Seconds without any message after which the link counts as interrupted: five heartbeats."""
+
+POSITION_RATE = 5.0
+"""Positions a second that are asked for. Chosen: at 8 m/s they are 1.6 m apart."""
+
+_PERIODS = {SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
+"""Other messages that are needed, and the seconds between two of them that are asked for."""
+
+_SLOW = 1.5
+"""Positions that come with so many times the period between them are asked for again; chosen."""
+
+_MISSED = 3.0
+"""Seconds without one of these after which it is asked for again; chosen."""
+
+_FRESH = 3.0
+"""Seconds for which what was heard of the vehicle's state counts: three heartbeats. Chosen."""
+
+_READ_AGAIN = 1.0
+"""Seconds between two items that are read again; chosen."""
+
+_PROPULSION = (0, 1, 2)
+"""MAV_BATTERY_FUNCTION of batteries that keep the aircraft in the air: unknown, all, propulsion."""
+
+_BACK = 2000
+"""Milliseconds by which a vehicle's clock goes back when it has rebooted; less is a late packet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How watching ended: `kind`, and in words.
+
+    "finished": the mission was flown to its end; "taken over": not by the mission, the pilot or a
+    failsafe had the aircraft; "held": we asked it to hold; "left": interrupted by the user;
+    "refused": not armed or not started; "contested": another ground station is there, nothing was
+    started; "changed": the vehicle's mission is another one now; "rebooted"; "lost": nothing is
+    heard any more.
+    """
+
+    kind: Kind
+    text: str
+
+
+@dataclass(slots=True)
+class Samples:
+    """Where the vehicle was: its clock in s, degrees, metres above home."""
+
+    t: list[float] = field(default_factory=list)
+    latitude: list[float] = field(default_factory=list)
+    longitude: list[float] = field(default_factory=list)
+    height: list[float] = field(default_factory=list)
+
+    def record(self, first: int = 0) -> "FlightRecord":
+        """Return them as arrays, from number `first` on; -1: the last one alone."""
+        import numpy as np
+
+        from faao_mav.fly.record import FlightRecord
+
+        t, *place = (
+            np.array(column[first:])
+            for column in (self.t, self.latitude, self.longitude, self.height)
+        )
+        return FlightRecord(t, place[0], place[1], place[2])
+
+
+class Telemetry:
+    """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
+
+    Without `rows` its mission is not looked at. It is asked for `rate` positions a second.
+
+    Attributes:
+        told: what has happened, in words, one after the other.
+        said: what the vehicle said that is a warning or worse.
+        samples: where it was.
+        heartbeat, current, status, position: the last of these messages, None before the first.
+        knows_place: LOCAL_POSITION_NED was heard, which ArduPilot sends once its estimator knows
+            where it is.
+        wanted: the last CURRENT_MODE, None where the last heartbeat tells another mode.
+        place: where it is by `position`, metres above mean sea level; None: not known.
+        stations: other ground stations that were heard.
+        strangers: network addresses from which something else speaks in the vehicle's name.
+        ending: why nothing more can be known, None as long as something can.
+        patience: seconds without any message after which nothing more can be known.
+        last_heard: when the last message came, s.
+        is_silent: nothing was heard for so long that it was told.
+    """
+
+    def __init__(
+        self, peer: Peer, rows: Sequence[WireItem], patience: float, rate: float = POSITION_RATE
+    ) -> None:
+        self._peer, self._rows, self.patience = peer, tuple(rows), patience
+        self._home = home_items(peer.vehicle, MissionType.MISSION)
+        self.told: list[str] = []
+        self.said: list[str] = []
+        self.samples = Samples()
+        self.heartbeat: Heartbeat | None = None
+        self.current: MissionCurrent | None = None
+        self.status: SysStatus | None = None
+        self.knows_place = False
+        self.position: GlobalPositionInt | None = None
+        self.wanted: CurrentMode | None = None
+        self.place: Home | None = None
+        self._batteries: dict[int, int] = {}
+        self._beat_at = self._placed_at = float("-inf")
+        self._periods = {POSITION: 1 / rate} | _PERIODS
+        self.stations: set[str] = set()
+        self.strangers: Set[str] = set()
+        self.ending: Ending | None = None
+        self._next_item = self._home
+        self.start(0.0)
+
+    def start(self, now: float) -> None:
+        """Begin to listen."""
+        self.last_heard, self.is_silent = now, False
+        self._needed = dict.fromkeys(self._periods, now - _MISSED)
+        self._next_reading = now
+
+    def ask_for(self, kind: int, period: float) -> None:
+        """Ask for the messages of number `kind` too, `period` s apart, from `start` on."""
+        self._periods[kind] = period
+
+    @property
+    def items(self) -> int:
+        """How many items the mission has, home not counted."""
+        return len(self._rows) - self._home
+
+    @property
+    def mode(self) -> str:
+        """The vehicle's mode by its name."""
+        return "unknown" if self.heartbeat is None else mode_name(self.heartbeat)
+
+    def where(self, now: float) -> str:
+        """Return in words its mode and height, and how old that is."""
+        height = f", {self.samples.height[-1]:.0f} m above home" if self.samples.t else ""
+        old = f", {now - self.last_heard:.0f} s ago" if self.is_silent else ""
+        return f"in mode {self.mode}{height}{old}"
+
+    @property
+    def battery(self) -> int | None:
+        """What is left of the emptiest battery that keeps it in the air, percent."""
+        told = [*self._batteries.values()]
+        told += [] if self.status is None else [self.status.battery_remaining]
+        return min((each for each in told if each >= 0), default=None)
+
+    def is_fresh(self, now: float) -> bool:
+        """Tell whether mode, armed state and place were heard of in the last seconds."""
+        return now - min(self._beat_at, self._placed_at) <= _FRESH
+
+    @property
+    def row(self) -> int | None:
+        """The row of the mission file that is under way: row 0 is home, also for PX4."""
+        return None if self.current is None else self._row(self.current.seq)
+
+    def _row(self, seq: int) -> int:
+        return seq + 1 - self._home
+
+    def hear(self, envelope: Envelope, now: float) -> None:
+        """Take note of a message."""
+        sender, message = envelope.sender, envelope.message
+        if isinstance(message, Heartbeat) and message.type == GROUND_STATION_TYPE:
+            name = str(sender)
+            if name not in self.stations:
+                self.stations.add(name)
+                self.told.append(f"another ground station is on this link: {name}")
+        if sender != self._peer.address:
+            return
+        if self.is_silent:
+            self.told.append(f"heard again after {now - self.last_heard:.0f} s")
+        self.last_heard, self.is_silent = now, False
+        match message:
+            case BatteryStatus(battery_function=function) if function in _PROPULSION:
+                self._batteries[message.id] = message.battery_remaining
+            case Heartbeat():
+                self.heartbeat, self._beat_at = message, now
+                if self.wanted is not None and self.wanted.custom_mode != message.custom_mode:
+                    self.wanted = None
+            case CurrentMode():
+                self._needed[CURRENT_MODE], self.wanted = now, message
+                if self.heartbeat is not None:
+                    self.heartbeat = replace(self.heartbeat, custom_mode=message.custom_mode)
+            case GlobalPositionInt():
+                self._on_position(message, now)
+            case SysStatus():
+                self._needed[SYSTEM_STATUS], self.status = now, message
+            case LocalPositionNed():
+                self._needed[LOCAL_POSITION], self.knows_place = now, True
+            case MissionCurrent():
+                self._needed[CURRENT_ITEM] = now
+                self._on_current(message)
+            case MissionItemInt(mission_type=MissionType.MISSION, seq=seq, item=item):
+                self._on_item(seq, item)
+            case Statustext(severity=severity, text=text) if severity <= MavSeverity.WARNING:
+                self.said.append(text.strip())
+                self.told.append(f"the vehicle says: {text.strip()}")
+
+    def tick(self, now: float) -> Sequence[Message]:
+        """Take note of the time, and return what to ask the vehicle."""
+        quiet = now - self.last_heard
+        if quiet >= self.patience:
+            self._end("lost", f"nothing was heard for {quiet:.0f} s; the vehicle is on its own")
+        elif quiet >= _SILENT and not self.is_silent:
+            self.is_silent = True
+            self.told.append(f"nothing heard for {quiet:.0f} s")
+        out: list[Message] = []
+        for kind, period in self._periods.items():
+            if now - self._needed[kind] >= _MISSED:
+                self._needed[kind] = now
+                ask = (MavCommand.SET_INTERVAL, 0, float(kind), period * 1e6)
+                out.append(CommandLong(self._peer.address, *ask))
+        # ArduPilot has no number for its mission, and answers each request by itself: its mission
+        # is read again item by item, which disturbs nobody.
+        reads = self._peer.manners.any_request_order and self._rows
+        if reads and now >= self._next_reading:
+            self._next_reading = now + _READ_AGAIN
+            out.append(MissionRequestInt(self._peer.address, MissionType.MISSION, self._next_item))
+            beyond = self._next_item + 1
+            self._next_item = beyond if beyond < len(self._rows) else self._home
+        return out
+
+    def _on_position(self, message: GlobalPositionInt, now: float) -> None:
+        t, samples = message.time_boot_ms, self.samples
+        last = 1000 * samples.t[-1] if samples.t else -1.0
+        if t < last - _BACK:
+            self._end("rebooted", "the vehicle has rebooted: what it flies now is not known")
+        elif t > last and (place := place_in(message)) is not None:
+            self.position, self.place, self._placed_at = message, place, now
+            if t < last + 1000 * _SLOW * self._periods[POSITION]:
+                self._needed[POSITION] = now
+            samples.t.append(t / 1000)
+            samples.latitude.append(message.lat / 1e7)
+            samples.longitude.append(message.lon / 1e7)
+            samples.height.append(message.relative_alt / 1000)
+
+    def _on_current(self, message: MissionCurrent) -> None:
+        known, self.current = self.current or message, message
+        same = (message.total, message.mission_id) == (known.total, known.mission_id)
+        if self._rows and not (same and message.total in (0, self.items)):
+            self._end("changed", "the vehicle's mission is another one now than the file's")
+
+    def _on_item(self, seq: int, item: WireItem) -> None:
+        if not self._home <= seq < len(self._rows):
+            return
+        rows = (*self._rows[: self._home], self._rows[seq])
+        part = MissionType.MISSION
+        found = compare(rows, (*rows[:-1], item), part, self._peer.vehicle)
+        wrong = next((each for each in found if each.kind == "wrong"), None)
+        if wrong is not None:
+            row = f"item {self._row(seq)} of the vehicle's mission"
+            text = f"{wrong.field} is {wrong.found}, in the file {wrong.sent}"
+            self._end("changed", f"{row} is another one now: {text}")
+
+    def _end(self, kind: Kind, text: str) -> None:
+        if self.ending is None:
+            self.ending = Ending(kind, text)

@@ -1,0 +1,173 @@
+"""What is told of a flight while it is watched: to people, to programs, and to radios."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from faao_mav.autopilot import Track
+from faao_mav.fly.fly import FlightReport
+from faao_mav.fly.radio import RadioFeed, UdpRadio
+from faao_mav.fly.watch import Watch
+from faao_mav.optimizer.solution import Solution
+from faao_mav.validate.comparison import on_the_plans_clock
+from faao_mav.validate.flown import Debriefing, Line, Standing, plan_start, planned_line, standing
+from faao_mav.validate.rule import Finding, Level
+from faao_mav.validate.words import by_rule, count_of, line_of
+
+_PERIOD = 1.0
+"""Seconds between two lines, by the world's clock and by the vehicle's (a simulator's is quick)."""
+
+_NO_VOLTAGE = 65_535
+"""What SYS_STATUS says of a voltage that is not known."""
+
+
+def _predicted_line(solution: Solution, track: Track | None) -> Line:
+    return planned_line(solution) if track is None else Line(*on_the_plans_clock(solution, track))
+
+
+class Telling:
+    """Tells what a watch sees: called after its every step, it says what is new.
+
+    `say` is given events, {"note": text}, of which one has "findings" too, what the gate before the
+    flight found, and once a second how the flight stands: where the
+    vehicle is, and beside `solution`, of which `track` is the predicted flight, how late it is and
+    what it delivers. A `feed` tells radios the slots of `solution` meanwhile.
+    """
+
+    def __init__(
+        self,
+        solution: Solution | None,
+        track: Track | None,
+        feed: "Feed | None",
+        say: Callable[[dict[str, Any]], object],
+    ) -> None:
+        self._solution, self._feed, self._say = solution, feed, say
+        self._start: float | None = None
+        self._told, self._next, self._last = 0, 0.0, -_PERIOD
+        self._found: tuple[Finding, ...] | None = None
+        self._line = None if solution is None else _predicted_line(solution, track)
+
+    def __call__(self, watch: Watch) -> None:
+        """Say what has happened since the last call, and once a second how the flight stands."""
+        seen = watch.seen
+        if watch.findings is not self._found and watch.findings is not None:
+            self._found = watch.findings
+            told = [asdict(each) for each in self._found]
+            self._say({"note": findings_text(self._found), "findings": told})
+        for text in seen.told[self._told :]:
+            self._say({"note": text})
+        self._told = len(seen.told)
+        if self._feed is not None:
+            self._feed(watch, self._start if watch.relay_start is None else watch.relay_start)
+        now, t = time.monotonic(), seen.samples.t[-1] if seen.samples.t else float("-inf")
+        if seen.heartbeat is None or now < self._next or t < self._last + _PERIOD:
+            return
+        self._next, self._last = now + _PERIOD, t
+        stands = None
+        if watch.phase not in ("checking", "engaging", "arming", "starting", "waiting"):
+            stands = self._standing(watch)
+        self._say(_as_dict(watch, stands, self._solution))
+
+    def debriefing(self, report: FlightReport) -> Debriefing | None:
+        """Return what became of the plan; None without one, or without its flight."""
+        if self._solution is None or self._line is None or not report.samples.t:
+            return None
+        record = report.samples.record()
+        return record.debriefing(self._solution, self._line, report.relay_start)
+
+    def _standing(self, watch: Watch) -> Standing | None:
+        """Return how the flight stands; None before it has left w_I, and when it is over."""
+        if self._solution is None or self._line is None:
+            return None
+        flight = watch.seen.samples.record().line(self._solution)
+        start = watch.relay_start
+        if start is None and not watch.streams:
+            self._start = start = plan_start(self._solution, self._line, flight)
+        if start is None:
+            return None
+        stands = standing(self._solution, self._line, Line(flight.t - start, flight.w))
+        return None if stands.over else stands
+
+
+class Feed:
+    """Tells radios the slots that are reached: called after every step of a watch."""
+
+    def __init__(self, solution: Solution, to: str) -> None:
+        self._solution = solution
+        self._feed, self._radio = RadioFeed(solution), UdpRadio(to)
+        self._seen = 0
+        self.slots_per_second = 1 / solution.plan.flight.time_step
+
+    def __call__(self, watch: Watch, start: float | None) -> None:
+        """Send what is new; the plan's clock read 0 at `start`, s on the vehicle's."""
+        samples = watch.seen.samples
+        if len(samples.t) == self._seen:
+            return
+        self._seen = len(samples.t)
+        t = None if start is None else samples.t[-1] - start
+        place = samples.record(-1).line(self._solution).w[0]
+        if (line := self._feed.line(t, place)) is not None:
+            self._radio.send(line)
+
+
+def _as_dict(watch: Watch, stands: Standing | None, solution: Solution | None) -> dict[str, Any]:
+    """Return a line of `--json`: s, degrees, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
+    samples, status = watch.seen.samples, watch.seen.status
+    volts = status.voltage_battery if status is not None else _NO_VOLTAGE
+    percent = status.battery_remaining if status is not None else -1
+    told: dict[str, Any] = {
+        "t": samples.t[-1],
+        "phase": watch.phase,
+        "mode": watch.seen.mode,
+        "item": watch.seen.row,
+        "latitude": samples.latitude[-1],
+        "longitude": samples.longitude[-1],
+        "height": samples.height[-1],
+        "volts": None if volts == _NO_VOLTAGE else volts / 1000,
+        "battery": None if percent < 0 else percent,
+        "plan": asdict(stands) if stands is not None else None,
+    }
+    if stands is not None and solution is not None:
+        for name in ("delivered", "expected"):
+            rate = told["plan"][name] / solution.plan.flight.duration
+            told["plan"][f"{name}_mbytes"] = solution.plan.megabytes(rate)
+    return told
+
+
+def findings_text(findings: Sequence[Finding]) -> str:
+    """Return what the gate before a flight found, for people: a line for each rule."""
+    counts = ", ".join(count_of(findings, level) for level in Level)
+    lines = [f"before the flight: {counts}"]
+    for group in by_rule(findings):
+        action = f"; to do: {group[0].action}" if group[0].action else ""
+        lines.append(f"   {line_of(group)}{action}")
+    return "\n".join(lines)
+
+
+HEADER = "    plan  mode      item   height     late  off plan  off path  to UAV  to user  arrived"
+"""What the columns of `as_text` are: the plan's clock, s, the mode, the item under way, m above
+home, how late against the plan, how far from it now and from its path, both hops' rates now,
+bit/s/Hz, and what is delivered so far of what is expected by the end."""
+
+
+def as_text(told: dict[str, Any]) -> str:
+    """Return what a `Telling` says for people: an event, or a row of the table under `HEADER`."""
+    if "note" in told:
+        return f"-- {told['note']}"
+    plan, item = told["plan"], "?" if told["item"] is None else told["item"]
+    clock = f"{plan['time']:6.1f} s" if plan is not None else f"{'-':>8}"
+    parts = [clock, f"{told['mode']:<8}", f"{item:>4}", f"{told['height']:5.1f} m"]
+    if plan is not None:
+        unit, suffix = ("bit/Hz", "") if plan["expected_mbytes"] is None else ("MB", "_mbytes")
+        parts += [
+            f"{plan['late']:+5.1f} s",
+            f"{plan['apart']:6.1f} m",
+            f"{plan['astray']:6.1f} m",
+            f"{plan['I_U']:6.2f}",
+            f"{plan['I_G']:7.2f}",
+            f"{plan['delivered' + suffix]:.1f} of {plan['expected' + suffix]:.1f} {unit}",
+        ]
+    if told["battery"] is not None:
+        parts.append(f"battery {told['battery']} %")
+    return "  ".join(parts)

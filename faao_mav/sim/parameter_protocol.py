@@ -1,0 +1,74 @@
+"""The parameters that ground stations ask a mock autopilot for, and its answers."""
+
+import math
+from collections.abc import Mapping
+
+from faao_mav.autopilot import VehicleType
+from faao_mav.autopilot.px4 import PX4
+from faao_mav.wire.messages import (
+    Message,
+    ParamRequestList,
+    ParamRequestRead,
+    ParamSet,
+    ParamValue,
+)
+from faao_mav.wire.parameters import Setting, on_the_wire, setting_in
+
+_INT32, _REAL32 = 6, 9
+"""MAV_PARAM_TYPE of whole numbers, and of single-precision ones."""
+
+
+class ParameterServer:
+    """Parameters of `vehicle` by name, in the autopilot's own units.
+
+    Those whose default is an `int` are whole numbers; `given` are other values than the `defaults`.
+    Of the names that one parameter has it knows the oldest that is given.
+    PX4 sends whole numbers as their bits, and sets nothing that comes with another type than it
+    has.
+    """
+
+    def __init__(
+        self, defaults: Mapping[str, float], given: Mapping[str, float], vehicle: VehicleType
+    ) -> None:
+        self._vehicle = vehicle
+        self._whole = {name for name, x in {**given, **defaults}.items() if isinstance(x, int)}
+        self.values = {
+            name: int(value) if name in self._whole else value
+            for name, value in {**defaults, **given}.items()
+        }
+        for parameter in vehicle.parameters.values():
+            known = [name for name in parameter.names if name in given]
+            for other in {*parameter.names} - {*known[-1:]} if known else ():
+                self.values.pop(other, None)
+
+    def on(self, message: ParamRequestList | ParamRequestRead | ParamSet) -> list[Message]:
+        """Return the answer to a request; unknown names get none."""
+        match message:
+            case ParamRequestList():
+                return [self._value(name) for name in self.values]
+            case ParamRequestRead(param_index=-1, param_id=name):
+                return [self._value(name)] if name in self.values else []
+            case ParamRequestRead(param_index=index):
+                names = list(self.values)
+                return [self._value(names[index])] if 0 <= index < len(names) else []
+            case ParamSet(param_id=name):
+                return self._set(message) if name in self.values else []
+        return []
+
+    def _set(self, message: ParamSet) -> list[Message]:
+        name, kind = message.param_id, message.param_type
+        if self._vehicle.family == PX4 and kind != self._kind(name):
+            return []
+        told = ParamValue(name, message.param_value, kind, 0, 0)
+        value = setting_in(told, self._vehicle).value
+        if math.isfinite(value):
+            self.values[name] = int(value) if name in self._whole else value
+        return [self._value(name)]
+
+    def _kind(self, name: str) -> int:
+        return _INT32 if name in self._whole else _REAL32
+
+    def _value(self, name: str) -> ParamValue:
+        index, kind = list(self.values).index(name), self._kind(name)
+        number = on_the_wire(Setting(float(self.values[name]), kind), self._vehicle)
+        return ParamValue(name, number, kind, len(self.values), index)

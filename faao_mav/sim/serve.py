@@ -1,0 +1,54 @@
+"""The mock autopilot on a real endpoint."""
+
+import time
+from collections.abc import Callable
+
+from faao_mav.autopilot import Track, Vehicle
+from faao_mav.mission.item import Mission
+from faao_mav.sim.mock_autopilot import Fly, MockAutopilot
+from faao_mav.wire.faults import Faults, FaultyTransport
+from faao_mav.wire.link import WireLink
+from faao_mav.wire.signing import Signing
+from faao_mav.wire.transport import Transport, open_transport
+
+_PATIENCE = 0.1
+"""Seconds between two looks at whether to stop."""
+
+
+def serve(
+    mock: MockAutopilot,
+    connection: str | Transport,
+    *,
+    faults: Faults | None = None,
+    key: bytes | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    observe: Callable[[MockAutopilot], object] | None = None,
+) -> None:
+    """Run `mock` at `connection` until `stop()`; `observe` is shown it after every step.
+
+    Raises `LinkError` or `InputError` if the connection cannot be opened.
+    """
+    transport = open_transport(connection) if isinstance(connection, str) else connection
+    if faults is not None:
+        transport = FaultyTransport(transport, faults)
+    signing = None if key is None else Signing(key)
+    with WireLink(transport, signing=signing, address=mock.address) as link:
+        link.begin(mock)
+        while not stop():
+            link.step(mock, time.monotonic() + _PATIENCE)
+            if observe is not None:
+                observe(mock)
+
+
+def predicted(wind: tuple[float, float] = (0.0, 0.0)) -> Fly:
+    """Return how vehicles fly missions, by the flight prediction with their parameters.
+
+    `wind` is in m/s east and north.
+    """
+
+    def fly(mission: Mission, vehicle: Vehicle) -> Track:
+        from faao_mav.autopilot.predict import predict  # most uses of a mock never fly
+
+        return predict(mission, vehicle, wind=wind)
+
+    return fly

@@ -1,0 +1,411 @@
+"""What a ground station does: upload and verify, download, clear."""
+
+import secrets
+import time
+import warnings
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeAlias, TypedDict, TypeVar, Unpack
+
+from faao_mav.autopilot.ardupilot import ARDUPILOT
+from faao_mav.autopilot.files import MadeFor, addressee_mistake
+from faao_mav.errors import InputError, LinkError
+from faao_mav.mission.item import Mission
+from faao_mav.wire.discover import SETTLE, Discovery, FoundVehicle, choose
+from faao_mav.wire.link import Observe, WireLink
+from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.messages import GlobalPositionInt, HomePosition
+from faao_mav.wire.parameters import Change, Names, check_settable, set_parameters
+from faao_mav.wire.protocol import (
+    GROUND_STATION,
+    HOME_POSITION,
+    POSITION,
+    Address,
+    MavResult,
+    MissionType,
+)
+from faao_mav.wire.questions import AskAlive, AskFor
+from faao_mav.wire.signing import Verdict, read_signing, remember
+from faao_mav.wire.transfer.exchange import Outcome, Peer
+from faao_mav.wire.transfer.pace import Timeouts
+from faao_mav.wire.transfer.session import (
+    PartReport,
+    clear_lists,
+    download_lists,
+    explain,
+    upload_parts,
+    what_is_left,
+)
+from faao_mav.wire.transport import parse_connection
+from faao_mav.wire.whereabouts import Whereabouts, home_in, place_in
+from faao_mav.wire.wire_items import mission_of, wire_items
+
+T = TypeVar("T")
+
+_ABSENT = (MavResult.UNSUPPORTED, MavResult.INVALID)
+"""What a vehicle answers that has no such list at all."""
+
+_PASSED_OVER: dict[Verdict, str] = {
+    "forged": "packets come that are signed with another key than the one in {key}",
+    "old": (
+        "packets come that are signed with this key, but not later than those before: of a "
+        "recording, or of a vehicle whose clock is behind and that does not hear this station"
+    ),
+    "unsigned": (
+        "packets come that are not signed: set the vehicle up to sign them with this key, or leave "
+        "out --signing-key"
+    ),
+}
+"""Why no vehicle is heard where packets come that have to be signed."""
+
+
+class LinkOptions(TypedDict, total=False):
+    """How to talk to a vehicle: what `upload`, `download` and `clear` have in common.
+
+    `system` and `component` choose among several autopilots; the vehicle is found by its heartbeat
+    within `wait` seconds (10). `own_system` is the number to speak as, for a vehicle that takes
+    orders of a certain one only (`GROUND_STATION` has the usual one). `log` is a `.tlog` file to
+    write, `signing_key` a file with the key for signed packets, beside which the time of the last
+    one is kept. `observe` is told what is going on, how much of it is done, and of how much;
+    `note`, in words, what goes wrong beside it: a log that ends early, packets that do not count.
+    Without `note` that is a Python warning.
+    """
+
+    system: int | None
+    component: int | None
+    own_system: int | None
+    log: Path | None
+    signing_key: Path | None
+    wait: float
+    timeouts: Timeouts | None
+    observe: Observe | None
+    note: Callable[[str], object] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Holdings:
+    """What a vehicle holds, as far as it could be read; `problems` say why a list is missing.
+
+    A missing fence or missing rally points are among `Mission.unread`.
+    """
+
+    vehicle: FoundVehicle
+    mission: Mission
+    problems: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class UploadReport:
+    """What became of an upload: one report for each list, `seconds` in all.
+
+    `stands` is where the vehicle stands beside the mission, None where it does not tell; `changes`
+    are the parameters that were set.
+    """
+
+    vehicle: FoundVehicle
+    parts: tuple[PartReport, ...]
+    seconds: float
+    problems: tuple[str, ...]
+    stands: Whereabouts | None = None
+    changes: tuple[Change, ...] = ()
+
+    @property
+    def verified(self) -> bool:
+        """Whether everything is on the vehicle, whole and equal."""
+        return not self.problems
+
+
+def upload(
+    mission: Mission,
+    connection: str,
+    *,
+    allow_armed: bool = False,
+    made_for: MadeFor | None = None,
+    parameters: Mapping[str, float] | None = None,
+    clear_rest: bool = False,
+    **options: Unpack[LinkOptions],
+) -> UploadReport:
+    """Put `mission` on the vehicle at `connection`, read it back and compare.
+
+    Fence and rally points follow where the mission has them; else those of the vehicle stay as
+    they are, or are cleared with `clear_rest`. With `parameters`, which have to be a mission's own
+    (see `check_settable`), these are set and read back before. Nothing is armed or started.
+    `options` are those of `LinkOptions`.
+
+    Raises `LinkError` if there is no such vehicle, it is another one than the mission was
+    `made_for`, it is armed (replacing the mission in flight needs `allow_armed`), or the link
+    breaks; `InputError` for what cannot be sent.
+    """
+    if not mission.items:
+        raise InputError("upload: the mission has no items; clear the vehicle's instead")
+    check_settable(parameters or (), "parameters")
+
+    def job(session: "Session") -> "Work":
+        vehicle = session.peer.vehicle
+        if made_for is not None and vehicle is not None:
+            mistake = addressee_mistake(made_for, vehicle)
+            if mistake is not None:
+                raise LinkError(f"{connection}: {mistake}: nothing is uploaded")
+        return _upload(mission, session.peer, session.timeouts, parameters or {}, clear_rest)
+
+    return _change(connection, mission, allow_armed, job, options)
+
+
+def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
+    """Return the mission, fence and rally points of the vehicle at `connection`.
+
+    See `holdings`; raises `LinkError` where one of them does not come whole, too.
+    """
+    found = holdings(connection, **options)
+    if found.problems:
+        raise LinkError(f"{connection}: {found.problems[0]}")
+    return found.mission
+
+
+def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
+    """Return the vehicle at `connection`, and the mission, fence and rally points that it holds.
+
+    Home is ArduPilot's item 0, or what PX4 says when asked. `options` are those of `LinkOptions`.
+    Raises `LinkError` if there is no such vehicle or its mission does not come whole; a vehicle
+    that has no fence or rally points at all is one that has none stored.
+    """
+    with Session(connection, options, knocks=True) as session:
+        peer = session.peer
+        lists = session.run(Script(download_lists(tuple(MissionType), peer, session.timeouts)))
+        missing = {
+            part: session.not_read(part, outcome)
+            for part, outcome in lists.missing.items()
+            if part is MissionType.MISSION or outcome.result not in _ABSENT
+        }
+        if MissionType.MISSION in missing:
+            raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
+        try:
+            mission = mission_of(lists.items, peer.vehicle)
+            if mission.home is None:
+                told = session.run(AskFor(peer.address, HOME_POSITION, HomePosition))
+                mission = replace(mission, home=home_in(told[0]) if told else None)
+        except InputError as error:
+            raise LinkError(
+                f"{connection}: what the vehicle holds is no mission: {error}"
+            ) from None
+    mission = replace(mission, unread=tuple(part.title for part in missing))
+    return Holdings(session.found, mission, tuple(missing.values()))
+
+
+def clear(
+    connection: str,
+    *,
+    types: Sequence[MissionType] = tuple(MissionType),
+    allow_armed: bool = False,
+    **options: Unpack[LinkOptions],
+) -> UploadReport:
+    """Clear lists of the vehicle at `connection` and read back that they are empty.
+
+    Arguments and errors as in `upload`.
+    """
+
+    def job(session: "Session") -> "Work":
+        return _Done((yield from clear_lists(types, session.peer, session.timeouts)))
+
+    return _change(connection, Mission(()), allow_armed, job, options)
+
+
+@dataclass(frozen=True, slots=True)
+class _Done:
+    """What a change of a vehicle's lists and parameters led to."""
+
+    reports: tuple[PartReport, ...]
+    stands: Whereabouts | None = None
+    changes: tuple[Change, ...] = ()
+    problems: tuple[str, ...] = ()
+
+
+Work: TypeAlias = Generator[Machine[Any], Any, _Done]
+"""What changes a vehicle, for a `Script`."""
+
+
+class Session:
+    """A link to the one vehicle that has been found; to be used in a `with` statement.
+
+    With `knocks` one is woken up that waits for a heartbeat on a serial line: see `Discovery`.
+    """
+
+    def __init__(self, connection: str, options: LinkOptions, *, knocks: bool = False) -> None:
+        if unknown := set(options) - set(LinkOptions.__annotations__):
+            known = ", ".join(LinkOptions.__annotations__)
+            raise TypeError(f"there is no option {min(unknown)!r}; expected some of {known}")
+        self._observe, self._note = options.get("observe"), options.get("note") or warnings.warn
+        self._key_file = options.get("signing_key")
+        self.timeouts = options.get("timeouts") or Timeouts()
+        self.started = time.monotonic()
+        self._signing = None if self._key_file is None else read_signing(self._key_file)
+        own = options.get("own_system") or GROUND_STATION.system
+        self.link = WireLink(
+            connection,
+            signing=self._signing,
+            log=options.get("log"),
+            address=Address(own, GROUND_STATION.component),
+            note=self._note,
+        )
+        try:
+            names = options.get("system"), options.get("component")
+            wait = options.get("wait", 10.0)
+            discovery = Discovery(
+                *names,
+                patience=wait,
+                settle=SETTLE if self.link.listens else None,
+                boot=self.timeouts.boot,
+                knocks=knocks and parse_connection(connection).kind == "serial",
+            )
+            found = self.run(discovery)
+            if self._signing is not None and not found:
+                self._check_heard(connection)
+            others = discovery.others.values()
+            self.found = choose(found, connection, *names, wait, others)
+            self.link.bind(self.found.address, *self.found.origins)
+            if self._signing is not None or self.link.speaks_old(self.found.address):
+                self._check_alive(connection)
+        except BaseException:
+            self.close()
+            raise
+        self.peer = Peer(self.link.address, self.found.address, self.found.vehicle)
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the link; say what became of the log, keep the time of the last packet."""
+        self.link.close()
+        if self._signing is not None and self._key_file is not None:
+            remember(self._key_file, self._signing)
+        if self.link.log is not None and self.link.log.failure is not None:
+            self._note(self.link.log.failure)
+
+    def _check_alive(self, connection: str) -> None:
+        """Raise `LinkError` where nobody answers what no recording can, nor who cannot read it."""
+        number, patience = secrets.randbits(62), self.timeouts.silence
+        if self.run(AskAlive(self.found.address, number, patience)):
+            return
+        why = (
+            "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "
+            "or a recording of it?"
+        )
+        if self.link.speaks_old(self.found.address):
+            why = (
+                "it speaks MAVLink 1 only, and does not answer MAVLink 2: set its port to MAVLink "
+                "2 (ArduPilot: SERIALn_PROTOCOL 2; PX4: MAV_PROTO_VER 2)"
+            )
+        raise LinkError(f"{connection}: {self.found}: {why}")
+
+    def _check_heard(self, connection: str) -> None:
+        """Raise `LinkError` where packets come that this key does not vouch for."""
+        for verdict, text in _PASSED_OVER.items():
+            if verdict in self.link.heard:
+                raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
+
+    def not_read(self, part: MissionType, outcome: Outcome) -> str:
+        """Return in words why a list was not read."""
+        why = "the vehicle stopped answering"
+        if outcome.result is not None:
+            why = f"refused: {self.peer.manners.meaning(outcome.result)}"
+        elif part is MissionType.MISSION:
+            why += self.why_silent()
+        return f"{part.title}: not read: {why}"
+
+    def why_silent(self) -> str:
+        """Return why the vehicle may never answer, in words; "" where nothing hints at it."""
+        if self._signing is None and "signed" in self.link.heard:
+            return "; it signs its packets, and may want them signed: --signing-key"
+        if self.found.family == ARDUPILOT:
+            only = "only MAV_GCS_SYSID (SYSID_ENFORCE, MAV_OPTIONS)"
+            return f"; where it takes orders of {only}, give that number: --own-system"
+        return ""
+
+    def run(self, machine: Machine[T]) -> T:
+        """Run `machine` to its end and return the outcome."""
+        return self.link.run(machine, self._observe)
+
+
+def _upload(
+    mission: Mission,
+    peer: Peer,
+    timeouts: Timeouts,
+    parameters: Mapping[str, float],
+    clear_rest: bool,
+) -> Work:
+    """Find out where the vehicle stands, set `parameters`, and upload what `mission` has."""
+    lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
+    told = yield AskFor(peer.address, POSITION, GlobalPositionInt)
+    place = place_in(told[0]) if told else None
+    stands = None if place is None else Whereabouts.of(place, mission)
+    changes, unknown = yield from set_parameters(parameters, peer, timeouts)
+    if problems := _parameter_problems(changes, unknown):
+        return _Done((), stands, changes, problems)
+    given = [(part, items) for part, items in lists.items() if items]
+    reports = yield from upload_parts(given, peer, timeouts)
+    if clear_rest and all(each.verified for each in reports):
+        rest = [part for part, items in lists.items() if not items]
+        cleared = yield from clear_lists(rest, peer, timeouts)
+        reports += tuple(each for each in cleared if each.result not in _ABSENT)
+    return _Done(reports, stands, changes)
+
+
+def _change(
+    connection: str,
+    mission: Mission,
+    allow_armed: bool,
+    job: Callable[[Session], Work],
+    options: LinkOptions,
+) -> UploadReport:
+    """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
+    with Session(connection, options, knocks=True) as session:
+        if session.found.armed and not allow_armed:
+            raise LinkError(
+                f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
+                "disarm it, or allow it (--allow-armed)"
+            )
+        session.peer = replace(session.peer, may_be_armed=allow_armed)
+        work = Script(job(session))
+        try:
+            done = session.run(work)
+        except LinkError as error:
+            raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
+        seconds = time.monotonic() - session.started
+        told = _problems(done.reports, session.peer, mission, session.why_silent())
+        problems = done.problems + told
+    return UploadReport(session.found, done.reports, seconds, problems, done.stands, done.changes)
+
+
+def _parameter_problems(changes: Sequence[Change], unknown: Sequence[Names]) -> tuple[str, ...]:
+    """Return in words which parameters were not set, for which nothing else is changed either."""
+    if unknown:
+        names = ", ".join(" or ".join(each) for each in unknown)
+        return (f"parameters: the vehicle has no {names}: nothing was set or uploaded",)
+    failed = [str(each) for each in changes if not each.made]
+    if failed:
+        return (f"parameters: not set: {', '.join(failed)}: the mission was not uploaded",)
+    return ()
+
+
+def _problems(
+    reports: Sequence[PartReport], peer: Peer, mission: Mission, why_silent: str
+) -> tuple[str, ...]:
+    limit = 0 if peer.vehicle is None else peer.vehicle.dialect.items.sure
+
+    def describe(item: int) -> str:
+        if item < 0:
+            return "the home row"
+        if item >= len(mission.items):
+            return f"item {item}"
+        return f"item {item} (command {mission.items[item].command})"
+
+    failed = [report for report in reports if not report.verified]
+    return tuple(
+        explain(report, peer, limit, describe if report.part is MissionType.MISSION else str)
+        + (why_silent if report.verdict == "silent" and report.item is None else "")
+        for report in failed
+    )

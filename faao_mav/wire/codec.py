@@ -1,0 +1,192 @@
+"""Packets to messages and back, by pymavlink, always MAVLink 2."""
+
+import math
+import re
+from dataclasses import dataclass, fields
+from typing import Any
+
+from faao_mav.wire import messages
+from faao_mav.wire.framing import Framer, is_signed, payload_of, sender_of, version_of
+from faao_mav.wire.messages import (
+    Envelope,
+    Message,
+    MissionItemInt,
+    MissionRequestInt,
+    WireItem,
+)
+from faao_mav.wire.protocol import Address
+from faao_mav.wire.signing import Signing, Verdict
+from faao_mav.wire.wire_items import coordinate_scale
+
+_KINDS: dict[str, type[Message]] = {
+    re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).upper(): kind
+    for kind in vars(messages).values()
+    if isinstance(kind, type) and issubclass(kind, Message)
+}
+"""Message types by their MAVLink names."""
+
+_NAMES = {kind: name for name, kind in _KINDS.items()}
+_LEGACY: dict[str, type[Message]] = {
+    "MISSION_REQUEST": MissionRequestInt,
+    "MISSION_ITEM": MissionItemInt,
+}
+"""Predecessors with the same fields."""
+
+_BEYOND = ("opaque_id", "mission_id")
+"""Fields behind those that the dialects of pymavlink know, of 4 bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """One valid packet: its bytes, and what it says if that is known here."""
+
+    raw: bytes
+    envelope: Envelope | None
+
+
+class Codec:
+    """One end of a link: writes packets as `address`, reads those of others.
+
+    With `signing` packets are signed, and those passed over that are not, or that are old. `heard`
+    has what the messages known here were, whether or not they were passed over: without `signing`,
+    "signed" and "unsigned" are about whether there is a signature. `versions` has the latest
+    MAVLink that each sender has spoken, 1 or 2.
+    """
+
+    def __init__(self, address: Address, signing: Signing | None = None) -> None:
+        from pymavlink.dialects.v20 import development  # common, and CURRENT_MODE
+
+        self.address, self._signing = address, signing
+        self.heard: set[Verdict] = set()
+        self.versions: dict[Address, int] = {}
+        self._dialect: Any = development
+        self._reader: Any = development.MAVLink(None)
+        self._mav: Any = development.MAVLink(None, address.system, address.component)
+        if signing is not None:
+            self._mav.signing.secret_key = signing.key
+            self._mav.signing.sign_outgoing = True
+
+    def pack(self, message: Message) -> bytes:
+        """Return the packet that carries `message`."""
+        if self._signing is not None:
+            self._mav.signing.timestamp = self._signing.next_tick()
+        packet = self._encode(message)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        return packet
+
+    def parse(self, data: bytes, origin: str = "") -> list[Packet]:
+        """Return the packets in `data`, from `origin`; damaged or cut off ones are passed over."""
+        found = [self._parse_one(packet, origin) for packet in Framer().feed(data)]
+        return [packet for packet in found if packet is not None]
+
+    def _parse_one(self, raw: bytes, origin: str) -> Packet | None:
+        try:
+            message = self._reader.decode(bytearray(raw))
+        except self._dialect.MAVError:
+            return None
+        sender = sender_of(raw)
+        verdict, envelope = self._judge(raw), self._envelope(message, sender, origin)
+        self.versions[sender] = max(version_of(raw), self.versions.get(sender, 1))
+        if envelope is not None:
+            self.heard.add(verdict)
+        if self._signing is not None and verdict != "signed":
+            return None
+        return Packet(raw, envelope)
+
+    def _judge(self, raw: bytes) -> Verdict:
+        if self._signing is not None:
+            return self._signing.judge(raw, sender_of(raw))
+        return "signed" if is_signed(raw) else "unsigned"
+
+    def _encode(self, message: Message) -> bytes:
+        name = _NAMES[type(message)]
+        values = {field.name: getattr(message, field.name) for field in fields(message)}
+        if values.pop("legacy", False):
+            name = name.removesuffix("_INT")
+        if (target := values.pop("target", None)) is not None:
+            values |= {"target_system": target.system, "target_component": target.component}
+        if (item := values.pop("item", None)) is not None:
+            values |= _item_values(item, exact=name.endswith("_INT"))
+        kind = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
+        packet = kind(*_arguments(kind, values))
+        beyond = next((values[field] for field in _BEYOND if field in values), None)
+        if beyond is None:
+            return bytes(packet.pack(self._mav))
+        known = kind.unpacker.pack(*(values.get(field, 0) for field in kind.ordered_fieldnames))
+        payload = known + beyond.to_bytes(4, "little")
+        return bytes(packet._pack(self._mav, packet.crc_extra, payload))
+
+    def _envelope(self, packet: Any, sender: Address, origin: str) -> Envelope | None:
+        name = packet.get_type()
+        kind = _KINDS.get(name) or _LEGACY.get(name)
+        if kind is None:
+            return None
+        legacy = name in _LEGACY
+        values: dict[str, Any] = {}
+        for field in fields(kind):
+            match field.name:
+                case "target":
+                    values["target"] = Address(packet.target_system, packet.target_component)
+                case "opaque_id" | "mission_id" as beyond:
+                    values[beyond] = _number_beyond(packet)
+                case "legacy":
+                    values["legacy"] = legacy
+                case "item":
+                    values["item"] = _wire_item(packet, exact=not legacy)
+                    if values["item"] is None:
+                        return None
+                case plain:
+                    values[plain] = _text_or_number(getattr(packet, plain))
+        return Envelope(sender, kind(**values), origin)
+
+
+def _item_values(item: WireItem, *, exact: bool) -> dict[str, Any]:
+    """Return the fields of MISSION_ITEM_INT, or of MISSION_ITEM (not `exact`), for `item`."""
+    values = {field.name: getattr(item, field.name) for field in fields(item)}
+    values |= {f"param{number}": value for number, value in enumerate(item.params, start=1)}
+    if exact:
+        return values
+    scale = coordinate_scale(item.frame)
+    return values | {"x": item.x / scale, "y": item.y / scale}
+
+
+def _wire_item(packet: Any, *, exact: bool) -> WireItem | None:
+    """Return the item that MISSION_ITEM_INT, or MISSION_ITEM (not `exact`), carries."""
+    x, y = packet.x, packet.y
+    if not exact:
+        if not (math.isfinite(x) and math.isfinite(y)):
+            return None
+        scale = coordinate_scale(packet.frame)
+        x, y = round(x * scale), round(y * scale)
+    params = (packet.param1, packet.param2, packet.param3, packet.param4)
+    flags = (packet.current, packet.autocontinue)
+    return WireItem(packet.command, packet.frame, params, x, y, packet.z, *flags)
+
+
+def _arguments(kind: Any, known: dict[str, Any]) -> list[Any]:
+    """Return the arguments of pymavlink's `kind`; fields that are not `known` are zeros."""
+    sizes = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
+    arguments = []
+    for name, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
+        value = known.get(name)
+        if isinstance(value, str):
+            value = value.encode("ascii", "replace")[: sizes[name]]
+        elif value is None:
+            value = 0
+            if sizes[name]:
+                value = b"" if type_name == "char" else [0] * sizes[name]
+        arguments.append(value)
+    return arguments
+
+
+def _text_or_number(value: Any) -> Any:
+    """Return a field as it is, or its text on one line: what moves a terminal's cursor is blank."""
+    if not isinstance(value, str):
+        return value
+    return "".join(letter if letter.isprintable() else " " for letter in value)
+
+
+def _number_beyond(packet: Any) -> int:
+    """Return the next field of a packet that is longer than pymavlink knows it, or 0."""
+    tail = payload_of(bytes(packet.get_msgbuf()))[packet.unpacker.size :][:4]
+    return int.from_bytes(tail, "little")

@@ -1,0 +1,250 @@
+"""A machine on a real link, and the log of what passes it."""
+
+import os
+import secrets
+import struct
+import time
+from collections.abc import Callable, Sequence, Set
+from io import FileIO
+from pathlib import Path
+from typing import TypeAlias, TypeVar
+
+from faao_mav.errors import HangUp, InputError, LinkError
+from faao_mav.files import check_writable
+from faao_mav.wire.codec import Codec, Packet
+from faao_mav.wire.framing import message_id, sender_of
+from faao_mav.wire.machine import Machine
+from faao_mav.wire.messages import Heartbeat, Message
+from faao_mav.wire.protocol import (
+    GROUND_STATION,
+    GROUND_STATION_TYPE,
+    NO_AUTOPILOT,
+    Address,
+    MavState,
+)
+from faao_mav.wire.signing import Signing, Verdict
+from faao_mav.wire.transport import Origin, Transport, open_transport
+
+T = TypeVar("T")
+
+Observe: TypeAlias = Callable[[str, int, int], object]
+"""Told what is going on, how much of it is done, and of how much."""
+
+_BEAT = 1.0
+"""Seconds between two heartbeats, what the MAVLink guide asks for, and between two looks at how
+far a machine is."""
+
+_SHOWN = 3
+"""Other origins of the vehicle's packets that are told, at most; chosen."""
+
+_SETUP_SIGNING = 256
+"""The number of the message SETUP_SIGNING."""
+
+
+class Tlog:
+    """A `.tlog` file: before each packet the time since 1970, 8 bytes, big-endian, microseconds.
+
+    MAVProxy and Mission Planner write and read such files. Only its owner may read this one, and it
+    holds no SETUP_SIGNING, which carries a key. An older log of the name stays until the first
+    packet is received. `failure` says why the log ends early, if it does: the link goes on.
+
+    Raises `InputError` if the file cannot be written, or by its name is none of these: a slip of
+    the pen must not replace the mission.
+    """
+
+    def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
+        if path.suffix != ".tlog":
+            raise InputError(f"--log {path}: give a name that ends in .tlog")
+        check_writable(path)
+        self.failure: str | None = None
+        self._path, self._clock = path, clock
+        self._file: FileIO | None = None
+        self._waiting = b""
+
+    def write(self, packet: bytes, *, received: bool) -> None:
+        """Append `packet`, sent or received now."""
+        if self.failure is not None or message_id(packet) == _SETUP_SIGNING:
+            return
+        self._waiting += struct.pack(">Q", int(self._clock() * 1e6)) + packet
+        try:
+            if received and self._file is None:
+                self._file = FileIO(self._path, "w", opener=_open_for_owner)
+            while self._file is not None and self._waiting:
+                self._waiting = self._waiting[self._file.write(self._waiting) :]
+        except OSError as error:
+            self.failure = f"{self._path}: cannot be written: {error.strerror}; the log ends early"
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+
+def _open_for_owner(path: str, flags: int) -> int:
+    """Open a file that only its owner may read, also one that was there and others might read."""
+    handle = os.open(path, flags, mode=0o600)
+    Path(path).chmod(0o600)
+    return handle
+
+
+class WireLink:
+    """One end of a link: runs machines on a transport.
+
+    What a machine answers goes where it was asked from. What it says by itself goes to everybody,
+    and once the link is `bound` to a vehicle everything goes to that alone. `log` is the exchange
+    in a file, if there is to be one; `note` is told what is odd. Use the link in a `with`
+    statement.
+    """
+
+    def __init__(
+        self,
+        connection: str | Transport,
+        *,
+        signing: Signing | None = None,
+        log: Path | None = None,
+        address: Address = GROUND_STATION,
+        note: Callable[[str], object] = lambda _: None,
+    ) -> None:
+        self.address, self._note = address, note
+        self._codec = Codec(address, signing)
+        self.log = None if log is None else Tlog(log)
+        self._vehicle: tuple[Address, Origin] | None = None
+        # A number in it tells it from that of another program with this address, if it comes back.
+        token, state = secrets.randbits(32), MavState.ACTIVE
+        self._being_there = Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, token, state)
+        self.strangers: set[Origin] = set()
+        """Where packets in the name of the vehicle come from that is bound elsewhere."""
+        self._transport = open_transport(connection) if isinstance(connection, str) else connection
+
+    def __enter__(self) -> "WireLink":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the connection, finish the log."""
+        self._transport.close()
+        if self.log is not None:
+            self.log.close()
+
+    @property
+    def listens(self) -> bool:
+        """Whether anybody may send here: several vehicles, of one number perhaps."""
+        return self._transport.listens
+
+    @property
+    def heard(self) -> Set[Verdict]:
+        """What signatures the packets of others had, as `Codec.heard`."""
+        return self._codec.heard
+
+    def speaks_old(self, sender: Address) -> bool:
+        """Tell whether all that was heard of `sender` is MAVLink 1."""
+        return self._codec.versions.get(sender) == 1
+
+    def bind(self, vehicle: Address, origin: Origin) -> None:
+        """Talk to `vehicle` at `origin` alone from now on.
+
+        What comes from elsewhere under its number is another vehicle's, or its own after its
+        address has changed, which cannot be told apart: it is noted, and does not count. Nor do
+        heartbeats from there that are not an autopilot's.
+        """
+        self._vehicle = vehicle, origin
+
+    def run(self, machine: Machine[T], observe: Observe | None = None) -> T:
+        """Run `machine` to its end and return the outcome.
+
+        Interrupted from the keyboard it cancels the transfer first. Raises `LinkError`, which says
+        what was under way.
+        """
+        try:
+            return self._run(machine, observe)
+        except (KeyboardInterrupt, LinkError) as end:
+            what, done, total = machine.progress
+            text = f"while {what}" + (f" at item {done} of {total}" if total else "")
+            if isinstance(end, LinkError):
+                raise LinkError(f"{end}, {text}") from None
+            self._send(machine.cancel(time.monotonic()))
+            raise LinkError(f"interrupted {text}: cancelled") from None
+
+    def _run(self, machine: Machine[T], observe: Observe | None) -> T:
+        self.begin(machine)
+        while (outcome := machine.outcome) is None:
+            self.step(machine, time.monotonic() + _BEAT)
+            if observe is not None:
+                observe(*machine.progress)
+        return outcome
+
+    def watch(self, machine: Machine[T], observe: Callable[[], object], *, beats: bool) -> T:
+        """Run `machine` to its end and return the outcome; `observe` is called after every step.
+
+        With `beats` this end says once a second that it is a ground station. Interrupted from the
+        keyboard the machine is told to cancel, and is run on until it ends; likewise `hang_up`
+        when the terminal has gone, or `observe` cannot tell anybody anything any more.
+        """
+        next_beat = time.monotonic()
+        self.begin(machine)
+        while (outcome := machine.outcome) is None:
+            try:
+                if beats and time.monotonic() >= next_beat:
+                    next_beat = time.monotonic() + _BEAT
+                    self._send([self._being_there])
+                self.step(machine, time.monotonic() + _BEAT if not beats else next_beat)
+                try:
+                    observe()
+                except OSError:
+                    raise HangUp from None
+            except HangUp:
+                observe = _tell_nobody
+                self._send(machine.hang_up(time.monotonic()))
+            except KeyboardInterrupt:
+                self._send(machine.cancel(time.monotonic()))
+        return outcome
+
+    def begin(self, machine: Machine[T]) -> None:
+        """Start `machine`; `step` then carries it on."""
+        self._send(machine.start(time.monotonic()))
+
+    def step(self, machine: Machine[T], until: float) -> None:
+        """Feed `machine` with what arrives first: packets, its deadline or the time `until`."""
+        due = machine.deadline
+        until = until if due is None else min(due, until)
+        for data, origin in self._transport.read(until - time.monotonic()):
+            for packet in self._codec.parse(data, origin):
+                if not self._counts(packet, origin):
+                    continue
+                if self.log is not None:
+                    self.log.write(packet.raw, received=True)
+                if packet.envelope is not None and machine.outcome is None:
+                    self._send(machine.on(packet.envelope, time.monotonic()), origin)
+        if machine.outcome is None:
+            self._send(machine.tick(time.monotonic()))
+
+    def _counts(self, packet: Packet, origin: Origin) -> bool:
+        """Tell whether `packet` counts: no own heartbeat that comes back; for others see `bind`."""
+        message = None if packet.envelope is None else packet.envelope.message
+        if message == self._being_there:
+            return False
+        if self._vehicle is None or sender_of(packet.raw) != self._vehicle[0]:
+            return True
+        vehicle, own = self._vehicle
+        if origin != own:
+            if origin not in self.strangers and len(self.strangers) < _SHOWN:
+                self.strangers.add(origin)
+                self._note(
+                    f"packets of {vehicle} come from {origin} too, not only from {own}: they do "
+                    "not count. If the vehicle's address has changed, begin again"
+                )
+            return False
+        return not isinstance(message, Heartbeat) or message.of_autopilot
+
+    def _send(self, messages: Sequence[Message], to: Origin | None = None) -> None:
+        for message in messages:
+            packet = self._codec.pack(message)
+            if self.log is not None:
+                self.log.write(packet, received=False)
+            self._transport.write(packet, to if self._vehicle is None else self._vehicle[1])
+
+
+def _tell_nobody() -> None:
+    """Do without those who were told."""

@@ -1,0 +1,253 @@
+"""Whole jobs on a vehicle: upload and verify, download everything, clear and verify.
+
+Each is a generator of machines for `Script`, so that it runs on a real link and on a simulated
+one alike.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias, TypeVar
+
+from faao_mav.wire.machine import Machine
+from faao_mav.wire.manners import autopilot_name
+from faao_mav.wire.messages import WireItem
+from faao_mav.wire.protocol import MavResult, MissionType
+from faao_mav.wire.transfer.download import Download
+from faao_mav.wire.transfer.exchange import TENTATIVE, Clear, Outcome, Peer
+from faao_mav.wire.transfer.pace import Budget, Timeouts
+from faao_mav.wire.transfer.upload import Upload
+from faao_mav.wire.transfer.verify import Difference, compare
+from faao_mav.wire.wire_items import home_items
+
+T = TypeVar("T")
+Job: TypeAlias = Generator[Machine[Any], Outcome, T]
+"""What `Script` runs: yields exchanges, is sent their outcomes, returns its own."""
+
+Verdict: TypeAlias = Literal[
+    "verified", "different", "unread", "refused", "silent", "stalled", "armed", "cancelled"
+]
+
+
+@dataclass(frozen=True, slots=True)
+class PartReport:
+    """What became of one list.
+
+    `verdict`: "verified": the list was read back, and is what was sent but for what `differences`
+    tell as dropped; "different": it is not; "unread": accepted, but could not be read back;
+    otherwise it is not known to be there. `items` leaves out the home item; `item`, the number of
+    the item last asked for, does not. `attempts` counts uploads, `said` are the vehicle's own
+    words.
+    """
+
+    part: MissionType
+    items: int
+    verdict: Verdict
+    differences: tuple[Difference, ...] = ()
+    result: int | None = None
+    item: int | None = None
+    attempts: int = 1
+    said: tuple[str, ...] = ()
+    opaque_id: int = 0
+
+    @property
+    def verified(self) -> bool:
+        """Whether the list is on the vehicle, whole and equal."""
+        return self.verdict == "verified"
+
+
+@dataclass(frozen=True, slots=True)
+class Lists:
+    """What was downloaded; `missing` says why a list is not among `items`."""
+
+    items: dict[MissionType, tuple[WireItem, ...]]
+    missing: dict[MissionType, Outcome]
+
+
+def upload_parts(
+    parts: Sequence[tuple[MissionType, tuple[WireItem, ...]]],
+    peer: Peer,
+    timeouts: Timeouts | None = None,
+) -> Job[tuple[PartReport, ...]]:
+    """Upload lists one after the other, read each back and compare; stop at the first failure.
+
+    A transfer that the link broke is begun again, and one whose last answer was lost or whose
+    list reads back differently too (ArduPilot now and then loses a fence that it accepted), at
+    most `Timeouts.attempts` times. A refusal is final, except one that may be about something else.
+    """
+    reports: list[PartReport] = []
+    for part, items in parts:
+        report, armed = yield from _upload_part(part, items, peer, timeouts or Timeouts())
+        reports.append(report)
+        if not report.verified:
+            break
+        if armed and not peer.may_be_armed and len(reports) < len(parts):
+            left = parts[len(reports)]
+            reports.append(PartReport(left[0], _own_items(*left, peer), "armed"))
+            break
+    return tuple(reports)
+
+
+def download_lists(
+    types: Sequence[MissionType], peer: Peer, timeouts: Timeouts | None = None
+) -> Job["Lists"]:
+    """Download the lists of `types`, each that comes.
+
+    Where not even the first one comes, and it is not refused, the others are not asked for.
+    """
+    items: dict[MissionType, tuple[WireItem, ...]] = {}
+    missing: dict[MissionType, Outcome] = {}
+    for part in types:
+        outcome = yield Download(peer, part, timeouts)
+        if outcome.status == "accepted":
+            items[part] = outcome.items
+            continue
+        missing[part] = outcome
+        if _by_us(outcome) or (outcome.status != "refused" and not items):
+            break
+    return Lists(items, missing)
+
+
+def clear_lists(
+    types: Sequence[MissionType], peer: Peer, timeouts: Timeouts | None = None
+) -> Job[tuple[PartReport, ...]]:
+    """Clear the lists of `types`, and read back that they are empty (but for the home item)."""
+    reports = []
+    for part in types:
+        cleared = yield Clear(peer, part, timeouts)
+        report = _failed(part, 0, cleared, 1)
+        if cleared.status in ("accepted", "silent"):
+            read = yield Download(peer, part, timeouts)
+            if read.status == "accepted":
+                differences = compare(
+                    read.items[: home_items(peer.vehicle, part)], read.items, part, peer.vehicle
+                )
+                verdict: Verdict = "different" if differences else "verified"
+                report = replace(report, verdict=verdict, differences=differences)
+        reports.append(report)
+        if report.verdict in ("silent", "stalled", "armed", "cancelled"):
+            break
+    return tuple(reports)
+
+
+def _own_items(part: MissionType, items: Sequence[WireItem], peer: Peer) -> int:
+    """Return how many of `items` are not the home item."""
+    return len(items) - home_items(peer.vehicle, part)
+
+
+def _upload_part(
+    part: MissionType, items: tuple[WireItem, ...], peer: Peer, timeouts: Timeouts
+) -> Job[tuple[PartReport, bool]]:
+    """Return what became of a list, and whether the vehicle was armed when it was read back."""
+    number, budget = _own_items(part, items, peer), Budget(timeouts)
+    for attempt in range(1, timeouts.attempts + 1):
+        uploading = Upload(items, peer, part, timeouts, budget)
+        sent = yield uploading
+        report, armed, stop = _failed(part, number, sent, attempt), sent.armed, _is_final(sent)
+        if sent.status in ("accepted", "unknown"):
+            read = yield Download(peer, part, timeouts, budget, uploading.pace)
+            armed, stop = armed or read.armed, _is_final(read)
+            if read.status == "accepted":
+                differences = compare(items, read.items, part, peer.vehicle)
+                wrong = any(difference.kind == "wrong" for difference in differences)
+                report = replace(
+                    report,
+                    verdict="different" if wrong else "verified",
+                    differences=differences,
+                    opaque_id=sent.opaque_id or read.opaque_id,
+                )
+                if sent.result in TENTATIVE:
+                    # Of a reminder or a duplicate if the list is right, else of an item.
+                    told = replace(report, verdict="refused")
+                    report = told if wrong else replace(report, result=None)
+            elif _by_us(read):
+                report = replace(report, verdict="cancelled")
+            elif sent.status == "accepted":
+                report = replace(report, verdict="unread", said=read.said)
+        # PX4 says ERROR when busy, and of packets that come late or twice: that may pass. So may
+        # DENIED, but not if it is said of every announcement of a whole attempt.
+        unheard = report.result == MavResult.DENIED and report.item is None
+        refused = report.verdict == "refused" and (unheard or report.result not in TENTATIVE)
+        if report.verified or refused or stop:
+            break
+    return report, armed
+
+
+def _failed(part: MissionType, items: int, outcome: Outcome, attempts: int) -> PartReport:
+    """Return the report for `outcome` as long as nothing was read back."""
+    verdicts: dict[str, Verdict] = {
+        "accepted": "unread",
+        "unknown": "silent",
+        "refused": "refused",
+        "silent": "silent",
+        "stalled": "stalled",
+        "armed": "armed",
+        "cancelled": "cancelled",
+    }
+    verdict = verdicts[outcome.status]
+    result, said = outcome.result, outcome.said
+    return PartReport(part, items, verdict, (), result, outcome.last_requested, attempts, said)
+
+
+def _by_us(outcome: Outcome) -> bool:
+    return outcome.status == "cancelled" and outcome.result is None
+
+
+def _is_final(outcome: Outcome) -> bool:
+    """Tell whether nothing is to be tried again after `outcome`."""
+    return _by_us(outcome) or outcome.status in ("armed", "stalled")
+
+
+def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int], str]) -> str:
+    """Return in words why `report` is not verified.
+
+    `limit` is how many items the vehicle is thought to hold, `describe(item)` names an item.
+    """
+    part = report.part.title
+    home = home_items(peer.vehicle, report.part)
+    text = f"{part}: "
+    match report.verdict:
+        case "different":
+            wrong = [d for d in report.differences if d.kind == "wrong"]
+            shown = "; ".join(str(difference) for difference in wrong[:5])
+            more = f"; and {len(wrong) - 5} more" if len(wrong) > 5 else ""
+            text = f"not what was sent: {shown}{more}"
+        case "unread":
+            text += "accepted, but it could not be read back; download it to see what is there"
+        case "armed":
+            text += "the vehicle is armed: nothing more is written (--allow-armed allows it)"
+        case "stalled":
+            text += "the transfer got no further in time"
+            if report.item is not None:
+                text += f" than item {report.item} of {report.items + home}"
+        case "silent":
+            text += "the vehicle stopped answering"
+            if report.item is not None:
+                text += f" after it asked for item {report.item} of {report.items + home}"
+        case "cancelled":
+            text += "the transfer was cancelled"
+            text += "" if report.result is None else " by the vehicle"
+        case _:
+            assert report.result is not None
+            text += f"refused: {peer.manners.meaning(report.result)}"
+            if report.result == MavResult.NO_SPACE:
+                text += f": {report.items + home} rows"
+                text += " with home" if home else ""
+                text += f", and a vehicle like this holds about {limit}"
+            elif report.item is not None:
+                text += f", at {describe(report.item - home)}"
+    if report.said:
+        text += f". The vehicle says: {'; '.join(report.said)}"
+    begun = report.item is not None and report.verdict not in ("different", "unread")
+    if begun and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
+        text += f". {what_is_left(peer)}"
+    return text
+
+
+def what_is_left(peer: Peer) -> str:
+    """Return in words what a vehicle may hold when a change of its lists has stopped half-way."""
+    if peer.vehicle is None:
+        return "What the vehicle holds now is not known: upload again, or download it"
+    name = autopilot_name(peer.vehicle)
+    if peer.vehicle.dialect.atomic:
+        return f"{name} holds the old list or the new one, whole: download it to see which"
+    return f"{name} may now hold old and new items mixed: upload again before flying"

@@ -1,0 +1,321 @@
+"""Packets to and from a connection string: UDP, TCP, serial.
+
+The strings are pymavlink's. The sockets are not: its connections print on standard output, hide
+errors, and share UDP ports silently with whoever else listens.
+"""
+
+import contextlib
+import errno
+import select
+import socket
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias
+
+from faao_mav.errors import InputError, LinkError
+from faao_mav.wire.framing import Framer
+
+FORMS = (
+    "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
+    "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
+)
+_KINDS = ("udpin", "udpout", "udp", "tcp", "tcpin")
+_CONNECT_TIMEOUT = 5.0
+"""Seconds to wait for a TCP connection: chosen."""
+
+_FORGET = 30.0
+"""Seconds after which a silent UDP sender is not answered any more: chosen, 30 lost heartbeats."""
+
+_MOST_PEERS = 64
+"""UDP senders that are remembered, and TCP peers, at most; chosen: each is sent every packet."""
+
+_BURST = 256
+"""Datagrams that are read at once, at most; chosen: who sends without end stops nothing else."""
+
+_WRITE_TIMEOUT = 5.0
+"""Seconds in which a serial port has to take a packet: chosen, above the 4.3 s in which a line of
+9600 baud empties the 4096 bytes that Linux keeps for it."""
+
+_UNUSABLE = frozenset({errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES})
+"""Errors of a connection that this machine can not make: the argument is to be another one."""
+
+_MAX_DATAGRAM = 65_535
+_DEFAULT_BAUD = 57_600
+"""Bits per second: what telemetry radios are delivered with."""
+
+
+Origin: TypeAlias = str
+"""Where packets come from: HOST:PORT, or "" on a line that has one other end."""
+
+
+class Transport(Protocol):
+    """Packets in, packets out; `listens`: anybody may send, from wherever."""
+
+    listens: bool
+
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
+        """Return the packets that arrive within `timeout` seconds, as soon as something does."""
+
+    def write(self, data: bytes, to: Origin | None = None, /) -> None:
+        """Send one packet to `to`, or to everybody who was heard of late."""
+
+    def close(self) -> None:
+        """Let go of the connection."""
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A connection string, taken apart; `kind` "serial" has a device and a baud rate."""
+
+    kind: str
+    host: str
+    port: int
+
+
+def parse_connection(text: str) -> Endpoint:
+    """Return what the connection string `text` says; raises `InputError`.
+
+    >>> parse_connection("udp:0.0.0.0:14550")
+    Endpoint(kind='udpin', host='0.0.0.0', port=14550)
+    """
+    kind, colon, rest = text.partition(":")
+    if colon and kind in _KINDS:
+        host, colon, port = rest.rpartition(":")
+        if not colon or not host or not port.isascii() or not port.isdigit():
+            raise InputError(f"connection {text!r}: expected {kind}:HOST:PORT")
+        if not 0 < int(port) < 65_536:
+            raise InputError(f"connection {text!r}: port {port}; expected 1 to 65535")
+        return Endpoint("udpin" if kind == "udp" else kind, host, int(port))
+    device, comma, baud = text.partition(",")
+    if not device or (colon and "/" not in kind) or not (comma or "/" in device):
+        raise InputError(f"connection {text!r}: expected {FORMS}")
+    if comma and not (baud.isascii() and baud.isdigit() and int(baud) > 0):
+        raise InputError(f"connection {text!r}: baud rate {baud!r}; expected a number, as in 57600")
+    return Endpoint("serial", device, int(baud) if comma else _DEFAULT_BAUD)
+
+
+def open_transport(text: str) -> Transport:
+    """Return a transport for the connection string `text`.
+
+    Raises `InputError` for a string or device that is none, or where this machine cannot listen,
+    `LinkError` if the other end cannot be reached.
+    """
+    endpoint = parse_connection(text)
+    if endpoint.kind == "serial":
+        return _Serial(endpoint)
+    try:
+        address = socket.getaddrinfo(endpoint.host, endpoint.port, socket.AF_INET)[0][4]
+    except (OSError, UnicodeError):  # UnicodeError: empty or overlong labels between dots
+        raise LinkError(f"connection {text!r}: there is no host {endpoint.host}") from None
+    host_port = (str(address[0]), endpoint.port)
+    try:
+        match endpoint.kind:
+            case "udpin":
+                return _Udp(host_port, None)
+            case "udpout":
+                return _Udp(None, host_port)
+            case _:
+                return _Tcp(host_port, listens=endpoint.kind == "tcpin")
+    except OSError as error:
+        kind = InputError if error.errno in _UNUSABLE else LinkError
+        raise kind(f"connection {text!r}: {_reason(error)}") from None
+
+
+def _reason(error: OSError) -> str:
+    match error.errno:
+        case errno.EADDRINUSE:
+            return "the port is in use; stop the program that listens there, or take another port"
+        case errno.EADDRNOTAVAIL:
+            return "this machine does not have that address; to listen on all, use 0.0.0.0"
+        case errno.ECONNREFUSED:
+            return "nothing listens there"
+        case errno.EACCES:
+            return "not permitted; ports below 1024 are reserved"
+    if isinstance(error, TimeoutError):
+        return f"no answer within {_CONNECT_TIMEOUT:g} s"
+    return error.strerror or str(error)
+
+
+@dataclass(slots=True)
+class _Sender:
+    """Who sends from one address; `heard` is when, s."""
+
+    heard: float = 0.0
+    framer: Framer = field(default_factory=Framer)
+
+
+def _origin(address: tuple[str, int]) -> Origin:
+    return f"{address[0]}:{address[1]}"
+
+
+class _Udp:
+    """A UDP socket that sends to one place, or to whoever was heard."""
+
+    def __init__(self, listen: tuple[str, int] | None, target: tuple[str, int] | None) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._target = target
+        self.listens = target is None
+        self._senders: dict[tuple[str, int], _Sender] = {}
+        try:
+            self._socket.setblocking(False)
+            if listen is not None:
+                self._socket.bind(listen)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
+        if not select.select([self._socket], [], [], max(timeout, 0.0))[0]:
+            return []
+        found: list[tuple[bytes, Origin]] = []
+        # A refused datagram is told as an error of the next call: the other side is not up yet.
+        with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+            for _ in range(_BURST):
+                data, address = self._socket.recvfrom(_MAX_DATAGRAM)
+                packets = self._sender(address).framer.feed_datagram(data)
+                found += [(packet, _origin(address)) for packet in packets]
+        return found
+
+    def write(self, data: bytes, to: Origin | None = None) -> None:
+        for target in self._targets(to):
+            # Full buffers and absent receivers lose datagrams: that is what retries are for.
+            with contextlib.suppress(OSError):
+                self._socket.sendto(data, target)
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _targets(self, to: Origin | None) -> list[tuple[str, int]]:
+        if self._target is not None:
+            return [self._target]
+        if to is not None:
+            host, _, port = to.rpartition(":")
+            return [(host, int(port))]
+        recent = time.monotonic() - _FORGET
+        return [who for who, sender in self._senders.items() if sender.heard > recent]
+
+    def _sender(self, address: tuple[str, int]) -> _Sender:
+        """Return who is at `address` and was heard now; too many forget who is silent longest."""
+        sender = self._senders.pop(address, None) or _Sender()
+        sender.heard = time.monotonic()
+        if len(self._senders) == _MOST_PEERS:
+            del self._senders[next(iter(self._senders))]
+        self._senders[address] = sender
+        return sender
+
+
+class _Tcp:
+    """TCP: the connection that this end made, or all that others make to a listening socket."""
+
+    def __init__(self, address: tuple[str, int], *, listens: bool) -> None:
+        self._name = f"tcp:{address[0]}:{address[1]}"
+        self.listens = listens
+        self._listener = socket.create_server(address) if listens else None
+        self._peers: dict[socket.socket, tuple[Origin, Framer]] = {}
+        if self._listener is not None:
+            self._listener.setblocking(False)
+        else:
+            peer = socket.create_connection(address, timeout=_CONNECT_TIMEOUT)
+            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._peers[peer] = (_origin(address), Framer())
+
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
+        found: list[tuple[bytes, Origin]] = []
+        for ready in select.select(self._sockets(), [], [], max(timeout, 0.0))[0]:
+            if ready is self._listener:
+                with contextlib.suppress(OSError):
+                    self._welcome(*ready.accept())
+                continue
+            try:
+                data, error = ready.recv(_MAX_DATAGRAM), None
+            except OSError as broken:
+                data, error = b"", broken
+            if data:
+                origin, framer = self._peers[ready]
+                found += [(packet, origin) for packet in framer.feed(data)]
+            else:
+                self._drop(ready, error)
+        return found
+
+    def write(self, data: bytes, to: Origin | None = None) -> None:
+        for peer, (origin, _) in list(self._peers.items()):
+            if to not in (None, origin):
+                continue
+            try:
+                peer.sendall(data)
+            except OSError as error:
+                self._drop(peer, error)
+
+    def close(self) -> None:
+        for each in self._sockets():
+            each.close()
+
+    def _sockets(self) -> list[socket.socket]:
+        return [*self._peers] if self._listener is None else [self._listener, *self._peers]
+
+    def _welcome(self, peer: socket.socket, address: tuple[str, int]) -> None:
+        """Take one more peer, if there is room; it is dropped when it does not read."""
+        if len(self._peers) == _MOST_PEERS:
+            peer.close()
+            return
+        peer.setblocking(False)
+        self._peers[peer] = (_origin(address), Framer())
+
+    def _drop(self, peer: socket.socket, error: OSError | None) -> None:
+        """Forget one of several peers; raise `LinkError` for the only one there can be."""
+        if self._listener is not None:
+            del self._peers[peer]
+            peer.close()
+        elif error is None or isinstance(error, ConnectionError):
+            raise LinkError(f"{self._name}: the other side closed the connection") from None
+        else:
+            raise LinkError(f"{self._name}: {error.strerror or error}") from None
+
+
+class _Serial:
+    """A serial port."""
+
+    listens = False
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        import serial
+
+        self._name = endpoint.host
+        self._framer = Framer()
+        self._error: type[Exception] = serial.SerialException
+        self._late: type[Exception] = serial.SerialTimeoutException
+        if "/" in endpoint.host and not Path(endpoint.host).exists():
+            raise InputError(
+                f"connection {endpoint.host!r}: there is no such device; is the vehicle plugged in?"
+            )
+        try:
+            self._port: Any = serial.Serial(
+                endpoint.host, endpoint.port, timeout=0, write_timeout=_WRITE_TIMEOUT
+            )
+        except (serial.SerialException, ValueError, OSError) as error:
+            raise LinkError(f"connection {endpoint.host!r}: {error}") from None
+
+    def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
+        try:
+            self._port.timeout = max(timeout, 0.0)
+            data = bytes(self._port.read(1))
+            data += bytes(self._port.read(self._port.in_waiting))
+        except (self._error, OSError) as error:
+            raise LinkError(f"{self._name}: {error}") from None
+        return [(packet, "") for packet in self._framer.feed(data)]
+
+    def write(self, data: bytes, _: Origin | None = None) -> None:
+        try:
+            self._port.write(data)
+        except self._late:
+            self._port.reset_output_buffer()  # closing waits for what is in it
+            raise LinkError(
+                f"{self._name}: it has taken no bytes for {_WRITE_TIMEOUT:g} s; is the vehicle "
+                "switched on, and the cable or radio in order?"
+            ) from None
+        except (self._error, OSError) as error:
+            raise LinkError(f"{self._name}: {error}") from None
+
+    def close(self) -> None:
+        self._port.close()

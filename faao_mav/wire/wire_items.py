@@ -1,0 +1,144 @@
+"""Missions, fences and rally points as the items of the mission protocol, and back.
+
+A vehicle with a home item (ArduPilot) has its home as item 0, others (PX4) have none. Targets of
+DO_JUMP count in a `Mission` as in mission files, where home is 0 and the first item 1: on PX4 they
+are one less on the wire.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+from faao_mav.autopilot import VehicleType
+from faao_mav.errors import InputError
+from faao_mav.mission.command import FLOWN_TO, Frame
+from faao_mav.mission.fence import RallyPoint, check_place
+from faao_mav.mission.fence_items import fence_items, fence_of, rally_items
+from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
+from faao_mav.wire.manners import autopilot_name
+from faao_mav.wire.messages import WireItem
+from faao_mav.wire.protocol import MissionType
+
+GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
+"""Frames whose coordinates are latitude and longitude, by their numbers in MAV_FRAME."""
+
+_INT32 = range(-(2**31), 2**31)
+_FLOAT32 = 2.0**128 - 2.0**104
+"""The largest single-precision number."""
+
+
+def coordinate_scale(frame: int) -> float:
+    """Return what one degree, metre or unit of x and y is on the wire, in `frame`."""
+    if frame in GLOBAL_FRAMES:
+        return 1e7
+    return 1.0 if frame == Frame.MISSION else 1e4
+
+
+def home_items(vehicle: VehicleType | None, mission_type: MissionType) -> int:
+    """Return how many items before the mission's own a list of `vehicle` has: its home, or none."""
+    has_home = vehicle is not None and vehicle.dialect.home_row
+    return int(has_home and mission_type is MissionType.MISSION)
+
+
+def wire_items(
+    mission: Mission, mission_type: MissionType, vehicle: VehicleType | None
+) -> tuple[WireItem, ...]:
+    """Return what `vehicle` is sent for one of the lists of `mission`.
+
+    Parameters that are not set (NaN) are 0 for an autopilot that refuses NaN. Raises `InputError`
+    for a place to fly to that is not set, for a rally point without an altitude, and for numbers
+    that the wire does not carry.
+    """
+    if mission_type is MissionType.FENCE:
+        items = fence_items(mission.fence)
+    elif mission_type is MissionType.RALLY:
+        items = rally_items(mission.rally)
+    else:
+        items = as_sent(mission, home_row=bool(home_items(vehicle, mission_type)))
+    first = 0 if mission_type is MissionType.MISSION else None
+    return tuple(
+        wire_item(_without_nan(item, index, vehicle), index, current=index == first)
+        for index, item in enumerate(items)
+    )
+
+
+def mission_item(item: WireItem) -> MissionItem:
+    """Return `item` in degrees, or in the units of its frame."""
+    scale = coordinate_scale(item.frame)
+    params = tuple(map(_finite_or_nan, item.params))
+    return MissionItem(
+        item.command,
+        item.frame,
+        (params[0], params[1], params[2], params[3]),
+        item.x / scale,
+        item.y / scale,
+        _finite_or_nan(item.z),
+        bool(item.autocontinue),
+    )
+
+
+def mission_of(
+    lists: Mapping[MissionType, Sequence[WireItem]], vehicle: VehicleType | None
+) -> Mission:
+    """Return the mission that the `lists` downloaded from `vehicle` make; one may be missing.
+
+    Raises `InputError` for items that are none: places off the Earth, infinities, half a polygon.
+    """
+    for mission_type, items in lists.items():
+        for number, item in enumerate(items):
+            _check(item, f"{mission_type.title} item {number}")
+    flown, fence, rally = (
+        [mission_item(item) for item in lists.get(mission_type, ())] for mission_type in MissionType
+    )
+    mission = as_received(flown, home_row=bool(home_items(vehicle, MissionType.MISSION)))
+    points = tuple(RallyPoint(item.x, item.y, item.z) for item in rally)
+    return replace(mission, fence=fence_of(fence), rally=points)
+
+
+def _check(item: WireItem, name: str) -> None:
+    """Raise `InputError`, which names the item, for what is no place on Earth or infinite."""
+    if item.frame in GLOBAL_FRAMES:
+        check_place((item.x / 1e7, item.y / 1e7), name)
+    if any(map(math.isinf, (*item.params, item.z))):
+        raise InputError(f"{name}: params {item.params}, z {item.z}; expected finite numbers")
+
+
+def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:
+    """Return `item` as `vehicle` is sent it; see `wire_items`."""
+    unset = [
+        name
+        for name, value in (("latitude", item.x), ("longitude", item.y), ("altitude", item.z))
+        if math.isnan(value)
+    ]
+    if unset and item.command in FLOWN_TO and item.frame in GLOBAL_FRAMES:
+        raise InputError(
+            f"item {index}: {' and '.join(unset)} not set, which {autopilot_name(vehicle)} would "
+            "take for 0: give the place"
+        )
+    return item if vehicle is None else vehicle.dialect.sent(item)
+
+
+def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireItem:
+    """Return `item`, number `index` of its list, as the wire carries it.
+
+    Raises `InputError` for numbers that the wire does not carry.
+    """
+    scale = coordinate_scale(item.frame)
+    x, y = (0 if math.isnan(value) else round(value * scale) for value in (item.x, item.y))
+    if x not in _INT32 or y not in _INT32:
+        raise InputError(
+            f"item {index}: x {item.x}, y {item.y}; expected degrees within 180, or in frame "
+            f"{item.frame} what 32 bits hold"
+        )
+    if any(abs(value) > _FLOAT32 for value in (*item.params, item.z)):
+        raise InputError(
+            f"item {index}: params {item.params}, z {item.z}; expected single-precision numbers"
+        )
+    return WireItem(
+        item.command, item.frame, item.params, x, y, item.z, int(current), int(item.autocontinue)
+    )
+
+
+def _finite_or_nan(value: float) -> float:
+    return value if math.isfinite(value) else math.nan

@@ -1,0 +1,183 @@
+"""A third autopilot is one `VehicleType` and one call of `register`: nothing else names it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from conftest import MISSIONS, edited
+
+from faao_mav.arrays import Flags, Real
+from faao_mav.autopilot import (
+    AutopilotFamily,
+    Vehicle,
+    VehicleType,
+    register,
+    unregister,
+    vehicle_of,
+    vehicle_type_by_numbers,
+)
+from faao_mav.autopilot.dialect import Dialect, Limit, SpeedChange
+from faao_mav.autopilot.files import autopilot_of, parameter_path
+from faao_mav.autopilot.flight_path import VerticalProfile
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
+from faao_mav.autopilot.px4.flight_model import Px4
+from faao_mav.errors import PlanError
+from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.formats.parameter_file import render_parameters
+from faao_mav.mission.item import MissionItem
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.plan import parse_plan
+from faao_mav.schedule import convert
+from faao_mav.validate import Limits
+from faao_mav.validate.check import check
+
+TOY = AutopilotFamily(
+    key="toy",
+    name="ToyPilot",
+    mav_autopilot=99,
+    parameter_suffix=".toy",
+    parameter_style="list",
+    parameter_prefixes=("TOY_",),
+)
+
+TABLE = table(
+    Parameter("cruise_speed", "m/s", 6.0, {"TOY_SPEED": 1.0, "TOY_SPEED_KMH": 1 / 3.6}, 0.5),
+    Parameter("acceleration", "m/s^2", 4.0, {"TOY_ACCEL": 1.0}, 0.5),
+    Parameter("climb_speed", "m/s", 2.0, {"TOY_CLIMB": 1.0}, 0.5),
+    Parameter("descent_speed", "m/s", 1.0, {"TOY_SINK": 1.0}, 0.5),
+    Parameter("return_height", "m", 20.0, {"TOY_RTL": 1.0}, 0.0),
+)
+
+
+def fly(vehicle: ParameterValues, latitude: float | None) -> Px4:
+    """It flies like something that is known, at its own speed and acceleration."""
+    assert latitude is None or abs(latitude) <= 90
+    return Px4(
+        cruise_speed=vehicle.value("cruise_speed"),
+        acceleration=vehicle.value("acceleration"),
+        jerk=20.0,
+        error_limit=10.0,
+    )
+
+
+@dataclass(frozen=True)
+class ToyLegs:
+    """v² = a d: half the leg to speed up, half to slow down."""
+
+    acceleration: float
+    least = 3.0
+    run_in = 1.2
+    slowest = 0.1
+
+    def shortest_leg(self, speed: Real) -> Real:
+        return speed**2 / self.acceleration
+
+    def reachable_speed(self, length: Real) -> Real:
+        return np.sqrt(self.acceleration * length)
+
+    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
+        return np.minimum(4.0, 0.4 * room) + 0 * turn
+
+
+COPTER = VehicleType(
+    family=TOY,
+    kind="copter",
+    name="ToyCopter",
+    mav_types=(2,),
+    hovers=True,
+    parameters=TABLE,
+    dialect=Dialect(
+        home_row=False,
+        items=Limit(500, 500),
+        jumps=None,
+        fence_rows=10,
+        rally_rows=1,
+        atomic=True,
+        unset_is_zero=False,
+        zero_means_here=False,
+        placed_in_mission_frame=False,
+        refusal=lambda item: "no splines" if item.command == Command.NAV_SPLINE_WAYPOINT else None,
+        stored=lambda item: replace(item, autocontinue=True),
+        speed_change=lambda item: SpeedChange("horizontal", item.params[1]),
+    ),
+    vertical=lambda vehicle: VerticalProfile(
+        take_off_speed=vehicle.value("climb_speed"),
+        climb_speed=vehicle.value("climb_speed"),
+        descent_speed=vehicle.value("descent_speed"),
+        acceleration=2.0,
+        landing_speed=0.5,
+        landing_height=5.0,
+        return_height=vehicle.value("return_height"),
+        spool=1.0,
+    ),
+    legs=lambda vehicle: ToyLegs(vehicle.value("acceleration")),
+    flight_model=fly,
+    recommended=lambda speed, _: ({"TOY_SPEED": speed, "TOY_ACCEL": 5.0},),
+)
+
+PLAN = edited(
+    (MISSIONS / "copter_relay.yaml").read_text(),
+    {
+        "vehicle.autopilot": "toy",
+        "vehicle.max_speed": 8.0,
+        "vehicle.max_acceleration": 1.5,
+        "flight.start": [0, 30],
+        "flight.end": [30, 0],
+        "flight.altitude": 40,
+        "flight.duration": 14,
+        "flight.time_step": 0.5,
+        "radio.ground_user.position": [40, 40],
+        "radio.fading_samples": 4,
+    },
+)
+
+
+@pytest.fixture(autouse=True)
+def registered() -> Iterator[None]:
+    register(COPTER)
+    yield
+    unregister(COPTER)
+
+
+def test_a_mission_is_made_predicted_and_validated() -> None:
+    plan = parse_plan(PLAN)
+    assert vehicle_of(plan).type is COPTER
+    solution = optimize(plan)
+    conversion = convert(solution)
+    assert dict(conversion.parameters) == {"TOY_SPEED": 8.0, "TOY_ACCEL": 5.0}
+    assert conversion.schedule.deviation.rms < 3
+    found = check(
+        conversion.mission, conversion.vehicle, limits=Limits(max_speed=8.0), solution=solution
+    )
+    assert found.track is not None
+    assert found.track.position[:, 2].max() == pytest.approx(40, abs=1)
+    assert [f.rule for f in found.findings if f.level == "error"] == []
+    assert not [f for f in found.findings if f.rule.startswith(("px4", "ardupilot"))]
+
+
+def test_its_rules_are_its_dialect_and_its_table() -> None:
+    spline = MissionItem(Command.NAV_SPLINE_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=47, y=8, z=30)
+    mission = convert(optimize(parse_plan(PLAN))).mission
+    judged = check(replace(mission, items=(*mission.items, spline)), Vehicle("toy"))
+    assert "refused-on-upload" in {finding.rule for finding in judged.findings}
+    full = check(replace(mission, items=mission.items * 99), Vehicle("toy"))
+    message = next(f.message for f in full.findings if f.rule == "storage-full")
+    assert message.endswith("ToyCopter stores 500 at most (NO_SPACE)")
+
+
+def test_its_files_and_numbers_are_known() -> None:
+    assert parameter_path(MISSIONS / "x.plan", "toy").name == "x.toy"
+    assert autopilot_of({"TOY_SPEED": 1.0}) == "toy"
+    assert render_parameters({"TOY_SPEED": 8.0}, TOY.parameter_style) == "TOY_SPEED,8\n"
+    assert vehicle_type_by_numbers(99, 2) is COPTER
+    assert Vehicle("toy", "copter", {"TOY_SPEED_KMH": 36}).value("cruise_speed") == 10
+
+
+def test_without_it_the_plan_is_refused_by_name() -> None:
+    unregister(COPTER)
+    try:
+        with pytest.raises(PlanError, match=r"vehicle\.autopilot: 'toy' is not accepted"):
+            parse_plan(PLAN)
+    finally:
+        register(COPTER)

@@ -1,0 +1,289 @@
+"""What holds for every ArduCopter flight, and what was measured."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flight_paths import line, path_of, wandering
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.ardupilot.copter import ArduCopter
+from faao_mav.autopilot.flight_path import FlightPath
+from faao_mav.errors import InputError
+
+QUICK = ArduCopter(acceleration=4, jerk=10)
+
+models = st.sampled_from([ArduCopter(), QUICK, ArduCopter(acceleration=1)])
+
+
+@pytest.mark.parametrize(
+    ("model", "speeds"),
+    [
+        (ArduCopter(), {2: 0.9, 5: 1.7, 10: 2.7, 20: 4.4, 40: 7.0}),
+        (ArduCopter(acceleration=5, jerk=5), {2: 1.4, 5: 2.7, 10: 4.5, 20: 7.2, 40: 8.0}),
+    ],
+    ids=["defaults", "quick"],
+)
+def test_measured_mean_speeds_by_spacing(model: ArduCopter, speeds: dict[int, float]) -> None:
+    for spacing, speed in speeds.items():
+        legs = max(12, 240 // spacing)
+        arrivals = model.fly(line(spacing, legs)).arrivals
+        first, last = legs // 3, 2 * legs // 3
+        mean = spacing * (last - first) / (arrivals[last] - arrivals[first])
+        assert mean == pytest.approx(speed, abs=0.1), spacing
+
+
+def test_splines_do_not_crawl() -> None:
+    path = line(5, 60)
+    arrivals = ArduCopter().fly(replace(path, splines=np.arange(61) > 0)).arrivals
+    assert 100 / (arrivals[40] - arrivals[20]) > 7.3
+
+
+@pytest.mark.parametrize(("degrees", "top"), [(30, 10.3), (45, 15.2)])
+def test_measured_top_speed_by_lean_angle(degrees: float, top: float) -> None:
+    model = ArduCopter(lean_angle=math.radians(degrees))
+    flown = model.fly(line(1500, 1, 20.0))
+    assert np.hypot(*flown.velocity[:, :2].T).max() == pytest.approx(top, rel=0.05)
+
+
+@settings(max_examples=30)
+@given(wandering(climbs=True), models)
+def test_motion_is_continuous_and_within_limits(path: FlightPath, model: ArduCopter) -> None:
+    flown = model.fly(path, 0.05)
+    np.testing.assert_allclose(np.diff(flown.t), 0.05)
+    assert flown.t[0] == 0
+    assert flown.t[-1] >= flown.departures[-1] - 1e-9
+    middle = (flown.velocity[1:] + flown.velocity[:-1]) / 2
+    assert np.diff(flown.position, axis=0) / 0.05 == pytest.approx(middle, abs=0.25)
+    ground = np.hypot(*flown.velocity[:, :2].T)
+    drag = model.body.linear_drag * ground + model.body.quadratic_drag * ground**2
+    acceleration = np.linalg.norm(np.diff(flown.velocity[:, :2], axis=0), axis=1) / 0.05
+    assert np.all(acceleration <= 9.81 * math.tan(model.lean_angle) + drag[1:] + 0.2)
+    # Where two legs overlap both move the target: their climbs never add up to more than both.
+    assert flown.velocity[:, 2].max() <= 2 * model.climb_speed + 1e-9
+    assert flown.velocity[:, 2].min() >= -2 * model.descent_speed - 1e-9
+
+
+@given(wandering(climbs=True))
+def test_it_comes_to_rest_at_the_last_point(path: FlightPath) -> None:
+    holds = np.append(path.holds[:-1], 15.0)
+    flown = ArduCopter().fly(replace(path, holds=holds))
+    assert np.linalg.norm(flown.position[-1] - path.points[-1]) < 0.3
+    assert np.linalg.norm(flown.velocity[-1]) < 0.2
+
+
+@given(wandering(climbs=True))
+def test_faster_is_never_much_later(path: FlightPath) -> None:
+    # Measured paths have corners at which a higher speed costs a little: none costs a second.
+    slow = ArduCopter().fly(path).arrivals[-1]
+    fast = ArduCopter().fly(replace(path, speeds=path.speeds * 1.2)).arrivals[-1]
+    assert fast < slow + 1.0
+
+
+def test_a_longer_straight_leg_takes_its_length_over_the_speed_longer() -> None:
+    ends = [ArduCopter().fly(line(length, 1, 6.0)).arrivals[-1] for length in (300, 900)]
+    assert ends[1] - ends[0] == pytest.approx(100, abs=0.02)
+
+
+@given(models, st.integers(1, 20))
+def test_a_leg_after_a_hold_takes_about_as_long_as_from_rest(model: ArduCopter, hold: int) -> None:
+    alone = ArduCopter.fly(model, path_of([0, 300])).arrivals[-1]
+    after = model.fly(path_of([-300j, 0, 300], holds={1: hold}))
+    assert after.arrivals[2] - after.departures[1] == pytest.approx(alone, abs=0.6)
+
+
+def test_it_stops_only_where_it_holds() -> None:
+    flown = ArduCopter().fly(path_of([0, 100, 200, 300], 6, holds={1: 0.9, 2: 1}))
+    speed = np.linalg.norm(flown.velocity, axis=1)
+    near = [speed[abs(flown.t - t) < 2].min() for t in flown.arrivals[1:3]]
+    assert near[0] > 5
+    assert near[1] < 1
+
+
+def test_a_leg_to_where_it_is_takes_no_time() -> None:
+    flown = ArduCopter().fly(path_of([0, 0, 60], 6))
+    alone = ArduCopter().fly(path_of([0, 60], 6))
+    assert flown.arrivals == pytest.approx([0, 0, alone.arrivals[-1]])
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, math.inf])
+def test_useless_speeds_are_refused(speed: float) -> None:
+    with pytest.raises(InputError, match="speeds"):
+        ArduCopter().fly(path_of([0, 9], speed))
+
+
+def test_splines_pass_straight_legs_without_a_stop() -> None:
+    points = [0, 80, 140 + 40j, 200 + 80j, 300 + 80j]
+    splines = np.array([False, False, True, True, False])
+    flown = ArduCopter().fly(replace(path_of(points, 6), splines=splines))
+    between = (flown.t > flown.arrivals[1] - 5) & (flown.t < flown.arrivals[3] + 3)
+    assert np.linalg.norm(flown.velocity[between], axis=1).min() > 2.5
+    for point, arrival in zip(points[1:4], flown.arrivals[1:4], strict=True):
+        place = flown.position[round(arrival / 0.1), :2]
+        assert abs(complex(*place) - point) < 3
+
+
+@settings(max_examples=30)
+@given(wandering(climbs=True), models)
+def test_arrivals_are_in_order_and_stops_are_at_their_points(
+    path: FlightPath, model: ArduCopter
+) -> None:
+    flown = model.fly(path, 0.05)
+    waits = np.floor(path.holds)
+    assert flown.arrivals[0] == 0
+    np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
+    assert (flown.arrivals[1:] > flown.departures[:-1]).all()
+    for point, leaves, wait in zip(path.points, flown.departures, waits, strict=True):
+        if wait >= 10:
+            place = [np.interp(leaves, flown.t, x) for x in flown.position.T]
+            np.testing.assert_allclose(place, point, atol=0.5)
+
+
+def test_holds_lose_their_fractions_and_delays_keep_them() -> None:
+    path = path_of([0, 100, 100 + 100j], holds={1: 5.7})
+    held = ArduCopter().fly(path)
+    assert held.departures[1] - held.arrivals[1] == pytest.approx(5)
+    delays = np.array([0.0, 0.7, 0.0])
+    both = ArduCopter().fly(replace(path, delays=delays))
+    assert both.departures[1] - both.arrivals[1] == pytest.approx(5.7)
+    only = ArduCopter().fly(replace(path, holds=np.zeros(3), delays=delays))
+    assert only.departures[1] - only.arrivals[1] == pytest.approx(0.7)
+
+
+def test_the_rest_of_a_long_hold_is_only_waited() -> None:
+    short, long = (QUICK.fly(path_of([0, 60, 60 + 80j], holds={1: hold})) for hold in (25, 300))
+    shift = np.array([0.0, 0.0, 275.0])
+    np.testing.assert_allclose(long.arrivals - short.arrivals, shift, atol=1e-4)
+    waiting = (long.t > long.arrivals[1] + 20) & (long.t < long.departures[1])
+    np.testing.assert_allclose(long.position[waiting, :2], [[60, 0]] * waiting.sum(), atol=1e-3)
+
+
+def test_a_hold_of_less_than_a_second_is_none() -> None:
+    passing = ArduCopter().fly(line(60, 2))
+    holding = ArduCopter().fly(path_of([0, 60, 120], holds={1: 0.9}))
+    np.testing.assert_allclose(holding.arrivals, passing.arrivals)
+
+
+@pytest.mark.parametrize("model", [ArduCopter(), QUICK])
+@pytest.mark.parametrize("leg", [0, 3, 6, 9])
+def test_arrivals_are_smooth_in_speeds(model: ArduCopter, leg: int) -> None:
+    rng = np.random.default_rng(leg)
+    turns, spacing = rng.uniform(-0.25, 0.25, 14), rng.uniform(12, 30, 14)
+    path = path_of(
+        [0j, *np.cumsum(spacing * np.exp(1j * np.cumsum(turns)))],
+        list(rng.uniform(3, 8, 14)),
+        holds={7: 6.0},
+    )
+    change, one = np.linspace(-0.02, 0.02, 41), np.eye(14)[leg]
+    tried = [replace(path, speeds=path.speeds + each * one) for each in change]
+    arrivals = np.array([model.fly(each).arrivals[-1] for each in tried])
+    noise = arrivals - np.polyval(np.polyfit(change, arrivals, 3), change)
+    assert abs(noise).max() < 3e-3
+
+
+def test_a_commanded_speed_is_flown_on_legs_with_room_for_it() -> None:
+    flown = ArduCopter().fly(line(200, 3, [6.0, 3.0, 8.0]))
+    ends = [0, *flown.arrivals[1:]]
+    for k, speed in enumerate([6.0, 3.0, 8.0]):
+        middle = (ends[k] + ends[k + 1]) / 2
+        assert np.interp(middle, flown.t, flown.velocity[:, 0]) == pytest.approx(speed, abs=0.2)
+
+
+def test_a_leg_that_climbs_is_as_slow_as_the_climb() -> None:
+    model = ArduCopter(climb_speed=2.0, descent_speed=1.0)
+    up = model.fly(path_of([0, 40], heights=[30, 90]))
+    down = model.fly(path_of([0, 40], heights=[90, 30]))
+    assert up.velocity[:, 2].max() == pytest.approx(2.0, abs=1e-6)
+    assert down.velocity[:, 2].min() == pytest.approx(-1.0, abs=1e-6)
+    assert up.departures[-1] == pytest.approx(60 / 2 + 2.0 + 1.3, abs=1.5)
+    assert down.departures[-1] == pytest.approx(60 / 1 + 2.3, abs=1.5)
+    middle = up.position[len(up.t) // 2]
+    assert (middle[2] - 30) / 60 == pytest.approx(middle[0] / 40, abs=1e-4)
+
+
+def test_one_point_is_only_held() -> None:
+    flown = ArduCopter().fly(path_of([3 + 4j], holds={0: 2.5}))
+    assert flown.departures[0] == pytest.approx(2)
+    np.testing.assert_array_equal(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
+
+
+def test_a_sharper_turn_takes_longer() -> None:
+    ends = [
+        ArduCopter().fly(path_of([0, 100, 100 + 100 * np.exp(1j * np.radians(turn))])).arrivals[2]
+        for turn in (0, 45, 90, 135, 180)
+    ]
+    assert ends == sorted(ends)
+    assert ends[-1] > ends[0] + 2
+
+
+def test_a_wider_radius_cuts_the_corner() -> None:
+    nearest = []
+    for radius in (1.0, 2.0, 5.0):
+        flown = ArduCopter(radius=radius).fly(path_of([0, 100, 100 + 100j]))
+        nearest.append(np.hypot(flown.position[:, 0] - 100, flown.position[:, 1]).min())
+    assert nearest == sorted(nearest)
+    assert 1.0 < nearest[1] < 1.5  # measured
+
+
+@settings(max_examples=30)
+@given(wandering(shortest=12.0), models)
+def test_splines_pass_their_points(path: FlightPath, model: ArduCopter) -> None:
+    splines = np.arange(len(path.points)) > 0
+    flown = model.fly(replace(path, splines=splines), 0.05)
+    assert (np.diff(flown.arrivals) > 0).all()
+    waits = np.floor(path.holds)
+    np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
+    for point in path.points[:-1]:
+        assert np.linalg.norm(flown.position - point, axis=1).min() < 3.0
+
+
+@given(st.floats(0.1, 20), st.floats(0.5, 5), st.floats(0.5, 2))
+def test_an_error_counts_as_far_as_it_asks_for_the_commanded_speed(
+    speed: float, acceleration: float, gain: float
+) -> None:
+    error = ArduCopter(acceleration=acceleration, position_gain=gain).farthest(speed)
+    asked = gain * error
+    if asked > acceleration / gain:
+        asked = math.sqrt(2 * acceleration * (error - acceleration / (2 * gain**2)))
+    assert asked == pytest.approx(speed)
+
+
+def test_limits_come_from_parameters_of_either_generation() -> None:
+    older = {"WPNAV_ACCEL": 400, "WPNAV_JERK": 10, "WPNAV_SPEED_UP": 300, "WPNAV_SPEED": 700}
+    newer = {"WP_ACC": 4, "WP_JERK": 10, "WP_SPD_UP": 3, "WP_SPD": 7}
+    expected = replace(QUICK, climb_speed=3, cruise_speed=7)
+    for parameters in (older, newer, {"WPNAV_ACCEL": 999, "WPNAV_SPEED": 1} | older | newer):
+        assert ArduCopter.from_vehicle(Vehicle(parameters=parameters)) == expected
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_useless_parameter_is_named(value: float) -> None:
+    vehicle = Vehicle("ardupilot", "copter", {"WPNAV_JERK": value}, "quad.param")
+    with pytest.raises(InputError, match=r"quad\.param: WPNAV_JERK: .*at least 0\.1"):
+        ArduCopter.from_vehicle(vehicle)
+
+
+def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:
+    # A degree of latitude has 110,574 m at the equator and 111,694 m at the poles.
+    vehicle = Vehicle()
+    equator, pole = (ArduCopter.from_vehicle(vehicle, latitude) for latitude in (0.0, 90.0))
+    assert equator.north_metre == pytest.approx(111_318.845 / 110_574.3, rel=1e-5)
+    assert pole.north_metre == pytest.approx(111_318.845 / 111_693.9, rel=1e-5)
+    north = path_of([0, 2000j], 8)
+    late = [model.fly(north).arrivals[-1] for model in (equator, pole)]
+    assert late[0] - late[1] == pytest.approx(2000 / 8 * 0.01008, abs=0.05)
+    np.testing.assert_allclose(equator.fly(north).position[-1], [0, 2000, 30], atol=1.0)
+
+
+@settings(max_examples=30)
+@given(wandering(climbs=True), models)
+def test_a_model_flies_a_path_as_it_did_before(path: FlightPath, model: ArduCopter) -> None:
+    """What it remembers of other speeds on the same legs changes nothing."""
+    first = model.fly(path)
+    model.fly(replace(path, speeds=0.8 * path.speeds))
+    for flown in (model.fly(path), replace(model).fly(path)):
+        np.testing.assert_array_equal(flown.position, first.position)
+        np.testing.assert_array_equal(flown.arrivals, first.arrivals)

@@ -1,0 +1,174 @@
+"""What holds for every flight of an ArduPlane."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flight_paths import line, path_of, wandering
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane
+from faao_mav.autopilot.flight_path import FlightPath
+from faao_mav.errors import InputError
+from faao_mav.plan import Wind
+from faao_mav.plan.body import PlaneBody
+
+PLANE = ArduPlane()
+
+
+@settings(max_examples=50)
+@given(wandering(shortest=0.0, climbs=True))
+def test_motion_is_an_aeroplanes(path: FlightPath) -> None:
+    flown = PLANE.fly(path)
+    speed = np.linalg.norm(flown.velocity, axis=1)
+    assert speed.min() >= 0.5 * PLANE.min_speed
+    assert speed.max() <= PLANE.max_speed
+    assert abs(flown.velocity[:, 2]).max() <= 2 * PLANE.climb_speed
+    moved = np.linalg.norm(np.diff(flown.position, axis=0), axis=1) / 0.1
+    assert moved.max(initial=0) <= speed.max() + 0.1
+    heading = np.unwrap(np.arctan2(flown.velocity[:, 1], flown.velocity[:, 0]))
+    turning = abs(np.diff(heading)) / 0.1
+    assert turning.max(initial=0) <= 2 * 9.81 * math.tan(PLANE.roll_limit) / speed.min()
+    assert (flown.departures >= flown.arrivals + path.holds - 1e-9).all()
+    assert (flown.arrivals[1:] >= flown.departures[:-1] - 1e-9).all()
+    assert flown.t[-1] >= flown.departures[-1] - 1e-9
+
+
+def test_a_straight_line_at_the_commanded_airspeed() -> None:
+    flown = PLANE.fly(line(500, 2, 15.0))
+    assert flown.arrivals[1] == pytest.approx(500 / 15, abs=0.2)
+    np.testing.assert_allclose(flown.position[:, 1], 0, atol=1e-6)
+
+
+def test_the_demanded_airspeed_falls_as_total_energy_control_lets_it() -> None:
+    """The autopilot's log shows 0.80 m/s², and 1.65 m/s² with TECS_SINK_MIN 3 and cruise 16."""
+    rates = ArduPlane(cruise_speed=22.0).speed_rates
+    assert rates.fall == pytest.approx(0.80, abs=0.01)
+    assert rates.power / 17.7 == pytest.approx(1.38, abs=0.01)
+    rates = ArduPlane(cruise_speed=16.0, descent_speed=3.0).speed_rates
+    assert rates.fall == pytest.approx(1.65, abs=0.01)
+
+
+@given(speed=st.floats(0, 8), degrees=st.floats(0, 360))
+def test_a_wind_shifts_the_velocity_and_the_track_is_kept(speed: float, degrees: float) -> None:
+    """The airspeed V leads along the track at sqrt(V^2 - across^2) + along."""
+    wind = Wind(speed, degrees).velocity
+    flown = PLANE.fly(replace(line(500, 2, 15.0), wind=wind))
+    np.testing.assert_allclose(flown.position[:, 1], 0, atol=0.05)
+    ground = math.sqrt(15**2 - wind[1] ** 2) + wind[0]
+    assert flown.arrivals[1] == pytest.approx(500 / ground, abs=0.25)
+    entered = replace(line(1000, 2, 15.0), wind=wind, entry=np.array([0.0, 14.0, 0.0]))
+    settled = PLANE.fly(entered)
+    np.testing.assert_allclose(settled.velocity[0, :2], [0, 14], atol=1e-9)
+    np.testing.assert_allclose(settled.velocity[-1, :2], [ground, 0], atol=0.2)
+    assert abs(settled.position[-1, 1]) < 1
+
+
+def test_a_wind_that_carries_it_away_is_told() -> None:
+    with pytest.raises(InputError, match="perhaps for the wind"):
+        PLANE.fly(replace(line(500, 1, 15.0), wind=(-20.0, 0.0), longest=600.0))
+
+
+@pytest.mark.parametrize(("command", "flown"), [(3, 9), (40, 22), (0, 12), (15, 15)])
+def test_airspeed_is_held_within_its_limits(command: float, flown: float) -> None:
+    track = PLANE.fly(line(800, 1, float(command)))
+    true = flown * PLANE.true_over_commanded(30)
+    assert np.linalg.norm(track.velocity, axis=1)[-1] == pytest.approx(true, abs=0.05)
+
+
+@pytest.mark.parametrize(("exponent", "ratio"), [(0.5, 1.0337), (1.0, 1.0337**2)])
+def test_thin_air_is_flown_through_faster(exponent: float, ratio: float) -> None:
+    """Standard atmosphere, 684 m: the density is 0.9359 of that at sea level."""
+    plane = ArduPlane(body=PlaneBody(airspeed_exponent=exponent))
+    track = plane.fly(replace(line(1500, 1, 15.0), elevation=654.0))
+    speed = np.linalg.norm(track.velocity, axis=1)[-1]
+    assert speed == pytest.approx(15 * ratio, rel=2e-4)
+
+
+def test_goes_on_at_the_velocity_of_a_take_off() -> None:
+    climbing = replace(path_of([0, 800], 14.0), entry=np.array([26.0, 0.0, 6.0]))
+    flown = PLANE.fly(climbing)
+    np.testing.assert_allclose(flown.velocity[0], [26, 0, 6])
+    assert flown.position[:, 2].max() > 33
+    assert np.hypot(*flown.velocity[-1, :2]) == pytest.approx(14, abs=0.3)
+
+
+def test_turns_early_and_settles_on_the_next_leg() -> None:
+    flown = PLANE.fly(path_of([0, 600, 600 + 600j], 15.0))
+    turn = int(flown.arrivals[1] / 0.1)
+    assert 10 < 600 - flown.position[turn, 0] <= PLANE.waypoint_radius
+    assert abs(flown.position[-1, 0] - 600) < 2
+
+
+def test_a_small_radius_is_passed_at_the_perpendicular() -> None:
+    flown = PLANE.fly(path_of([0, 60, 60 + 15j, 200 + 15j], 15.0, radius=1))
+    assert np.isfinite(flown.arrivals).all()
+    assert np.hypot(*(flown.position[-1, :2] - [200, 15])) < 40
+
+
+def test_a_hold_is_a_loiter() -> None:
+    flown = PLANE.fly(path_of([0, 500, 1000 + 300j], 15.0, holds={1: 60.0}))
+    settled = (flown.t > flown.arrivals[1] + 15) & (flown.t < flown.arrivals[1] + 60)
+    radius = np.hypot(flown.position[settled, 0] - 500, flown.position[settled, 1])
+    assert radius.min() > 57
+    assert radius.max() < 75  # sideslip carries it outwards
+    assert 60 <= flown.departures[1] - flown.arrivals[1] < 60 + 2 * math.pi * 60 / 15
+    leaving = int(flown.departures[1] / 0.1) + 1
+    course = flown.velocity[leaving, 0] + 1j * flown.velocity[leaving, 1]
+    onward = 1000 + 300j - complex(*flown.position[leaving, :2])
+    assert abs(np.angle(onward / course)) < math.radians(15)
+
+
+@pytest.mark.parametrize(("radius", "turns"), [(60.0, -1), (-60.0, 1)])
+def test_the_sign_of_the_loiter_radius_is_its_direction(radius: float, turns: int) -> None:
+    flown = ArduPlane(loiter_radius=radius).fly(path_of([0, 300], 15.0, holds={1: 60.0}))
+    heading = np.unwrap(np.arctan2(flown.velocity[:, 1], flown.velocity[:, 0]))
+    assert turns * (heading[-1] - heading[-300]) > 2 * math.pi
+
+
+def test_a_loiter_tighter_than_the_bank_allows_still_ends() -> None:
+    plane = ArduPlane(loiter_radius=15, roll_limit=math.radians(20))
+    flown = plane.fly(path_of([0, 100, 120, 120], 18.0, holds={0: 20.0, 1: 20.0, 2: 5.0}))
+    assert np.isfinite(flown.departures).all()
+
+
+def test_climbs_along_the_leg_as_fast_as_it_may() -> None:
+    flown = PLANE.fly(path_of([0, 1000, 1500], 15.0, heights=[50, 100, 100]))
+    middle = int(flown.arrivals[1] / 0.1 / 2)
+    assert flown.position[middle, 2] == pytest.approx(75, abs=3)
+    steep = PLANE.fly(path_of([0, 100, 1500], 15.0, heights=[50, 200, 200]))
+    climb = steep.velocity[:, 2]
+    assert np.median(climb[climb > 1]) == pytest.approx(5, abs=0.5)
+
+
+def test_one_point() -> None:
+    flown = PLANE.fly(path_of([3 + 4j], holds={0: 20.0}))
+    assert flown.departures[0] == 20
+    assert np.hypot(flown.position[:, 0] - 3, flown.position[:, 1] - 4).max() < 150
+
+
+def test_limits_come_from_parameters_of_either_generation() -> None:
+    old = {"TRIM_ARSPD_CM": 1800, "LIM_ROLL_CD": 3000, "ARSPD_FBW_MAX": 25, "WP_LOITER_RAD": -80}
+    new = {"AIRSPEED_CRUISE": 18, "ROLL_LIMIT_DEG": 30, "AIRSPEED_MAX": 25, "WP_LOITER_RAD": -80}
+    for parameters in (old, new):
+        plane = ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", parameters))
+        assert plane.cruise_speed == 18
+        assert plane.roll_limit == pytest.approx(math.radians(30))
+        assert plane.max_speed == 25
+        assert plane.loiter_radius == -80
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "least"),
+    [
+        ("TRIM_ARSPD_CM", 50, "100"),
+        ("WP_LOITER_RAD", 0, "1 of either sign"),
+        ("LIM_ROLL_CD", 9, "500"),
+    ],
+)
+def test_a_useless_parameter_is_named(name: str, value: float, least: str) -> None:
+    with pytest.raises(InputError, match=rf"plane\.parm: {name}: {value}; .*at least {least}"):
+        ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", {name: value}, "plane.parm"))

@@ -1,0 +1,150 @@
+"""Rules, flight models and recommended parameters read one table for each vehicle."""
+
+import math
+from dataclasses import fields
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from faao_mav.autopilot import (
+    ARDUCOPTER,
+    ARDUPLANE,
+    PX4_COPTER,
+    PX4_PLANE,
+    Vehicle,
+    VehicleType,
+    families,
+    vehicle_type,
+    vehicle_type_by_numbers,
+    vehicle_types,
+)
+from faao_mav.autopilot.parameter import Parameter
+from faao_mav.errors import InputError
+from faao_mav.mission.item import Mission
+from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
+from faao_mav.validate.context import ValidationContext
+
+TYPES = (ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE)
+PARAMETERS = [(each, parameter) for each in TYPES for parameter in each.parameters.values()]
+UNITS = {"", "m", "s", "rad", "m/s", "m/s^2", "m/s^3", "1/s", "1/s^2", "rad/s", "rad/s^2"}
+
+
+def label(each: VehicleType) -> str:
+    return f"{each.family.key}-{each.kind}"
+
+
+def bare(each: VehicleType, parameters: dict[str, float] | None = None) -> Vehicle:
+    return Vehicle(each.family.key, each.kind, parameters or {})
+
+
+def another(parameter: Parameter) -> float:
+    """A usable value of `parameter` that is not its default."""
+    value = parameter.default * 0.8 if parameter.default else 1.0
+    return value if value >= parameter.least else parameter.default * 1.25
+
+
+def test_every_record_is_whole() -> None:
+    for each, parameter in PARAMETERS:
+        said = f"{label(each)} {parameter.key}"
+        assert parameter.unit in UNITS, said
+        assert parameter.source, said
+        assert parameter.least <= parameter.default <= parameter.greatest, said
+        low, high = parameter.documented
+        assert low <= parameter.default <= high, said
+        assert all(name.isupper() and len(name) <= 16 for name in parameter.names), said
+        assert all(factor > 0 for factor in parameter.names.values()), said
+        assert not parameter.capped_by or parameter.capped_by in each.parameters, said
+        assert bare(each).value(parameter.key) == pytest.approx(parameter.default), said
+
+
+def test_every_name_sets_the_value_and_is_named() -> None:
+    for each, parameter in PARAMETERS:
+        value = another(parameter)
+        for name, factor in parameter.names.items():
+            vehicle = bare(each, {name: value / factor})
+            assert vehicle.value(parameter.key) == pytest.approx(value), name
+            assert vehicle.name_of(parameter.key) == name
+
+
+def test_models_and_rules_take_the_same_value() -> None:
+    for each, parameter in PARAMETERS:
+        value, name = another(parameter), parameter.newest_name
+        vehicle = bare(each, {name: value / parameter.names[name]})
+        judged = ValidationContext(Mission(()), vehicle).vehicle
+        assert judged.value(parameter.key) == vehicle.value(parameter.key) == pytest.approx(value)
+        if each.flight_model is None:
+            continue
+        model, vertical = vehicle.flight_model(), vehicle.vertical
+        assert getattr(model, parameter.key, value) == pytest.approx(value), name
+        if parameter.key in {field.name for field in fields(vertical)} - {"acceleration"}:
+            assert getattr(vertical, parameter.key) == pytest.approx(value), name
+
+
+@pytest.mark.parametrize("each", [each for each in TYPES if each.flight_model], ids=label)
+def test_a_models_defaults_are_the_tables(each: VehicleType) -> None:
+    assert bare(each).flight_model() == type(bare(each).flight_model())()
+
+
+@pytest.mark.parametrize("each", TYPES, ids=label)
+def test_what_is_recommended_is_in_the_table(each: VehicleType) -> None:
+    known = {name: p for p in each.parameters.values() for name in p.names}
+    for parameters in each.recommended(8.0, 1.5):
+        assert set(parameters) <= set(known)
+        bare(each, dict(parameters)).flight_model() if each.flight_model else None
+        for name, number in parameters.items():
+            assert known[name].is_usable(number, name)
+            low, high = known[name].documented
+            assert low <= known[name].names[name] * number <= high
+
+
+@given(st.sampled_from(PARAMETERS), st.floats(allow_nan=True, allow_infinity=True))
+def test_a_value_is_usable_or_named_in_an_error(
+    which: tuple[VehicleType, Parameter], number: float
+) -> None:
+    each, parameter = which
+    name = parameter.newest_name
+    vehicle = bare(each, {name: number})
+    try:
+        assert math.isfinite(vehicle.value(parameter.key))
+        assert vehicle.usable() == vehicle
+    except InputError as error:
+        assert f"parameters: {name}: " in str(error)
+        assert vehicle.usable().parameters == {}
+
+
+def test_of_two_generations_the_newest_counts() -> None:
+    vehicle = Vehicle("ardupilot", "copter", {"WPNAV_ACCEL": 400, "WP_ACC": 3.0})
+    assert (vehicle.value("acceleration"), vehicle.name_of("acceleration")) == (3.0, "WP_ACC")
+
+
+def test_px4_lowers_a_speed_to_its_cap_and_says_so() -> None:
+    vehicle = Vehicle("px4", "copter", {"MPC_Z_V_AUTO_UP": 4, "MPC_Z_VEL_MAX_UP": 2})
+    assert (vehicle.value("climb_speed"), vehicle.name_of("climb_speed")) == (
+        2,
+        "MPC_Z_VEL_MAX_UP",
+    )
+
+
+def test_plans_know_the_vehicles_of_the_registry() -> None:
+    assert set(vehicle_types()) == set(TYPES)
+    for each in vehicle_types():
+        key = (each.family.key, each.kind)
+        made = each.legs is not None and each.flight_model is not None
+        one = each.fence_needs_one_inclusion(Vehicle(*key))
+        lean = each.parameters["lean_angle"].default if "lean_angle" in each.parameters else 0.0
+        assert VEHICLES[key] == PlannedVehicle(*key, each.hovers, made, one, each.body, lean)
+        assert vehicle_type(*key) is each
+        assert (each.flight_model is None) == bool(each.unmodelled)
+        for number in each.mav_types:
+            assert vehicle_type_by_numbers(each.family.mav_autopilot, number) is each
+    assert len({each.mav_autopilot for each in families()}) == len(families())
+    assert vehicle_type_by_numbers(3, None) is ARDUCOPTER
+    assert vehicle_type_by_numbers(3, 10) is None
+
+
+def test_an_unknown_vehicle_is_named() -> None:
+    with pytest.raises(
+        InputError, match="betaflight copter is unknown; known are ardupilot copter"
+    ):
+        _ = Vehicle("betaflight").type

@@ -1,0 +1,208 @@
+"""What autopilots answer in the mission protocol, as recorded exchanges.
+
+`tests/data/exchanges/` has one file for each autopilot: real ones gave the answers, and the mocks
+are held to them. Each exchange begins with its name after `#`; a line `> ...` is what a ground
+station sends, `~ SECONDS` is silence of it, and the lines `< ...` after it are the answers.
+
+    count mission 2              MISSION_COUNT
+    item mission 0 way           MISSION_ITEM_INT: one of `ROWS`
+    request mission 0            MISSION_REQUEST_INT
+    list mission, clear mission  MISSION_REQUEST_LIST, MISSION_CLEAR_ALL
+    ack mission ACCEPTED         MISSION_ACK
+
+`python tests/wire/exchanges.py arducopter` (or arduplane, px4) writes the answers of a real one
+into the file. Each line waits for as many answers as the file has: what is new needs two runs.
+"""
+
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from simulators import simulated
+
+from faao_mav.wire.discover import Discovery
+from faao_mav.wire.link import WireLink
+from faao_mav.wire.machine import Machine
+from faao_mav.wire.messages import (
+    Envelope,
+    ListMessage,
+    Message,
+    MissionAck,
+    MissionClearAll,
+    MissionCount,
+    MissionItemInt,
+    MissionRequestInt,
+    MissionRequestList,
+    WireItem,
+)
+from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
+
+EXCHANGES = Path(__file__).parent.parent / "data" / "exchanges"
+_FILES = {"arducopter": "ardupilot.txt", "arduplane": "ardupilot.txt", "px4": "px4.txt"}
+
+Talk: TypeAlias = Callable[[list[Message], float, int], list[Message]]
+"""Sends messages, and returns what is said about lists within so many seconds, or as soon as there
+are so many answers."""
+
+QUIET = 0.1
+"""Seconds without a word after which an autopilot says nothing: chosen, below the 0.25 s after
+which PX4 asks again."""
+
+PATIENCE = 2.0
+"""Seconds that an answer may take on a busy machine."""
+
+
+def _row(command: int, frame: int, *params: float, z: float = 20.5, step: int = 0) -> WireItem:
+    four = (*params, *[0.0] * (4 - len(params)))
+    place = (-353_600_000 + step * 10_000, 1_491_600_000 + step * step * 10_000)
+    return WireItem(command, frame, (four[0], four[1], four[2], four[3]), *place, z)
+
+
+ROWS = {
+    "home": _row(16, 0, z=0.0),
+    "way": _row(16, 3),
+    "unknown": _row(4242, 3),
+    "frame1": _row(16, 1),
+    "vertex0": _row(5001, 0, 3.4, 2.5, 3.5, 4.5, z=7.5),
+    "vertex1": _row(5001, 3, 3.0, z=0.0, step=1),
+    "vertex2": _row(5001, 6, 3.0, z=0.0, step=2),
+    "thin": _row(5001, 0, 2.0, z=0.0),
+    "circle": _row(5004, 3, 40.7, 2.5, 3.5, 4.5, z=7.5),
+    "circle1": _row(5004, 1, 40.0),
+    "circle2": _row(5004, 2, 40.0),
+    "circle10": _row(5004, 10, 40.0),
+    "flat": _row(5003, 0, 0.0),
+    "return": _row(5000, 3, 1.5, 2.5, 3.5, 4.5, z=7.5),
+    "rally": _row(5100, 3, 1.5, 2.5, 3.5, 4.5, z=12.9),
+    "rally0": _row(5100, 5, z=-5.6),
+    "rally10": _row(5100, 10),
+    "rally1": _row(5100, 1),
+    "high": _row(5100, 3, z=40_000.0),
+}
+"""The items that are sent, by name."""
+
+
+def exchanges(text: str) -> dict[str, list[str]]:
+    """Return the lines of each exchange in `text`, by its name."""
+    found: dict[str, list[str]] = {}
+    for line in text.splitlines():
+        if line.startswith("# "):
+            lines = found.setdefault(line[2:], [])
+        elif line:
+            lines.append(line)
+    return found
+
+
+def played(lines: list[str], talk: Talk, vehicle: Address) -> list[str]:
+    """Return `lines` with the answers that `talk` gives in place of those that they have."""
+    out = []
+    for number, line in enumerate(lines):
+        if line.startswith("<"):
+            continue
+        expected = 0
+        while lines[number + 1 + expected : number + 2 + expected] and lines[
+            number + 1 + expected
+        ].startswith("<"):
+            expected += 1
+        out.append(line)
+        if line.startswith("~"):
+            answers = talk([], float(line[2:]), expected)
+        else:
+            answers = talk([_parsed(line[2:].split(), vehicle)], PATIENCE, expected)
+        out += [f"< {_written(answer)}" for answer in answers]
+    return out
+
+
+def _parsed(words: list[str], vehicle: Address) -> Message:
+    match words:
+        case ["count", part, number]:
+            return MissionCount(vehicle, _TYPES[part], int(number))
+        case ["item", part, number, row]:
+            return MissionItemInt(vehicle, _TYPES[part], int(number), ROWS[row])
+        case ["request", part, number]:
+            return MissionRequestInt(vehicle, _TYPES[part], int(number))
+        case ["list", part]:
+            return MissionRequestList(vehicle, _TYPES[part])
+        case ["clear", part]:
+            return MissionClearAll(vehicle, _TYPES[part])
+        case ["ack", part, result]:
+            return MissionAck(vehicle, _TYPES[part], MavResult[result])
+    raise ValueError(words)
+
+
+def _written(message: Message) -> str:
+    assert isinstance(message, ListMessage)
+    part = MissionType(message.mission_type).name.lower()
+    match message:
+        case MissionCount():
+            return f"count {part} {message.count}"
+        case MissionRequestInt():
+            return f"request {part} {message.seq}" + " legacy" * message.legacy
+        case MissionAck():
+            return f"ack {part} {MavResult(message.type).name}"
+        case MissionItemInt(seq=seq, item=item):
+            values = " ".join(f"{value:.7g}" for value in (*item.params, item.z))
+            plain = f"{item.command} {item.frame} {item.x} {item.y}"
+            return f"item {part} {seq}: {plain} {values} {item.autocontinue}"
+    return type(message).__name__
+
+
+_TYPES = {part.name.lower(): part for part in MissionType}
+
+
+class Conversation(Machine[list[Message]]):
+    """A machine that sends messages once, and whose outcome is what is said about lists to it."""
+
+    progress = ("talking", 0, 0)
+
+    def __init__(self, messages: list[Message], patience: float, expected: int) -> None:
+        super().__init__()
+        self._messages, self._patience, self._expected = messages, patience, expected
+        self._heard: list[Message] = []
+
+    def start(self, now: float) -> list[Message]:
+        self._due = now + (self._patience if self._expected else QUIET)
+        return self._messages
+
+    def _receive(self, envelope: Envelope, now: float) -> list[Message]:  # noqa: ARG002
+        message = envelope.message
+        if isinstance(message, ListMessage) and message.target == GROUND_STATION:
+            self._heard.append(message)
+            if len(self._heard) == self._expected:
+                self.outcome = self._heard
+        return []
+
+    def _time_out(self, now: float) -> list[Message]:  # noqa: ARG002
+        self.outcome = self._heard
+        return []
+
+
+def recorded(kind: str) -> str:
+    """Return the exchanges that are recorded of the real autopilot `kind`."""
+    return (EXCHANGES / _FILES[kind]).read_text()
+
+
+def renewed(kind: str, autopilots: Path, where: Path) -> str:
+    """Return these exchanges with the answers that the real one gives now."""
+    with simulated(autopilots, kind, where) as connection, WireLink(connection) as link:
+        (found,) = link.run(Discovery(patience=20.0))
+
+        def talk(messages: list[Message], patience: float, expected: int) -> list[Message]:
+            # What is said late, on a busy machine, is waited for.
+            return link.run(Conversation(messages, max(patience, PATIENCE), expected))
+
+        return "\n\n".join(
+            "\n".join([f"# {name}", *played(lines, talk, found.address)])
+            for name, lines in exchanges(recorded(kind)).items()
+        )
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        text = renewed(sys.argv[1], Path(os.environ["FAAO_AUTOPILOTS"]), Path(folder))
+    (EXCHANGES / _FILES[sys.argv[1]]).write_text(f"{text}\n")

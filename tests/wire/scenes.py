@@ -1,0 +1,142 @@
+"""A mock autopilot and a watch of it, on a simulated link."""
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, cast
+
+from mock_flights import fly
+from simulate import Station, simulate
+from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
+
+from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.seen import Flight, Held
+from faao_mav.fly.stream import Stream
+from faao_mav.fly.watch import Watch
+from faao_mav.mission import Mission
+from faao_mav.optimizer.solution import Solution
+from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.wire.faults import Faults
+from faao_mav.wire.machine import Machine
+from faao_mav.wire.messages import (
+    CommandLong,
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionRequestInt,
+    ParamRequestRead,
+    SetMode,
+    Timesync,
+)
+from faao_mav.wire.parameters import Reading, Setting
+from faao_mav.wire.protocol import (
+    GROUND_STATION,
+    GROUND_STATION_TYPE,
+    NO_AUTOPILOT,
+    MavCommand,
+    MissionType,
+)
+from faao_mav.wire.wire_items import wire_items
+
+
+def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
+    """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
+    values = mock.parameters.values.items()
+    settings = {name: Setting(value, 9) for name, value in values if name not in untold}
+    lists = {part: mock.lists.items(part) for part in MissionType}
+    return Held(lists, Reading(settings), home=mock.home)
+
+
+class Scene:
+    """A mock autopilot that holds a mission, and a watch of it on a simulated link.
+
+    `flight` is what is asked for beside that mission, for which the mock may not be ready.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        mission: Mission | None = None,
+        *,
+        lands: bool = True,
+        solution: Solution | None = None,
+        flight: Flight | None = None,
+        elsewhere: bool = False,
+        untimed: bool = False,
+        untold: Collection[str] = (),
+        **options: Any,
+    ) -> None:
+        self.arm = bool(options.pop("arm", False))
+        mission = mission or a_mission(12)
+        behaviour = behaviour_of(cast(MockKind, kind))
+        if solution is not None:
+            options["parameters"] = {"GUID_TIMEOUT": 1.0} | dict(options.get("parameters") or {})
+        self.mock: Any = MockAutopilot(behaviour, fly=fly, **{"home": HOME, **options})
+        for part in MissionType:
+            self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
+        rows, peer = self.mock.lists.items(MissionType.MISSION), peer_of(kind)
+        flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
+        held = held_by(self.mock, untold)
+        ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
+        self.watch: Any = Watch(peer, rows, arm=self.arm, lands=lands, readiness=ready)
+        if solution is not None:
+            self.watch = Stream(peer, solution, ready)
+        self.client = Counted(self.watch)
+
+    def run(self, faults: Faults | None = None, until: float = 300.0, **more: Any) -> str:
+        """Return the kind of the ending, "" for none."""
+        stations = Station(self.client, GROUND_STATION), Station(self.mock, VEHICLE)
+        simulate(*stations, faults, until, **more)
+        return self.watch.outcome.kind if self.watch.outcome is not None else ""
+
+    @property
+    def orders(self) -> list[Message]:
+        """What was sent that moves the vehicle: everything but requests for telemetry."""
+        return [each for each in self.client.sent if not harmless(each)]
+
+    def does(self, number: int, *params: float) -> Any:
+        """Return an event: somebody else gives a command."""
+        message = CommandLong(VEHICLE, number, 0, *map(float, params))
+        return lambda now: self.mock.on(Envelope(FOREIGN, message), now)
+
+    def sets(self, mode: int) -> Any:
+        """Return an event: the pilot sets a mode."""
+        return lambda now: self.mock.on(Envelope(FOREIGN, SetMode(1, 1, mode)), now)
+
+    def tells(self, lens: Callable[[Message, float], Sequence[Message]]) -> None:
+        """Let the vehicle send what `lens` makes of each of its messages, and the time."""
+        tick, on = self.mock.tick, self.mock.on
+
+        def through(messages: Sequence[Message], now: float) -> list[Message]:
+            return [told for message in messages for told in lens(message, now)]
+
+        self.mock.tick = lambda now: through(tick(now), now)
+        self.mock.on = lambda envelope, now: through(on(envelope, now), now)
+
+    def told(self, words: str) -> bool:
+        return any(words in text for text in self.watch.seen.told)
+
+
+def harmless(message: Message) -> bool:
+    asks = isinstance(message, CommandLong) and message.command == MavCommand.SET_INTERVAL
+    asks |= isinstance(message, CommandLong) and message.command == MavCommand.REQUEST_MESSAGE
+    return asks or isinstance(message, MissionRequestInt | ParamRequestRead | Timesync)
+
+
+class AnotherStation(Machine[None]):
+    """A ground station that says once a second, from a given time on, that it is there."""
+
+    progress = ("being there", 0, 0)
+
+    def __init__(self, since: float = 0.0) -> None:
+        super().__init__()
+        self._since = since
+
+    def start(self, now: float) -> Sequence[Message]:
+        self._due = now + self._since
+        return ()
+
+    def _receive(self, *_: object) -> Sequence[Message]:
+        return ()
+
+    def _time_out(self, now: float) -> Sequence[Message]:
+        self._due = now + 1.0
+        return [Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, 4)]

@@ -1,0 +1,102 @@
+"""Machines that talk over a bad link, on a clock that jumps from event to event."""
+
+import heapq
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Any
+
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.faults import Channel, Faults
+from faao_mav.wire.messages import Envelope, Message
+from faao_mav.wire.protocol import Address
+
+_STEP = 1e-3  # s, least time between two ticks of a machine that stays due
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A machine on a simulated link, and the address that it speaks from."""
+
+    machine: Any
+    address: Address
+
+
+@dataclass(slots=True)
+class _Node:
+    station: Station
+    codec: Codec
+    channels: dict[int, Channel] = field(default_factory=dict)
+    ticked: float = -1.0
+
+    def due(self) -> float | None:
+        if self.station.machine.outcome is not None:
+            return None
+        deadline = self.station.machine.deadline
+        return None if deadline is None else max(deadline, self.ticked + _STEP)
+
+
+def simulate(
+    client: Station,
+    server: Station,
+    faults: Faults | None = None,
+    until: float = 600.0,
+    *,
+    others: Sequence[Station] = (),
+    events: Sequence[tuple[float, Callable[[float], object]]] = (),
+    heard: Callable[[Envelope, float], object] | None = None,
+) -> float:
+    """Run until `client` has an outcome, or `until`, and return the time that it took, s.
+
+    Everybody hears everybody, as behind a router, through `faults` that are drawn for each pair
+    and direction. Packets are real ones: what is corrupted is rejected by its checksum, or is
+    not. `events` are called at their times, with them; `heard` is told what the client receives.
+    """
+    faults = faults or Faults()
+    nodes = [_Node(station, Codec(station.address)) for station in (client, server, *others)]
+    for sender, node in enumerate(nodes):
+        for receiver in range(len(nodes)):
+            node.channels[receiver] = Channel(faults, f"{sender} to {receiver}")
+    order = count()
+    queue: list[tuple[float, int, int, bytes]] = []
+    planned = sorted(events, key=lambda event: event[0])
+
+    def send(sender: int, messages: Sequence[Message], now: float) -> None:
+        for message in messages:
+            packet = nodes[sender].codec.pack(message)
+            for receiver in range(len(nodes)):
+                if receiver != sender:
+                    for time, arriving in nodes[sender].channels[receiver].carry(packet, now):
+                        heapq.heappush(queue, (time, next(order), receiver, arriving))
+
+    now = 0.0
+    for index in range(len(nodes) - 1, -1, -1):  # the client last: the others are there already
+        send(index, nodes[index].station.machine.start(now), now)
+    while client.machine.outcome is None:
+        due = [
+            (time, index) for index, node in enumerate(nodes) if (time := node.due()) is not None
+        ]
+        moments = [queue[0][0]] if queue else []
+        moments += [min(due)[0]] if due else []
+        moments += [planned[0][0]] if planned else []
+        if not moments or min(moments) > until:
+            return until
+        now = max(now, min(moments))
+        if planned and planned[0][0] <= now:
+            planned.pop(0)[1](now)
+        elif queue and queue[0][0] <= now:
+            _, _, receiver, packet = heapq.heappop(queue)
+            node = nodes[receiver]
+            for envelope in _read(node.codec, packet):
+                if receiver == 0 and heard is not None:
+                    heard(envelope, now)
+                send(receiver, node.station.machine.on(envelope, now), now)
+        else:
+            index = min(due)[1]
+            nodes[index].ticked = now
+            send(index, nodes[index].station.machine.tick(now), now)
+    return now
+
+
+def _read(codec: Codec, packet: bytes) -> list[Envelope]:
+    return [found.envelope for found in codec.parse(packet) if found.envelope is not None]

@@ -1,0 +1,193 @@
+"""Missions, peers and short ways to run machines for the tests of the wire."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+from simulate import Station, simulate
+
+from faao_mav.autopilot import VehicleType, vehicle_type
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.wire.faults import Faults
+from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.messages import (
+    Envelope,
+    Message,
+    MissionItemInt,
+    MissionRequestInt,
+    WireItem,
+)
+from faao_mav.wire.protocol import GROUND_STATION, Address, MissionType
+from faao_mav.wire.transfer.download import Download
+from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer.pace import Timeouts
+from faao_mav.wire.transfer.session import upload_parts
+from faao_mav.wire.transfer.upload import Upload
+from faao_mav.wire.wire_items import wire_items
+
+VEHICLE = Address(1, 1)
+FOREIGN = Address(250, 190)
+KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")
+HOME = Home(-35.363262, 149.165237, 584.0)
+FENCE = Fence(
+    (Polygon(((-35.3, 149.1), (-35.4, 149.1), (-35.4, 149.2)), inclusion=True),),
+    (Circle((-35.36, 149.16), 40.0, inclusion=False),),
+)
+RALLY = (RallyPoint(-35.36, 149.16, 30.0), RallyPoint(-35.37, 149.17, 40.0))
+
+
+def vehicle_of(kind: str) -> VehicleType | None:
+    """Return the copter of a kind of mock autopilot; None for "generic"."""
+    if kind == "generic":
+        return None
+    return vehicle_type("ardupilot" if kind == "ardupilot" else "px4", "copter")
+
+
+def peer_of(kind: str) -> Peer:
+    return Peer(GROUND_STATION, VEHICLE, vehicle_of(kind))
+
+
+def signing_key(phrase: str) -> bytes:
+    """Return the key that ground stations make of a pass phrase."""
+    return hashlib.sha256(phrase.encode()).digest()
+
+
+def a_mission(count: int, shift: float = 0.0, **more: Any) -> Mission:
+    """Return a mission of take-off, waypoints and a return, `shift` degrees away."""
+    start = MissionItem(22, 3, x=HOME.latitude, y=HOME.longitude, z=20.0)
+    way = [
+        MissionItem(16, 3, (float(k % 7), 0.0, 0.0, 0.0), -35.36 + shift + k * 1e-5, 149.16, 30.0)
+        for k in range(count - 2)
+    ]
+    return Mission((start, *way, MissionItem(20, 2)), HOME, **more)
+
+
+def rows_for(kind: str, count: int = 5, shift: float = 0.0) -> tuple[WireItem, ...]:
+    """Return the rows of a mission of `count` items."""
+    return wire_items(a_mission(count, shift), MissionType.MISSION, vehicle_of(kind))
+
+
+def places(rows: Sequence[WireItem]) -> list[tuple[int, int, int, float]]:
+    """Return what tells rows apart and no autopilot changes."""
+    return [(row.command, row.x, row.y, row.z) for row in rows]
+
+
+class Desk:
+    """A machine on a table: told things by hand, one at a time."""
+
+    def __init__(self, machine: Any, sender: Address = VEHICLE) -> None:
+        self.machine, self.sender = machine, sender
+        self.now = 0.0
+        self.sent: list[Message] = []
+
+    def start(self) -> list[Any]:
+        return self._note(self.machine.start(self.now))
+
+    def tell(self, message: Message, sender: Address | None = None) -> list[Any]:
+        """Return the answer to `message`."""
+        envelope = Envelope(sender or self.sender, message)
+        return self._note(self.machine.on(envelope, self.now))
+
+    def wait(self, seconds: float) -> list[Any]:
+        """Return what is sent within `seconds` of silence."""
+        end, out = self.now + seconds, list[Any]()
+        while (due := self.machine.deadline) is not None and due <= end:
+            if self.machine.outcome is not None:
+                break
+            self.now = max(self.now, due)
+            out += self._note(self.machine.tick(self.now))
+        self.now = end
+        return out
+
+    def _note(self, messages: Sequence[Message]) -> list[Any]:
+        self.sent += messages
+        return list(messages)
+
+
+def upload_to(
+    mock: MockAutopilot,
+    rows: Sequence[WireItem],
+    faults: Faults | None = None,
+    *,
+    part: MissionType = MissionType.MISSION,
+    timeouts: Timeouts | None = None,
+    until: float = 600.0,
+    **more: Any,
+) -> tuple[Any, float]:
+    """Upload `rows` to `mock` over a simulated link, verified; report and time taken."""
+    peer = peer_of(mock.behaviour.family.key)
+    script = Script(upload_parts([(part, tuple(rows))], peer, timeouts=timeouts))
+    client = Station(script, GROUND_STATION)
+    took = simulate(client, Station(mock, VEHICLE), faults, until, **more)
+    return (script.outcome[0] if script.outcome else None), took
+
+
+def mock_of(kind: str | Behaviour, **options: Any) -> MockAutopilot:
+    """Return a mock autopilot that sends no position reports."""
+    behaviour = kind if isinstance(kind, Behaviour) else behaviour_of(cast(MockKind, kind))
+    return MockAutopilot(behaviour, home=HOME, rate=0.0, **options)
+
+
+@dataclass
+class Counted:
+    """A machine, and what it sends."""
+
+    machine: Any
+    sent: list[Message] = field(default_factory=list)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.machine, name)
+
+    def start(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.start(now))
+
+    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        return self._note(self.machine.on(envelope, now))
+
+    def tick(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.tick(now))
+
+    def hang_up(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.hang_up(now))
+
+    def number(self) -> int:
+        """Return how many items and requests for items those are."""
+        kinds = (MissionItemInt, MissionRequestInt)
+        return sum(isinstance(message, kinds) for message in self.sent)
+
+    def _note(self, messages: Sequence[Message]) -> Sequence[Message]:
+        self.sent += messages
+        return messages
+
+
+@dataclass(frozen=True)
+class Course:
+    """How a transfer went: s, and items and requests sent by either end."""
+
+    status: str
+    took: float
+    ours: int
+    theirs: int
+
+
+def there_and_back(
+    kind: MockKind, count: int, faults: Faults, telemetry: float = 0.0
+) -> list[Course]:
+    """Return the courses of an upload of `count` rows and of reading them back."""
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, rate=telemetry)
+    mock.tick(0.0)
+    peer = peer_of(kind)
+    rows = rows_for(kind, count)[:count]
+    courses = []
+    machines: tuple[Machine[Any], ...] = (Upload(rows, peer), Download(peer))
+    for machine in machines:
+        client, server = Counted(machine), Counted(mock)
+        stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
+        took = simulate(*stations, faults, until=2000.0)
+        courses.append(Course(client.outcome.status, took, client.number(), server.number()))
+        if client.outcome.items:
+            assert client.outcome.items == mock.lists.items(MissionType.MISSION)
+    return courses

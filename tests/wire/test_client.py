@@ -1,0 +1,375 @@
+"""Our client against our mock autopilot, over real sockets of the loopback interface."""
+
+import re
+import select
+import socket
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import free_port
+from mock_flights import fly
+from pymavlink import mavutil
+from served import running
+from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
+
+from faao_mav.errors import InputError, LinkError
+from faao_mav.mission import Mission, MissionItem
+from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.wire import Timeouts, clear, download, upload
+from faao_mav.wire.faults import Faults
+from faao_mav.wire.link import WireLink
+from faao_mav.wire.messages import WireItem
+from faao_mav.wire.protocol import Address, MavResult, MissionType
+from faao_mav.wire.transport import open_transport, parse_connection
+from faao_mav.wire.wire_items import wire_items
+
+MISSION = MissionType.MISSION
+BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+
+
+@pytest.fixture
+def port() -> int:
+    return free_port()
+
+
+def mock_of(kind: MockKind | Behaviour, **options: Any) -> MockAutopilot:
+    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
+    return MockAutopilot(behaviour, home=HOME, fly=fly, beat=0.1, **options)
+
+
+@BOTH
+@pytest.mark.parametrize("loss", [0.0, 0.05, 0.2])
+def test_a_mission_there_and_back(kind: MockKind, loss: float, port: int) -> None:
+    mission = a_mission(8)
+    faults = Faults(loss=loss, latency=0.0, seed=3)
+    with running(mock_of(kind), f"udpin:127.0.0.1:{port}", faults=faults) as mock:
+        connection, timeouts = f"udpout:127.0.0.1:{port}", Timeouts(response=0.4)
+        report = upload(mission, connection, system=1, timeouts=timeouts)
+        assert report.verified, report.problems
+        assert places(mock.lists.items(MISSION)) == places(
+            wire_items(mission, MISSION, vehicle_of(kind))
+        )
+        found = download(connection, system=1, timeouts=timeouts)
+    assert places(wire_items(found, MISSION, vehicle_of(kind))) == places(
+        wire_items(mission, MISSION, vehicle_of(kind))
+    )
+    assert found.home == HOME or (loss == 0.2 and found.home is None)  # asked for a few times only
+
+
+@BOTH
+def test_all_three_lists(kind: MockKind, port: int) -> None:
+    mission = a_mission(5, fence=FENCE, rally=RALLY)
+    connection = f"udpout:127.0.0.1:{port}"
+    with running(mock_of(kind), f"udpin:127.0.0.1:{port}") as mock:
+        report = upload(mission, connection, system=1)
+        assert [part.part for part in report.parts] == list(MissionType)
+        found = download(connection, system=1)
+        assert (found.fence, found.rally) == (FENCE, RALLY)
+        kept = upload(a_mission(4), connection, system=1)
+        assert [part.part for part in kept.parts] == [MISSION]
+        assert mock.mission().rally == RALLY
+        assert clear(connection, system=1, types=[MissionType.RALLY]).verified
+        assert (mock.mission().rally, mock.mission().fence) == ((), FENCE)
+        assert clear(connection, system=1).verified
+        assert mock.mission().items == ()
+
+
+@pytest.mark.parametrize(
+    ("listen", "to"), [("tcpin", "tcp"), ("udpout", "udpin")], ids=["tcp", "vehicle calls"]
+)
+def test_other_ways_to_connect(listen: str, to: str) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    with running(mock_of("px4"), f"{listen}:127.0.0.1:{port}"):
+        assert upload(a_mission(5), f"{to}:127.0.0.1:{port}", system=1).verified
+
+
+def test_what_storage_drops_is_in_the_report(port: int) -> None:
+    item = MissionItem(16, 3, (2.7, 0.0, 0.0, 30.0), -35.36, 149.16, 20.0)
+    mission = Mission((item,), HOME)
+    with running(mock_of("ardupilot"), f"udpin:127.0.0.1:{port}"):
+        report = upload(mission, f"udpout:127.0.0.1:{port}", system=1)
+    assert report.verified
+    assert [(d.item, d.field, d.kind) for d in report.parts[0].differences] == [
+        (0, "param1", "dropped"),
+        (0, "param4", "dropped"),
+    ]
+
+
+def test_a_refusal_says_what_is_wrong_and_where(port: int) -> None:
+    mock = mock_of(behaviour_of("ardupilot", refusals={(0, 2): MavResult.UNSUPPORTED}))
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        report = upload(a_mission(5), f"udpout:127.0.0.1:{port}", system=1)
+    (problem,) = report.problems
+    assert re.search(r"refused: UNSUPPORTED \(a command .*\), at item 1 \(command", problem)
+    assert "old and new items mixed" in problem
+
+
+def test_no_space_says_the_limit_and_the_count(port: int) -> None:
+    with running(mock_of("ardupilot"), f"udpin:127.0.0.1:{port}"):
+        report = upload(a_mission(700), f"udpout:127.0.0.1:{port}", system=1)
+    (problem,) = report.problems
+    assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 650" in problem
+    assert "The vehicle says: Only 655 items are supported" in problem
+
+
+def test_the_mission_of_an_armed_vehicle_is_left_alone(port: int) -> None:
+    connection = f"udpout:127.0.0.1:{port}"
+    with running(mock_of("px4"), f"udpin:127.0.0.1:{port}") as mock:
+        mock.armed = True
+        changes = (upload, a_mission(5), connection), (clear, connection)
+        for change, *arguments in changes:
+            with pytest.raises(LinkError, match="armed vehicle is not replaced; disarm it"):
+                change(*arguments, system=1)
+        assert mock.mission().items == ()
+        assert upload(a_mission(5), connection, system=1, allow_armed=True).verified
+
+
+def test_a_booting_vehicle_is_waited_for(port: int) -> None:
+    with running(mock_of("ardupilot", boot=1.5), f"udpin:127.0.0.1:{port}"):
+        assert upload(a_mission(5), f"udpout:127.0.0.1:{port}", system=1).verified
+
+
+def test_several_vehicles_and_other_ground_stations(port: int) -> None:
+    """Two autopilots and a second ground station behind one port, like behind a router."""
+    connection = f"udpin:127.0.0.1:{port}"
+    stop = threading.Event()
+
+    def chatter() -> None:
+        other = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=254)
+        while not stop.wait(0.02):
+            other.mav.heartbeat_send(6, 8, 0, 0, 4)
+            other.mav.mission_request_int_send(255, 190, 0, 0)
+            other.mav.mission_ack_send(255, 190, 14, 0)
+        other.close()
+
+    thread = threading.Thread(target=chatter)
+    thread.start()
+    one, two = (mock_of("px4", address=Address(n, 1)) for n in (7, 8))
+    try:
+        with running(one, f"udpout:127.0.0.1:{port}"), running(two, f"udpout:127.0.0.1:{port}"):
+            with pytest.raises(LinkError, match=r"several autopilots: .*system 7.*; .*system 8"):
+                upload(a_mission(5), connection)
+            assert upload(a_mission(5), connection, system=8).verified
+    finally:
+        stop.set()
+        thread.join()
+    assert len(two.mission().items) == 5
+    assert one.mission().items == ()
+
+
+def test_a_vehicle_that_holds_nonsense(port: int) -> None:
+    vertex = WireItem(5001, 0, (4.0, 0.0, 0.0, 0.0), -350_000_000, 1_490_000_000, 0.0)
+    mock = mock_of("px4")
+    mock.lists.replace(MissionType.FENCE, [vertex] * 3)
+    with (
+        running(mock, f"udpin:127.0.0.1:{port}"),
+        pytest.raises(LinkError, match="no mission: fence: a polygon stops after 3"),
+    ):
+        download(f"udpout:127.0.0.1:{port}", system=1)
+
+
+def test_no_vehicle(port: int) -> None:
+    with pytest.raises(LinkError, match=r"no heartbeat of an autopilot within 0\.3 s"):
+        download(f"udpout:127.0.0.1:{port}", wait=0.3)
+    with (
+        running(mock_of("px4"), f"udpin:127.0.0.1:{port}"),
+        pytest.raises(LinkError, match="the autopilot of system 9"),
+    ):
+        download(f"udpout:127.0.0.1:{port}", system=9, wait=0.3)
+    with pytest.raises(LinkError, match="an autopilot with component number 7 within"):
+        download(f"udpout:127.0.0.1:{port}", component=7, wait=0.3)
+
+
+def test_an_empty_mission_is_not_uploaded() -> None:
+    with pytest.raises(InputError, match="no items; clear the vehicle's instead"):
+        upload(Mission(()), "udpout:127.0.0.1:9")
+
+
+def test_a_log_does_not_replace_a_mission(tmp_path: Path) -> None:
+    path = tmp_path / "m.waypoints"
+    path.write_text("QGC WPL 110\n")
+    with pytest.raises(InputError, match=r"m\.waypoints: give a name that ends in \.tlog"):
+        upload(a_mission(5), "udpout:127.0.0.1:9", log=path)
+    assert path.read_text() == "QGC WPL 110\n"
+
+
+def test_the_log_is_one_that_pymavlink_reads(port: int, tmp_path: Path) -> None:
+    path = tmp_path / "exchange.tlog"
+    before = time.time()
+    with running(mock_of("px4"), f"udpin:127.0.0.1:{port}"):
+        upload(a_mission(5), f"udpout:127.0.0.1:{port}", system=1, log=path)
+    log = mavutil.mavlink_connection(str(path))
+    found = []
+    while (message := log.recv_match()) is not None:
+        found.append(message)
+    log.close()
+    names = [message.get_type() for message in found]
+    assert names.count("MISSION_ITEM_INT") == 10  # sent, and read back
+    assert {"HEARTBEAT", "MISSION_COUNT", "MISSION_ACK", "MISSION_REQUEST_LIST"} <= set(names)
+    assert {message.get_srcSystem() for message in found} == {1, 246}
+    stamps = [message._timestamp for message in found]
+    assert before - 1 < stamps[0] <= stamps[-1] < time.time() + 1
+    assert stamps == sorted(stamps)
+
+
+def test_a_log_that_cannot_be_written_is_an_error_before_anything_is_sent(
+    tmp_path: Path, port: int
+) -> None:
+    with pytest.raises(InputError, match="there is no directory"):
+        upload(a_mission(5), f"udpout:127.0.0.1:{port}", log=tmp_path / "no" / "x.tlog")
+
+
+def test_interrupted_from_the_keyboard(port: int) -> None:
+    mock = mock_of("px4")
+    connection = f"udpout:127.0.0.1:{port}"
+
+    def observe(what: str, done: int, total: int) -> None:
+        if what.startswith("uploading") and done == 3:
+            raise KeyboardInterrupt
+
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        with pytest.raises(LinkError, match="interrupted while uploading mission at item 3 of 9"):
+            upload(a_mission(9), connection, system=1, observe=observe)
+        # The vehicle is free again at once, and nothing of it holds the port.
+        report = upload(a_mission(5), connection, system=1)
+        assert report.verified
+        assert [part.attempts for part in report.parts] == [1]
+
+
+def test_who_looks_for_a_vehicle_is_no_ground_station_and_orders_nothing(port: int) -> None:
+    heard = []
+    listener = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    with pytest.raises(LinkError):
+        upload(a_mission(5), f"udpout:127.0.0.1:{port}", wait=2.2)
+    while (message := listener.recv_match()) is not None:
+        heard.append(message)
+    listener.close()
+    assert len(heard) in (2, 3)  # one a second
+    assert {message.get_type() for message in heard} == {"TIMESYNC"}
+    assert {(m.tc1, m.get_srcSystem(), m.get_srcComponent()) for m in heard} == {(0, 246, 190)}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "expected udpin:HOST:PORT"),
+        ("nonsense", "expected udpin:HOST:PORT"),
+        ("udpin:14550", "expected udpin:HOST:PORT"),
+        ("udpout::14550", "expected udpout:HOST:PORT"),
+        ("tcp:localhost:http", "expected tcp:HOST:PORT"),
+        ("udpin:127.0.0.1:0", "port 0; expected 1 to 65535"),
+        ("udpin:127.0.0.1:65536", "port 65536"),
+        ("http://127.0.0.1:80", "expected udpin:HOST:PORT"),
+        ("/dev/ttyACM0,fast", "baud rate 'fast'"),
+        ("/dev/ttyNONE,57600", "there is no such device"),
+    ],
+)
+def test_connections_that_are_none(text: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        open_transport(text)
+
+
+def test_connections_by_name() -> None:
+    assert parse_connection("udp:0.0.0.0:14550").kind == "udpin"
+    serial = parse_connection("/dev/ttyACM0,115200")
+    assert (serial.kind, serial.host, serial.port) == ("serial", "/dev/ttyACM0", 115_200)
+    assert parse_connection("COM3,57600").host == "COM3"
+    assert parse_connection("/dev/ttyUSB0").port == 57_600
+
+
+def test_connections_that_cannot_be_opened() -> None:
+    with pytest.raises(LinkError, match=r"there is no host no-such-host\.invalid"):
+        open_transport("udpout:no-such-host.invalid:14550")
+    port = free_port(socket.SOCK_STREAM)
+    with pytest.raises(LinkError, match="nothing listens there"):
+        open_transport(f"tcp:127.0.0.1:{port}")
+    for kind in ("udpin", "tcpin"):
+        first = open_transport(f"{kind}:127.0.0.1:{port}")
+        try:
+            with pytest.raises(InputError, match="the port is in use"):
+                open_transport(f"{kind}:127.0.0.1:{port}")
+        finally:
+            first.close()
+
+
+def test_a_tcp_link_that_is_closed() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        connection = f"tcp:127.0.0.1:{server.getsockname()[1]}"
+
+        def hang_up() -> None:
+            server.accept()[0].close()
+
+        thread = threading.Thread(target=hang_up)
+        thread.start()
+        with pytest.raises(LinkError, match="the other side closed the connection"):
+            download(connection, wait=3.0)
+        thread.join()
+
+
+def test_a_serial_line() -> None:
+    """A pseudo terminal: the same bytes as over a radio."""
+    pty, os = pytest.importorskip("pty"), pytest.importorskip("os")
+    tty = pytest.importorskip("tty")
+    ours, theirs = pty.openpty()
+    tty.setraw(ours)
+    tty.setraw(theirs)
+
+    class Radio:
+        listens = False
+
+        def read(self, timeout: float) -> list[tuple[bytes, str]]:
+            ready = select.select([ours], [], [], max(timeout, 0))[0]
+            return [(os.read(ours, 4096), "")] if ready else []
+
+        def write(self, data: bytes, _: str | None = None) -> None:
+            os.write(ours, data)
+
+        def close(self) -> None:
+            pass
+
+    try:
+        with running(mock_of("ardupilot", rate=0.0), Radio()) as mock:
+            assert upload(a_mission(5), f"{os.ttyname(theirs)},57600", system=1).verified
+        assert len(mock.mission().items) == 5
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_a_serial_device_that_takes_no_bytes_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pseudo terminal that nobody reads, and that is full."""
+    pty, os = pytest.importorskip("pty"), pytest.importorskip("os")
+    tty = pytest.importorskip("tty")
+    monkeypatch.setattr("faao_mav.wire.transport._WRITE_TIMEOUT", 0.2)
+    ours, theirs = pty.openpty()
+    try:
+        tty.setraw(theirs)
+        os.set_blocking(theirs, False)
+        for _ in range(10):  # what is under way makes room once more
+            with suppress(BlockingIOError):
+                while True:
+                    os.write(theirs, bytes(64))
+            time.sleep(0.02)
+        started = time.monotonic()
+        with pytest.raises(LinkError, match=r"it has taken no bytes for 0\.2 s; is the vehicle"):
+            upload(a_mission(5), os.ttyname(theirs), system=1, wait=60.0)
+        assert time.monotonic() - started < 30  # of the 60 s for a vehicle to be found
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_a_link_in_use_is_let_go_of(port: int) -> None:
+    for _ in range(2):
+        with WireLink(f"udpin:127.0.0.1:{port}"):
+            pass
+
+
+def test_an_option_that_there_is_none_of_is_an_error() -> None:
+    options: Any = {"sytem": 1}
+    with pytest.raises(TypeError, match="no option 'sytem'; expected some of system, component"):
+        download("udpout:127.0.0.1:9", **options)

@@ -1,0 +1,461 @@
+"""Whatever the link does: an upload is verified and right, or reported as failed, and ends."""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from simulate import Station, simulate
+from stations import (
+    FENCE,
+    FOREIGN,
+    KINDS,
+    RALLY,
+    VEHICLE,
+    Desk,
+    a_mission,
+    mock_of,
+    peer_of,
+    places,
+    rows_for,
+    upload_to,
+    vehicle_of,
+)
+
+from faao_mav.autopilot import PX4_COPTER, register, unregister
+from faao_mav.errors import LinkError
+from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim.firmware import StoredLists
+from faao_mav.wire.discover import Discovery, choose
+from faao_mav.wire.faults import Channel, Faults, Lost
+from faao_mav.wire.machine import Script
+from faao_mav.wire.messages import (
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionAck,
+    MissionCount,
+    WireItem,
+)
+from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
+from faao_mav.wire.transfer.exchange import TENTATIVE, Peer
+from faao_mav.wire.transfer.session import clear_lists, download_lists, explain, upload_parts
+from faao_mav.wire.transfer.upload import Upload
+from faao_mav.wire.wire_items import wire_items
+
+MISSION, FENCES = MissionType.MISSION, MissionType.FENCE
+REQUEST, MISSION_ACK, COUNT_ID, REQUEST_INT, ITEM_INT = 40, 47, 44, 51, 73
+
+shares = st.floats(0, 0.4)
+bad_links = st.builds(
+    Faults,
+    loss=shares,
+    duplication=shares,
+    corruption=st.floats(0, 0.1),
+    reordering=shares,
+    delay=st.floats(0, 2),
+    latency=st.floats(0, 0.3),
+    outages=st.lists(
+        st.tuples(st.floats(0, 20), st.floats(0, 3)).map(lambda t: (t[0], t[0] + t[1])), max_size=2
+    ).map(tuple),
+    seed=st.integers(0, 2**32),
+)
+
+
+def vehicle_holds(
+    mock: MockAutopilot, rows: Sequence[WireItem], part: MissionType = MISSION
+) -> bool:
+    """Tell whether the list of the vehicle is `rows`, by its own storage."""
+    return places(mock.lists.items(part)) == places(rows)
+
+
+@settings(max_examples=200)
+@given(st.sampled_from([*KINDS, "px4-late-items"]), st.integers(2, 12), bad_links, st.booleans())
+def test_no_wrong_mission_is_ever_called_verified(
+    kind: str, count: int, faults: Faults, occupied: bool
+) -> None:
+    manners = behaviour_of("px4", complete_only=False) if kind == "px4-late-items" else kind
+    mock = mock_of(manners)
+    firmware = mock.behaviour.family.key
+    if occupied:
+        mock.lists.replace(MISSION, rows_for(firmware, 7, shift=0.1))
+    rows = rows_for(firmware, count)
+    report, took = upload_to(mock, rows, faults, until=1000.0)
+    assert report is not None, "it does not end"
+    assert took < 600
+    if report.verified:
+        assert vehicle_holds(mock, rows)
+        assert not [d for d in report.differences if d.kind == "wrong"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("loss", [0.05, 0.2, 0.4])
+def test_plain_loss_is_overcome(kind: MockKind, loss: float) -> None:
+    for seed in range(15):
+        mock = mock_of(kind)
+        rows = rows_for(kind, 12)
+        report, _ = upload_to(mock, rows, Faults(loss=loss, latency=0.03, seed=seed))
+        assert report.verified, (seed, report)
+        assert vehicle_holds(mock, rows)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_link_that_dies_for_3_s_is_overcome(kind: MockKind) -> None:
+    for begin in (0.0, 0.05, 0.2, 0.5, 1.0):
+        mock, rows = mock_of(kind), rows_for(kind, 30)
+        faults = Faults(latency=0.01, outages=((begin, begin + 3.0),))
+        report, _ = upload_to(mock, rows, faults)
+        assert (report.verified, report.attempts) == (True, 1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_link_that_dies_for_a_minute_is_reported(kind: MockKind) -> None:
+    mock, rows = mock_of(kind), rows_for(kind, 30)
+    report, _ = upload_to(mock, rows, Faults(latency=0.01, outages=((0.2, 90.0),)))
+    assert report.verdict == "silent"
+    assert report.attempts == 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "lost"),
+    [
+        ("ardupilot", Lost(REQUEST, 1)),
+        ("ardupilot", Lost(REQUEST, 4)),
+        ("ardupilot", Lost(ITEM_INT, 4)),
+        ("ardupilot", Lost(COUNT_ID, 1)),
+        ("ardupilot", Lost(MISSION_ACK, 1)),
+        ("px4", Lost(REQUEST_INT, 1)),
+        ("px4", Lost(REQUEST_INT, 4)),
+        ("px4", Lost(ITEM_INT, 4)),
+        ("px4", Lost(COUNT_ID, 1)),
+        ("px4", Lost(MISSION_ACK, 1)),
+    ],
+)
+def test_any_one_packet_may_be_lost(kind: MockKind, lost: Lost) -> None:
+    mock, rows = mock_of(kind), rows_for(kind, 4)
+    report, took = upload_to(mock, rows, Faults(lost=(lost,)))
+    assert (report.verified, report.attempts) == (True, 1)
+    assert took < 4
+
+
+def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way() -> None:
+    for kind, answer in (("px4", MavResult.ACCEPTED), ("ardupilot", MavResult.ERROR)):
+        mock, rows = mock_of(kind), rows_for(kind, 4)
+        upload: Any = Upload(rows, peer_of(kind))
+        client = Station(upload, GROUND_STATION)
+        heard: list[Message] = []
+        took = simulate(
+            client,
+            Station(mock, VEHICLE),
+            Faults(lost=(Lost(MISSION_ACK, 1),)),
+            heard=lambda *told, heard=heard: heard.append(told[0].message),
+        )
+        assert upload.outcome.status == ("accepted" if kind == "px4" else "unknown")
+        acks = [message for message in heard if isinstance(message, MissionAck)]
+        assert [message.type for message in acks] == [answer]
+        assert took < 1
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+def test_what_was_asked_about_a_lost_answer_is_no_refusal(kind: MockKind) -> None:
+    mock, rows = mock_of(kind), rows_for(kind, 4)
+    report, took = upload_to(mock, rows, Faults(lost=(Lost(MISSION_ACK, 1),)))
+    assert (report.verified, report.attempts) == (True, 1)
+    assert not report.result
+    assert took < 1
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize(
+    "result", sorted(set(MavResult) - {MavResult.ACCEPTED, MavResult.INVALID_SEQUENCE})
+)
+@pytest.mark.parametrize("seq", [COUNT, 0, 3, 5])
+def test_refusals_of_every_kind_are_reported(kind: MockKind, result: MavResult, seq: int) -> None:
+    if kind == "ardupilot" and seq == 0:
+        seq = 1
+    mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): result}))
+    rows = rows_for(mock.behaviour.family.key, 6)[:6]
+    report, _ = upload_to(mock, rows)
+    assert not report.verified
+    assert report.result == result
+    assert report.verdict == ("cancelled" if result == MavResult.OPERATION_CANCELLED else "refused")
+    if result not in (*TENTATIVE, MavResult.OPERATION_CANCELLED):
+        assert report.attempts == 1
+        assert report.item == (None if seq == COUNT else seq)
+
+
+def test_a_refused_mission_leaves_px4_as_it_was() -> None:
+    mock = mock_of(behaviour_of("px4", refusals={(MISSION, 3): MavResult.INVALID_PARAM1}))
+    old = rows_for("px4", 7, shift=0.1)
+    mock.lists.replace(MISSION, old)
+    upload_to(mock, rows_for("px4", 6))
+    assert vehicle_holds(mock, old)
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("when", [0.03, 0.1, 0.2])
+def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind: MockKind, when: float) -> None:
+    mock, rows = mock_of(kind, boot=4.0), rows_for(kind, 40)
+    faults = Faults(latency=0.005)
+    report, _ = upload_to(mock, rows, faults, events=[(4.5 + when, mock.reboot)])
+    assert report.verified
+    assert vehicle_holds(mock, rows)
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+def test_another_ground_station_uploads_something_else_at_the_same_time(kind: MockKind) -> None:
+    """One of the two is refused, or both come in turn: nobody is told a wrong thing."""
+    for head_start in range(4):
+        mock = mock_of(kind)
+        ours, theirs = rows_for(kind, 8), rows_for(kind, 9, shift=0.1)
+        rival = Upload(theirs, Peer(FOREIGN, VEHICLE, vehicle_of(kind)))
+        faults = Faults(latency=0.004 * (1 + head_start), reordering=0.5, delay=0.05)
+        report, _ = upload_to(mock, ours, faults, others=[Station(rival, FOREIGN)])
+        if report.verified:
+            assert vehicle_holds(mock, ours)
+        else:
+            assert report.verdict in ("refused", "different", "unread")
+
+
+def test_another_vehicle_with_the_same_list_does_not_mix_in() -> None:
+    mock, rows = mock_of("px4"), rows_for("px4", 6)
+    other = mock_of("px4", address=Address(2, 1))
+    report, _ = upload_to(mock, rows, others=[Station(other, other.address)])
+    assert report.verified
+    assert other.lists.items(MISSION) == ()
+
+
+def test_all_three_lists_of_a_mission() -> None:
+    for kind in KINDS:
+        firmware, mock = kind, mock_of(kind)
+        mission = a_mission(6, fence=FENCE, rally=RALLY)
+        parts = [(part, wire_items(mission, part, vehicle_of(firmware))) for part in MissionType]
+        script: Any = Script(upload_parts(parts, peer_of(firmware)))
+        simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
+        assert [report.verdict for report in script.outcome] == ["verified"] * 3
+        stored = mock.mission()
+        assert (stored.fence, stored.rally) == (mission.fence, mission.rally)
+
+        lists: Any = Script(download_lists(tuple(MissionType), peer_of(firmware)))
+        simulate(Station(lists, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
+        for part, rows in parts:
+            assert places(lists.outcome.items[part]) == places(rows)
+
+        cleared: Any = Script(clear_lists(tuple(MissionType), peer_of(firmware)))
+        simulate(Station(cleared, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
+        assert [report.verdict for report in cleared.outcome] == ["verified"] * 3
+        assert mock.mission().items == ()
+
+
+def test_an_upload_stops_at_the_list_that_fails() -> None:
+    mock = mock_of(behaviour_of("px4", refusals={(MissionType.FENCE, COUNT): MavResult.NO_SPACE}))
+    mission = a_mission(6, fence=FENCE, rally=RALLY)
+    parts = [(part, wire_items(mission, part, vehicle_of("px4"))) for part in MissionType]
+    script: Any = Script(upload_parts(parts, peer_of("px4")))
+    simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE))
+    assert [report.verdict for report in script.outcome] == ["verified", "refused"]
+    assert mock.lists.items(MissionType.RALLY) == ()
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("seed", range(6))
+def test_late_packets_and_copies_of_them_end_no_upload(kind: MockKind, seed: int) -> None:
+    mock, rows = mock_of(kind), rows_for(kind, 30)
+    faults = Faults(duplication=0.05, reordering=0.1, delay=0.3, seed=seed)
+    report, took = upload_to(mock, rows, faults)
+    assert report.verified
+    assert places(mock.lists.items(MISSION)) == places(rows)
+    assert took < 60
+
+
+def test_an_accepted_fence_that_is_lost_is_sent_again() -> None:
+    """A real ArduPilot reads back an empty fence after about one of twelve uploads."""
+
+    class Loses(StoredLists):
+        times = 2
+
+        def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
+            self.times -= 1
+            super().replace(part, items if self.times < 0 else ())
+
+    mock = mock_of("ardupilot")
+    mock.lists.__class__ = Loses
+    rows = wire_items(a_mission(6, fence=FENCE), MissionType.FENCE, vehicle_of("ardupilot"))
+    report, _ = upload_to(mock, rows, part=MissionType.FENCE)
+    assert (report.verified, report.attempts) == (True, 3)
+
+
+@pytest.mark.parametrize("may_be_armed", [False, True])
+@pytest.mark.parametrize("when", ["before", "while it is read back"])
+def test_an_armed_vehicle_gets_no_fence_after_its_mission(may_be_armed: bool, when: str) -> None:
+    mock = mock_of("px4", beat=0.01)
+    mission = a_mission(6, fence=FENCE)
+    parts = [(part, wire_items(mission, part, vehicle_of("px4"))) for part in (MISSION, FENCES)]
+    peer = dataclasses.replace(peer_of("px4"), may_be_armed=may_be_armed)
+    script: Any = Script(upload_parts(parts, peer))
+
+    def arm(envelope: Envelope, _: float) -> None:
+        counted = isinstance(envelope.message, MissionCount)
+        mock.armed = mock.armed or when == "before" or counted
+
+    simulate(
+        Station(script, GROUND_STATION),
+        Station(mock, VEHICLE),
+        Faults(latency=0.02),
+        heard=arm,
+    )
+    verdicts = [report.verdict for report in script.outcome]
+    if may_be_armed:
+        assert verdicts == ["verified", "verified"]
+    else:
+        assert verdicts == (["armed"] if when == "before" else ["verified", "armed"])
+        assert mock.lists.items(FENCES) == ()
+
+
+def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
+    desk = Desk(Discovery())
+    desk.start()
+    desk.tell(Heartbeat(2, 3, 128, 0, 4))
+    desk.tell(Heartbeat(2, 3, 0, 0, 3))
+    desk.wait(2.0)
+    assert [found.armed for found in desk.machine.outcome] == [True]
+
+
+def test_a_vehicle_that_stores_something_else_is_found_out() -> None:
+    class Forgetful(StoredLists):
+        def kept(self, part: MissionType, seq: int, row: WireItem) -> WireItem:
+            kept = super().kept(part, seq, row)
+            return super().kept(part, seq, rows_for("px4", 8)[3]) if seq == 5 else kept
+
+    mock = mock_of("px4")
+    mock.lists.__class__ = Forgetful
+    report, _ = upload_to(mock, rows_for("px4", 8))
+    assert report.verdict == "different"
+    assert {d.item for d in report.differences} == {5}
+
+
+def test_650_items_over_a_bad_link() -> None:
+    for kind in ("ardupilot", "px4"):
+        mock, rows = mock_of(kind), rows_for(kind, 650)
+        report, took = upload_to(mock, rows, Faults(loss=0.2, latency=0.01), until=2000)
+        assert report.verified
+        assert took < 400
+
+
+def test_a_vehicle_that_another_station_uploads_to_is_given_up_after_one_attempt() -> None:
+    mock = mock_of(behaviour_of("ardupilot", refusals={(0, COUNT): MavResult.DENIED}))
+    report, took = upload_to(mock, rows_for("ardupilot", 5))
+    assert took < 10
+    told = explain(report, peer_of("ardupilot"), 650, str)
+    assert told == "mission: refused: DENIED (another ground station is uploading)"
+
+
+def test_who_is_interrupted_frees_the_vehicle() -> None:
+    mock, rows = mock_of("px4"), rows_for("px4", 30)
+    script: Any = Script(upload_parts([(MISSION, rows)], peer_of("px4")))
+    client = Station(script, GROUND_STATION)
+    out: list[Message] = []
+
+    def interrupt(now: float) -> None:
+        out.extend(script.cancel(now))
+
+    simulate(client, Station(mock, VEHICLE), Faults(latency=0.01), events=[(0.1, interrupt)])
+    assert script.outcome[0].verdict == "cancelled"
+    assert out == [MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)]
+
+
+def test_clearing_over_a_bad_link() -> None:
+    for kind in KINDS:
+        for seed in range(10):
+            mock = mock_of(kind)
+            mock.lists.replace(MissionType.RALLY, rows_for("px4", 3))
+            steps = clear_lists([MissionType.RALLY], peer_of(kind))
+            script: Any = Script(steps)
+            client = Station(script, GROUND_STATION)
+            simulate(client, Station(mock, VEHICLE), Faults(loss=0.4, seed=seed))
+            (report,) = script.outcome
+            assert report.verified
+            assert mock.lists.items(MissionType.RALLY) == ()
+
+
+def test_the_same_seed_gives_the_same_link() -> None:
+    faults = Faults(loss=0.3, duplication=0.3, reordering=0.5, delay=1.0, corruption=0.2, seed=4)
+    packets = [bytes([0xFD, index]) * 8 for index in range(50)]
+
+    def carried(name: str, seed: int = 4) -> list[list[tuple[float, bytes]]]:
+        channel = Channel(Faults(**{**vars_of(faults), "seed": seed}), name)
+        return [channel.carry(packet, 1.0) for packet in packets]
+
+    assert carried("a") == carried("a")
+    assert carried("a") != carried("b")
+    assert carried("a") != carried("a", seed=5)
+
+
+def vars_of(faults: Faults) -> dict[str, Any]:
+    return {name: getattr(faults, name) for name in faults.__slots__}
+
+
+def test_what_a_channel_does() -> None:
+    assert Channel(Faults(latency=0.5), "x").carry(b"abc", 1.0) == [(1.5, b"abc")]
+    assert Channel(Faults(loss=1.0), "x").carry(b"abc", 1.0) == []
+    assert Channel(Faults(outages=((0.5, 1.5),)), "x").carry(b"abc", 1.0) == []
+    assert len(Channel(Faults(duplication=1.0), "x").carry(b"abc", 1.0)) == 2
+    ((_, damaged),) = Channel(Faults(corruption=1.0), "x").carry(b"abc", 1.0)
+    assert sum((a ^ b).bit_count() for a, b in zip(damaged, b"abc", strict=True)) == 1
+    ((late, _),) = Channel(Faults(reordering=1.0, delay=2.0), "x").carry(b"abc", 1.0)
+    assert 1.0 < late <= 3.1
+    channel = Channel(Faults(rate=10.0, latency=0.5), "x")
+    assert [channel.carry(b"abc", now)[0][0] for now in (1.0, 1.1, 9.0)] == [1.8, 2.1, 9.8]
+    channel = Channel(Faults(lost=(Lost(MISSION_ACK, 2),)), "x")
+    packet = bytes([0xFD, 0, 0, 0, 0, 0, 0, MISSION_ACK, 0, 0])
+    assert [len(channel.carry(packet, 0.0)) for _ in range(3)] == [1, 0, 1]
+
+
+def test_messages_used_here_are_what_the_numbers_say() -> None:
+    from faao_mav.wire.codec import Codec
+
+    codec = Codec(VEHICLE)
+    numbers = [
+        int.from_bytes(codec.pack(message)[7:10], "little")
+        for message in (
+            MissionAck(VEHICLE, 0, 0),
+            MissionCount(VEHICLE, 0, 0),
+            Heartbeat(0, 0, 0, 0, 0),
+        )
+    ]
+    assert numbers == [MISSION_ACK, COUNT_ID, 0]
+
+
+@pytest.mark.parametrize(
+    ("mav_type", "autopilot", "name"),
+    [(10, 3, "ArduPilot"), (22, 3, "ArduPilot"), (22, 12, "PX4"), (0, 12, "PX4")],
+)
+def test_a_type_of_vehicle_that_is_not_supported_is_said(
+    mav_type: int, autopilot: int, name: str
+) -> None:
+    search = Discovery(system=1)
+    search.start(0.0)
+    search.on(Envelope(VEHICLE, Heartbeat(mav_type, autopilot, 0, 0, 3)), 0.5)
+    with pytest.raises(LinkError, match=f"{name} vehicle of MAV_TYPE {mav_type} .* not supported"):
+        choose(search.outcome or (), "udpin:0.0.0.0:14550", 1, None, 10.0)
+
+
+def test_an_autopilot_that_is_registered_is_found_and_served_as_the_guide_says() -> None:
+    family = dataclasses.replace(PX4_COPTER.family, key="toy", name="Toy", mav_autopilot=99)
+    toy = register(dataclasses.replace(PX4_COPTER, family=family))
+    try:
+        search = Discovery(system=1)
+        search.start(0.0)
+        search.on(Envelope(VEHICLE, Heartbeat(2, 99, 0, 0, 3)), 0.5)
+        (found,) = search.outcome or ()
+        assert str(found) == "Toy copter (system 1, component 1, disarmed)"
+        mock, rows = mock_of("px4"), rows_for("px4", 6)
+        peer = Peer(GROUND_STATION, VEHICLE, found.vehicle)
+        assert found.vehicle is toy
+        script: Any = Script(upload_parts([(MISSION, rows)], peer))
+        simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.05))
+        assert script.outcome[0].verified
+    finally:
+        unregister(toy)

@@ -1,0 +1,360 @@
+"""Peers that store, send or say what no vehicle should: nothing falls over, nothing is believed."""
+
+import math
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import PATIENCE, free_port
+from mock_flights import fly
+from served import running
+from stations import FENCE, HOME, VEHICLE, a_mission, mock_of, rows_for, vehicle_of
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.errors import InputError, LinkError
+from faao_mav.mission.formats.wpl import write_wpl
+from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim.serve import predicted
+from faao_mav.wire import download, upload
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.discover import Discovery, choose
+from faao_mav.wire.machine import Machine
+from faao_mav.wire.messages import (
+    CommandAck,
+    CommandLong,
+    Envelope,
+    Heartbeat,
+    HomePosition,
+    Message,
+    MissionAck,
+    MissionCount,
+    MissionItemInt,
+    Statustext,
+    WireItem,
+)
+from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand, MavResult, MissionType
+from faao_mav.wire.transfer.verify import compare
+from faao_mav.wire.wire_items import mission_of
+
+DENIED = 2
+"""MAV_RESULT_DENIED."""
+
+NAN, INF = math.nan, math.inf
+
+
+def row(
+    command: int, z: float = 30.0, x: int = -353_600_000, y: int = 1_491_600_000, p: float = 0.0
+) -> WireItem:
+    return WireItem(command, 3, (p, 0.0, 0.0, 0.0), x, y, z)
+
+
+def told(machine: Machine[Any], *messages: Message) -> list[Message]:
+    """Return what `machine` answers, by way of real packets."""
+    here, there, out = Codec(VEHICLE), Codec(GROUND_STATION), list[Message]()
+    for number, message in enumerate(messages):
+        for packet in here.parse(there.pack(message)):
+            assert packet.envelope is not None
+            out += machine.on(packet.envelope, number / 100)
+    for answer in out:
+        here.pack(answer)
+    return out
+
+
+def fill(mock: MockAutopilot, part: MissionType, rows: tuple[WireItem, ...]) -> list[Message]:
+    items = (MissionItemInt(VEHICLE, part, seq, item) for seq, item in enumerate(rows))
+    return told(mock, MissionCount(VEHICLE, part, len(rows)), *items)
+
+
+def flying(kind: MockKind) -> MockAutopilot:
+    mock = mock_of(kind, fly=predicted())
+    mock.start(0.0)
+    return mock
+
+
+START = (
+    CommandLong(VEHICLE, MavCommand.ARM, 0, 1.0),
+    CommandLong(VEHICLE, MavCommand.START, 0),
+)
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("count", [NAN, INF, -1.0, 2.0])
+def test_a_polygon_of_so_many_vertices_is_refused(kind: MockKind, count: float) -> None:
+    answers = fill(flying(kind), MissionType.FENCE, (row(5001, 0.0, p=count),) * 3)
+    results = [answer.type for answer in answers if isinstance(answer, MissionAck)]
+    assert results
+    assert MavResult.ACCEPTED not in results or count == INF
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize(
+    ("part", "stored"),
+    [
+        (MissionType.FENCE, row(5001, 0.0, p=5.0)),
+        (MissionType.FENCE, row(5003, 0.0, p=NAN)),
+        (MissionType.FENCE, row(5000, NAN)),
+        (MissionType.RALLY, row(5100, INF)),
+        (MissionType.MISSION, row(16, 3e38)),
+        (MissionType.MISSION, row(16, -3e38)),
+        (MissionType.MISSION, row(16, NAN)),
+        (MissionType.MISSION, row(16, INF)),
+        (MissionType.MISSION, row(16, x=-(2**31))),
+    ],
+    ids=str,
+)
+def test_a_mock_lives_on_whatever_it_stores_and_is_started(
+    kind: MockKind, part: MissionType, stored: WireItem
+) -> None:
+    mock = flying(kind)
+    mission = rows_for(kind, 4)
+    if part is MissionType.MISSION:
+        mission = (*mission[:-1], stored)
+    else:
+        fill(mock, part, (stored,))
+    fill(mock, MissionType.MISSION, mission)
+    answers = told(mock, *START)
+    assert sum(isinstance(answer, CommandAck) for answer in answers) == 2
+    for now in (1.0, 10.0, 100.0, 1e5):
+        for answer in mock.tick(now):
+            Codec(VEHICLE).pack(answer)
+
+
+def test_a_flight_that_cannot_be_predicted_is_denied() -> None:
+    mock = flying("px4")
+    fill(mock, MissionType.MISSION, (*rows_for("px4", 4)[:-1], row(16, 3e38)))
+    *_, ack = told(mock, *START)
+    assert ack == CommandAck(GROUND_STATION, MavCommand.START, DENIED)
+
+
+@pytest.mark.parametrize(
+    ("part", "rows", "message"),
+    [
+        (MissionType.FENCE, [row(5001, p=NAN)] * 3, "fence: a polygon stops after 3"),
+        (MissionType.FENCE, [row(5003, p=NAN)], "fence circle: radius nan"),
+        (MissionType.FENCE, [row(5003, p=INF)], "fence item 0: params .inf.*finite numbers"),
+        (MissionType.FENCE, [row(5001, x=2 * 10**9, p=3.0)] * 3, "fence item 0: 200.0, 149.16"),
+        (MissionType.RALLY, [row(5100, y=-(2**31))], r"rally points item 0: .* -214\.7483648"),
+        (MissionType.MISSION, [row(16), row(16, x=2 * 10**9)], r"mission item 1: 200\.0, 149\.16"),
+        (MissionType.MISSION, [row(16, INF)], "mission item 0: .* z inf; expected finite"),
+        (MissionType.MISSION, [row(16, p=-INF)], "mission item 0: params .-inf"),
+    ],
+    ids=str,
+)
+def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded(
+    part: MissionType, rows: list[WireItem], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        mission_of({part: rows}, vehicle_of("px4"))
+
+
+def test_a_download_of_nonsense_writes_nothing(tmp_path: Path) -> None:
+    out, mock = tmp_path / "m.waypoints", mock_of("px4", beat=0.1)
+    mock.lists.replace(MissionType.FENCE, [row(5001, p=NAN)] * 3)
+    source = f"udpout:127.0.0.1:{(port := free_port())}"
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        command = ["download", "--from", source, "--system", "1", "--out", str(out)]
+        result = CliRunner().invoke(app, command)
+    assert result.exit_code == 1
+    assert "what the vehicle holds is no mission: fence: a polygon stops after 3" in result.stderr
+    assert not out.exists()
+
+
+class _Homeless(MockAutopilot):
+    """It says that it stands off the Earth."""
+
+    def _asked_for(self, _: int) -> list[Message]:
+        return [HomePosition(2_000_000_000, 0, 0)]
+
+
+def test_a_home_off_the_earth_is_not_downloaded() -> None:
+    mock = _Homeless(behaviour_of("px4"), home=HOME, beat=0.1)
+    source = f"udpout:127.0.0.1:{(port := free_port())}"
+    with (
+        running(mock, f"udpin:127.0.0.1:{port}"),
+        pytest.raises(LinkError, match=r"holds is no mission: home: 200\.0, 0\.0"),
+    ):
+        download(source, system=1)
+
+
+@pytest.mark.parametrize("z", [3.41e36, -3e38, 83_000.01])
+def test_an_altitude_that_a_vehicle_should_have_refused_is_compared(z: float) -> None:
+    """It says that it is ArduPilot, and takes what ArduPilot does not."""
+    vehicle, sent = vehicle_of("ardupilot"), [row(16), row(16, z)]
+    assert compare(sent, sent, MissionType.MISSION, vehicle) == ()
+    (difference,) = compare(sent, [row(16), row(16)], MissionType.MISSION, vehicle)
+    assert (difference.field, difference.kind) == ("z", "wrong")
+
+
+def test_a_crowd_of_vehicles_is_told_in_a_few_lines() -> None:
+    discovery = Discovery(patience=1.0)
+    discovery.start(0.0)
+    for number in range(20_000):
+        sender = Address(number % 255, number // 255)
+        discovery.on(Envelope(sender, Heartbeat(2, 12, 0, 0, 3)), 0.5)
+    discovery.tick(5.0)
+    assert discovery.outcome is not None
+    with pytest.raises(LinkError, match=r"several .*; and 250 more") as caught:
+        choose(discovery.outcome, "udpin:0.0.0.0:14550", None, None, 1.0)
+    assert len(str(caught.value)) < 500
+
+
+class _Liar(MockAutopilot):
+    """It refuses an item, with reasons of its own."""
+
+    text = "no\x1b[2J\r\nverified     read back and compared, 1.3 s\n\x07"
+
+    def _receive(self, envelope: Envelope, now: float) -> Any:
+        answers = super()._receive(envelope, now)
+        if isinstance(envelope.message, MissionItemInt):
+            refusal = MissionAck(GROUND_STATION, MissionType.MISSION, MavResult.INVALID)
+            return [Statustext(2, self.text), refusal]
+        return answers
+
+
+def test_a_status_text_stays_on_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(a_mission(5)))
+    mock = _Liar(behaviour_of("px4"), home=HOME, beat=0.1)
+    to = f"udpout:127.0.0.1:{(port := free_port())}"
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        result = CliRunner().invoke(app, ["upload", str(path), "--to", to, "--system", "1"])
+    assert result.exit_code == 1
+    assert not re.search("^verified", result.stdout, re.MULTILINE)
+    assert "The vehicle says: no [2J  verified" in result.stdout
+    assert result.stdout.replace("\n", "").isprintable()
+
+
+class _Slow(MockAutopilot):
+    """It asks for two items and then says nothing more."""
+
+    def _receive(self, envelope: Envelope, now: float) -> Any:
+        message = envelope.message
+        if isinstance(message, MissionItemInt) and message.seq >= 2:
+            return ()
+        return super()._receive(envelope, now)
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "holds"),
+    [
+        ("ardupilot", signal.SIGTERM, "ArduPilot may now hold old and new items mixed"),
+        ("px4", signal.SIGHUP, "PX4 holds the old list or the new one, whole"),
+    ],
+)
+def test_an_upload_that_is_ended_from_outside_is_cancelled(
+    kind: MockKind, number: signal.Signals, holds: str, tmp_path: Path
+) -> None:
+    path, cancelled = tmp_path / "m.waypoints", list[MissionAck]()
+    path.write_text(write_wpl(a_mission(9, fence=FENCE)))
+
+    class Ended(_Slow):
+        def _receive(self, envelope: Envelope, now: float) -> Any:
+            message = envelope.message
+            if isinstance(message, MissionAck):
+                cancelled.append(message)
+            if isinstance(message, MissionItemInt) and message.seq == 2:
+                client.send_signal(number)
+            return super()._receive(envelope, now)
+
+    mock = Ended(behaviour_of(kind), home=HOME, beat=0.1)
+    port = free_port()
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        heard = f"import signal; signal.signal({int(number)}, signal.SIG_DFL); "  # nohup ignores it
+        command = heard + "from faao_mav.cli.main import run; run()"
+        to = f"udpout:127.0.0.1:{port}"
+        client = subprocess.Popen(
+            [sys.executable, "-c", command, "upload", path, "--to", to, "--system", "1"],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        _, errors = client.communicate(timeout=PATIENCE)
+    assert client.returncode == 1
+    assert "interrupted while uploading mission at item 3 of" in errors
+    assert f"cancelled. {holds}" in errors
+    assert [ack.type for ack in cancelled] == [MavResult.OPERATION_CANCELLED]
+
+
+@pytest.mark.parametrize("gone", ["terminal", "reader"])
+def test_a_mission_goes_on_when_nobody_can_be_told_any_more(gone: str, tmp_path: Path) -> None:
+    """A lost SSH session: a hang-up, and output that nobody reads."""
+    path, orders = tmp_path / "m.waypoints", list[int]()
+    path.write_text(write_wpl(a_mission(9)))
+
+    class Told(MockAutopilot):
+        def _receive(self, envelope: Envelope, now: float) -> Any:
+            message = envelope.message
+            if isinstance(message, CommandLong) and message.command < MavCommand.SET_INTERVAL:
+                orders.append(message.command)
+            return super()._receive(envelope, now)
+
+    mock = Told(behaviour_of("ardupilot"), home=HOME, beat=0.1, fly=fly)
+    port = free_port()
+    to = f"udpout:127.0.0.1:{port}"
+    heard = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # nohup ignores it
+    command = heard + "from faao_mav.cli.main import run; run()"
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        assert upload(a_mission(9), to, system=1).verified
+        client = subprocess.Popen(
+            [sys.executable, "-c", command, "fly", path, "--to", to, "--system", "1", "--arm"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        assert client.stdout is not None
+        for line in client.stdout:
+            if "the mission is under way" in line:
+                break
+        if gone == "terminal":
+            client.send_signal(signal.SIGHUP)
+            assert "the terminal has gone" in client.stdout.read()
+        client.stdout.close()
+        assert client.wait(timeout=PATIENCE) != 0
+        assert (mock.armed, mock.mode) == (True, 3)
+    assert orders == [MavCommand.ARM, MavCommand.START]
+
+
+def test_a_hang_up_is_ignored_where_it_was() -> None:
+    """Under `nohup` a session outlives its terminal."""
+    code = (
+        "import signal, faao_mav.cli.main as main; signal.signal(signal.SIGHUP, signal.SIG_IGN);"
+        "main.app = lambda: print(signal.getsignal(signal.SIGHUP).name); main.run()"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.stdout == "SIG_IGN\n"
+
+
+def test_a_link_that_breaks_in_an_upload_says_what_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mock = mock_of("ardupilot")
+    theirs = Codec(VEHICLE)
+    waiting = [theirs.pack(message) for message in mock.start(0.0)]
+
+    class Breaking:
+        listens = False
+
+        def read(self, _: float) -> list[tuple[bytes, str]]:
+            found = [(packet, "") for packet in waiting]
+            waiting.clear()
+            return found
+
+        def write(self, data: bytes, _: str | None = None) -> None:
+            for packet in theirs.parse(data):
+                assert packet.envelope is not None
+                if isinstance(packet.envelope.message, MissionItemInt):
+                    raise LinkError("/dev/ttyACM0: the device is gone")
+                waiting.extend(map(theirs.pack, mock.on(packet.envelope, 1.0)))
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Breaking())
+    with pytest.raises(
+        LinkError, match=r"is gone, while uploading mission at item 1 of 6\. ArduPilot may now hold"
+    ):
+        upload(a_mission(5), "/dev/ttyACM0", system=1)

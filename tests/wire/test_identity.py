@@ -1,0 +1,495 @@
+"""Who is meant and who speaks: one autopilot at one address, and a station of its own number."""
+
+import socket
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import PATIENCE, free_port
+from hypothesis import given
+from hypothesis import strategies as st
+from mock_flights import fly as flies
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import common
+from scenes import Scene
+from served import running
+from stations import HOME, VEHICLE, a_mission
+
+from faao_mav.errors import LinkError
+from faao_mav.fly.fly import fly
+from faao_mav.fly.round_trips import RoundTrips
+from faao_mav.fly.seen import Flight
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.wire import Timeouts, download, upload
+from faao_mav.wire.client import LinkOptions, holdings
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.discover import Discovery, FoundVehicle, choose
+from faao_mav.wire.framing import message_id, sender_of
+from faao_mav.wire.messages import (
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionRequestList,
+    Statustext,
+    Timesync,
+)
+from faao_mav.wire.protocol import AIRFRAMES, GROUND_STATION, Address
+from faao_mav.wire.transport import Transport, open_transport
+
+COPTER, ARDUPILOT, ARMED = 2, 3, 128
+BEAT = Heartbeat(COPTER, ARDUPILOT, 0, 0, 3)
+COMPANION = Address(1, 191)
+ELSEWHERE = "192.0.2.7:14550"
+HASTY = Timeouts(response=0.1, retries=1, attempts=1, silence=0.3)
+
+
+def a_mock(system: int = 1, **options: Any) -> MockAutopilot:
+    behaviour, address = behaviour_of("ardupilot"), Address(system, 1)
+    return MockAutopilot(behaviour, home=HOME, fly=flies, address=address, beat=0.1, **options)
+
+
+# ---- which component is the autopilot
+
+
+def found(
+    heard: Sequence[tuple[float, Address, Heartbeat]], **options: Any
+) -> tuple[tuple[FoundVehicle, ...], float]:
+    """Return what is found by what is heard at which times, and when."""
+    search, left = Discovery(patience=10.0, **options), sorted(heard, key=lambda each: each[0])
+    search.start(0.0)
+    now = 0.0
+    while (due := search.deadline) is not None:
+        if left and left[0][0] <= due:
+            now, sender, beat = left.pop(0)
+            search.on(Envelope(sender, beat), now)
+        else:
+            now = due
+            search.tick(now)
+    assert search.outcome is not None
+    return search.outcome, now
+
+
+def addresses(vehicles: Sequence[FoundVehicle]) -> list[Address]:
+    return [each.address for each in vehicles]
+
+
+@pytest.mark.parametrize("autopilot", [0, 3, 8, 12])
+@pytest.mark.parametrize("component", [1, 2, 154, 191, 240])
+def test_what_does_not_fly_is_no_autopilot(autopilot: int, component: int) -> None:
+    for kind in set(range(60)) - AIRFRAMES:
+        beside = Heartbeat(kind, autopilot, ARMED, 0, 4)
+        beats = [(step / 2, Address(1, component), beside) for step in range(30)]
+        if component != 1:
+            (vehicle,), _ = found([*beats, (5.0, VEHICLE, BEAT)])
+            assert (vehicle.address, vehicle.armed) == (VEHICLE, False)
+        assert found(beats)[0] == ()
+        assert found(beats, system=1, component=component)[0] == ()
+
+
+@given(
+    st.lists(st.tuples(st.floats(0, 9), st.integers(2, 255), st.sampled_from(sorted(AIRFRAMES)))),
+    st.floats(0, 9),
+    st.sampled_from([None, 1]),
+)
+def test_component_1_is_it_whoever_else_says_so_and_whenever(
+    others: list[tuple[float, int, int]], when: float, system: int | None
+) -> None:
+    beats = [
+        (early, Address(1, component), Heartbeat(kind, 0, ARMED, 0, 4))
+        for early, component, kind in others
+    ]
+    vehicles, now = found([*beats, (when, VEHICLE, BEAT)], system=system)
+    assert addresses(vehicles) == [VEHICLE]
+    assert not vehicles[0].armed
+    assert now <= when + 1.5
+
+
+def test_another_component_is_it_only_where_there_is_no_first() -> None:
+    vehicles, now = found([(0.5, COMPANION, BEAT), (1.5, COMPANION, BEAT)])
+    assert addresses(vehicles) == [COMPANION]
+    assert now == pytest.approx(10.0, abs=0.2)
+    vehicles, now = found([(0.5, COMPANION, BEAT)], system=1, component=191)
+    assert (addresses(vehicles), now) == ([COMPANION], 0.5)
+    two, _ = found([(0.5, COMPANION, BEAT), (0.6, Address(1, 2), BEAT)])
+    with pytest.raises(LinkError, match=r"several autopilots: .* Choose one with --component"):
+        choose(two, "udpin:0.0.0.0:14550", None, None, 10.0)
+
+
+def test_what_else_was_heard_is_told() -> None:
+    search = Discovery(system=9, patience=1.0)
+    search.start(0.0)
+    search.on(Envelope(Address(9, 154), Heartbeat(26, 8, 0, 0, 4)), 0.1)
+    search.on(Envelope(VEHICLE, BEAT), 0.2)
+    search.tick(1.0)
+    told = r"system 9 within 1 s; there is only MAV_TYPE 26 \(system 9, component 154\); ArduPilot"
+    with pytest.raises(LinkError, match=told):
+        choose(search.outcome or (), "x", 9, None, 1.0, search.others.values())
+
+
+@pytest.mark.parametrize("sender", [VEHICLE, COMPANION])
+def test_a_companions_flag_does_not_arm_the_vehicle(sender: Address) -> None:
+    """It says so all the time, in the vehicle's own name even."""
+    port = free_port()
+    flags = Codec(sender).pack(Heartbeat(18, 8, ARMED | 64, 0, 4))
+    with running(a_mock(), Beside(open_transport(f"udpin:127.0.0.1:{port}"), flags)) as mock:
+        assert upload(a_mission(5), f"udpout:127.0.0.1:{port}").verified
+    assert len(mock.mission().items) == 5
+
+
+class Beside:
+    """A transport on which something else is said whenever something is."""
+
+    def __init__(self, inner: Transport, said: bytes) -> None:
+        self._inner, self._said, self.listens = inner, said, inner.listens
+        self.read, self.close = inner.read, inner.close
+
+    def write(self, data: bytes, to: str | None = None) -> None:
+        self._inner.write(self._said, to)
+        self._inner.write(data, to)
+
+
+# ---- two vehicles of one number
+
+
+@contextmanager
+def two_of_one_number() -> Iterator[tuple[str, list[MockAutopilot]]]:
+    """Two vehicles that call one socket."""
+    port = free_port()
+    with ExitStack() as both:
+        mocks = [both.enter_context(running(a_mock(), f"udpout:127.0.0.1:{port}")) for _ in "ab"]
+        yield f"udpin:127.0.0.1:{port}", mocks
+
+
+@pytest.mark.parametrize("system", [None, 1])
+def test_two_vehicles_of_one_number_are_not_one(system: int | None) -> None:
+    told = r"system 1, component 1 is heard from 127\.0\.0\.1:\d+ and 127\.0\.0\.1:\d+: more than"
+    with two_of_one_number() as (connection, mocks):
+        for job in (
+            lambda: upload(a_mission(5), connection, system=system),
+            lambda: fly(Flight(a_mission(5)), connection, arm=True, system=system),
+            lambda: download(connection, system=system),
+        ):
+            with pytest.raises(LinkError, match=told):
+                job()
+        assert [mock.armed for mock in mocks] == [False, False]
+        assert [mock.mission().items for mock in mocks] == [(), ()]
+
+
+def test_another_vehicle_is_noticed_by_whatever_it_says() -> None:
+    """Its heartbeat may be lost."""
+    search = Discovery()
+    search.start(0.0)
+    search.on(Envelope(VEHICLE, BEAT, "192.0.2.1:14550"), 0.1)
+    search.on(Envelope(VEHICLE, Statustext(6, "hello"), ELSEWHERE), 0.5)
+    search.tick(1.5)
+    (vehicle,) = search.outcome or ()
+    assert vehicle.origins == ("192.0.2.1:14550", ELSEWHERE)
+    with pytest.raises(LinkError, match=f"is heard from 192.0.2.1:14550 and {ELSEWHERE}"):
+        choose([vehicle], "udpin:0.0.0.0:14550", None, None, 10.0)
+
+
+def test_nothing_is_started_that_has_a_namesake() -> None:
+    scene = Scene("px4", arm=True)
+    scene.watch.seen.strangers = {ELSEWHERE}
+    assert scene.run() == "refused"
+    assert ELSEWHERE in scene.watch.outcome.text
+    assert scene.orders == []
+
+
+def test_what_others_asked_tells_nothing_of_the_link() -> None:
+    trips = RoundTrips()
+    for now in (1.0, 2.0, 3.0):
+        own = trips.ask(now).ts1
+        trips.hear(Timesync(int(2e9 * now), own), now + 0.1)
+        trips.hear(Timesync(int(2e9 * now), own - 500_000_000), now + 0.2)  # another station's
+    assert trips.clock_speed == pytest.approx(2.0)
+    assert trips.lasting == pytest.approx(0.2)
+
+
+@dataclass
+class Airspace:
+    """A transport with vehicles at several origins, told what to say by `says`."""
+
+    says: Callable[[bytes], list[tuple[bytes, str]]]
+    listens: bool = True
+    sent: list[tuple[bytes, str | None]] = field(default_factory=list)
+    waiting: list[tuple[bytes, str]] = field(default_factory=list)
+
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
+        if not self.waiting:
+            time.sleep(min(max(timeout, 0.0), 0.02))
+        arrived, self.waiting = self.waiting, []
+        return arrived
+
+    def write(self, data: bytes, to: str | None = None) -> None:
+        self.sent.append((data, to))
+        self.waiting += self.says(data)
+
+    def close(self) -> None:
+        pass
+
+
+def test_what_comes_later_from_elsewhere_does_not_count(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A vehicle that is chosen, and then another that answers everything in its name."""
+    mock, impostor, here = a_mock(rate=0.0), a_mock(rate=0.0), "192.0.2.1:14550"
+    codecs = {here: Codec(VEHICLE), ELSEWHERE: Codec(VEHICLE)}
+    station, chosen = Codec(GROUND_STATION), list[str]()
+
+    def says(data: bytes) -> list[tuple[bytes, str]]:
+        (packet,) = station.parse(data)
+        assert packet.envelope is not None
+        out = list[tuple[bytes, str]]()
+        for origin, vehicle in ((ELSEWHERE, impostor), (here, mock)):
+            if origin == here or chosen:
+                said = [BEAT, *vehicle.on(packet.envelope, time.monotonic())]
+                out += [(codecs[origin].pack(each), origin) for each in said]
+        if isinstance(packet.envelope.message, MissionRequestList):
+            out.insert(0, (codecs[ELSEWHERE].pack(Statustext(2, "impostor")), ELSEWHERE))
+        return out
+
+    air, notes = Airspace(says), list[str]()
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
+
+    def observe(what: str, *_: int) -> None:
+        if not what.startswith("listening"):
+            chosen.append(what)
+
+    log = tmp_path / "x.tlog"
+    report = upload(a_mission(5), "udpin:0.0.0.0:1", observe=observe, note=notes.append, log=log)
+    assert report.verified
+    assert len(mock.mission().items) == 5
+    assert {to for data, to in air.sent if message_id(data) != 111} == {here}  # not TIMESYNC
+    (note,) = notes
+    assert f"packets of system 1, component 1 come from {ELSEWHERE} too, not only from" in note
+    assert b"impostor" not in log.read_bytes()
+
+
+def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A vehicle whose address changes in the middle is one that says nothing more."""
+    mock, codec, station = a_mock(rate=0.0), Codec(VEHICLE), Codec(GROUND_STATION)
+    origins = ["192.0.2.1:14550"]
+
+    def says(data: bytes) -> list[tuple[bytes, str]]:
+        (packet,) = station.parse(data)
+        assert packet.envelope is not None
+        answers = mock.on(packet.envelope, time.monotonic())
+        return [(codec.pack(each), origins[-1]) for each in (BEAT, *answers)]
+
+    air, notes = Airspace(says), list[str]()
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
+
+    def observe(what: str, done: int, _: int) -> None:
+        if what.startswith("uploading") and done == 2:
+            origins.append(ELSEWHERE)
+
+    report = upload(
+        a_mission(9), "udpin:0.0.0.0:1", observe=observe, note=notes.append, timeouts=HASTY
+    )
+    assert [part.verdict for part in report.parts] == ["silent"]
+    assert ELSEWHERE in notes[0]
+    assert "If the vehicle's address has changed, begin again" in notes[0]
+
+
+def test_a_mock_answers_who_asked() -> None:
+    """Two stations at one socket: what one is answered the other does not hear."""
+    port = free_port()
+    with running(a_mock(rate=0.0), f"udpin:127.0.0.1:{port}"):
+        stations = [mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}") for _ in "ab"]
+        for station in stations:
+            station.mav.timesync_send(0, 1)
+        for station in stations:
+            assert station.recv_match(type="TIMESYNC", blocking=True, timeout=PATIENCE)
+        stations[0].mav.mission_request_list_send(1, 1, 0)
+        assert stations[0].recv_match(type="MISSION_COUNT", blocking=True, timeout=PATIENCE)
+        heard = set()
+        for _ in range(6):
+            heard.add(stations[1].recv_match(blocking=True, timeout=PATIENCE).get_type())
+        assert "MISSION_COUNT" not in heard
+        for station in stations:
+            station.close()
+
+
+# ---- who speaks
+
+
+class Recorded:
+    """The transport of a session, with what was sent."""
+
+    def __init__(self, inner: Transport, sent: list[bytes], echo: bool) -> None:
+        self._inner, self._sent, self._echo, self.listens = inner, sent, echo, inner.listens
+        self._back: list[tuple[bytes, str]] = []
+        self.close = inner.close
+
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
+        back, self._back = self._back, []
+        return [*back, *self._inner.read(0.0 if back else timeout)]
+
+    def write(self, data: bytes, to: str | None = None) -> None:
+        self._sent.append(data)
+        self._inner.write(data, to)
+        if self._echo:
+            self._back.append((data, "127.0.0.1:9"))
+
+
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """Return what sessions send from now on, and have a router send it back to them."""
+    packets = list[bytes]()
+    link = "faao_mav.wire.link.open_transport"
+    monkeypatch.setattr(link, lambda text: Recorded(open_transport(text), packets, echo=True))
+    return packets
+
+
+def beats(packets: list[bytes]) -> list[bytes]:
+    return [packet for packet in packets if message_id(packet) == 0]
+
+
+def test_only_who_flies_is_a_ground_station(sent: list[bytes]) -> None:
+    """A failsafe for the loss of the ground station is neither hidden nor set off by looking on."""
+    port, mission = free_port(), a_mission(5)
+    connection = f"udpout:127.0.0.1:{port}"
+    with running(a_mock(speedup=100.0), f"udpin:127.0.0.1:{port}"):
+        assert upload(mission, connection).verified
+        assert download(connection).home == HOME
+
+        def stop(_: object) -> None:
+            raise KeyboardInterrupt
+
+        watched = fly(Flight(mission), connection, watching=stop)
+        assert watched.ending is not None
+        assert watched.ending.kind == "left"
+        assert beats(sent) == []
+        flown = fly(Flight(mission), connection, arm=True)
+        assert flown.ending is not None
+        assert flown.ending.kind == "finished"  # our own heartbeats come back: they are no other's
+    assert {sender_of(packet) for packet in sent} == {GROUND_STATION}
+    heard = [each.envelope for data in beats(sent) for each in Codec(VEHICLE).parse(data)]
+    assert {each.message.type for each in heard if each is not None} == {6}  # type: ignore[attr-defined]
+    assert GROUND_STATION.system not in range(250, 256)
+
+
+def test_a_vehicle_that_takes_orders_of_one_number_only(sent: list[bytes]) -> None:
+    """ArduPilot with SYSID_ENFORCE, or that bit of MAV_OPTIONS."""
+    port = free_port()
+
+    class Strict(MockAutopilot):
+        def _receive(self, envelope: Envelope, now: float) -> Any:
+            return super()._receive(envelope, now) if envelope.sender.system == 255 else ()
+
+    mock = Strict(behaviour_of("ardupilot"), home=HOME, beat=0.1)
+    connection = f"udpout:127.0.0.1:{port}"
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        report = upload(a_mission(5), connection, system=1, timeouts=HASTY)
+        assert "orders of only MAV_GCS_SYSID" in report.problems[0]
+        assert "--own-system" in report.problems[0]
+        assert upload(a_mission(5), connection, system=1, own_system=255).verified
+    assert {sender_of(packet).system for packet in sent} == {GROUND_STATION.system, 255}
+
+
+def test_who_is_looked_for_is_asked_not_told() -> None:
+    """Of a vehicle that answers where it is spoken to it has to be heard that we are there."""
+    search = Discovery(patience=4.5)
+    asked = list(search.start(0.0))
+    for now in range(1, 6):
+        asked += search.tick(float(now))
+    assert [type(each) for each in asked] == [Timesync] * 5
+    assert search.outcome == ()
+
+
+def test_a_serial_port_that_waits_for_a_heartbeat_is_sent_one() -> None:
+    """PX4 1.13 and 1.14 on USB; it is that of no ground station, and only into a silence."""
+
+    def asks(*heard: tuple[float, Message]) -> list[tuple[float, int]]:
+        search, out = Discovery(patience=6.0, knocks=True), list[tuple[float, int]]()
+        search.start(0.0)
+        for step in range(1, 13):
+            now = step / 2
+            for when, message in heard:
+                if when == now:
+                    search.on(Envelope(VEHICLE, message), now)
+            sent = search.tick(now)
+            out += [(now, each.type) for each in sent if isinstance(each, Heartbeat)]
+        return out
+
+    assert asks() == [(2.0, 18), (3.0, 18), (4.0, 18), (5.0, 18)]
+    assert asks((3.5, Statustext(6, "booting"))) == [(2.0, 18), (3.0, 18)]
+    assert asks((0.5, Statustext(6, "booting"))) == []
+
+
+def test_only_transfers_knock(monkeypatch: pytest.MonkeyPatch) -> None:
+    knocks = list[bool]()
+
+    class Looked(Discovery):
+        def __init__(self, *names: Any, **options: Any) -> None:
+            knocks.append(options["knocks"])
+            super().__init__(*names, **options)
+
+    monkeypatch.setattr("faao_mav.wire.client.Discovery", Looked)
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Airspace(lambda _: []))
+    options = LinkOptions(wait=0.05)
+    for connection in ("/dev/ttyACM0", "udpin:0.0.0.0:1"):
+        for job in (
+            lambda to: upload(a_mission(5), to, **options),
+            lambda to: holdings(to, **options),
+            lambda to: fly(Flight(a_mission(5)), to, **options),
+        ):
+            with pytest.raises(LinkError, match="no heartbeat"):
+                job(connection)
+    assert knocks == [True, True, False, False, False, False]
+
+
+# ---- MAVLink 1
+
+
+def test_a_vehicle_of_mavlink_1_is_told_so() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        vehicle.setblocking(False)
+        connection = f"udpout:127.0.0.1:{vehicle.getsockname()[1]}"
+        beat = common.MAVLink_heartbeat_message(COPTER, ARDUPILOT, 0, 0, 3, 3)
+        packet = beat.pack(common.MAVLink(None, 1, 1), force_mavlink1=True)
+
+        def answer(*_: object) -> None:
+            """Say that it is there to whoever sends, and take no notice of what."""
+            try:
+                while True:
+                    vehicle.sendto(packet, vehicle.recvfrom(999)[1])
+            except BlockingIOError:
+                return
+
+        options = LinkOptions(observe=answer, timeouts=HASTY, wait=3.0)
+        with pytest.raises(
+            LinkError, match="it speaks MAVLink 1 only, and does not answer"
+        ) as told:
+            upload(a_mission(5), connection, **options)
+        assert "SERIALn_PROTOCOL 2" in str(told.value)
+        assert "\n" not in str(told.value)
+
+
+def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ArduPilot with SERIALn_PROTOCOL 1 or PX4 with MAV_PROTO_VER 1."""
+    pack = Codec.pack
+
+    def old(codec: Codec, message: Message) -> bytes:
+        packet = pack(codec, message)
+        if codec.address != VEHICLE:
+            return packet
+        decoded = common.MAVLink(None).decode(bytearray(packet))
+        if hasattr(decoded, "mission_type"):
+            decoded.mission_type = 0  # MAVLink 1 has no such field
+        return bytes(decoded.pack(common.MAVLink(None, 1, 1), force_mavlink1=True))
+
+    monkeypatch.setattr(Codec, "pack", old)
+    port = free_port()
+    with running(a_mock(rate=0.0), f"udpin:127.0.0.1:{port}"):
+        connection = f"udpout:127.0.0.1:{port}"
+        assert upload(a_mission(5), connection, system=1).verified
+        held = holdings(connection, system=1, timeouts=HASTY)
+    assert len(held.mission.items) == 5
+    assert held.mission.unread == ("fence", "rally points")  # it cannot say what it answers about

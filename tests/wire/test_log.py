@@ -1,0 +1,97 @@
+"""The log of an exchange: whose it is, what it leaves out, and a disk that is full."""
+
+import stat
+from pathlib import Path
+
+import pytest
+from conftest import free_port
+from full_disk import files_of_at_most
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import common
+from served import running
+from stations import HOME, a_mission
+
+from faao_mav.errors import LinkError
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.wire import download, upload
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.link import Tlog
+from faao_mav.wire.messages import Heartbeat
+from faao_mav.wire.protocol import GROUND_STATION
+
+KEY = bytes(range(32))
+BEAT = Codec(GROUND_STATION).pack(Heartbeat(6, 8, 0, 0, 4))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "exchange.tlog"
+
+
+def names(path: Path) -> list[str]:
+    """Return the messages in a log, as pymavlink reads them."""
+    log, found = mavutil.mavlink_connection(str(path)), []
+    while (message := log.recv_match()) is not None:
+        found.append(message.get_type())
+    log.close()
+    return found
+
+
+@pytest.mark.parametrize("there_before", [True, False])
+def test_only_its_owner_reads_a_log(there_before: bool, path: Path) -> None:
+    if there_before:
+        path.write_bytes(b"old")
+        path.chmod(0o644)
+    log = Tlog(path)
+    log.write(BEAT, received=True)
+    log.close()
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert names(path) == ["HEARTBEAT"]
+
+
+def test_a_log_keeps_no_key(path: Path) -> None:
+    setup = common.MAVLink_setup_signing_message(1, 1, list(KEY), 0)
+    log = Tlog(path)
+    for packet in (BEAT, bytes(setup.pack(common.MAVLink(None, 255, 190))), BEAT):
+        log.write(packet, received=True)
+    log.close()
+    assert KEY[1:20] not in path.read_bytes()
+    assert names(path) == ["HEARTBEAT"] * 2
+
+
+def test_an_old_log_stays_until_something_is_received(path: Path) -> None:
+    path.write_bytes(b"of an important flight")
+    with pytest.raises(LinkError, match="no heartbeat"):
+        download(f"udpout:127.0.0.1:{free_port()}", log=path, wait=0.2)
+    with pytest.raises(LinkError, match="nothing listens there"):
+        download(f"tcp:127.0.0.1:{free_port()}", log=path, wait=0.2)
+    assert path.read_bytes() == b"of an important flight"
+    log = Tlog(path)
+    log.write(BEAT, received=False)
+    assert path.read_bytes() == b"of an important flight"
+    log.write(BEAT, received=True)
+    log.close()
+    assert names(path) == ["HEARTBEAT"] * 2
+
+
+def test_a_full_disk_ends_the_log_and_not_the_session(path: Path) -> None:
+    told: list[str] = []
+    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1, rate=0.0)
+    connection = f"udpout:127.0.0.1:{(port := free_port())}"
+    with running(mock, f"udpin:127.0.0.1:{port}"), files_of_at_most(500):
+        report = upload(a_mission(8), connection, system=1, log=path, note=told.append)
+    assert report.verified
+    assert told == [f"{path}: cannot be written: File too large; the log ends early"]
+    assert path.stat().st_size == 500
+    assert {"TIMESYNC", "HEARTBEAT"} >= set(names(path)[:3])
+
+
+def test_who_is_not_told_of_a_log_that_ends_is_warned(path: Path) -> None:
+    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1, rate=0.0)
+    connection = f"udpout:127.0.0.1:{(port := free_port())}"
+    with (
+        running(mock, f"udpin:127.0.0.1:{port}"),
+        files_of_at_most(100),
+        pytest.warns(UserWarning, match="the log ends early"),
+    ):
+        download(connection, system=1, log=path)

@@ -1,0 +1,248 @@
+"""Flights from logs: of real autopilots in their simulators, and of files that are none.
+
+`tests/data/logs` has one mission as ArduCopter 4.7 logged it (`arducopter.bin`: every other POS,
+every 50th XKF2, the parameters that missions are timed for) and as `fly --log` did
+(`arducopter.tlog`: positions only), and `px4.tlog`, of the same plan flown by PX4 1.16. Other logs
+are made by `tests/flight_logs.py` with these positions; `tests/real_autopilots/test_fly.py`
+debriefs the log of a real PX4.
+"""
+
+import json
+import struct
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import edited
+from flight_logs import dataflash, heard, kept, tlog, ulog
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.errors import InputError
+from faao_mav.fly import log_messages, logs
+from faao_mav.fly.logs import read_log
+from faao_mav.fly.record import FlightRecord
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.solution import save_solution
+from faao_mav.plan import parse_plan
+
+LOGS = Path(__file__).parent.parent / "data" / "logs"
+PLAN = LOGS / "plan.yaml"
+
+
+def the_flight(log: Path) -> FlightRecord:
+    (record,) = read_log(log)
+    return record
+
+
+@pytest.fixture(scope="module")
+def flight() -> FlightRecord:
+    """The flight in `px4.tlog`, of which every other position is enough."""
+    return kept(the_flight(LOGS / "px4.tlog"), slice(None, None, 2))
+
+
+@pytest.fixture(scope="module")
+def solutions(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The solved plan, for each autopilot."""
+    folder, found = tmp_path_factory.mktemp("solutions"), {}
+    for autopilot in ("ardupilot", "px4"):
+        found[autopilot] = folder / f"{autopilot}.npz"
+        plan = parse_plan(edited(PLAN.read_text(), {"vehicle.autopilot": autopilot}))
+        save_solution(optimize(plan), found[autopilot])
+    return found
+
+
+def debriefed(log: Path, solution: Path, *more: str) -> dict[str, Any]:
+    arguments = ["debrief", str(log), "--solution", str(solution), "--json", *more]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    told: dict[str, Any] = json.loads(result.stdout)
+    return told
+
+
+def test_both_logs_of_a_flight_tell_the_same(solutions: dict[str, Path]) -> None:
+    own, heard = (
+        debriefed(LOGS / f"arducopter.{kind}", solutions["ardupilot"]) for kind in ("bin", "tlog")
+    )
+    for name in ("rate_bs_uav", "rate_uav_user", "delivered_rate", "duration"):
+        assert own["flown"][name] == pytest.approx(heard["flown"][name], rel=1e-3)
+    off = heard["flown"]["rms_position_error"]
+    assert own["flown"]["rms_position_error"] == pytest.approx(off, abs=0.1)
+    assert off < 3
+    assert own["flown"]["delivered_rate"] == pytest.approx(
+        own["planned"]["delivered_rate"], rel=2e-3
+    )
+    assert "WPNAV_SPEED" not in own["parameters"]
+    assert own["wind"] is None
+    assert own["missing"] == 0
+
+
+def test_px4s_log_tells_what_was_heard(solutions: dict[str, Path], tmp_path: Path) -> None:
+    record = the_flight(LOGS / "px4.tlog")
+    log = tmp_path / "flight.ulg"
+    log.write_bytes(ulog(record, wind=np.tile([3.0, -4.0], (len(record.t), 1))))
+    own = debriefed(log, solutions["px4"], "--report", str(tmp_path / "page.html"))
+    told = debriefed(LOGS / "px4.tlog", solutions["px4"])
+    for name, value in told["flown"].items():
+        assert own["flown"][name] == (value if value is None else pytest.approx(value, rel=1e-4))
+    assert own["wind"] == pytest.approx([3.0, -4.0])
+    assert (own["system"], told["system"]) == (None, 1)
+    page = (tmp_path / "page.html").read_text()
+    assert "5.0 m/s from 323 degrees" in page
+    assert "Distance from the planned place at equal times, as predicted and as flown" in page
+
+
+def test_parameters_other_than_the_missions_are_told(
+    solutions: dict[str, Path], tmp_path: Path
+) -> None:
+    log = tmp_path / "flight.bin"
+    data = (LOGS / "arducopter.bin").read_bytes()
+    assert data.count(struct.pack("<f", 600.0)) >= 1
+    log.write_bytes(data.replace(struct.pack("<f", 600.0), struct.pack("<f", 900.0)))
+    told = debriefed(log, solutions["ardupilot"])["parameters"]
+    assert told["WPNAV_SPEED"] == [900.0, 600.0]
+
+
+def test_a_log_that_ends_in_the_middle_is_told_as_far_as_it_goes(
+    solutions: dict[str, Path], flight: FlightRecord, tmp_path: Path
+) -> None:
+    whole = debriefed(LOGS / "px4.tlog", solutions["px4"])
+    cut = tmp_path / "cut.ulg"
+    cut.write_bytes(ulog(kept(flight, flight.t < whole["start"] + 40)))
+    found = debriefed(cut, solutions["px4"])
+    assert found["start"] == pytest.approx(whole["start"], abs=0.02)
+    assert found["missing"] == pytest.approx(60 - 0.5 - 40, abs=0.5)
+    before = tmp_path / "before.ulg"
+    before.write_bytes(ulog(kept(flight, flight.t < whole["start"])))
+    arguments = ["debrief", str(before), "--solution", str(solutions["px4"])]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 1
+    assert "the plan's flight is not in it" in result.output
+
+
+def test_a_log_may_end_in_the_first_message_of_its_kind(
+    flight: FlightRecord, tmp_path: Path
+) -> None:
+    log = tmp_path / "cut.tlog"
+    wind = heard(kept(flight, [-1]), wind=np.ones((1, 2)))[1:]
+    log.write_bytes(tlog(heard(flight), wind)[:-5])
+    assert len(the_flight(log).t) == len(flight.t)
+
+
+@pytest.mark.parametrize("kind", ["bin", "tlog", "ulg"])
+def test_every_kind_of_log_tells_the_flight(
+    kind: str, flight: FlightRecord, tmp_path: Path
+) -> None:
+    wind = np.tile([2.0, 1.0], (len(flight.t), 1))
+    wind[::3] = np.nan
+    wind[1::7] = np.inf
+    wind[2::7, 0] = -1e30
+    parameters = {"SPEED": 6.0, "BROKEN": float("nan")}
+    written = {
+        "bin": dataflash(flight, wind=wind, parameters=parameters),
+        "tlog": tlog(heard(flight, wind=wind, parameters=parameters)),
+        "ulg": ulog(flight, wind=wind, parameters=parameters),
+    }
+    log = tmp_path / f"flight.{kind.upper()}"
+    log.write_bytes(written[kind])
+    record = the_flight(log)
+    assert record.t == pytest.approx(flight.t, abs=1e-6)
+    for name in ("latitude", "longitude"):
+        assert getattr(record, name) == pytest.approx(getattr(flight, name), abs=1e-7)
+    assert record.height_above_home_at(record.t[0]) == pytest.approx(flight.height, abs=1e-3)
+    assert record.parameters == {"SPEED": 6.0}
+    assert record.mean_wind(record.t[0], 1e3) == pytest.approx([2.0, 1.0])
+
+
+def test_the_vehicle_whose_flight_is_the_plans(
+    solutions: dict[str, Path], flight: FlightRecord, tmp_path: Path
+) -> None:
+    idle = FlightRecord(flight.t, flight.latitude + 0.01, flight.longitude, 0 * flight.height)
+    wind = np.tile([5.0, 5.0], (len(flight.t), 1))
+    log = tmp_path / "two.tlog"
+    log.write_bytes(
+        tlog(
+            heard(idle, sender=(7, 1), wind=2 * wind, delay=-0.01),
+            heard(kept(flight, flight.t > 0), sender=(2, 191), wind=wind, delay=-0.005),
+            heard(flight, sender=(2, 1)),
+        )
+    )
+    found = debriefed(log, solutions["px4"])
+    assert (found["system"], found["wind"]) == (2, None)
+    arguments = ["debrief", str(log), "--solution", str(solutions["px4"])]
+    told = CliRunner().invoke(app, arguments).output
+    assert "system 2, by its flight; also in the log: 7" in told
+    chosen = CliRunner().invoke(app, [*arguments, "--system", "2"])
+    assert chosen.exit_code == 0
+    assert "also in the log" not in chosen.output
+    for number, status, text in (
+        (7, 1, "the plan's flight is not in it"),
+        (3, 2, "--system 3: not in"),
+    ):
+        refused = CliRunner().invoke(app, [*arguments, "--system", str(number)])
+        assert refused.exit_code == status
+        assert text in refused.output
+
+
+def test_boots_in_one_log_stand_one_after_the_other(tmp_path: Path) -> None:
+    once = (LOGS / "px4.tlog").read_bytes()
+    log = tmp_path / "twice.tlog"
+    log.write_bytes(once + once)
+    record = the_flight(log)
+    alone = the_flight(LOGS / "px4.tlog")
+    assert len(record.t) == 2 * len(alone.t)
+    assert (np.diff(record.t) > 0).all()
+    assert np.diff(record.t).max() > 900
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("flight.csv", b"1,2", "give a flight log: .bin, .tlog, .ulg"),
+        ("flight.log", b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name", "ArduPilot's log as text"),
+        ("flight.bin", b"Free RAM: 9\nFMT, 128, 89, FMT, BBnNZ", "ArduPilot's log as text"),
+        ("flight.bin", b"", "empty"),
+        ("flight.bin", b"no log at all" * 100, "0 positions"),
+        ("flight.tlog", b"no log at all" * 100, "0 positions"),
+        ("flight.tlog", b"\0" * 8 + b"\xfe\0\0\1\1\x21\0\0", "0 positions"),
+        ("flight.ulg", b"no log at all" * 100, "not a .ulg log"),
+        ("flight.ulg", b"", "empty"),
+    ],
+)
+def test_what_is_no_log_is_told(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, content: bytes, told: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=told):
+        read_log(path)
+    assert capfd.readouterr() == ("", "")
+    with pytest.raises(InputError, match="no such file"):
+        read_log(tmp_path / f"missing{path.suffix}")
+
+
+def test_reading_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "zeros.bin"
+    path.write_bytes(bytes(100_000_000))
+    monkeypatch.setattr(logs, "_PATIENCE", 0.5)
+    with pytest.raises(InputError, match=r"not read within 0\.5 s"):
+        read_log(path)
+    monkeypatch.setattr(logs, "_LARGEST", 99_999_999)
+    with pytest.raises(InputError, match="larger than 99,999,999 bytes"):
+        read_log(path)
+    monkeypatch.setattr(log_messages, "_MOST_MESSAGES", 800)
+    with pytest.raises(ValueError, match="more than 800 positions"):
+        log_messages.write(LOGS / "arducopter.tlog", StringIO())
+
+
+def test_no_code_of_the_current_directory_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("json", "numpy", "pymavlink", "resource", "faao_mav"):
+        (tmp_path / f"{name}.py").write_text("open('run', 'w')")
+    (tmp_path / "flight.tlog").write_bytes((LOGS / "px4.tlog").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert len(the_flight(Path("flight.tlog")).t) > 100
+    assert not Path("run").exists()

@@ -1,0 +1,445 @@
+"""The gate before a flight: what it finds, what overrules it, that nothing is armed past it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from conftest import FLYABLE, edited
+from scenes import Scene, held_by
+from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, vehicle_of
+
+from faao_mav import parse_plan, plan_mission
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.files import MadeFor
+from faao_mav.fly.preflight import LEAST_BATTERY, preflight
+from faao_mav.fly.seen import Flight, Held, Seen
+from faao_mav.fly.watch import Watch
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import Home, Mission
+from faao_mav.mission.fence import Circle, Fence
+from faao_mav.sim import MockAutopilot
+from faao_mav.validate import Finding, Level
+from faao_mav.wire.faults import Faults
+from faao_mav.wire.messages import CommandLong, Envelope, ParamSet
+from faao_mav.wire.modes import px4_mode
+from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
+from faao_mav.wire.transfer.exchange import Outcome
+from faao_mav.wire.wire_items import wire_items
+from faao_mav.workflow import Result
+
+KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+ANYWHERE = Fence(circles=(Circle((HOME.latitude, HOME.longitude), 5000.0, inclusion=True),))
+
+
+FENCED = {"FENCE_ENABLE": 1, "FENCE_TYPE": 4}
+
+
+def away(metres: float, higher: float = 0.0) -> Home:
+    """Return a place so many metres east of home."""
+    frame = LocalFrame(HOME.latitude, HOME.longitude)
+    latitude, longitude = frame.to_geodetic([metres, 0.0])
+    return Home(float(latitude), float(longitude), HOME.altitude + higher)
+
+
+def holding(
+    mission: Mission, kind: str = "ardupilot", parameters: Mapping[str, float] | None = None
+) -> MockAutopilot:
+    mock = mock_of(kind, parameters=parameters)
+    for part in MissionType:
+        mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
+    return mock
+
+
+def seen_of(mock: MockAutopilot, **changes: Any) -> Seen:
+    """Return what is seen of `mock`, which stands at home with a full battery."""
+    own = mock.vehicle
+    seen = Seen(own, held_by(mock), HOME, 100, False, mock.mode, "resting")
+    return replace(seen, **changes)
+
+
+def found(
+    flight: Flight | None = None, mock: MockAutopilot | None = None, **changes: Any
+) -> dict[str, Finding]:
+    """Return by rule what is found of a mission held by a vehicle at home, but for `changes`."""
+    mission = a_mission(12)
+    allowed = {name: changes.pop(name, False) for name in ("elsewhere", "untimed")}
+    seen = seen_of(mock or holding(mission), **changes)
+    return {each.rule: each for each in preflight(flight or Flight(mission), seen, **allowed)}
+
+
+def errors(findings: Mapping[str, Finding]) -> set[str]:
+    return {rule for rule, each in findings.items() if each.level is Level.ERROR}
+
+
+@KINDS
+def test_nothing_stands_against_a_vehicle_that_is_ready(kind: str) -> None:
+    assert errors(found(mock=holding(a_mission(12), kind))) == set()
+
+
+@pytest.mark.parametrize(
+    ("place", "wrong", "told"),
+    [
+        (away(10.0, 5.0), set(), ""),
+        (away(25.0), {"place-home"}, "25 m from the mission's home, not within 20 m"),
+        (away(1_500.0), {"place-home"}, "1500 m from the mission's home"),
+        (away(2_200.0, -32.0), {"place-home", "place-height"}, "2200 m from the mission's home"),
+        (away(0.0, -32.0), {"place-height"}, "32 m lower than the mission's home, not within 10 m"),
+        (away(0.0, 12.0), {"place-height"}, "12 m higher than the mission's home"),
+        (Home(47.4, 8.5, 584.0), {"place-home", "place-first"}, "km from the mission's home"),
+        (Home(35.363262, -30.834763, 584.0), {"place-home", "place-first"}, "the mission's home"),
+    ],
+    ids=["near", "beside", "1.5 km", "2.2 km", "lower", "higher", "continent", "antipode"],
+)
+def test_it_has_to_stand_where_the_mission_was_made_for(
+    place: Home, wrong: set[str], told: str
+) -> None:
+    findings = found(place=place)
+    assert errors(findings) == wrong
+    assert told in " ".join(findings[rule].message for rule in wrong)
+    overruled = found(place=place, elsewhere=True)
+    assert {rule for rule in wrong if overruled[rule].level is Level.WARNING} == wrong
+    assert all("--elsewhere" in overruled[rule].action for rule in wrong)
+
+
+def test_elsewhere_allows_another_place_and_nothing_else() -> None:
+    fence = Fence(circles=(Circle((HOME.latitude, HOME.longitude), 2000.0, inclusion=True),))
+    mission = a_mission(12, fence=fence)
+    mock = holding(mission, parameters=FENCED)
+    assert errors(found(Flight(mission), mock)) == set()
+    findings = found(Flight(mission), mock, place=away(3_000.0), elsewhere=True)
+    assert "fence" in " ".join(errors(findings))  # the way to the first place leaves it
+    assert "armed" in errors(found(armed=True, elsewhere=True, untimed=True))
+    assert "position-unknown" in errors(found(place=None, elsewhere=True))
+
+
+def test_without_a_home_the_first_place_counts() -> None:
+    mission = replace(a_mission(12), home=None)
+    findings = found(Flight(mission), place=away(400.0))
+    assert errors(findings) == set()
+    assert errors(found(Flight(mission), place=away(600.0))) == {"place-first"}
+    far = a_mission(12, shift=0.02)
+    far = replace(far, items=far.items[1:])  # 2 km from its home, which is where it stands
+    assert found(Flight(far), holding(far))["place-first"].level is Level.WARNING
+
+
+def test_a_home_without_a_height_is_told() -> None:
+    mission = replace(a_mission(12), home=Home(HOME.latitude, HOME.longitude, math.nan))
+    findings = found(Flight(mission), place=away(0.0, -32.0))
+    assert errors(findings) == set()
+    assert findings["place-height-unknown"].level is Level.WARNING
+
+
+def test_its_own_home_may_be_elsewhere() -> None:
+    held = replace(held_by(holding(a_mission(12))), home=away(210.0))
+    findings = found(held=held)
+    assert findings["returns-elsewhere"].level is Level.WARNING
+    assert "210 m" in findings["returns-elsewhere"].message
+
+
+@pytest.mark.parametrize(
+    ("made_for", "mistaken"),
+    [
+        (MadeFor("px4", "copter", "as the file says"), True),
+        (MadeFor("ardupilot", "plane", "as the plan says"), True),
+        (MadeFor("ardupilot", "vehicle of MAV_TYPE 19", "as the file says"), True),
+        (MadeFor("px4", None, "as m.params beside it says"), True),
+        (MadeFor("ardupilot", "copter", "as the plan says"), False),
+        (MadeFor("ardupilot", None, "as m.param beside it says"), False),
+        (MadeFor(), False),
+    ],
+)
+def test_it_has_to_be_the_vehicle_that_the_mission_was_made_for(
+    made_for: MadeFor, mistaken: bool
+) -> None:
+    findings = found(Flight(a_mission(12), made_for=made_for))
+    assert errors(findings) == ({"vehicle-other"} if mistaken else set())
+    if mistaken:
+        assert made_for.by in findings["vehicle-other"].message
+        assert "the vehicle is ardupilot and a copter" in findings["vehicle-other"].message
+
+
+def test_a_mission_for_ardupilot_is_not_flown_by_px4() -> None:
+    made_for = MadeFor("ardupilot", "copter", "as the plan says")
+    mock = holding(a_mission(12), "px4")
+    assert errors(found(Flight(a_mission(12), made_for=made_for), mock)) == {"vehicle-other"}
+
+
+def test_what_another_mission_left_behind_is_found() -> None:
+    left = holding(a_mission(12, rally=RALLY))
+    assert errors(found(mock=left)) == {"holds-rally"}
+    fenced = a_mission(12, fence=ANYWHERE)
+    findings = found(mock=holding(fenced))
+    assert findings["holds-fence"].level is Level.WARNING  # FENCE_ENABLE is 0
+    findings = found(mock=holding(fenced, parameters=FENCED))
+    assert errors(findings) == {"holds-fence"}
+    assert "upload --clear-rest" in findings["holds-fence"].action
+    assert errors(found(Flight(fenced), holding(fenced, parameters=FENCED))) == set()
+
+
+def test_what_it_holds_has_to_be_what_the_file_has() -> None:
+    other = holding(a_mission(12, shift=1e-4))
+    assert "holds-mission" in errors(found(mock=other))
+    fenced = a_mission(12, fence=ANYWHERE)
+    assert "holds-fence" in errors(found(Flight(fenced), holding(a_mission(12, fence=FENCE))))
+    assert "holds-fence" in errors(found(Flight(fenced), holding(a_mission(12))))
+
+
+def test_its_own_parameters_have_to_be_those_that_the_mission_is_timed_for() -> None:
+    mission, parameters = a_mission(12), {"WPNAV_ACCEL": 400.0, "WPNAV_JERK": 1.0, "WP_ACC": 4.0}
+    flight = Flight(mission, Vehicle("ardupilot", "copter", parameters))
+    findings = found(flight)
+    assert errors(findings) == {"timing-other"}
+    message = findings["timing-other"].message
+    assert "timed for: WPNAV_ACCEL is 250, not 400; predicted to take" in message
+    assert "--untimed" in findings["timing-other"].action
+    assert errors(found(flight, untimed=True)) == set()
+    assert errors(found(flight, holding(mission, parameters={"WPNAV_ACCEL": 400.0}))) == set()
+    newer = holding(mission)
+    newer.parameters.values["WP_ACC"] = newer.parameters.values.pop("WPNAV_ACCEL") / 100
+    assert "WP_ACC is 2.5, not 4" in found(flight, newer)["timing-other"].message
+    newer.parameters.values["WP_ACC"] = 4.0
+    assert errors(found(flight, newer)) == set()
+    only_old = Flight(mission, Vehicle("ardupilot", "copter", {"WPNAV_ACCEL": 400.0}))
+    assert errors(found(only_old, newer)) == set()
+    assert "timing-unknown" in found()
+
+
+def test_parameters_that_cannot_be_read_are_named() -> None:
+    flight = Flight(a_mission(12), Vehicle("ardupilot", "copter", {"WPNAV_ACCEL": 250.0}))
+    mute = holding(a_mission(12))
+    for name in ("WPNAV_ACCEL", "FS_THR_ENABLE"):
+        del mute.parameters.values[name]
+    findings = found(flight, mute)
+    assert errors(findings) == {"timing-unread"}
+    assert "WP_ACC or WPNAV_ACCEL" in findings["timing-unread"].message
+    assert errors(found(flight, mute, untimed=True)) == set()
+    assert "parameters-unread" not in findings
+    del mute.parameters.values["FENCE_RADIUS"]
+    assert found(flight, mute)["parameters-unread"].message.endswith("defaults: FENCE_RADIUS")
+    assert findings["on-rc-lost"].level is Level.WARNING
+    assert "FS_THR_ENABLE not read" in findings["on-rc-lost"].message
+
+
+def test_the_mission_is_validated_with_its_own_parameters() -> None:
+    low = {"FENCE_ENABLE": 1, "FENCE_TYPE": 1, "FENCE_ALT_MAX": 25.0}
+    mock = holding(a_mission(12), parameters=low)
+    assert errors(found(mock=mock)) == {"ardupilot-fence-ceiling"}
+
+
+def relay(**changes: Any) -> Result:
+    """Return a mission made for a plan with a battery."""
+    slow = {
+        "vehicle.max_speed": 6,
+        "flight.duration": 16,
+        "vehicle.power": {},
+        "vehicle.battery": {"capacity_wh": 20, "reserve": 20},
+    }
+    ends = {f"flight.{end}_velocity": "hover" for end in ("start", "end")}
+    return plan_mission(parse_plan(edited(FLYABLE, slow | ends | changes)))
+
+
+@pytest.mark.parametrize(("percent", "low"), [(100, False), (LEAST_BATTERY - 1, True)])
+def test_a_low_battery_is_not_flown_with(percent: int, low: bool) -> None:
+    assert ("battery-low" in errors(found(battery=percent))) == low
+
+
+def test_a_battery_that_is_not_told_is_not_known() -> None:
+    assert found(battery=None)["battery-unknown"].level is Level.WARNING
+
+
+def test_a_plan_tells_what_the_flight_takes_of_the_battery() -> None:
+    result = relay()
+    conversion, check = result.conversion, result.check
+    assert conversion is not None
+    assert check is not None
+    assert check.energy is not None
+    takes = 100 * check.energy.total / 20
+    flight = Flight.planned(conversion, result.solution)
+    mock = holding(conversion.mission, parameters=conversion.vehicle.parameters)
+    findings = found(flight, mock, battery=int(takes) + 19)
+    assert errors(findings) == {"battery-low"}
+    assert f"takes {takes:.0f} %, and is to leave 20 %" in findings["battery-low"].message
+    assert errors(found(flight, mock, battery=int(takes) + 22)) == set()
+    slow = holding(conversion.mission)
+    assert errors(found(flight, slow)) >= {"timing-other"}
+    assert errors(found(flight, slow, untimed=True)) == set()
+
+
+def test_who_has_the_vehicle_keeps_it() -> None:
+    assert errors(found(armed=True)) == {"armed"}
+    assert errors(found(stations=("system 250, component 190",))) == {"ground-station"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode", "refused"),
+    [
+        ("ardupilot", 0, False),  # STABILIZE
+        ("ardupilot", 5, False),  # LOITER
+        ("ardupilot", 6, True),  # RTL
+        ("ardupilot", 9, True),  # LAND
+        ("ardupilot", 18, True),  # THROW
+        ("px4", px4_mode(3, 0), False),  # Position
+        ("px4", px4_mode(4, 3), False),  # Hold
+        ("px4", px4_mode(4, 2), True),  # Takeoff
+        ("px4", px4_mode(4, 5), True),  # Return
+    ],
+)
+def test_a_mode_in_which_it_flies_by_itself_is_not_armed_in(
+    kind: str, mode: int, refused: bool
+) -> None:
+    mock = holding(a_mission(12), kind)
+    assert ("mode" in errors(found(mock=mock, mode=mode))) == refused
+    streamed = Flight(a_mission(12), streamed=True)  # its mode is set before it is armed
+    assert "mode" not in errors(found(streamed, mock, mode=mode))
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "rule", "told", "level"),
+    [
+        ("ardupilot", {}, "on-rc-lost", "it returns (RTL) (FS_THR_ENABLE 1)", Level.NOTE),
+        ("ardupilot", {"FS_THR_ENABLE": 0}, "on-rc-lost", "does nothing", Level.WARNING),
+        ("ardupilot", {"FS_OPTIONS": 1}, "on-rc-lost", "flies on (FS_OPTIONS 1)", Level.WARNING),
+        ("ardupilot", {}, "on-ground-station-lost", "nothing (FS_GCS_ENABLE 0)", Level.WARNING),
+        ("ardupilot", {"FS_GCS_ENABLE": 5}, "on-ground-station-lost", "after 5 s", Level.NOTE),
+        ("ardupilot", {"BATT_MONITOR": 0}, "on-battery-low", "measures none", Level.WARNING),
+        (
+            "ardupilot",
+            {"BATT_FS_LOW_ACT": 2, "BATT_LOW_MAH": 300},
+            "on-battery-low",
+            "returns (RTL) (BATT_FS_LOW_ACT 2) at 10.5 V or 300 mAh left",
+            Level.NOTE,
+        ),
+        ("ardupilot", {"RTL_ALT": 4000}, "on-return", "40 m above home", Level.NOTE),
+        ("px4", {}, "on-rc-lost", "returns (NAV_RCL_ACT 2) after 0.5 s", Level.NOTE),
+        ("px4", {"COM_RCL_EXCEPT": 1}, "on-rc-lost", "flies on", Level.WARNING),
+        ("px4", {}, "on-ground-station-lost", "does nothing (NAV_DLL_ACT 0)", Level.WARNING),
+        ("px4", {"NAV_DLL_ACT": 2}, "on-ground-station-lost", "after 10 s", Level.NOTE),
+        ("px4", {"COM_LOW_BAT_ACT": 3}, "on-battery-low", "returns at 7 %, lands", Level.NOTE),
+        ("px4", {"RTL_RETURN_ALT": 30.0}, "on-return", "30 m above home", Level.NOTE),
+    ],
+)
+def test_what_it_does_on_a_loss_is_told(
+    kind: str, parameters: dict[str, float], rule: str, told: str, level: Level
+) -> None:
+    findings = found(mock=holding(a_mission(12), kind, parameters))
+    assert told in findings[rule].message
+    assert findings[rule].level is level
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "told"),
+    [
+        ("ardupilot", {"FENCE_ENABLE": 1}, "it returns (FENCE_ACTION)"),
+        ("ardupilot", {}, "it flies on (FENCE_ENABLE)"),
+        ("px4", {}, "it holds (GF_ACTION)"),
+        ("px4", {"GF_ACTION": 1}, "it says so and flies on (GF_ACTION)"),
+    ],
+)
+def test_what_it_does_at_its_fence_is_told(
+    kind: str, parameters: dict[str, float], told: str
+) -> None:
+    fenced = a_mission(12, fence=ANYWHERE)
+    findings = found(Flight(fenced), holding(fenced, kind, parameters))
+    assert told in findings["on-fence-left"].message
+
+
+# ---- on the wire
+
+
+def armed(scene: Scene) -> bool:
+    return any(isinstance(each, CommandLong) and each.command == 400 for each in scene.orders)
+
+
+@KINDS
+@pytest.mark.parametrize("place", [away(1_500.0), away(0.0, -32.0), Home(47.4, 8.5, 500.0)])
+def test_nothing_is_armed_at_another_place(kind: str, place: Home) -> None:
+    scene = Scene(kind, arm=True, home=place)
+    assert scene.run() == "refused"
+    assert scene.orders == []
+    assert "the mission's home" in scene.watch.outcome.text
+    assert "--elsewhere" in scene.watch.outcome.text
+
+
+@KINDS
+def test_elsewhere_it_is_flown_and_that_is_said(kind: str) -> None:
+    scene = Scene(kind, arm=True, home=away(150.0), elsewhere=True)
+    assert scene.run() == "finished"
+    (told,) = [each for each in scene.watch.findings if each.rule == "place-home"]
+    assert told.action == "--elsewhere: flown all the same"
+
+
+def test_without_arm_the_same_is_told_and_the_watch_goes_on() -> None:
+    scene = Scene("ardupilot", home=away(1_500.0))
+    events = [(8.0, scene.does(MavCommand.ARM, 1)), (9.0, scene.does(MavCommand.START))]
+    assert scene.run(events=events, until=900.0) == "finished"
+    assert "place-home" in {each.rule for each in scene.watch.findings}
+    assert scene.orders == []
+
+
+def test_where_it_stands_is_looked_at_again_when_it_is_armed() -> None:
+    scene = Scene("ardupilot", arm=True)
+
+    def carry(_: float) -> None:
+        scene.mock.home = away(60.0)
+
+    assert scene.run(events=[(1.5, carry)]) == "refused"
+    assert scene.orders == []
+
+
+@KINDS
+def test_a_parameter_that_is_changed_before_it_is_armed_counts(kind: str) -> None:
+    name, value = {"ardupilot": ("WPNAV_ACCEL", 250.0), "px4": ("MPC_ACC_HOR", 3.0)}[kind]
+    flight = Flight(a_mission(12), Vehicle(kind, "copter", {name: value}))
+    assert Scene(kind, flight=flight, arm=True).run() == "finished"
+    scene = Scene(kind, flight=flight, arm=True)
+    station = scene.mock
+
+    def change(now: float) -> None:
+        answers = station.on(Envelope(GROUND_STATION, ParamSet(VEHICLE, name, 2 * value, 9)), now)
+        scene.watch.on(Envelope(VEHICLE, answers[0]), now)  # it tells all stations
+
+    assert scene.run(events=[(1.5, change)]) == "refused"
+    assert scene.orders == []
+    assert f"{name} is {2 * value:g}, not {value:g}" in scene.watch.outcome.text
+    assert Scene(kind, flight=flight, arm=True, parameters={name: 2 * value}).run() == "refused"
+    untimed = Scene(kind, flight=flight, arm=True, parameters={name: 2 * value}, untimed=True)
+    assert untimed.run() == "finished"
+
+
+@KINDS
+@pytest.mark.parametrize("loss", [0.0, 0.1])
+def test_what_was_read_long_before_is_read_again(kind: str, loss: float) -> None:
+    for leftover, ending in ((False, "finished"), (True, "refused")):
+        scene = Scene(kind, arm=True, boot=20.0)
+        rows = wire_items(a_mission(5, rally=RALLY), MissionType.RALLY, vehicle_of(kind))
+
+        def leave(_: float, scene: Scene = scene, rows: Any = rows) -> None:
+            scene.mock.lists.replace(MissionType.RALLY, rows)
+
+        events = [(10.0, leave)] if leftover else []
+        assert scene.run(Faults(loss=loss, seed=2), events=events) == ending
+        assert armed(scene) == (not leftover)
+
+
+def test_an_empty_battery_or_a_return_that_is_not_over_is_not_armed() -> None:
+    scene = Scene("ardupilot", arm=True, battery=12)
+    assert scene.run() == "refused"
+    assert "its battery is at 12 %, which is below 30 %" in scene.watch.outcome.text
+    scene = Scene("ardupilot", arm=True)
+    assert scene.run(events=[(0.1, scene.sets(6))]) == "refused"
+    assert "mode RTL" in scene.watch.outcome.text
+    assert not armed(scene)
+
+
+def test_nothing_is_armed_without_the_gate() -> None:
+    with pytest.raises(ValueError, match="nothing is armed without the gate"):
+        Watch(peer_of("px4"), (), arm=True)
+
+
+def test_what_was_never_read_does_not_stand_for_nothing() -> None:
+    held = held_by(holding(a_mission(12)))
+    lists = {MissionType.MISSION: held.lists[MissionType.MISSION]}
+    unread = Held(lists, held.reading, {MissionType.FENCE: Outcome("silent")})
+    assert errors(found(held=unread)) == {"holds-fence"}

@@ -1,0 +1,147 @@
+"""From the command line: uploads say where the vehicle stands, nothing is armed past the gate."""
+
+import json
+import socket
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import free_port
+from mock_flights import fly
+from served import running
+from stations import FENCE, HOME, RALLY, a_mission
+from test_preflight import away
+from typer.testing import CliRunner, Result
+
+from faao_mav.cli.main import app
+from faao_mav.mission import Mission
+from faao_mav.mission.formats import PlanTarget, render_mission
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.wire import upload
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def to(request: pytest.FixtureRequest) -> str:
+    return f"udpout:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
+
+
+def vehicle(to: str, kind: Any = "ardupilot", **options: Any) -> Any:
+    """Return a mock autopilot that runs at `to` for as long as a `with` block lasts."""
+    settings: dict[str, Any] = {"home": HOME, "fly": fly, "beat": 0.1, "speedup": 20.0} | options
+    listen = to.replace("udpout", "udpin")
+    return running(MockAutopilot(behaviour_of(kind), **settings), listen)
+
+
+def written(folder: Path, name: str = "m.waypoints", **target: Any) -> Path:
+    mission = a_mission(6)
+    path = folder / name
+    path.write_text(render_mission(mission, path, PlanTarget(**target) if target else None))
+    return path
+
+
+def test_an_upload_says_where_the_vehicle_stands(tmp_path: Path, to: str) -> None:
+    mission = written(tmp_path)
+    with vehicle(to, home=away(1_500.0, -32.0)):
+        result = run("upload", mission, "--to", to)
+        assert result.exit_code == 0, result.output
+        stands = "stands       1500 m from the mission's home, 32 m lower: it is not armed there"
+        assert stands in result.stdout.splitlines()
+        told = json.loads(run("upload", mission, "--to", to, "--json").stdout)
+    assert told["stands"]["from_home"] == pytest.approx(1500, abs=1)
+    assert told["stands"]["higher"] == pytest.approx(-32, abs=0.1)
+    assert told["stands"]["is_meant"] is False
+    with vehicle(to, place=1e9):
+        result = run("upload", mission, "--to", to)
+        assert result.exit_code == 0, result.output
+        assert "stands       not known how far from the mission's home" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "beside", "kind", "aircraft"),
+    [
+        ("m.plan", {"firmware": 12, "vehicle_type": 2}, "", "ardupilot", "copter"),
+        ("m.plan", {"firmware": 3, "vehicle_type": 2}, "", "px4", "copter"),
+        ("m.plan", {"firmware": 3, "vehicle_type": 1}, "", "ardupilot", "copter"),
+        ("m.plan", {"firmware": 3, "vehicle_type": 20}, "", "ardupilot", "copter"),
+        ("m.waypoints", {}, "m.param", "px4", "copter"),
+        ("m.waypoints", {}, "m.params", "ardupilot", "plane"),
+    ],
+)
+def test_a_mission_for_another_vehicle_is_not_uploaded(
+    tmp_path: Path, to: str, name: str, target: Any, beside: str, kind: str, aircraft: str
+) -> None:
+    mission = written(tmp_path, name, **target)
+    if beside:
+        own = "WPNAV_SPEED,800" if beside == "m.param" else "1\t1\tMPC_XY_CRUISE\t8.0\t9"
+        (tmp_path / beside).write_text(own + "\n")
+    with vehicle(to, kind, aircraft=aircraft) as mock:
+        result = run("upload", mission, "--to", to)
+        assert result.exit_code == 1
+        assert "the mission is for" in result.stderr
+        assert f"the vehicle is {kind} and a {aircraft}: nothing is uploaded" in result.stderr
+        assert mock.mission().items == ()
+
+
+def test_the_missions_own_parameters_are_set_and_no_others(tmp_path: Path, to: str) -> None:
+    mission, file = written(tmp_path), tmp_path / "own.param"
+    give = ("upload", mission, "--to", to, "--parameters", file)
+    with vehicle(to) as mock:
+        before = dict(mock.parameters.values)
+        for lines, status, told in (
+            ("WPNAV_ACCEL,400\nFENCE_ENABLE,1", 2, "FENCE_ENABLE: what decides about failsafes"),
+            ("WPNAV_ACCEL,400\nFS_THR_ENABLE,0", 2, "FS_THR_ENABLE: what decides"),
+            ("WPNAV_ACCEL,400\nRTL_ALT,3000", 2, "RTL_ALT: what decides"),
+            ("WPNAV_ACCEL,400\nARMING_CHECK,0", 2, "ARMING_CHECK: what no mission is timed for"),
+            ("MPC_ACC_HOR,4", 1, "the vehicle has no MPC_ACC_HOR: nothing was set or uploaded"),
+        ):
+            file.write_text(lines)
+            result = run(*give)
+            assert result.exit_code == status, result.output
+            assert told in result.output
+            assert mock.parameters.values == before
+            assert mock.mission().items == ()
+        file.write_text("WPNAV_ACCEL,400\nWP_ACC,4\nWPNAV_SPEED,1000\n")
+        result = run(*give)
+        assert result.exit_code == 0, result.output
+        assert "parameter    WPNAV_ACCEL 250 -> 400" in result.stdout.splitlines()
+        assert "WPNAV_SPEED" not in result.stdout
+        assert mock.parameters.values == before | {"WPNAV_ACCEL": 400.0}
+
+
+def test_what_another_mission_left_is_cleared_where_that_is_asked_for(
+    tmp_path: Path, to: str
+) -> None:
+    mission = written(tmp_path)
+    with vehicle(to, parameters={"FENCE_ENABLE": 0}) as mock:
+        assert upload(a_mission(5, fence=FENCE, rally=RALLY), to).verified
+        assert run("upload", mission, "--to", to).exit_code == 0
+        result = run("fly", mission, "--to", to, "--arm", "--json")
+        assert result.exit_code == 1
+        end = json.loads(result.stdout.splitlines()[-1])
+        assert end["ending"] == "refused"
+        found = {each["rule"]: each["level"] for each in end["findings"]}
+        assert (found["holds-rally"], found["holds-fence"]) == ("error", "warning")
+        assert not mock.armed
+        result = run("upload", mission, "--to", to, "--clear-rest")
+        assert result.exit_code == 0, result.output
+        assert mock.mission() == Mission(mock.mission().items, HOME)
+        assert run("fly", mission, "--to", to, "--arm", "--json").exit_code == 0
+
+
+def test_elsewhere_is_said_aloud(tmp_path: Path, to: str) -> None:
+    mission = written(tmp_path)
+    with vehicle(to, home=away(200.0)) as mock:
+        assert run("upload", mission, "--to", to).exit_code == 0
+        result = run("fly", mission, "--to", to, "--arm")
+        assert result.exit_code == 1
+        assert "error: it stands 200 m from the mission's home, not within 20 m" in result.stdout
+        assert "refused      nothing was started: it stands 200 m" in result.stdout
+        assert not mock.armed
+        result = run("fly", mission, "--to", to, "--arm", "--elsewhere")
+        assert result.exit_code == 0, result.output
+        assert "warning: it stands 200 m from the mission's home" in result.stdout
+        assert "--elsewhere: flown all the same" in result.stdout

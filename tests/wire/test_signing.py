@@ -1,0 +1,278 @@
+"""Signed links: whose packets are taken, and what a recording, another key or none is told as."""
+
+import hashlib
+import math
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import free_port
+from hypothesis import given
+from hypothesis import strategies as st
+from mock_flights import fly
+from served import running
+from stations import HOME, VEHICLE, a_mission, signing_key
+
+from faao_mav.errors import InputError, LinkError
+from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.wire import Timeouts, upload
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.messages import Heartbeat, Statustext
+from faao_mav.wire.protocol import GROUND_STATION
+from faao_mav.wire.signing import Signing, read_signing, remember
+from faao_mav.wire.transport import Transport, open_transport
+
+KEY = signing_key("open sesame")
+TEXT = Statustext(6, "hello")
+NOW = 1_800_000_000.0
+"""A time after 2015, s since 1970."""
+
+HASTY = Timeouts(response=0.4, retries=2, attempts=1, silence=0.5)
+
+
+@pytest.fixture
+def key_file(tmp_path: Path) -> Path:
+    path = tmp_path / "key"
+    path.write_bytes(KEY)
+    path.chmod(0o600)
+    return path
+
+
+def signing(key: bytes = KEY, latest: int = 0, clock: Callable[[], float] = lambda: NOW) -> Signing:
+    return Signing(key, latest, clock)
+
+
+def signed(at: float = NOW, key: bytes = KEY) -> bytes:
+    return Codec(VEHICLE, signing(key, clock=lambda: at)).pack(TEXT)
+
+
+def mock() -> MockAutopilot:
+    return MockAutopilot(behaviour_of("px4"), home=HOME, fly=fly, beat=0.1, rate=0.0)
+
+
+def test_signed_packets_need_the_key() -> None:
+    packet = signed()
+    assert len(packet) == len(Codec(VEHICLE).pack(TEXT)) + 13
+    (found,) = Codec(GROUND_STATION, signing()).parse(packet)
+    assert found.envelope is not None
+    assert found.envelope.message == TEXT
+    for theirs, verdict in ((signing_key("wrong"), "forged"), (KEY, "signed")):
+        codec = Codec(GROUND_STATION, signing(theirs))
+        assert bool(codec.parse(packet)) == (verdict == "signed")
+        assert codec.heard == {verdict}
+    codec = Codec(GROUND_STATION, signing())
+    assert codec.parse(Codec(VEHICLE).pack(TEXT)) == []
+    assert codec.heard == {"unsigned"}
+
+
+def test_pymavlink_takes_what_is_signed() -> None:
+    from pymavlink.dialects.v20 import common
+
+    reader = common.MAVLink(None)
+    reader.signing.secret_key = KEY
+    for codec in [Codec(VEHICLE, signing())] * 3:
+        (message,) = reader.parse_buffer(codec.pack(TEXT))
+        assert message.get_signed()
+
+
+@given(st.lists(st.tuples(st.integers(-9, 9), st.integers(0, 255)), max_size=30))
+def test_a_packet_is_taken_that_is_younger_than_all_before(
+    stream: list[tuple[int, int]],
+) -> None:
+    """Whatever number its sender gives the link."""
+    receiver, youngest = signing(), -math.inf
+    for step, link in stream:
+        unsigned = signed(NOW + step)[:-13] + bytes([link]) + signed(NOW + step)[-12:-6]
+        packet = unsigned + hashlib.sha256(KEY + unsigned).digest()[:6]
+        expected = "signed" if step > youngest else "old"
+        assert receiver.judge(packet, VEHICLE) == expected
+        youngest = max(step, youngest)
+
+
+def test_a_forged_packet_does_not_make_later_ones_old() -> None:
+    receiver = signing()
+    assert receiver.judge(signed(NOW + 1e6, signing_key("wrong")), VEHICLE) == "forged"
+    assert receiver.judge(signed(), VEHICLE) == "signed"
+
+
+def test_a_first_packet_is_at_most_a_minute_late_and_after_what_is_remembered() -> None:
+    assert signing().judge(signed(NOW - 59), VEHICLE) == "signed"
+    assert signing().judge(signed(NOW - 61), VEHICLE) == "old"
+    before = signing()
+    assert before.judge(signed(NOW - 20), VEHICLE) == "signed"
+    assert signing(latest=before.latest).judge(signed(NOW - 21), VEHICLE) == "old"
+    assert signing(latest=before.latest).judge(signed(NOW - 19), VEHICLE) == "signed"
+
+
+def test_times_of_sent_packets_grow_whatever_the_clock_does() -> None:
+    clock = iter([NOW, NOW, NOW - 1000, NOW - 1000])
+    sender = signing(clock=lambda: next(clock))
+    ticks = [sender.next_tick() for _ in range(3)]
+    assert ticks == [ticks[0], ticks[0] + 1, ticks[0] + 2]
+    heard = signing(clock=lambda: NOW)
+    heard.judge(signed(NOW + 50), VEHICLE)
+    assert heard.next_tick() == ticks[0] + 5_000_001  # the guide: after all that was heard
+
+
+def test_keys_in_files(key_file: Path) -> None:
+    assert read_signing(key_file).key == KEY
+    key_file.write_text(KEY.hex() + "\n")
+    assert read_signing(key_file).key == KEY
+    key_file.write_text("open sesame")
+    with pytest.raises(InputError, match="expected a signing key: 32 bytes, or 64 hex") as caught:
+        read_signing(key_file)
+    assert "sesame" not in str(caught.value)
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", "/dev/urandom", "PIPE", "FOLDER", "none", "-"])
+def test_what_is_no_key_file_is_refused_at_once(path: str, tmp_path: Path) -> None:
+    if path == "PIPE":
+        os.mkfifo(tmp_path / path)
+    elif path == "FOLDER":
+        (tmp_path / path).mkdir()
+    with pytest.raises(InputError, match=r"is a device or a pipe|cannot be read"):
+        read_signing(tmp_path / path)
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620])
+def test_a_key_that_others_have_access_to_is_refused(mode: int, key_file: Path) -> None:
+    key_file.chmod(mode)
+    with pytest.raises(InputError, match=rf"mode {mode:o}\); .*: chmod 600 {key_file}"):
+        read_signing(key_file)
+
+
+def test_the_last_time_is_kept_beside_the_key(key_file: Path) -> None:
+    before = read_signing(key_file)
+    before.latest = 77
+    remember(key_file, before)
+    assert read_signing(key_file).latest == 77
+    beside = key_file.with_name("key.last")
+    for nonsense in ("soon", "-1", f"{2**48}", "", "²"):
+        beside.write_text(nonsense)
+        with pytest.raises(InputError, match=r"key\.last: expected the time of the last packet"):
+            read_signing(key_file)
+
+
+def test_a_signed_session(key_file: Path) -> None:
+    connection = f"udpout:127.0.0.1:{(port := free_port())}"
+    with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
+        for _ in range(2):  # the second is after what is remembered of the first
+            assert upload(a_mission(5), connection, system=1, signing_key=key_file).verified
+        report = upload(a_mission(5), connection, system=1, timeouts=HASTY)
+        assert not report.verified
+        assert "signs its packets" in report.problems[-1]
+
+
+class Recorder:
+    """A transport that keeps what arrived, after how many packets sent."""
+
+    def __init__(self, inner: Transport) -> None:
+        self._inner, self.listens = inner, inner.listens
+        self._sent = 0
+        self.tape: list[tuple[int, bytes]] = []
+
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
+        found = self._inner.read(timeout)
+        self.tape += [(self._sent, packet) for packet, _ in found]
+        return found
+
+    def write(self, data: bytes, to: str | None = None) -> None:
+        self._sent += 1
+        self._inner.write(data, to)
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+class Playback:
+    """A transport on which a tape of `Recorder` answers."""
+
+    listens = False
+
+    def __init__(self, tape: list[tuple[int, bytes]]) -> None:
+        self._tape, self._sent = list(tape), 0
+
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
+        due = [(packet, "") for after, packet in self._tape if after <= self._sent]
+        self._tape = self._tape[len(due) :]
+        if not due:
+            time.sleep(max(timeout, 0.0))
+        return due
+
+    def write(self, *_: object) -> None:
+        self._sent += 1
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("remembered", [True, False])
+def test_a_recorded_session_is_not_taken_for_a_vehicle(
+    remembered: bool, key_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link = "faao_mav.wire.link.open_transport"
+    connection = f"udpout:127.0.0.1:{(port := free_port())}"
+    recorders: list[Recorder] = []
+
+    def recorded(text: str) -> Recorder:
+        recorders.append(Recorder(open_transport(text)))
+        return recorders[-1]
+
+    def put(**options: Any) -> Any:
+        return upload(a_mission(5), connection, system=1, signing_key=key_file, **options)
+
+    monkeypatch.setattr(link, recorded)
+    with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
+        assert put().verified
+    monkeypatch.setattr(link, lambda _: Playback(recorders[0].tape))
+    if not remembered:
+        key_file.with_name("key.last").unlink()
+    told = "no vehicle: packets come .* of a recording" if remembered else "a recording of it"
+    with pytest.raises(LinkError, match=told):
+        put(wait=1.0, timeouts=HASTY)
+
+
+@pytest.mark.parametrize(
+    ("theirs", "told"),
+    [
+        (signing_key("other"), r"signed with another key than the one in .*key$"),
+        (None, "packets come that are not signed: .* or leave out --signing-key"),
+    ],
+    ids=["another key", "none"],
+)
+def test_another_key_or_none_is_told_as_such(
+    theirs: bytes | None, told: str, key_file: Path
+) -> None:
+    connection = f"udpout:127.0.0.1:{(port := free_port())}"
+    with (
+        running(mock(), f"udpin:127.0.0.1:{port}", key=theirs),
+        pytest.raises(LinkError, match=told),
+    ):
+        upload(a_mission(5), connection, signing_key=key_file, wait=2.0)
+
+
+def test_a_heartbeat_is_not_enough_to_be_alive(
+    key_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A vehicle that is signed, and says nothing else: what a recording of heartbeats shows."""
+    codec = Codec(VEHICLE, Signing(KEY))
+
+    class Beating:
+        listens = False
+
+        def read(self, timeout: float) -> list[tuple[bytes, str]]:
+            time.sleep(min(max(timeout, 0.0), 0.05))
+            return [(codec.pack(Heartbeat(2, 12, 0, 0, 3)), "")]
+
+        def write(self, *_: object) -> None:
+            pass
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Beating())
+    with pytest.raises(LinkError, match="no answer to a question that was never asked before"):
+        upload(a_mission(5), "udpout:127.0.0.1:9", system=1, signing_key=key_file, timeouts=HASTY)

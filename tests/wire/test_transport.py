@@ -1,0 +1,181 @@
+"""Packets out of datagrams and streams, whoever else sends on the same port."""
+
+import os
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, suppress
+
+import pytest
+from conftest import free_port
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
+from stations import VEHICLE
+
+from faao_mav.errors import LinkError
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.framing import Framer, message_id, sender_of
+from faao_mav.wire.messages import Heartbeat, Message, Statustext
+from faao_mav.wire.transport import Transport, open_transport
+
+BEAT = Heartbeat(2, 12, 0, 0, 3)
+LONG = Statustext(6, "x" * 50)
+
+
+def packet_of(message: Message = BEAT) -> bytes:
+    return Codec(VEHICLE).pack(message)
+
+
+def old_packet() -> bytes:
+    """Return a MAVLink 1 packet."""
+    packet = common.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
+    return bytes(packet.pack(common.MAVLink(None, 1, 1), force_mavlink1=True))
+
+
+class Port:
+    """A listening transport, and sockets that send to it."""
+
+    def __init__(self, kind: int = socket.SOCK_DGRAM) -> None:
+        self.address = ("127.0.0.1", free_port(kind))
+        scheme = "udpin" if kind == socket.SOCK_DGRAM else "tcpin"
+        self.transport: Transport = open_transport(f"{scheme}:127.0.0.1:{self.address[1]}")
+        self._open = ExitStack()
+        self._open.enter_context(closing(self.transport))
+        self._kind = kind
+
+    def peer(self) -> socket.socket:
+        peer = self._open.enter_context(socket.socket(socket.AF_INET, self._kind))
+        peer.connect(self.address)
+        return peer
+
+    def received(self) -> list[bytes]:
+        """Return what arrives until a twentieth of a second is quiet."""
+        found = list[bytes]()
+        while more := self.transport.read(0.05):
+            found += [packet for packet, _ in more]
+        return found
+
+    def close(self) -> None:
+        self._open.close()
+
+
+@pytest.fixture
+def udp() -> Iterator[Port]:
+    with closing(Port()) as port:
+        yield port
+
+
+@pytest.fixture
+def tcp() -> Iterator[Port]:
+    with closing(Port(socket.SOCK_STREAM)) as port:
+        yield port
+
+
+def test_a_datagram_that_was_cut_off_does_not_swallow_the_next(udp: Port) -> None:
+    peer = udp.peer()
+    for data in (packet_of(LONG)[:-9], packet_of(), packet_of(LONG)[:2], packet_of()):
+        peer.send(data)
+    assert udp.received() == [packet_of()] * 2
+
+
+def test_senders_do_not_complete_each_other(udp: Port) -> None:
+    whole = packet_of(LONG)
+    one, other = udp.peer(), udp.peer()
+    one.send(whole[:20])
+    other.send(packet_of())
+    other.send(whole[20:])
+    assert udp.received() == [packet_of()]
+    one.send(whole[20:])
+    assert udp.received() == [whole]
+
+
+def test_a_bridge_may_cut_packets_anywhere(udp: Port) -> None:
+    stream, peer = b"".join(map(packet_of, (LONG, BEAT, LONG))), udp.peer()
+    for start in range(0, len(stream), 17):
+        peer.send(stream[start : start + 17])
+    assert udp.received() == [packet_of(LONG), packet_of(), packet_of(LONG)]
+
+
+def test_who_sends_without_end_is_read_a_burst_at_a_time(
+    udp: Port, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("faao_mav.wire.transport._BURST", 10)
+    peer = udp.peer()
+    for _ in range(25):
+        peer.send(packet_of())
+    assert [len(udp.transport.read(0.05)) for _ in range(3)] == [10, 10, 5]
+
+
+def test_of_too_many_senders_the_last_are_answered(udp: Port) -> None:
+    peers = [udp.peer() for _ in range(100)]
+    for peer in peers:
+        peer.send(packet_of())
+        udp.transport.read(0.05)
+    udp.transport.write(b"answer")
+    time.sleep(0.05)
+    answered = []
+    for number, peer in enumerate(peers):
+        peer.setblocking(False)
+        with suppress(BlockingIOError):
+            answered.append((number, peer.recv(9)))
+    assert answered == [(number, b"answer") for number in range(36, 100)]
+
+
+def test_of_too_many_tcp_clients_the_first_are_served(tcp: Port) -> None:
+    """`select` knows no file descriptor above 1023: a thousand clients would end a mock."""
+    peers = []
+    for _ in range(100):
+        peers.append(tcp.peer())
+        tcp.transport.read(0.05)
+    for peer in peers[64:]:
+        assert peer.recv(9) == b""
+    for peer in peers[:64]:
+        peer.send(packet_of())
+    assert tcp.received() == [packet_of()] * 64
+
+
+def test_a_tcp_client_that_does_not_read_is_dropped(tcp: Port) -> None:
+    idle, busy = tcp.peer(), tcp.peer()
+    idle.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    for _ in range(2):
+        tcp.transport.read(0.05)
+    for _ in range(4000):
+        tcp.transport.write(bytes(2000))
+        busy.recv(1 << 20)
+    busy.send(packet_of())
+    assert tcp.received() == [packet_of()]
+
+
+@pytest.mark.parametrize("host", ["127.0.0..1", "a..b", "x" * 64 + ".org", ".", "\u2024"])
+def test_names_of_hosts_that_are_none(host: str) -> None:
+    with pytest.raises(LinkError, match="there is no host"):
+        open_transport(f"udpout:{host}:14550")
+
+
+@given(st.lists(st.sampled_from([packet_of(), packet_of(LONG), old_packet(), b"noise"])), st.data())
+def test_packets_come_out_however_a_stream_is_cut(parts: list[bytes], data: st.DataObject) -> None:
+    stream, framer, found = b"".join(parts), Framer(), list[bytes]()
+    while stream:
+        size = data.draw(st.integers(1, len(stream)))
+        found += framer.feed(stream[:size])
+        stream = stream[size:]
+    assert found == [part for part in parts if part != b"noise"]
+    assert {(message_id(packet), sender_of(packet)) for packet in found} <= {
+        (0, VEHICLE),
+        (253, VEHICLE),
+    }
+
+
+def test_flags_that_nobody_knows_yet_are_passed_over() -> None:
+    strange = bytearray(packet_of())
+    strange[2] |= 2
+    assert Framer().feed(bytes(strange) + packet_of()) == [packet_of()]
+
+
+def test_noise_is_gone_through_in_a_moment() -> None:
+    framer, started = Framer(), time.process_time()
+    for _ in range(20):
+        framer.feed(bytes(65_535))
+        framer.feed(os.urandom(65_535))
+    assert time.process_time() - started < 4

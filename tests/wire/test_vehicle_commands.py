@@ -1,0 +1,304 @@
+"""The commands that talk to vehicles."""
+
+import json
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from conftest import free_port
+from served import running
+from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
+from typer.testing import CliRunner, Result
+
+from faao_mav.cli.autopilot import autopilot, read_home
+from faao_mav.cli.download import download
+from faao_mav.cli.progress import transfer_progress
+from faao_mav.cli.upload import upload
+from faao_mav.errors import InputError, LinkError
+from faao_mav.mission import Mission, MissionItem
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.formats import read_mission, read_mission_file, write_wpl
+from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.wire import Timeouts
+from faao_mav.wire.messages import Envelope, MissionRequestList
+from faao_mav.wire.protocol import MavResult, MissionType
+from faao_mav.wire.wire_items import wire_items
+
+app = typer.Typer(pretty_exceptions_enable=False)
+app.command()(upload)
+app.command()(download)
+app.command()(autopilot)
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+@pytest.fixture
+def mission_file(tmp_path: Path) -> Path:
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(a_mission(6)))
+    return path
+
+
+@pytest.fixture
+def port() -> int:
+    return free_port()
+
+
+def a_mock(kind: MockKind | Behaviour = "ardupilot", **options: Any) -> MockAutopilot:
+    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
+    return MockAutopilot(behaviour, home=HOME, beat=0.1, **options)
+
+
+def test_upload_and_download(mission_file: Path, port: int, tmp_path: Path) -> None:
+    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+        result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
+        assert result.exit_code == 0, result.output
+        vehicle, stands, mission, verified = result.stdout.splitlines()
+        assert vehicle == "vehicle      ArduPilot copter (system 1, component 1, disarmed)"
+        assert stands == "stands       0 m from the mission's home, 0 m higher"
+        assert mission == "mission      6 items stored"
+        assert verified.startswith("verified     read back and compared; the upload took ")
+        assert result.stderr == ""
+        out = tmp_path / "back.plan"
+        result = run("download", "--from", f"udpout:127.0.0.1:{port}", "--out", out, "--system", 1)
+        assert result.exit_code == 0, result.output
+    assert "mission      6 items, 0 fence areas, 0 rally points" in result.stdout
+    found, sent = read_mission(out), read_mission(mission_file)
+    assert found.home == sent.home
+    assert json.loads(out.read_text())["mission"]["firmwareType"] == 3  # MAV_AUTOPILOT of ArduPilot
+    rows, sent_rows = (
+        wire_items(each, MissionType.MISSION, vehicle_of("ardupilot")) for each in (found, sent)
+    )
+    assert places(rows) == places(sent_rows)
+
+
+def test_json_is_one_object(mission_file: Path, port: int) -> None:
+    with running(a_mock("px4"), f"udpin:127.0.0.1:{port}"):
+        connection = f"udpout:127.0.0.1:{port}"
+        result = run("upload", mission_file, "--to", connection, "--json", "--system", 1)
+    assert result.exit_code == 0
+    assert result.stdout.count("\n") == 1
+    data = json.loads(result.stdout)
+    assert data["verified"] is True
+    assert data["vehicle"]["autopilot"] == "px4"
+    assert data["problems"] == []
+    (mission,) = data["lists"]
+    assert (mission["list"], mission["items"], mission["verdict"]) == ("mission", 6, "verified")
+    assert mission["opaque_id"] > 0
+
+
+def test_json_has_no_nan(tmp_path: Path, port: int) -> None:
+    item = MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36, 149.16, 20.0)
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(Mission((item,), HOME)))
+    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+        result = run("upload", path, "--to", f"udpout:127.0.0.1:{port}", "--json", "--system", 1)
+    assert result.exit_code == 0
+    (difference,) = json.loads(result.stdout)["lists"][0]["differences"]
+    assert difference == {
+        "item": 0,
+        "field": "param1",
+        "sent": 2.5,
+        "found": 2.0,
+        "kind": "dropped",
+    }
+
+
+def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path, port: int) -> None:
+    items = tuple(
+        MissionItem(16, 3, (2.5, 0.0, 0.0, 0.0), -35.36 + k * 1e-4, 149.16, 20.0) for k in range(4)
+    )
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(Mission(items, HOME)))
+    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+        result = run("upload", path, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
+    told = [line for line in result.stdout.splitlines() if line.startswith("not kept")]
+    assert told == [
+        "not kept     mission item 0: param1 2.5 is kept as 2.0 (and so in 3 more items)"
+    ]
+
+
+def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
+    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): MavResult.INVALID_PARAM7}))
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
+    assert result.exit_code == 1
+    assert "failed       mission: refused: INVALID_PARAM7" in result.stdout
+    assert "item 2 (command 16)" in result.stdout
+    assert "not verified; do not fly it" in result.stderr
+    assert "verified     " not in result.stdout
+
+
+def test_no_vehicle_is_status_1(mission_file: Path, port: int) -> None:
+    result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--timeout", 0.3)
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    assert "no heartbeat of an autopilot within 0.3 s" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["upload", "missing.waypoints", "--to", "udpout:127.0.0.1:9"], "missing.waypoints"),
+        (["upload", "FILE", "--to", "nonsense"], "expected udpin:HOST:PORT"),
+        (["upload", "FILE", "--to", "/dev/ttyNONE,57600"], "there is no such device"),
+        (["upload", "FILE", "--to", "udpout:127.0.0.1:9", "--log", "no/x.tlog"], "no directory"),
+        (["upload", "FILE", "--to", "udpout:127.0.0.1:9", "--signing-key", "no"], "cannot be read"),
+        (["download", "--from", "nonsense", "--out", "FILE"], "expected udpin:HOST:PORT"),
+        (["download", "--from", "udpout:127.0.0.1:9", "--out", "x.doc"], "expected a name"),
+        (["autopilot", "--listen", "nonsense"], "expected udpin:HOST:PORT"),
+        (["autopilot", "--home", "1,2"], "expected LAT,LON,ALT"),
+        (["autopilot", "--home", "91,2,3"], "latitude"),
+        (["autopilot", "--home", "0,0,1e30"], "an altitude of at most 100000 m"),
+    ],
+)
+def test_unusable_input_is_status_2(arguments: list[str], told: str, mission_file: Path) -> None:
+    result = run(*(mission_file if each == "FILE" else each for each in arguments))
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_a_port_in_use_is_an_unusable_argument(mission_file: Path, port: int) -> None:
+    taken = f"udpin:127.0.0.1:{port}"
+    with running(a_mock(), taken):
+        for arguments in (("autopilot", "--listen"), ("upload", mission_file, "--to")):
+            result = run(*arguments, taken)
+            assert result.exit_code == 2
+            assert "the port is in use" in result.stderr
+
+
+def test_the_mock_autopilot_as_a_command(
+    mission_file: Path, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its diary tells what it was given; it ends by the keyboard."""
+    from faao_mav.sim import serve as serving
+
+    ended = threading.Event()
+    serve = serving.serve
+
+    def until_ended(mock: MockAutopilot, connection: str, **options: Any) -> None:
+        serve(mock, connection, **options, stop=ended.is_set)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(serving, "serve", until_ended)
+    results = []
+
+    def serve_it() -> None:
+        results.append(
+            run("autopilot", "--listen", f"udpin:127.0.0.1:{port}", "--kind", "px4", "--drop", 0.05)
+        )
+
+    thread = threading.Thread(target=serve_it)
+    thread.start()
+    try:
+        time.sleep(0.3)
+        from faao_mav.wire import upload as put
+
+        assert put(a_mission(6, fence=FENCE), f"udpout:127.0.0.1:{port}", system=1).verified
+    finally:
+        ended.set()
+        thread.join()
+    (result,) = results
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert lines[0] == f"px4, system 1, at udpin:127.0.0.1:{port}; Ctrl-C ends"
+    assert lines[1:] == ["mission: 6 rows", "fence: 4 rows", "ended"]
+
+
+class Reticent(MockAutopilot):
+    """It says nothing about what it holds beside its mission, or `part` of it."""
+
+    parts: tuple[MissionType, ...] = (MissionType.FENCE, MissionType.RALLY)
+
+    def _receive(self, envelope: Envelope, now: float) -> Any:
+        message = envelope.message
+        asked = isinstance(message, MissionRequestList) and message.mission_type in self.parts
+        return () if asked else super()._receive(envelope, now)
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command that soon gives up."""
+    quick = Timeouts(response=0.1, retries=1, attempts=1, silence=0.3)
+    monkeypatch.setattr("faao_mav.wire.client.Timeouts", lambda: quick)
+
+
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
+def test_what_can_be_read_is_written_and_what_cannot_is_told(
+    part: MissionType, port: int, tmp_path: Path
+) -> None:
+    mock = Reticent(behaviour_of("px4"), home=HOME, beat=0.1)
+    mock.parts = (part,)
+    held = a_mission(5, fence=FENCE, rally=RALLY)
+    for each in MissionType:
+        mock.lists.replace(each, wire_items(held, each, vehicle_of("px4")))
+    for name in ("m.plan", "m.waypoints"):
+        out = tmp_path / name
+        with running(mock, f"udpin:127.0.0.1:{port}"):
+            source = ("--from", f"udpout:127.0.0.1:{port}", "--system", 1)
+            result = run("download", *source, "--out", out)
+        assert result.exit_code == 1
+        assert f"{part.title} not read" in result.stdout
+        assert f"written      {out}" in result.stdout
+        assert f"{part.title}: not read: the vehicle stopped answering" in result.stderr
+        assert f"{out}: without the {part.title} that the vehicle may hold" in result.stderr
+        found = read_mission_file(out)
+        assert len(found.mission.items) == 5
+        expected = Fence() if part is MissionType.FENCE else FENCE
+        assert found.mission.fence == expected
+    assert "QGroundControl clears it there" not in result.stderr  # a text file has no such part
+    plan = read_mission_file(tmp_path / "m.plan")
+    assert plan.mission.rally == (() if part is MissionType.RALLY else RALLY)
+    (told,) = plan.warnings
+    assert told.endswith(
+        f"m.plan: without the {part.title} that the vehicle may hold: not read from it"
+    )
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_download_without_a_mission_writes_nothing(port: int, tmp_path: Path) -> None:
+    mock, out = Reticent(behaviour_of("px4"), home=HOME, beat=0.1), tmp_path / "m.plan"
+    mock.parts = (MissionType.MISSION,)
+    with running(mock, f"udpin:127.0.0.1:{port}"):
+        source = ("--from", f"udpout:127.0.0.1:{port}", "--system", 1)
+        result = run("download", *source, "--out", out)
+    assert result.exit_code == 1
+    assert "mission: not read: the vehicle stopped answering" in result.stderr
+    assert not out.exists()
+
+
+@pytest.mark.usefixtures("hasty")
+def test_python_is_not_given_a_part_for_the_whole(port: int) -> None:
+    from faao_mav.wire import download as get
+
+    with (
+        running(Reticent(behaviour_of("px4"), home=HOME, beat=0.1), f"udpin:127.0.0.1:{port}"),
+        pytest.raises(LinkError, match="fence: not read"),
+    ):
+        get(f"udpout:127.0.0.1:{port}", system=1)
+
+
+def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]) -> None:
+    with transfer_progress(shown=False) as nothing:
+        assert nothing is None
+    with transfer_progress(shown=True) as observe:
+        assert observe is not None
+        observe("uploading mission", 3, 9)
+        observe("asking for home", 0, 0)
+    assert capsys.readouterr().out == ""
+
+
+def test_homes_are_read() -> None:
+    home = read_home("47.397742, 8.545594, 488")
+    assert (home.latitude, home.longitude, home.altitude) == (47.397742, 8.545594, 488.0)
+    for altitude in ("nan", "inf", "-1e30", "100001"):
+        with pytest.raises(InputError, match="expected an altitude of at most 100000 m"):
+            read_home(f"1,2,{altitude}")
+    assert MissionType.RALLY.title == "rally points"

@@ -1,0 +1,210 @@
+"""Missions as rows, rows as packets, and back."""
+
+import dataclasses
+import math
+import struct
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
+from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, vehicle_of
+
+from faao_mav.errors import InputError
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import RallyPoint
+from faao_mav.wire.codec import Codec, Packet
+from faao_mav.wire.framing import Framer
+from faao_mav.wire.messages import (
+    CommandLong,
+    Heartbeat,
+    Message,
+    MissionAck,
+    MissionCount,
+    MissionItemInt,
+    MissionRequestInt,
+    ParamValue,
+    Statustext,
+    WireItem,
+)
+from faao_mav.wire.protocol import GROUND_STATION, MissionType
+from faao_mav.wire.wire_items import mission_of, wire_items
+
+MISSION = MissionType.MISSION
+
+
+def there_and_back(mission: Mission, firmware: str) -> Mission:
+    vehicle = vehicle_of(firmware)
+    return mission_of({part: wire_items(mission, part, vehicle) for part in MissionType}, vehicle)
+
+
+def test_home_is_row_0_of_ardupilot_and_no_row_of_px4() -> None:
+    mission = a_mission(3)
+    first, *rest = wire_items(mission, MISSION, vehicle_of("ardupilot"))
+    assert (first.command, first.frame, first.z) == (16, 0, 584.0)
+    assert (first.x, first.y) == (-353_632_620, 1_491_652_370)
+    px4 = wire_items(mission, MISSION, vehicle_of("px4"))
+    assert [row.command for row in px4] == [row.command for row in rest] == [22, 16, 20]
+    assert [row.current for row in px4] == [1, 0, 0]
+    assert [first.current, *(row.current for row in rest)] == [1, 0, 0, 0]
+
+
+def test_degrees_are_rounded_not_cut() -> None:
+    item = MissionItem(16, 3, x=-35.36326199999999, y=149.16523709999999, z=1.0)
+    (row,) = wire_items(Mission((item,)), MISSION, vehicle_of("px4"))
+    assert (row.x, row.y) == (-353_632_620, 1_491_652_371)
+
+
+def test_jumps_count_with_the_home_row_where_there_is_one() -> None:
+    jump = MissionItem(177, 2, (1.0, 3.0, 0.0, 0.0))
+    mission = Mission((*a_mission(3).items, jump), HOME)
+    assert wire_items(mission, MISSION, vehicle_of("ardupilot"))[-1].params[0] == 1
+    assert wire_items(mission, MISSION, vehicle_of("px4"))[-1].params[0] == 0
+    for firmware in ("ardupilot", "px4"):
+        assert there_and_back(mission, firmware).items[-1] == jump
+
+
+def test_what_is_not_set() -> None:
+    yaw = MissionItem(16, 3, (0.0, 0.0, 0.0, math.nan), -35.0, 149.0, 20.0)
+    nowhere = dataclasses.replace(yaw, x=math.nan, z=math.nan)
+    (row,) = wire_items(Mission((yaw,)), MISSION, vehicle_of("px4"))
+    assert math.isnan(row.params[3])
+    assert wire_items(Mission((yaw,)), MISSION, vehicle_of("ardupilot"))[1].params == (0.0,) * 4
+    for autopilot in ("ardupilot", "px4"):
+        with pytest.raises(InputError, match=r"latitude and altitude not set.* take for 0"):
+            wire_items(Mission((nowhere,)), MISSION, vehicle_of(autopilot))
+    low = RallyPoint(-35.0, 149.0, math.nan)
+    with pytest.raises(InputError, match="rally point 1: its altitude is not set"):
+        wire_items(Mission((), rally=(low,)), MissionType.RALLY, vehicle_of("px4"))
+
+
+@pytest.mark.parametrize(
+    ("item", "told"),
+    [
+        (MissionItem(183, 2, x=3e9), "item 0: x 3000000000.0"),
+        (MissionItem(16, 3, (1e39, 0.0, 0.0, 0.0)), "single-precision"),
+    ],
+)
+def test_what_the_wire_does_not_carry(item: Any, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        wire_items(Mission((item,)), MISSION, vehicle_of("px4"))
+
+
+@pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
+def test_fence_and_rally_points_there_and_back(firmware: str) -> None:
+    return_point = RallyPoint(-35.35, 149.15, 60.0)
+    fence = dataclasses.replace(FENCE, breach_return=return_point)
+    mission = a_mission(3, fence=fence, rally=RALLY)
+    found = there_and_back(mission, firmware)
+    assert (found.fence, found.rally) == (mission.fence, mission.rally)
+    commands = [row.command for row in wire_items(mission, MissionType.FENCE, vehicle_of(firmware))]
+    assert commands == [5000, 5001, 5001, 5001, 5004]
+
+
+@pytest.mark.parametrize("kept", [slice(0, 2), slice(1, 4)])
+def test_a_fence_with_part_of_a_polygon_is_refused(kept: Any) -> None:
+    rows = wire_items(a_mission(3, fence=FENCE), MissionType.FENCE, vehicle_of("px4"))
+    with pytest.raises(InputError, match="a polygon stops after 2 of its vertices"):
+        mission_of({MissionType.FENCE: rows[kept]}, vehicle_of("px4"))
+
+
+degrees = st.integers(-900_000_000, 900_000_000).map(lambda n: n / 1e7)
+floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
+items = st.builds(
+    MissionItem,
+    st.sampled_from([16, 17, 19, 21, 22, 82]),
+    st.sampled_from([0, 3]),
+    st.tuples(floats, floats, floats, floats),
+    degrees,
+    degrees,
+    floats,
+    st.booleans(),
+)
+
+
+@given(st.lists(items, min_size=1, max_size=5), st.sampled_from(["ardupilot", "px4"]))
+def test_rows_hold_all_of_an_item(items: Any, firmware: str) -> None:
+    mission = Mission(tuple(items), Home(47.0, 8.5, 400.0))
+    assert there_and_back(mission, firmware).items == mission.items
+
+
+def packets(*messages: Message) -> list[bytes]:
+    codec = Codec(VEHICLE)
+    return [codec.pack(message) for message in messages]
+
+
+ROW = WireItem(16, 3, (1.5, 0.0, 0.0, math.pi), -353_632_621, 1_491_652_371, 12.25, 1, 0)
+MESSAGES: list[Message] = [
+    Heartbeat(2, 3, 128, 3, 4),
+    Statustext(4, "Only 655 items are supported"),
+    MissionCount(GROUND_STATION, 0, 700, 0xDEADBEEF),
+    MissionAck(GROUND_STATION, 2, 4, 7),
+    MissionAck(GROUND_STATION, 2, 4),
+    MissionRequestInt(GROUND_STATION, 1, 12),
+    MissionRequestInt(GROUND_STATION, 1, 12, legacy=True),
+    CommandLong(VEHICLE, 400, 0, 1.0),
+    ParamValue("WPNAV_SPEED", 1000.0, 9, 12, 3),
+]
+
+
+def message_of(packet: Packet) -> Any:
+    assert packet.envelope is not None
+    return packet.envelope.message
+
+
+def test_messages_survive_the_wire() -> None:
+    codec = Codec(GROUND_STATION)
+    found = [packet for data in packets(*MESSAGES) for packet in codec.parse(data)]
+    assert [message_of(packet) for packet in found] == MESSAGES
+    assert {packet.envelope and packet.envelope.sender for packet in found} == {VEHICLE}
+
+
+def test_items_survive_the_wire_to_the_last_digit() -> None:
+    item = MissionItemInt(GROUND_STATION, 0, 3, ROW)
+    (packet,) = Codec(GROUND_STATION).parse(packets(item)[0])
+    found = message_of(packet).item
+    assert (found.x, found.y, found.z) == (ROW.x, ROW.y, ROW.z)
+    assert found.params[3] == struct.unpack("<f", struct.pack("<f", math.pi))[0]
+    assert (found.current, found.autocontinue) == (1, 0)
+
+
+def test_the_old_item_has_single_precision() -> None:
+    item = MissionItemInt(GROUND_STATION, 0, 3, ROW, legacy=True)
+    (packet,) = Codec(GROUND_STATION).parse(packets(item)[0])
+    found = message_of(packet)
+    assert found.legacy
+    assert 0 < abs(found.item.y - ROW.y) < 100
+
+
+def test_pymavlink_reads_the_packets() -> None:
+    reader = common.MAVLink(None)
+    count, item = packets(
+        MissionCount(GROUND_STATION, 1, 700, 5), MissionItemInt(GROUND_STATION, 2, 3, ROW)
+    )
+    (message,) = reader.parse_buffer(count)
+    assert (message.get_type(), message.count, message.mission_type) == ("MISSION_COUNT", 700, 1)
+    (message,) = reader.parse_buffer(item)
+    assert (message.get_type(), message.x, message.seq) == ("MISSION_ITEM_INT", ROW.x, 3)
+    assert message.get_msgbuf()[0] == 0xFD
+
+
+def test_damaged_and_unknown_packets_are_passed_over() -> None:
+    codec = Codec(GROUND_STATION)
+    good, other = packets(MESSAGES[0], MESSAGES[1])
+    damaged = bytearray(good)
+    damaged[12] ^= 1
+    assert codec.parse(bytes(damaged)) == []
+    assert [message_of(p) for p in codec.parse(b"noise" + other)] == [MESSAGES[1]]
+    writer = common.MAVLink(None, 1, 1)
+    unknown = common.MAVLink_vfr_hud_message(0, 0, 0, 0, 0, 0).pack(writer)
+    (packet,) = codec.parse(unknown)
+    assert packet.envelope is None
+    assert packet.raw == unknown
+
+
+def test_packets_may_come_in_pieces() -> None:
+    framer = Framer()
+    sent = packets(*MESSAGES)
+    found = [packet for byte in b"noise".join(sent) for packet in framer.feed(bytes([byte]))]
+    assert found == sent
