@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import FLYABLE, MakePlan, edited
+from conftest import FLYABLE, edited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -323,29 +323,14 @@ def test_a_plan_is_piped_in(tmp_path: Path) -> None:
     assert read_mission(out).items
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({}, "of about 1 s: the best start, 2.5000 bit/s/Hz"),
-        ({"optimizer.method": "algorithm1"}, "iteration 1 of at most 2: the best start, 2.5000"),
-        (
-            {"radio.causal": True, "goal": {"rate": 1.0, "minimise": "power"}},
-            "of about 7 s: the best start, 2.5000 bit/s/Hz",
-        ),
-    ],
-)
-def test_progress_says_how_long_the_work_takes_where_it_is_known(
-    small_plan: MakePlan,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    changes: dict[str, Any],
-    told: str,
+def test_progress_says_what_is_tried_and_the_best_so_far(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in (("FORCE_COLOR", "1"), ("COLUMNS", "100")):
         monkeypatch.setenv(name, value)
-    with optimizer_progress(small_plan(changes), shown=True) as observe:
+    with optimizer_progress(shown=True) as observe:
         assert observe is not None
         observe(Progress(1, 2, "the best start", 2.5))
     drawn = capsys.readouterr()
     assert drawn.out == ""
-    assert told in drawn.err
+    assert "iteration 1 of at most 2: the best start, 2.5000 bit/s/Hz" in drawn.err

@@ -76,7 +76,7 @@ def plan(
         raise InputError("--force: is for a mission; give --out MISSION or --upload CONNECTION too")
     started = time.perf_counter()
     plan = _checked_plan(plan_file, method, out, files, upload, force)
-    with optimizer_progress(plan, shown=shown) as observe:
+    with optimizer_progress(shown=shown) as observe:
         result = plan_mission(plan, bound=bound, observe=observe)
         for name, path in files.items():
             if path is not None:

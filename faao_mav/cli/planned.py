@@ -47,5 +47,5 @@ def planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | N
     from faao_mav.plan import read_plan
 
     plan = read_plan(plan_file)
-    with optimizer_progress(plan, shown=sys.stderr.isatty()) as observe:
+    with optimizer_progress(shown=sys.stderr.isatty()) as observe:
         return optimize(plan, observe=observe)

@@ -7,38 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Observer, Progress
-    from faao_mav.plan import Plan
     from faao_mav.study import StudyRow
     from faao_mav.wire.link import Observe
 
 
-_WIDTH = 12
-"""Characters of a bar with text beside it, of the 80 that terminals have. Chosen."""
-
-_FULL = 0.97
-"""The share of the bar that time alone fills: the rest is for work that takes longer. Chosen."""
-
-
 @contextmanager
-def optimizer_progress(plan: "Plan", *, shown: bool) -> "Iterator[Observer | None]":
-    """Give an observer of the work on `plan`, or None where nothing is `shown`.
-
-    The bar is that of all the work, and fills with the time: how long it takes is reckoned from the
-    plan's sizes. For Algorithm 1, whose number of steps is not known, it only moves.
-    """
-    columns = ("TimeBar", "TimeElapsedColumn", "{task.description}")
-    total = None
-    if shown and plan.optimizer.method == "direct":
-        from faao_mav.optimizer.size import cost
-
-        total = cost(plan)[0]
-    with _line(columns, shown=shown, first="starting", total=total) as update:
+def optimizer_progress(*, shown: bool) -> "Iterator[Observer | None]":
+    """Give an observer of the work on a plan, or None where nothing is `shown`."""
+    columns = ("BarColumn", "TimeElapsedColumn", "{task.description}")
+    with _line(columns, shown=shown, first="starting", total=None) as update:
 
         def observe(now: "Progress") -> None:
             step = f"iteration {now.iteration} of at most {now.max_iterations}"
-            done = step if total is None else f"of about {total:.0f} s"
             best = f", {now.best_rate:.4f} bit/s/Hz" if now.best_rate else ""
-            update(description=f"{done}: {now.stage}{best}")
+            update(description=f"{step}: {now.stage}{best}")
 
         yield observe if shown else None
 
@@ -77,31 +59,16 @@ def _line(
 ) -> Iterator[Callable[..., Any]]:
     """Give what updates the line, if one is `shown`.
 
-    `columns` are names of classes of `rich.progress`, "TimeBar", or templates of text, `first` the
-    first text.
+    `columns` are names of classes of `rich.progress`, or templates of text, `first` the first text.
     """
     if not shown:
         yield lambda **_: None
         return
     from rich import progress
     from rich.console import Console
-    from rich.progress_bar import ProgressBar
 
-    class TimeBar(progress.BarColumn):
-        """A bar that fills with the time, of a task whose total is in seconds."""
-
-        def __init__(self) -> None:
-            super().__init__(bar_width=_WIDTH)
-
-        def render(self, task: progress.Task) -> ProgressBar:
-            if task.total is not None:
-                task.completed = min(task.elapsed or 0.0, _FULL * task.total)
-            return super().render(task)
-
-    own = {"TimeBar": TimeBar}
     made = [
-        progress.TextColumn(name) if "{" in name else (own | vars(progress))[name]()
-        for name in columns
+        progress.TextColumn(name) if "{" in name else getattr(progress, name)() for name in columns
     ]
     with progress.Progress(*made, console=Console(stderr=True), transient=True) as line:
         yield partial(line.update, line.add_task(first, total=total))
