@@ -11,10 +11,10 @@ still meets the goal and one step less was found not to, but a smaller one may m
 """
 
 import math
-from abc import ABC, abstractmethod
-from bisect import bisect_left
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.direct import direct
@@ -34,6 +34,9 @@ ENERGY_SHARE = 1e-3
 """The step of the least energy, in shares of what the whole duration takes.
 
 Chosen: models of power are less true than that."""
+
+_BITS_PER_DB = math.log2(10) / 10
+"""What a link gains of a dB where it is not saturated, bit/s/Hz: the most that capacity gains."""
 
 
 def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
@@ -60,197 +63,159 @@ def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
     >>> found.least.below.plan.flight.duration, found.least.below.delivered_rate < 0.6
     (9.5, True)
     """
-    kinds: dict[str, Callable[[Plan, Observer | None], _Search]]
-    kinds = {"duration": _Durations, "power": _Powers, "energy": _Energies}
-    search: _Search = kinds[plan.goal.minimise or ""](plan, observe)
-    if not search.meets(search.high):
-        raise InfeasibleError(_out_of_reach(plan, search.solved[search.high]))
-    while search.high - search.low > 1:
-        search.meets(min(max(search.guess(), search.low + 1), search.high - 1))
-    best, below = search.answer(), search.solved.get(search.low)
-    return replace(best, least=Least(search.limit, below, search.optimizations))
+    kinds = {"duration": _durations, "power": _powers, "energy": _energies}
+    steps = kinds[plan.goal.minimise or ""](plan, observe)
+    solved = {steps.high: steps.at(steps.high, None)}
+    first = steps.first(solved[steps.high])
+
+    def surplus(number: int) -> float:
+        if number not in solved:
+            known = next(reversed(solved.values()))
+            with suppress(InfeasibleError):
+                solved[number] = steps.at(number, known)
+        return _surplus(solved[number]) if number in solved else -math.inf
+
+    if surplus(steps.high) < 0:
+        raise InfeasibleError(_out_of_reach(plan, solved[steps.high]))
+    number = least_number(surplus, steps.low, steps.high, first)
+    best, below = steps.ended(number, solved[number]), solved.get(number - 1)
+    return replace(best, least=Least(steps.limit, below, steps.optimizations()))
 
 
-class _Search(ABC):
-    """Plans by a whole number, `most` for the one given: at `high` the goal is met, at `low` not.
+def least_number(surplus: Callable[[int], float], low: int, high: int, guess: int) -> int:
+    """Return the least number above `low` whose `surplus`, which grows, is not negative.
 
-    `limit` is the quantity that is minimised, as the plan has it.
+    It is known not to be at `high`; -inf stands for a number without a flight. `guess` is tried
+    first. Then numbers are roots of chords; where the same end moves again the value of the other
+    is halved (the Illinois rule).
+
+    >>> least_number(lambda n: n**2 - 200.0, 0, 1000, 500)
+    15
+    """
+    less, more, moved = -math.inf, surplus(high), 0
+    beyond = (high, more)  # the last number above `high`
+    while high - low > 1:
+        number = min(max(guess, low + 1), high - 1)
+        value = surplus(number)
+        if value >= 0:
+            beyond, high, more = (high, more), number, value
+            less, moved = (less / 2 if moved == 1 else less), 1
+        else:
+            low, less = number, value
+            more, moved = (more / 2 if moved == -1 else more), -1
+        if math.isfinite(less):
+            guess = math.ceil(low - less / (more - less) * (high - low))
+        elif beyond[0] > high and beyond[1] > more:
+            root = high - more * (beyond[0] - high) / (beyond[1] - more)
+            guess = max(math.ceil(root), (3 * low + high) // 4)
+        else:
+            guess = (low + high) // 2
+    return high
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """Plans by a whole number: at `high` the one that was given, at `low` none that meets the goal.
+
+    `limit` is the quantity of the plan that is minimised, `at` optimises at a number, from the
+    flight of a near one, `first` is the first guess, `ended` the answer from all starts.
     """
 
+    low: int
+    high: int
     limit: float
-
-    def __init__(self, plan: Plan, observe: Observer | None, low: int, high: int) -> None:
-        self.plan, self.observe, self.low, self.high = plan, observe, low, high
-        self.solved: dict[int, Solution | None] = {}
-        self.optimizations = 0
-        self.last, self.repeats = high, 0  # the last number, and how often that end has moved alone
-
-    @abstractmethod
-    def optimised(self, number: int, known: Solution | None) -> Solution:
-        """Return the best flight of `number`; `known` is that of a near one."""
-
-    @abstractmethod
-    def guess(self) -> int:
-        """Return about the least number that meets the goal."""
-
-    def meets(self, number: int) -> bool:
-        """Optimise at `number`, and tell whether the goal is met; without a flight it is not."""
-        found: Solution | None = None
-        try:
-            found = self.optimised(number, self.solved.get(self.last))
-        except InfeasibleError:
-            if not self.solved:  # the plan as it was given
-                raise
-        met = found is not None and found.delivered_rate >= found.plan.needed_rate
-        same = self.solved and self.last == (self.high if met else self.low)
-        self.repeats = self.repeats + 1 if same else 0
-        self.solved[number], self.last = found, number
-        if met:
-            self.high = number
-        else:
-            self.low = number
-        return met
-
-    def answer(self) -> Solution:
-        """Return the solution at `high`, optimised from all starts."""
-        found = self.solved[self.high]
-        assert found is not None
-        return found
-
-    def changed(self, changes: Mapping[str, float], known: Solution | None) -> Solution:
-        """Optimise the plan with `changes` by dotted keys."""
-        told = ", ".join(f"{key} {value:g}" for key, value in changes.items())
-        self.optimizations += 1
-        return direct(
-            build_problem(self.plan.changed(changes)),
-            observe=staged(self.observe, told),
-            known=None if known is None else known.trajectory,
-        )
-
-
-class _Chords(_Search):
-    """Numbers in which T (R_del - needed) is nearly linear: of slots, or of shares of an energy."""
-
-    def guess(self) -> int:
-        """Return the root of the chord of T (R_del - needed).
-
-        Long flights stay where the rate is best. Where the same end moves again and again, half of
-        the other's value is taken (the Illinois rule). R_del is at most that of the longer flight:
-        the first guess for megabytes is the time in which that rate delivers them.
-        """
-        low, high = self.solved.get(self.low), self.solved[self.high]
-        assert high is not None
-        if low is None:
-            return self._without_flight(high)
-        less, more = _surplus(low), _surplus(high)
-        if self.last == self.low:
-            more *= 0.5**self.repeats
-        else:
-            less *= 0.5**self.repeats
-        return math.ceil(self.low - less / (more - less) * (self.high - self.low))
-
-    def _without_flight(self, high: Solution) -> int:
-        """Return the guess where nothing is known of less, or there is no flight."""
-        first = self.low not in self.solved
-        if first and self.plan.goal.deliver_mbytes is not None:
-            return int(self.high * high.plan.needed_rate / high.delivered_rate)
-        if first and self.plan.fence is None:
-            return self.low + 1
-        halfway = (self.low + self.high) // 2
-        longer = min((n for n, each in self.solved.items() if each and n > self.high), default=0)
-        beyond = self.solved.get(longer)
-        if beyond is None:
-            return halfway
-        here, there = _surplus(high), _surplus(beyond)
-        root = self.high - here / max(there - here, 1e-9) * (longer - self.high)
-        return max(math.ceil(root), (self.low + halfway) // 2)
+    at: Callable[[int, Solution | None], Solution]
+    first: Callable[[Solution], int]
+    ended: Callable[[int, Solution], Solution]
+    optimizations: Callable[[], int]
 
 
 def _surplus(found: Solution) -> float:
     return found.plan.flight.slots * (found.delivered_rate - found.plan.needed_rate)
 
 
-class _Durations(_Chords):
-    """Numbers of slots."""
+def _of_plans(
+    plan: Plan,
+    observe: Observer | None,
+    low: int,
+    high: int,
+    limit: float,
+    changes: Callable[[int], dict[str, Any]],
+    first: Callable[[Solution], int],
+) -> _Steps:
+    """Return the steps of plans with `changes` by dotted keys."""
+    count = 0
 
-    def __init__(self, plan: Plan, observe: Observer | None) -> None:
-        super().__init__(plan, observe, fewest_slots(plan) - 1, plan.flight.slots)
-        self.limit = plan.flight.duration
+    def at(number: int, known: Solution | None) -> Solution:
+        nonlocal count
+        count += 1
+        told = ", ".join(f"{key} {value:g}" for key, value in changes(number).items())
+        return direct(
+            build_problem(plan.changed(changes(number))),
+            observe=staged(observe, told),
+            known=None if known is None else known.trajectory,
+        )
 
-    def optimised(self, number: int, known: Solution | None) -> Solution:
-        duration = round(number * self.plan.flight.time_step, 9)
-        return self.changed({"flight.duration": duration}, known)
-
-
-class _Energies(_Chords):
-    """Numbers of `ENERGY_SHARE` of what the flight of the plan's whole duration takes."""
-
-    def __init__(self, plan: Plan, observe: Observer | None) -> None:
-        most = round(1 / ENERGY_SHARE)
-        super().__init__(plan, observe, 0, most)
-        self.within = WithinEnergy(plan, observe)
-        self.limit = self.within.unlimited_energy / JOULES_PER_WH
-        least = float(self.within.least.min())
-        self.low = min(most, math.ceil(most * least / self.within.unlimited_energy)) - 1
-        self.whole = most
-
-    def optimised(self, number: int, known: Solution | None) -> Solution:  # noqa: ARG002
-        if number == self.whole:
-            return self.within.unlimited
-        return self.within.best(self.energy(number))
-
-    def guess(self) -> int:
-        """Return the chord's root, at first no less than the straight flight takes."""
-        if self.high < self.whole or self.low in self.solved:
-            return super().guess()
-        return max(super().guess(), math.ceil(self.within.straight[1] / self.energy(1)))
-
-    def answer(self) -> Solution:
-        found = super().answer()
-        if found is not self.within.unlimited:
-            found = self.within.ended(found, self.energy(self.high))
-        self.optimizations = self.within.optimizations
-        return found
-
-    def energy(self, number: int) -> float:
-        """Return the energy of `number`, J."""
-        return number * ENERGY_SHARE * self.within.unlimited_energy
+    return _Steps(low, high, limit, at, first, lambda _, found: found, lambda: count)
 
 
-class _Powers(_Search):
-    """Numbers of steps of `POWER_STEP` by which both powers are changed, none or less."""
+def _durations(plan: Plan, observe: Observer | None) -> _Steps:
+    """Return numbers of slots.
 
-    def __init__(self, plan: Plan, observe: Observer | None) -> None:
-        self.given = {
-            key: dbm(power) for key, power in zip(ALIASES[POWER], plan.powers, strict=True)
-        }
-        self.limit = self.given[ALIASES[POWER][0]]
-        room = min(self.given.values()) - MIN_DBM
-        super().__init__(plan, observe, -int(room / POWER_STEP) - 1, 0)
+    R_del is at most that of the longer flight: the first guess for megabytes is the time in which
+    that rate delivers them, for a rate the shortest flight.
+    """
+    low, high = fewest_slots(plan) - 1, plan.flight.slots
 
-    def optimised(self, number: int, known: Solution | None) -> Solution:
-        changes = {key: round(p + number * POWER_STEP, 6) for key, p in self.given.items()}
-        return self.changed(changes, known)
+    def changes(number: int) -> dict[str, float]:
+        return {"flight.duration": round(number * plan.flight.time_step, 9)}
 
-    def guess(self) -> int:
-        """Return the number at which the last flight, with its precoders scaled, meets the goal.
+    def first(whole: Solution) -> int:
+        if plan.goal.deliver_mbytes is None:
+            return low + 1
+        return int(high * whole.plan.needed_rate / whole.delivered_rate)
 
-        The best rate at another power is no lower, and has the same slope (the envelope theorem):
-        the steps are those of Newton's method or better.
-        """
-        held, needed = self.solved[self.last], self.plan.needed_rate
-        assert held is not None  # power has no part in whether there is a flight
-
-        def met(number: int) -> bool:
-            scale = 10 ** ((number - self.last) * POWER_STEP / 10)
-            return held.relay(*held.recomputed_slots(scale), held.shares).rate >= needed
-
-        between = range(self.low + 1, self.high)
-        return self.low + 1 + bisect_left(between, True, key=met)
+    return _of_plans(plan, observe, low, high, plan.flight.duration, changes, first)
 
 
-def _out_of_reach(plan: Plan, best: Solution | None) -> str:
-    assert best is not None
+def _powers(plan: Plan, observe: Observer | None) -> _Steps:
+    """Return numbers of steps of `POWER_STEP` by which both powers are changed, none or less."""
+    given = {key: dbm(power) for key, power in zip(ALIASES[POWER], plan.powers, strict=True)}
+    low = -int((min(given.values()) - MIN_DBM) / POWER_STEP) - 1
+
+    def changes(number: int) -> dict[str, float]:
+        return {key: round(power + number * POWER_STEP, 6) for key, power in given.items()}
+
+    def first(whole: Solution) -> int:
+        spare = whole.delivered_rate - whole.plan.needed_rate
+        return -int(spare / _BITS_PER_DB / POWER_STEP)
+
+    limit = given[ALIASES[POWER][0]]
+    return _of_plans(plan, observe, low, 0, limit, changes, first)
+
+
+def _energies(plan: Plan, observe: Observer | None) -> _Steps:
+    """Return numbers of `ENERGY_SHARE` of what the flight of the plan's whole duration takes."""
+    within, high = WithinEnergy(plan, observe), round(1 / ENERGY_SHARE)
+    step = ENERGY_SHARE * within.unlimited_energy
+
+    def at(number: int, _: Solution | None) -> Solution:
+        return within.unlimited if number == high else within.best(number * step)
+
+    def first(whole: Solution) -> int:
+        """Return the share of the time that is needed, at least what the straight flight takes."""
+        share = whole.plan.needed_rate / whole.delivered_rate
+        straight = math.ceil(within.straight[1] / step)
+        return max(int(high * share) if plan.goal.deliver_mbytes is not None else 0, straight)
+
+    def ended(number: int, found: Solution) -> Solution:
+        return found if number == high else within.ended(found, number * step)
+
+    limit = within.unlimited_energy / JOULES_PER_WH
+    return _Steps(0, high, limit, at, first, ended, lambda: within.optimizations)
+
+
+def _out_of_reach(plan: Plan, best: Solution) -> str:
     goal, R_del = plan.goal, best.delivered_rate
     if goal.deliver_mbytes is not None:
         asked = f"goal.deliver_mbytes: {goal.deliver_mbytes:g} megabytes cannot be delivered"
