@@ -74,7 +74,7 @@ class Result:
 
     `information` is the mutual information along the solution, bit/s/Hz; `fresh` the rates on
     fading that was not planned on, None unless the plan averages over fading; `saturation` says
-    whether the alphabet limits the rate, `bound` what no route can exceed, if that was asked for.
+    whether the alphabet limits the rate, `bound` estimates what no route can exceed, if asked for.
     `seconds_optimize` is the time of the optimiser, `seconds_total` that of everything, in seconds.
     """
 

@@ -95,7 +95,7 @@ def test_it_says_what_was_found(result: Result) -> None:
     assert "more than by the plan" not in text
     assert "3, from 1.0000 (user) to 1.5000 (bs-user) bit/s/Hz" in text
     assert "within 50 % of the best that any route can do" in text
-    assert "(numerical)" in text
+    assert "(estimate)" in text
     assert "converged after" in text
     assert "none: give --out" in text
 

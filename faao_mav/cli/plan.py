@@ -42,7 +42,7 @@ def plan(
     method: Annotated[
         str | None, option("M", "Replace optimizer.method: direct or algorithm1.")
     ] = None,
-    bound: Annotated[bool, flag("--bound", "Also compute what no route can exceed.")] = False,
+    bound: Annotated[bool, flag("--bound", "Also estimate what no route can exceed.")] = False,
     as_json: AsJson = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
     verbose: Annotated[

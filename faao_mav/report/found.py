@@ -77,8 +77,7 @@ def _bounded(result: Result) -> Iterator[Line]:
     yield (
         "bound",
         f"within {short:.2g} % of the best that any route can do: at most "
-        f"{told_rate(bound.value, plan.radio.bandwidth_mhz)}"
-        f"{'' if bound.exact else ' (numerical)'}",
+        f"{told_rate(bound.value, plan.radio.bandwidth_mhz)} (estimate)",
     )
 
 

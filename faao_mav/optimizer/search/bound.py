@@ -1,8 +1,10 @@
-"""An upper bound on what a plan maximises, over all flights and precoders: the certificate.
+"""An estimated upper bound on what a plan maximises, over all flights and precoders.
 
-Each of two bounds holds for every flight; which are computed is said by the plan. `map_bound`
-knows the queue, half duplex and fences, and flights by their greatest speed alone. `axis_bound`
-knows accelerations along the line through the stations, for aircraft that these limit.
+It is no proof: the best rates over the distance, on which it rests, are tabulated to about 1e-6
+bit, and precoders without a closed form are those of a local search. Given these rates, each of two
+bounds holds for every flight; which are computed is said by the plan. `map_bound` knows the queue,
+half duplex and fences, and flights by their greatest speed alone. `axis_bound` knows accelerations
+along the line through the stations, for aircraft that these limit.
 """
 
 from dataclasses import dataclass
@@ -25,10 +27,9 @@ Chosen."""
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """An upper bound on the rate that a plan maximises: `value`, bit/s/Hz.
+    """The estimate of an upper bound on the rate that a plan maximises: `value`, bit/s/Hz.
 
-    `exact` tells that the best precoders have a closed form. Otherwise they are searched, and the
-    bound holds if the search has found the global optimum.
+    `exact` tells that the best precoders have a closed form; otherwise they are searched.
     """
 
     value: float
@@ -36,7 +37,7 @@ class Bound:
 
 
 def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | None = None) -> Bound:
-    """Return an upper bound on what `problem` maximises over all trajectories and precoders.
+    """Estimate an upper bound on what `problem` maximises over all trajectories and precoders.
 
     That is the delivered rate, or with `radio.causal: false` R_avg. `known` is that rate of any
     plan for it, bit/s/Hz: the better it is, the tighter the bound. `observe` is told the progress.
