@@ -103,8 +103,6 @@ class Solution:
     ... """))
     >>> round(solution.delivered_rate, 3), solution.is_feasible(1e-6)
     (0.602, True)
-    >>> solution.kkt_residual() < 1e-3
-    True
     '''
 
     problem: Problem
@@ -211,32 +209,6 @@ class Solution:
     def is_feasible(self, tolerance: float = 1e-6) -> bool:
         """Tell whether every one of the `residuals` is below `tolerance`, each in its own unit."""
         return max(self.residuals().values()) < tolerance
-
-    def kkt_residual(self, reach: float = 1.0) -> float:
-        """Return how much the objective can still gain per metre, to first order, bit/s/Hz/m.
-
-        The objective is R_avg, or with `radio.causal` the delivered rate.
-
-        The gain is that of the best feasible move by at most `reach` metres in x and in y of every
-        slot, with the best precoders of the plan's scheme everywhere; 0 at a local optimum. It is
-        found from the arrays by CVXPY, without the multipliers of the method that solved the plan.
-        Raises `SolverError` where the trajectory breaks its limits.
-        """
-        from faao_mav.optimizer.design import design
-        from faao_mav.optimizer.rates.field import rate_field
-        from faao_mav.optimizer.scaled import kkt_residual
-
-        problem = self.problem
-        rates = rate_field(problem, design(self.plan))
-        return kkt_residual(
-            problem.kinematics,
-            rates,
-            self.trajectory,
-            reach=reach,
-            relay=problem.maximised_queue,
-            fence=problem.fence,
-            energy=problem.energy_limit(problem.kinematics),
-        )
 
 
 def _excess(P: Complex, power: float) -> float:

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import cvxpy as cp
 import numpy as np
 import pytest
+from certificate import kkt_residual
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
@@ -22,7 +23,7 @@ from faao_mav.optimizer.interior.maximize import maximize, maximize_all
 from faao_mav.optimizer.interior.newton import Newton
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
-from faao_mav.optimizer.scaled import flight_variables, kkt_residual
+from faao_mav.optimizer.scaled import flight_variables
 from faao_mav.optimizer.search.starts import straight_flight
 
 STATIONS = np.array([[0.0, 0.0], [300.0, 300.0]])

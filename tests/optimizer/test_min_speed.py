@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from certificate import kkt_residual
 from conftest import SMALL, MakePlan, edited
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -15,7 +16,6 @@ from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.scaled import kkt_residual
 from faao_mav.optimizer.search.starts import starts, straight_flight
 from faao_mav.plan import Vector, parse_plan
 from faao_mav.report.summary import result_lines
