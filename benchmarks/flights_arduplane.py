@@ -18,9 +18,9 @@ from recorded import FLIGHTS, Row, compared, read, show, wind_of
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.ardupilot.plane import ArduPlane
+from faao_mav.autopilot.body import PlaneBody
 from faao_mav.autopilot.flight_path import FlightPath
 from faao_mav.geodesy import LocalFrame
-from faao_mav.plan.body import PlaneBody
 
 FOLDER = FLIGHTS / "arduplane"
 FITTED = (

@@ -1,10 +1,14 @@
 """Lengths and distances in the plane."""
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Real
+
+Vector: TypeAlias = tuple[float, float]
+"""East and north components, metres or m/s."""
 
 _CELLS = 1 << 14
 """Pairs of point and leg that are compared at once: their arrays stay in a processor's cache."""

@@ -9,9 +9,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from faao_mav.autopilot import autopilots
 from faao_mav.autopilot.files import parameter_path, plan_target
 from faao_mav.autopilot.predict import predict
-from faao_mav.autopilot.vehicle import candidates
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_together
 from faao_mav.geodesy import LocalFrame
@@ -28,7 +28,6 @@ from faao_mav.optimizer.pricing import (
 )
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan
-from faao_mav.plan.autopilots import autopilots
 from faao_mav.plan.fields import dbm
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction
@@ -358,7 +357,7 @@ def mission_files(path: str | Path, plan: Plan) -> tuple[Path, ...]:
     fence = fence_path(mission)
     check_writable(mission)
     beside = []
-    if any(candidates(plan)):
+    if any(plan.candidates):
         beside.append(parameter_path(mission, plan.vehicle.autopilot))
         check_replaceable(beside[-1], "the mission's parameters are")
     if fence is not None and plan.fence is not None:

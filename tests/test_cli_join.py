@@ -11,12 +11,12 @@ from served import running
 from typer.testing import CliRunner
 
 from faao_mav import download, upload
+from faao_mav.autopilot import autopilots, kinds
 from faao_mav.cli.main import app
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.plan.autopilots import autopilots, types
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire.messages import ParamRequestRead, ParamValue
 from faao_mav.wire.protocol import Address, MavResult
@@ -375,4 +375,4 @@ def test_a_plane_that_flies_at_no_such_speed_is_planned_but_gets_no_mission(
 
 def test_the_help_names_every_autopilot_and_type_that_is_known() -> None:
     shown = run("validate", "--help").stdout
-    assert all(name in shown for name in (*autopilots(), *types()))
+    assert all(name in shown for name in (*autopilots(), *kinds()))

@@ -13,10 +13,10 @@ from conftest import MISSIONS, SMALL, contents, edited
 from hypothesis import given
 from hypothesis import strategies as st
 
+from faao_mav.autopilot.body import ARDUCOPTER_BODY, PX4_BODY
 from faao_mav.errors import InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import Plan, parse_plan, read_plan, reference
-from faao_mav.plan.body import ARDUCOPTER_BODY, PX4_BODY
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 NAN, INF = float("nan"), float("inf")

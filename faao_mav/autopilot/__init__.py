@@ -12,17 +12,20 @@ from faao_mav.autopilot.flight_path import Track as Track
 from faao_mav.autopilot.px4 import PX4_COPTER as PX4_COPTER
 from faao_mav.autopilot.px4 import PX4_PLANE as PX4_PLANE
 from faao_mav.autopilot.vehicle import Vehicle as Vehicle
+from faao_mav.autopilot.vehicle import autopilots as autopilots
 from faao_mav.autopilot.vehicle import families as families
 from faao_mav.autopilot.vehicle import family as family
 from faao_mav.autopilot.vehicle import kind_by_number as kind_by_number
+from faao_mav.autopilot.vehicle import kinds as kinds
 from faao_mav.autopilot.vehicle import register as register
 from faao_mav.autopilot.vehicle import unregister as unregister
-from faao_mav.autopilot.vehicle import vehicle_of as vehicle_of
 from faao_mav.autopilot.vehicle import vehicle_type as vehicle_type
 from faao_mav.autopilot.vehicle import vehicle_type_by_numbers as vehicle_type_by_numbers
 from faao_mav.autopilot.vehicle import vehicle_types as vehicle_types
+from faao_mav.autopilot.vehicle_type import Autopilot as Autopilot
 from faao_mav.autopilot.vehicle_type import AutopilotFamily as AutopilotFamily
 from faao_mav.autopilot.vehicle_type import Ceiling as Ceiling
+from faao_mav.autopilot.vehicle_type import Kind as Kind
 from faao_mav.autopilot.vehicle_type import LegLimits as LegLimits
 from faao_mav.autopilot.vehicle_type import VehicleType as VehicleType
 

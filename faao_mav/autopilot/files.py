@@ -11,9 +11,8 @@ from faao_mav.autopilot.vehicle import (
     kind_by_number,
     vehicle_type_by_numbers,
 )
-from faao_mav.autopilot.vehicle_type import VehicleType
+from faao_mav.autopilot.vehicle_type import Autopilot, VehicleType
 from faao_mav.mission.formats import MissionFile, PlanTarget
-from faao_mav.plan.autopilots import Autopilot
 
 
 def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
-from faao_mav.plan import Vector
+from faao_mav.vector import Vector
 
 LONGEST = 21_600.0
 """The longest flight that is followed, s. Chosen: fuzzing took one of almost a day beyond 500 MB of

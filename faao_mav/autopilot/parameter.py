@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, Self, TypeAlias
 
-from faao_mav.plan.body import Body
+from faao_mav.autopilot.body import Body
 
 _GENTLE = (1.35, 2.0)
 """The gentle accelerations to try, as multiples of a_max: 1.35 makes up for the time that

@@ -20,7 +20,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.mission.jumps import JUMPS, jump_target
-from faao_mav.plan import Vector
+from faao_mav.vector import Vector
 
 LONGEST_COPTER = 5_400.0
 """The longest flight, s, of what can hover that is followed. Chosen: few copters can stay up for

@@ -7,15 +7,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from faao_mav.autopilot.body import Body, CopterBody
 from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
-from faao_mav.autopilot.vehicle_type import AutopilotFamily, LegLimits, VehicleType
+from faao_mav.autopilot.vehicle_type import Autopilot, AutopilotFamily, Kind, LegLimits, VehicleType
 from faao_mav.errors import InputError
-from faao_mav.plan import Plan
-from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
-from faao_mav.plan.body import Body, CopterBody
 
 _TYPES: dict[tuple[str, str], VehicleType] = {}
 """The vehicle types that are known, by the names of autopilot and type."""
+
+_HELD = 0.9
+"""The greatest airspeed that a plan asks of a copter, in that at which drag takes all of its lean
+limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,11 @@ class Vehicle:
         if not isinstance(body, CopterBody) or "lean_angle" not in self.type.parameters:
             return math.inf
         return body.top_airspeed(self.value("lean_angle"))
+
+    @property
+    def held_airspeed(self) -> float:
+        """The greatest airspeed, m/s, that it holds in wind with room to correct."""
+        return round(_HELD * self.top_airspeed, 2)
 
     @property
     def type(self) -> VehicleType:
@@ -136,49 +143,20 @@ class Vehicle:
         return self.type.flight_model(self, latitude)
 
 
-def vehicle_of(plan: Plan) -> Vehicle:
-    """Return the vehicle of `plan`."""
-    given = plan.vehicle
-    source = f"{plan.source}: vehicle.parameters"
-    return Vehicle(given.autopilot, given.type, given.parameters, source, given.body)
-
-
-def candidates(plan: Plan) -> tuple[Mapping[str, float], ...]:
-    """Return the sets of parameters to try for `plan`, the gentlest first.
-
-    An autopilot whose ramps take longer than the plan's falls behind at every one; one that turns
-    corners at a crawl does so in every curve. Few parameters decide that. One empty set if the plan
-    keeps its vehicle's own, or if they are tuned on each vehicle, as an aeroplane's are.
-    """
-    given = plan.vehicle
-    if plan.mission.parameters == "keep":
-        return ({},)
-    recommended = vehicle_type(given.autopilot, given.type).recommended
-    return tuple(recommended(given.max_speed, given.max_acceleration))
-
-
 def register(vehicle_type: VehicleType) -> VehicleType:
     """Make `vehicle_type` known by its names, to plans as well, and return it."""
-    key = (vehicle_type.family.key, vehicle_type.kind)
-    _TYPES[key] = vehicle_type
-    planned = vehicle_type.legs is not None and vehicle_type.flight_model is not None
-    one = vehicle_type.fence_needs_one_inclusion(Vehicle(*key))
-    lean = vehicle_type.parameters.get("lean_angle")
-    VEHICLES[key] = PlannedVehicle(
-        *key, vehicle_type.hovers, planned, one, vehicle_type.body, lean.default if lean else 0.0
-    )
+    _TYPES[vehicle_type.family.key, vehicle_type.kind] = vehicle_type
     return vehicle_type
 
 
 def unregister(vehicle_type: VehicleType) -> None:
     """Forget `vehicle_type`."""
-    key = (vehicle_type.family.key, vehicle_type.kind)
-    del _TYPES[key], VEHICLES[key]
+    del _TYPES[vehicle_type.family.key, vehicle_type.kind]
 
 
-def vehicle_types() -> tuple[VehicleType, ...]:
-    """Return every vehicle type that is known."""
-    return tuple(_TYPES.values())
+def vehicle_types(kind: str | None = None) -> tuple[VehicleType, ...]:
+    """Return every vehicle type that is known, or those of one `kind`."""
+    return tuple(each for each in _TYPES.values() if kind in (None, each.kind))
 
 
 def vehicle_type(autopilot: str, kind: str) -> VehicleType:
@@ -194,6 +172,24 @@ def vehicle_type(autopilot: str, kind: str) -> VehicleType:
     except KeyError:
         known = ", ".join(" ".join(key) for key in _TYPES)
         raise InputError(f"vehicle: {autopilot} {kind} is unknown; known are {known}") from None
+
+
+def autopilots() -> tuple[Autopilot, ...]:
+    """Return the names that `vehicle.autopilot` of a plan may have.
+
+    >>> autopilots()
+    ('ardupilot', 'px4')
+    """
+    return tuple(each.key for each in families())
+
+
+def kinds() -> tuple[Kind, ...]:
+    """Return the names that `vehicle.type` of a plan may have.
+
+    >>> kinds()
+    ('copter', 'plane')
+    """
+    return tuple(dict.fromkeys(each.kind for each in _TYPES.values()))
 
 
 def families() -> tuple[AutopilotFamily, ...]:

@@ -6,13 +6,19 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.autopilot.body import Body
 from faao_mav.autopilot.dialect import Dialect
 from faao_mav.autopilot.failsafe import Failsafe
 from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
 from faao_mav.autopilot.orbit import Orbits, RallyRule, no_orbit
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues
-from faao_mav.plan.body import Body
 from faao_mav.power import GRAVITY
+
+Autopilot: TypeAlias = str
+"""The name of an autopilot, as `vehicle.autopilot` of a plan has it."""
+
+Kind: TypeAlias = str
+"""The name of a type of vehicle, as `vehicle.type` of a plan has it."""
 
 OVERSPEED = 1.1
 """The greatest speed that a mission may command, as a multiple of the plan's max_speed: it makes up
@@ -34,7 +40,7 @@ class AutopilotFamily:
     Parameters whose names begin with one of `parameter_prefixes` are its own.
     """
 
-    key: str
+    key: Autopilot
     name: str
     mav_autopilot: int
     parameter_suffix: str
@@ -176,7 +182,7 @@ class VehicleType:
     """
 
     family: AutopilotFamily
-    kind: str
+    kind: Kind
     name: str
     mav_types: tuple[int, ...]
     hovers: bool
@@ -203,6 +209,11 @@ class VehicleType:
     corner_speed: Callable[[ParameterValues, float], float] | None = None
     orbits: Orbits = no_orbit
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
+
+    @property
+    def planned(self) -> bool:
+        """Whether missions are made for it; those of others can be validated and uploaded."""
+        return self.legs is not None and self.flight_model is not None
 
     def defaults(self) -> dict[str, float]:
         """Return the defaults by the autopilot's oldest names, in the autopilot's own units.

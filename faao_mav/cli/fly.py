@@ -149,14 +149,13 @@ def _flight(
     mission_file: Path, file: "MissionFile", solution: "Solution | None", *, streamed: bool
 ) -> "Flight":
     """Return what is to be flown, and what tells for whom and for which parameters it was made."""
-    from faao_mav.autopilot import vehicle_of
     from faao_mav.autopilot.files import made_for
     from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.fly.seen import Flight
 
     plan = solution.plan if solution is not None else None
     vehicle, _ = choose_vehicle(mission_file, file, plan, (None, None, None))
-    whose = made_for(mission_file, file, vehicle_of(plan) if plan is not None else None)
+    whose = made_for(mission_file, file, plan.aircraft if plan is not None else None)
     return Flight(file.mission, vehicle, whose, solution, streamed)
 
 

@@ -110,7 +110,6 @@ def _checked_plan(
     force: bool,
 ) -> "Plan":
     """Return the plan; what it asks for and where to is refused before the work if of no use."""
-    from faao_mav.autopilot import vehicle_of
     from faao_mav.plan import read_plan
     from faao_mav.report.style import FORMATS
     from faao_mav.schedule.conversion import beyond_vehicle, check_vehicle
@@ -121,7 +120,7 @@ def _checked_plan(
     if to_fly:
         check_vehicle(plan)
     else:
-        vehicle_of(plan).flight_model()  # what is useless is refused, what is not flown is told
+        plan.aircraft.flight_model()  # what is useless is refused, what is not flown is told
     beside = mission_files(out, plan)[1:] if out is not None else ()
     endings = {"--save": (".npz",), "--report": PAGES, "--figure": FORMATS}
     for name, path in files.items():

@@ -72,9 +72,9 @@ def exit_status() -> Iterator[None]:
 
 def check_known(autopilot: str | None, kind: str | None) -> None:
     """Raise `InputError` for --autopilot or --type of which no vehicle is known."""
-    from faao_mav.plan.autopilots import autopilots, types
+    from faao_mav.autopilot import autopilots, kinds
 
-    for name, value, known in (("autopilot", autopilot, autopilots()), ("type", kind, types())):
+    for name, value, known in (("autopilot", autopilot, autopilots()), ("type", kind, kinds())):
         if value is not None and value not in known:
             raise InputError(f"--{name} {value}: expected {' or '.join(known)}")
 

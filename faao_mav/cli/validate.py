@@ -25,10 +25,10 @@ from faao_mav.errors import InputError, printable
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
 
 if TYPE_CHECKING:
+    from faao_mav.autopilot import Autopilot, Kind
     from faao_mav.cli.findings import CheckedFile
     from faao_mav.optimizer.solution import Solution
     from faao_mav.plan import Vector
-    from faao_mav.plan.autopilots import Autopilot, Kind
 
 
 @exit_status()

@@ -3,11 +3,18 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from faao_mav.autopilot import Vehicle, family, kind_by_number, vehicle_of
+from faao_mav.autopilot import (
+    Autopilot,
+    Kind,
+    Vehicle,
+    autopilots,
+    family,
+    kind_by_number,
+    kinds,
+)
 from faao_mav.autopilot.files import autopilot_of, parameter_path, vehicle_in
 from faao_mav.errors import InputError
 from faao_mav.mission.formats.parameter_file import read_parameters
-from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
 
 if TYPE_CHECKING:
     from faao_mav.mission.formats import MissionFile
@@ -70,7 +77,7 @@ def told_vehicle(
     the file of parameters that was asked for holds.
     """
     if plan is not None:
-        return vehicle_of(plan), "as the plan says"
+        return plan.aircraft, "as the plan says"
     named = vehicle_in(file)
     if named is not None:
         return named, "as the file says"
@@ -78,7 +85,7 @@ def told_vehicle(
     if file.vehicle_type and kind is None and kind_by_number(file.vehicle_type) is None:
         raise InputError(
             f"{mission_file}: vehicleType {file.vehicle_type} (a MAV_TYPE) is not supported; "
-            f"--type {' or --type '.join(types())} says as which the mission is to be judged"
+            f"--type {' or --type '.join(kinds())} says as which the mission is to be judged"
         )
     if given is not None:
         theirs = autopilot_of(given)

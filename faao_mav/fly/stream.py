@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.vehicle import vehicle_of
 from faao_mav.errors import InputError
 from faao_mav.fly.belief import Belief
 from faao_mav.fly.course import Setpoint
@@ -173,7 +172,7 @@ class Stream(Watch):
                 text = f"its positions come {age:.0f} s late, by the clock that TIMESYNC tells"
                 self._end("refused", f"nothing was started: {text}")
             return ()
-        lean = beyond_lean(self._solution, vehicle_of(self._solution.plan))
+        lean = beyond_lean(self._solution, self._solution.plan.aircraft)
         if lean is not None:
             self.seen.told.append(str(lean))
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")

@@ -11,7 +11,6 @@ from functools import lru_cache
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import vehicle_of
 from faao_mav.plan import Plan, Vector
 from faao_mav.vector import chord
 
@@ -247,7 +246,7 @@ def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
 def kinematics(plan: Plan) -> Kinematics:
     """Return the feasible set of `plan`."""
     flight, vehicle = plan.flight, plan.vehicle
-    aircraft = vehicle_of(plan)
+    aircraft = plan.aircraft
     rates = aircraft.type.speed_rates(aircraft)
     fastest = math.hypot(plan.max_ground_speed, _WIND_IN_TURNS * math.hypot(*plan.wind))
 

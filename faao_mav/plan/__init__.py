@@ -4,7 +4,6 @@
 `reader` reads it, `keys.reference` lists them.
 """
 
-from faao_mav.plan.fields import Vector as Vector
 from faao_mav.plan.keys import reference as reference
 from faao_mav.plan.radio import BaseStation as BaseStation
 from faao_mav.plan.radio import GroundUser as GroundUser
@@ -20,3 +19,4 @@ from faao_mav.plan.sections import Origin as Origin
 from faao_mav.plan.sections import Site as Site
 from faao_mav.plan.sections import VehicleOptions as VehicleOptions
 from faao_mav.plan.sections import Wind as Wind
+from faao_mav.vector import Vector as Vector

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from faao_mav.autopilot import vehicle_types
 from faao_mav.errors import quote
-from faao_mav.plan.autopilots import VEHICLES
 from faao_mav.plan.fence import fence_problems
-from faao_mav.plan.fields import Vector, listed
+from faao_mav.plan.fields import listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.model import PlanContents
 from faao_mav.plan.sections import Flight
 from faao_mav.power import RotaryWing
-from faao_mav.vector import chord
+from faao_mav.vector import Vector, chord
 
 MAX_SLOTS = 100_000
 """Most time slots; chosen: the direct method solves 10,000 in 0.6 s; more is not measured."""
@@ -41,12 +41,12 @@ def problems(plan: PlanContents) -> Iterator[str]:
 
 def _vehicle(plan: PlanContents) -> Iterator[str]:
     vehicle = plan.vehicle
-    known = VEHICLES.get((vehicle.autopilot, vehicle.type))
-    if known is None or not known.planned:
-        others = [v.autopilot for v in VEHICLES.values() if v.type == vehicle.type and v.planned]
+    planned = {each.family.key: each for each in vehicle_types(vehicle.type) if each.planned}
+    known = planned.get(vehicle.autopilot)
+    if known is None:
         yield (
             f"vehicle.type: {vehicle.type}: missions for {vehicle.type}s are made for "
-            f"{listed(others, 'and')}, not for {vehicle.autopilot} (vehicle.autopilot)"
+            f"{listed([*planned], 'and')}, not for {vehicle.autopilot} (vehicle.autopilot)"
         )
     elif known.hovers:
         return

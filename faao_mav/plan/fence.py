@@ -10,9 +10,10 @@ from faao_mav.errors import InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
 from faao_mav.mission.fence_area import FreeArea
-from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Vector
+from faao_mav.plan.fields import MAX_LOCAL_DISTANCE
 from faao_mav.plan.model import PlanContents, PlanFile
 from faao_mav.plan.zones import CircleZone, FenceOptions, PolygonZone
+from faao_mav.vector import Vector
 
 _SHORTER_WAY = 2e-3
 """By how much of its length a way may be longer than the shortest, which is found to 0.01 %."""

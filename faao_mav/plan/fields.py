@@ -26,9 +26,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from faao_mav.geodesy import LocalFrame
-
-Vector: TypeAlias = tuple[float, float]
-"""East and north components, metres or m/s."""
+from faao_mav.vector import Vector
 
 MAX_LOCAL_DISTANCE = 100_000.0
 """Largest distance of a position from the origin in metres: the frame is flat to 0.01 % there."""

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from faao_mav.plan.autopilots import Autopilot, Kind, autopilots, types
+from faao_mav.autopilot import Autopilot, Kind, autopilots, kinds
 from faao_mav.plan.fields import Written, listed
 from faao_mav.plan.model import PlanFile
 
@@ -51,7 +51,7 @@ def reference() -> Mapping[str, PlanKey]:
     >>> reference()["mission.max_items"].accepted
     'a whole number, 2 to 65535'
     """
-    return _reference(autopilots(), types())
+    return _reference(autopilots(), kinds())
 
 
 @cache

@@ -10,15 +10,14 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Annotated
 
+from faao_mav.autopilot import Vehicle, VehicleType, vehicle_type
+from faao_mav.autopilot.body import Body
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
-from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
-from faao_mav.plan.body import Body
 from faao_mav.plan.fields import (
     Section,
     Text,
-    Vector,
     key,
 )
 from faao_mav.plan.radio import Radio
@@ -34,6 +33,7 @@ from faao_mav.plan.sections import (
 )
 from faao_mav.plan.zones import FenceOptions
 from faao_mav.power import PowerModel
+from faao_mav.vector import Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +83,7 @@ class PlanContents(PlanFile):
     @property
     def body(self) -> Body | None:
         """The airframe; None where no flight model of the vehicle has one."""
-        return self.vehicle.body or self._known.body
+        return self._bare.airframe
 
     @property
     def powers(self) -> tuple[float, float]:
@@ -110,14 +110,19 @@ class PlanContents(PlanFile):
         wind, most = self.site.wind, self.vehicle.max_airspeed
         gusts = max(0.0, wind.gust - wind.speed)
         if most is None:
-            most = self._known.max_airspeed(self.body) if wind.speed or gusts else math.inf
+            most = self._bare.held_airspeed if wind.speed or gusts else math.inf
         if not self._known.hovers:
             most = min(most, self.vehicle.max_speed)
         return most - gusts if most - gusts < self.max_ground_speed + wind.speed else math.inf
 
     @property
-    def _known(self) -> PlannedVehicle:
-        return VEHICLES[self.vehicle.autopilot, self.vehicle.type]
+    def _known(self) -> VehicleType:
+        return vehicle_type(self.vehicle.autopilot, self.vehicle.type)
+
+    @property
+    def _bare(self) -> Vehicle:
+        """The vehicle with its autopilot's own parameters."""
+        return Vehicle(self.vehicle.autopilot, self.vehicle.type, body=self.vehicle.body)
 
     @property
     def zones(self) -> tuple[Area, ...]:
@@ -126,8 +131,12 @@ class PlanContents(PlanFile):
 
     @property
     def any_inclusion(self) -> bool:
-        """Whether the vehicle's fence asks for one of several inclusions, not for all of them."""
-        return self._known.any_inclusion
+        """Whether the vehicle's fence asks for one of several inclusions, not for all of them.
+
+        That is so by its autopilot's own parameters: a plan that keeps inside all is right for
+        others too.
+        """
+        return self._known.fence_needs_one_inclusion(self._bare)
 
     @property
     def keep_in(self) -> FreeArea | None:

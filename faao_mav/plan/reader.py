@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from faao_mav.autopilot import Vehicle
 from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.files import read_text
 from faao_mav.plan.checks import problems
@@ -51,6 +52,25 @@ class Plan(PlanContents):
                 "a plan is not put together or replaced field by field: use "
                 'plan.changed({"flight.altitude": 60}) or Plan.from_dict({...}), which check it'
             )
+
+    @property
+    def aircraft(self) -> Vehicle:
+        """The vehicle, with the parameters that the plan gives."""
+        given, source = self.vehicle, f"{self.source}: vehicle.parameters"
+        return Vehicle(given.autopilot, given.type, given.parameters, source, given.body)
+
+    @property
+    def candidates(self) -> tuple[Mapping[str, float], ...]:
+        """The sets of parameters to try, the gentlest first.
+
+        An autopilot whose ramps take longer than the plan's falls behind at every one; one that
+        turns corners at a crawl does so in every curve. Few parameters decide that. One empty set
+        if the plan keeps its vehicle's own, or if they are tuned on each vehicle, as a plane's are.
+        """
+        if self.mission.parameters == "keep":
+            return ({},)
+        limits = self.vehicle.max_speed, self.vehicle.max_acceleration
+        return tuple(self.aircraft.type.recommended(*limits))
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "plan") -> "Plan":

@@ -7,21 +7,21 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, PlainValidator, ValidationInfo
 
-from faao_mav.plan.autopilots import AutopilotName, TypeName, body_of
-from faao_mav.plan.body import Body
+from faao_mav.autopilot.body import Body
+from faao_mav.plan.autopilots import AutopilotName, KindName, body_of
 from faao_mav.plan.energy import Battery, PowerOptions
 from faao_mav.plan.fields import (
     Flag,
     Number,
     Position,
     Section,
-    Vector,
     Velocity,
     Whole,
     check_degrees,
     key,
     told,
 )
+from faao_mav.vector import Vector
 
 Method: TypeAlias = Literal["direct", "algorithm1"]
 PrecoderScheme: TypeAlias = Literal["faao", "mmse", "mrt", "zf", "waterfilling"]
@@ -105,7 +105,7 @@ class VehicleOptions(Section):
     """The aircraft and its limits."""
 
     autopilot: Annotated[AutopilotName, key("The autopilot that the mission is for.")] = "ardupilot"
-    type: Annotated[TypeName, key("The kind of aircraft; a plane with ArduPilot.")] = "copter"
+    type: Annotated[KindName, key("The kind of aircraft; a plane with ArduPilot.")] = "copter"
     max_speed: Annotated[
         Number,
         key(

@@ -11,9 +11,9 @@ from faao_mav.plan.fields import (
     Position,
     Section,
     Text,
-    Vector,
     key,
 )
+from faao_mav.vector import Vector
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,6 @@
 """From a route to mission items: take-off, the way to w_I, the route, the end."""
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import vehicle_of
 from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
@@ -43,7 +42,7 @@ def assemble(route: Route, plan: Plan) -> Mission:
         )
     )
 
-    vehicle = vehicle_of(plan).type
+    vehicle = plan.aircraft.type
     axis = _GROUND_SPEED if vehicle.hovers else _AIRSPEED
     items = []
     if plan.mission.takeoff:

@@ -7,8 +7,7 @@ from math import floor, inf
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import Ceiling, Vehicle, vehicle_of
-from faao_mav.autopilot.vehicle import candidates
+from faao_mav.autopilot import Ceiling, Vehicle
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
@@ -59,7 +58,7 @@ def check_vehicle(plan: Plan) -> None:
     way from home and back: see `check_transit`.
     """
     check_transit(plan)
-    vehicle = vehicle_of(plan)
+    vehicle = plan.aircraft
     vehicle.legs  # noqa: B018
     vehicle.flight_model()
     if plan.vehicle.max_speed < SLOWEST:
@@ -114,10 +113,10 @@ def _ceiling(vehicle: Vehicle, key: str) -> tuple[float, str]:
 
 def _vehicles(plan: Plan) -> list[Vehicle]:
     """Return the vehicle of `plan` with each set of parameters that is recommended for it."""
-    given = vehicle_of(plan)
+    given = plan.aircraft
     return [
         replace(given, parameters={**given.parameters, **parameters})
-        for parameters in candidates(plan)
+        for parameters in plan.candidates
     ]
 
 
@@ -164,7 +163,7 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
     t, w = solution.t, np.round(solution.w, _DECIMALS)
-    hovers = vehicle_of(plan).type.hovers
+    hovers = plan.aircraft.type.hovers
     route = initial_route(t, w, plan, share=1.0 if hovers else _PLANE_SHARE)
     schedulers = [_scheduler(plan, t, w, vehicle) for vehicle in _vehicles(plan)]
     firsts = [scheduler.first(route) for scheduler in schedulers]
@@ -182,7 +181,7 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
         mission=assemble(best.route, plan),
         schedule=best,
         vehicle=schedulers[chosen].vehicle,
-        parameters=candidates(plan)[chosen],
+        parameters=plan.candidates[chosen],
     )
 
 
@@ -217,5 +216,5 @@ def _altitude(plan: Plan) -> float:
 
 def _true_over_commanded(plan: Plan) -> float:
     """Return true over commanded airspeed at the height of the flight."""
-    vehicle = vehicle_of(plan)
+    vehicle = plan.aircraft
     return vehicle.type.true_over_commanded(vehicle, _altitude(plan))

@@ -8,10 +8,10 @@ from faao_mav.autopilot import (
     VehicleType,
     families,
     kind_by_number,
+    kinds,
     vehicle_type_by_numbers,
 )
 from faao_mav.errors import LinkError
-from faao_mav.plan.autopilots import types
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import Envelope, Heartbeat, Message, Timesync
 from faao_mav.wire.protocol import (
@@ -215,7 +215,7 @@ def choose(
     if found[0].family is not None and found[0].vehicle is None:
         raise LinkError(
             f"{connection}: {found[0]}: this type of vehicle is not supported; "
-            f"{' and '.join(types())} are (VTOLs are neither)"
+            f"{' and '.join(kinds())} are (VTOLs are neither)"
         )
     return found[0]
 

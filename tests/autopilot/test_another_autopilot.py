@@ -14,7 +14,6 @@ from faao_mav.autopilot import (
     VehicleType,
     register,
     unregister,
-    vehicle_of,
     vehicle_type_by_numbers,
 )
 from faao_mav.autopilot.dialect import Dialect, Limit, SpeedChange
@@ -142,7 +141,7 @@ def registered() -> Iterator[None]:
 
 def test_a_mission_is_made_predicted_and_validated() -> None:
     plan = parse_plan(PLAN)
-    assert vehicle_of(plan).type is COPTER
+    assert plan.aircraft.type is COPTER
     solution = optimize(plan)
     conversion = convert(solution)
     assert dict(conversion.parameters) == {"TOY_SPEED": 8.0, "TOY_ACCEL": 5.0}

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.body import PX4_BODY, CopterBody, PlaneBody
 from faao_mav.autopilot.px4 import Px4
-from faao_mav.plan.body import PX4_BODY, CopterBody, PlaneBody
 from faao_mav.power import GRAVITY
 
 DRAGS = {"linear_drag": st.floats(0, 2), "quadratic_drag": st.floats(0, 0.1)}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from relay_flights import plan_with
 
-from faao_mav.autopilot import FlightPath, LegLimits, vehicle_of
+from faao_mav.autopilot import FlightPath, LegLimits
 from faao_mav.autopilot.ardupilot.copter import ArduCopter, ArduCopterLegs
 from faao_mav.autopilot.ardupilot.copter.course import motion_of
 from faao_mav.autopilot.ardupilot.copter.route import Router
@@ -77,9 +77,9 @@ def test_a_px4_leg_is_one_in_which_it_can_stop() -> None:
 def test_parameters_of_either_generation(
     autopilot: str, parameters: dict[str, float], legs: ArduCopterLegs | Px4Legs
 ) -> None:
-    assert vehicle_of(plan_with(autopilot=autopilot, parameters=parameters)).legs == legs
+    assert plan_with(autopilot=autopilot, parameters=parameters).aircraft.legs == legs
 
 
 def test_an_unusable_parameter_is_named() -> None:
     with pytest.raises(InputError, match=r"plan: vehicle\.parameters: WPNAV_JERK: 0; give"):
-        _ = vehicle_of(plan_with(parameters={"WPNAV_JERK": 0.0})).legs
+        _ = plan_with(parameters={"WPNAV_JERK": 0.0}).aircraft.legs

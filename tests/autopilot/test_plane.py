@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane
+from faao_mav.autopilot.body import PlaneBody
 from faao_mav.autopilot.flight_path import FlightPath
 from faao_mav.errors import InputError
 from faao_mav.plan import Wind
-from faao_mav.plan.body import PlaneBody
 
 PLANE = ArduPlane()
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot.body import PX4_BODY
 from faao_mav.autopilot.px4 import response
 from faao_mav.autopilot.px4.smoothing import follow, soon_there
-from faao_mav.plan.body import PX4_BODY
 
 JERK = 4.0
 LIMIT = 3.0

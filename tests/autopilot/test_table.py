@@ -22,7 +22,6 @@ from faao_mav.autopilot import (
 from faao_mav.autopilot.parameter import Parameter
 from faao_mav.errors import InputError
 from faao_mav.mission.item import Mission
-from faao_mav.plan.autopilots import VEHICLES, PlannedVehicle
 from faao_mav.validate.context import ValidationContext
 
 TYPES = (ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE)
@@ -126,15 +125,10 @@ def test_px4_lowers_a_speed_to_its_cap_and_says_so() -> None:
     )
 
 
-def test_plans_know_the_vehicles_of_the_registry() -> None:
+def test_vehicles_are_found_by_name_and_number() -> None:
     assert set(vehicle_types()) == set(TYPES)
     for each in vehicle_types():
-        key = (each.family.key, each.kind)
-        made = each.legs is not None and each.flight_model is not None
-        one = each.fence_needs_one_inclusion(Vehicle(*key))
-        lean = each.parameters["lean_angle"].default if "lean_angle" in each.parameters else 0.0
-        assert VEHICLES[key] == PlannedVehicle(*key, each.hovers, made, one, each.body, lean)
-        assert vehicle_type(*key) is each
+        assert vehicle_type(each.family.key, each.kind) is each
         assert (each.flight_model is None) == bool(each.unmodelled)
         for number in each.mav_types:
             assert vehicle_type_by_numbers(each.family.mav_autopilot, number) is each

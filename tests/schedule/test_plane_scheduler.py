@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from relay_flights import Trajectory, converted, plan_with
 
-from faao_mav.autopilot import Track, vehicle_of
+from faao_mav.autopilot import Track
 from faao_mav.autopilot.ardupilot.plane import ArduPlane
 from faao_mav.autopilot.atmosphere import density_ratio
 from faao_mav.autopilot.predict import predict
@@ -57,7 +57,7 @@ def steps() -> Trajectory:
 
 def followed_unmoved(t: np.ndarray, w: np.ndarray, plan: Plan) -> float:
     """How far the flight strays whose waypoints lie on the path, m."""
-    vehicle = vehicle_of(plan)
+    vehicle = plan.aircraft
     scheduler = PlaneScheduler(t, w, vehicle, ArduPlane.from_vehicle(vehicle), 12.0, 16.0, 5.0)
     route = with_run_in(initial_route(t, w, plan, share=0.4), t, w, vehicle.legs, 16.0)
     return scheduler.flight(route).deviation.path

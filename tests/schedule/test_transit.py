@@ -9,7 +9,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from faao_mav import Vehicle
-from faao_mav.autopilot import vehicle_of
 from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InfeasibleError, InputError, PlanError
 from faao_mav.geodesy import LocalFrame
@@ -102,7 +101,7 @@ def test_a_run_in_has_to_be_free_as_well() -> None:
     )
     for plan in (free, blocked):
         route = initial_route(T, W, plan)
-        route = with_run_in(route, T, W, vehicle_of(plan).legs, 8.0)
+        route = with_run_in(route, T, W, plan.aircraft.legs, 8.0)
         assert route.first == 1
         if plan is free:
             assert assemble(route, plan).items

@@ -6,13 +6,12 @@ import numpy as np
 from conftest import FLYABLE, edited
 
 from faao_mav import optimize, parse_plan
-from faao_mav.autopilot.vehicle import vehicle_of
 from faao_mav.validate.lean import beyond_lean
 
 
 def test_drag_and_acceleration_add_up() -> None:
     solution = optimize(parse_plan(edited(FLYABLE, {})))
-    vehicle = vehicle_of(solution.plan)
+    vehicle = solution.plan.aircraft
     v, a = np.zeros_like(solution.v), np.zeros_like(solution.a)
     v[:], a[:2] = (10.0, 0.0), (2.5, 0.0)  # drag of 5.4 m/s², and g tan 30 degrees is 5.66
     asked = replace(solution, v=v, a=a)

@@ -19,7 +19,7 @@ from judged import (
     track,
 )
 
-from faao_mav.plan.body import CopterBody
+from faao_mav.autopilot.body import CopterBody
 from faao_mav.validate import Limits
 
 OUT_AND_BACK = ((0, 0, 0), (0, 0, 30), (0, 100, 30), (0, 0, 30))

@@ -16,6 +16,7 @@ from math import cos
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot.body import PX4_BODY
 from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
 from faao_mav.autopilot.orbit import RallyRule, plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
@@ -34,7 +35,6 @@ from faao_mav.autopilot.vehicle_type import (
     VehicleType,
     lean_acceleration,
 )
-from faao_mav.plan.body import PX4_BODY
 
 _HOME_OUTSIDE_FENCE = "PX4 says so (Geofence invalid), and flies the mission all the same"
 """Measured on PX4 1.16.1."""

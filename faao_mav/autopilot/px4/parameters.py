@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf, radians
 
+from faao_mav.autopilot.body import PX4_BODY, CopterBody
 from faao_mav.autopilot.parameter import Parameter, ParameterRecord, table
-from faao_mav.plan.body import PX4_BODY, CopterBody
 
 _SOURCE = "PX4 1.16: parameter reference"
 

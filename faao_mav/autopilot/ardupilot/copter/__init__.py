@@ -17,13 +17,13 @@ from faao_mav.autopilot.ardupilot.copter.leg import ArduCopterLegs as ArduCopter
 from faao_mav.autopilot.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
+from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
 from faao_mav.autopilot.vehicle_type import Ceiling, VehicleType
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
-from faao_mav.plan.body import ARDUCOPTER_BODY
 
 _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""

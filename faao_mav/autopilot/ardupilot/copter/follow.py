@@ -13,7 +13,7 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot.ardupilot.copter.course import GRID, Course
 from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.errors import InputError
-from faao_mav.plan import Vector
+from faao_mav.vector import Vector
 
 _MARGIN = 0.05
 """The share by which an aircraft may be slower than its target before the target's clock waits for

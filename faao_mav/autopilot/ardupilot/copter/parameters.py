@@ -6,9 +6,9 @@ from math import radians
 from typing import Self
 
 from faao_mav.autopilot.ardupilot import DEGREE, SHARED, SOURCE, rally_parameters, switch
+from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.parameter import Parameter, ParameterRecord, ParameterValues, table
 from faao_mav.autopilot.vehicle_type import lean_acceleration
-from faao_mav.plan.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.power import GRAVITY
 
 

@@ -12,11 +12,11 @@ from faao_mav.autopilot.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPlane
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlaneLegs
 from faao_mav.autopilot.ardupilot.plane.parameters import TABLE, ArduPlaneLimits
+from faao_mav.autopilot.body import ARDUPLANE_BODY
 from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
 from faao_mav.autopilot.orbit import plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues
 from faao_mav.autopilot.vehicle_type import Ceiling, SpeedRates, VehicleType, lean_acceleration
-from faao_mav.plan.body import ARDUPLANE_BODY
 
 
 def _vertical(vehicle: ParameterValues) -> VerticalProfile:

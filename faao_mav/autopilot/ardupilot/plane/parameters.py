@@ -6,9 +6,9 @@ from math import pi, radians
 
 from faao_mav.autopilot.ardupilot import SHARED, SOURCE, rally_parameters, switch
 from faao_mav.autopilot.atmosphere import density_ratio
+from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody
 from faao_mav.autopilot.parameter import Parameter, ParameterRecord, table
 from faao_mav.autopilot.vehicle_type import SpeedRates
-from faao_mav.plan.body import ARDUPLANE_BODY, PlaneBody
 from faao_mav.power import GRAVITY
 
 

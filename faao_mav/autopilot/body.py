@@ -6,28 +6,35 @@ those of the simulated aircraft, yours has others. Limits are chosen.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-from faao_mav.plan.fields import Number, Section, key
+from pydantic import ConfigDict, Field
+
 from faao_mav.power import GRAVITY
 
-_HELD = 0.9
-"""The greatest airspeed that a plan asks of a copter, in that at which drag takes all of its lean
-limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
+_READ = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+def _key(description: str, unit: str = "", **limits: Any) -> Any:
+    """Declare a key of `vehicle.body`: what it means, its unit, pydantic's limits."""
+    extra: dict[str, Any] = {"unit": unit, "accepted": ""}
+    return Field(description=description, json_schema_extra=extra, strict=True, **limits)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CopterBody(Section):
+class CopterBody:
     """A copter's airframe: by default the quadrotor of ArduPilot's simulator."""
 
+    __pydantic_config__ = _READ
+
     lag: Annotated[
-        Number, key("Copter: time constant of the thrust's lag; PX4: 0.26.", "s", ge=0.05, le=1)
+        float, _key("Copter: time constant of the thrust's lag; PX4: 0.26.", "s", ge=0.05, le=1)
     ] = 0.17
     linear_drag: Annotated[
-        Number, key("Copter: drag over mass and airspeed; PX4: 0.2.", "1/s", ge=0, le=5)
+        float, _key("Copter: drag over mass and airspeed; PX4: 0.2.", "1/s", ge=0, le=5)
     ] = 0.28
     quadratic_drag: Annotated[
-        Number, key("Copter: drag over mass and airspeed squared; PX4: 0.", "1/m", ge=0, le=1)
+        float, _key("Copter: drag over mass and airspeed squared; PX4: 0.", "1/m", ge=0, le=1)
     ] = 0.0261
 
     def top_airspeed(self, lean_angle: float) -> float:
@@ -42,10 +49,6 @@ class CopterBody(Section):
         rooted = k + math.sqrt(k**2 + 4 * self.quadratic_drag * lean)
         return 2 * lean / rooted if rooted > 0 else math.inf
 
-    def held_airspeed(self, lean_angle: float) -> float:
-        """Return the greatest airspeed, m/s, that is held in wind with room to correct."""
-        return round(_HELD * self.top_airspeed(lean_angle), 2)
-
 
 ARDUCOPTER_BODY = CopterBody()
 """The quadrotor of ArduPilot's simulator."""
@@ -56,7 +59,7 @@ which a fit finds 0.19."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlaneBody(Section):
+class PlaneBody:
     """A plane's airframe: by default that of ArduPilot's simulator.
 
     A log of 12 m/s showed `sideslip_airspeed`: less sideslip, and tighter turns. Up to July 2026
@@ -64,19 +67,21 @@ class PlaneBody(Section):
     flies 3 % faster for it at 584 m.
     """
 
+    __pydantic_config__ = _READ
+
     airspeed_lag: Annotated[
-        Number,
-        key("Plane: time constant from the airspeed told to that flown.", "s", ge=0.05, le=10),
+        float,
+        _key("Plane: time constant from the airspeed told to that flown.", "s", ge=0.05, le=10),
     ] = 1.5
     sideslip: Annotated[
-        Number, key("Plane: share of a turn's acceleration that sideslip takes.", ge=0, le=0.9)
+        float, _key("Plane: share of a turn's acceleration that sideslip takes.", ge=0, le=0.9)
     ] = 0.286
     sideslip_airspeed: Annotated[
-        Number, key("Plane: airspeed below which `sideslip` falls.", "m/s", gt=0, le=1000)
+        float, _key("Plane: airspeed below which `sideslip` falls.", "m/s", gt=0, le=1000)
     ] = 13.0
     airspeed_exponent: Annotated[
-        Number,
-        key(
+        float,
+        _key(
             "Plane: power of the air's density, over sea level's, by which the airspeed reads low; "
             "0.5 is right, the simulator up to July 2026: 1.",
             ge=0,
