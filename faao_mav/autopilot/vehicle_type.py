@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol, TypeAlias
 
 from faao_mav.arrays import Flags, Real
@@ -10,8 +10,10 @@ from faao_mav.autopilot.body import Body
 from faao_mav.autopilot.dialect import Dialect
 from faao_mav.autopilot.failsafe import Failsafe
 from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.manners import FenceAction, Frame, Manners, Modes, SetpointRules
 from faao_mav.autopilot.orbit import Orbits, RallyRule, no_orbit
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues
+from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
 
 Autopilot: TypeAlias = str
@@ -30,14 +32,34 @@ def lean_acceleration(angle: float) -> float:
     return GRAVITY * math.tan(angle)
 
 
-@dataclass(frozen=True, slots=True)
+def custom_mode(mode: int) -> tuple[float, float, float]:
+    """Return the first parameters of DO_SET_MODE for a custom `mode`: that it is one, and which.
+
+    >>> custom_mode(17)
+    (1.0, 17.0, 0.0)
+    """
+    return 1.0, float(mode), 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class AutopilotFamily:
     """An autopilot, whatever it flies.
 
-    `key` is its name in plans and options, `name` the one that is shown, `mav_autopilot` its
-    MAV_AUTOPILOT number on the wire and in `.plan` files. Its parameter files end in
-    `parameter_suffix`: "list" has lines of NAME,VALUE, "qgroundcontrol" five fields between tabs.
-    Parameters whose names begin with one of `parameter_prefixes` are its own.
+    Attributes:
+        key: its name in plans and options.
+        name: the name that is shown.
+        mav_autopilot: its MAV_AUTOPILOT number on the wire and in `.plan` files.
+        parameter_suffix: what its parameter files end in.
+        parameter_style: "list" has lines of NAME,VALUE, "qgroundcontrol" five fields between tabs.
+        parameter_prefixes: parameters whose names begin with one of these are its own.
+        manners: how it takes and gives lists; those of one that is not known by default.
+        mode_parameters: the first three parameters of DO_SET_MODE for one of its custom modes.
+        setpoints: how it is flown by setpoints.
+        local_frame: the frame in which it takes them, about its origin in degrees.
+        whole_as_bits: whole numbers among its parameters are sent as their 32 bits, and only what
+            is sent with the right type is set.
+        mavlink_2: the parameter and its value with which a port speaks MAVLink 2.
+        only_one_station: what may be why it does not answer, and what to do; "": nothing is known.
     """
 
     key: Autopilot
@@ -46,6 +68,13 @@ class AutopilotFamily:
     parameter_suffix: str
     parameter_style: Literal["list", "qgroundcontrol"]
     parameter_prefixes: tuple[str, ...]
+    manners: Manners = field(default_factory=Manners)
+    mode_parameters: Callable[[int], tuple[float, float, float]] = custom_mode
+    setpoints: SetpointRules = field(default_factory=SetpointRules)
+    local_frame: Callable[[float, float], Frame] = LocalFrame
+    whole_as_bits: bool = False
+    mavlink_2: str = ""
+    only_one_station: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +101,6 @@ class SpeedRates:
     fall: float = math.inf
     power: float = math.inf
     turn: float = math.inf
-
-
-FenceAction: TypeAlias = Literal["nothing", "report", "hold", "return", "land", "terminate"]
-"""What a vehicle does that leaves its fence: flies on, says so and flies on, and so forth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +172,7 @@ class VehicleType:
         kind: the type of vehicle as plans and options name it.
         name: the name that is shown, as "ArduCopter".
         mav_types: its MAV_TYPE numbers; the first is written into `.plan` files and heartbeats.
+        modes: its flight modes.
         hovers: it can stand still in the air; else it circles to wait.
         whole_second_holds: the hold of a waypoint loses its fraction of a second.
         parameters: its parameters by key.
@@ -185,6 +211,7 @@ class VehicleType:
     kind: Kind
     name: str
     mav_types: tuple[int, ...]
+    modes: Modes
     hovers: bool
     parameters: ParameterTable
     dialect: Dialect

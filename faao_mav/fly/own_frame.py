@@ -7,7 +7,6 @@ from faao_mav.autopilot import AutopilotFamily
 from faao_mav.fly.course import Setpoint
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan.sections import Origin
-from faao_mav.wire.local_frame import frame_of
 from faao_mav.wire.messages import (
     GlobalPositionInt,
     GpsGlobalOrigin,
@@ -67,7 +66,7 @@ class OwnFrame:
     ) -> SetPositionTargetLocalNed:
         """Return `setpoint` for the vehicle `target` that has told its `position`."""
         assert self.origin is not None
-        own = frame_of(self._family, self.origin.latitude / 1e7, self.origin.longitude / 1e7)
+        own = self._family.local_frame(self.origin.latitude / 1e7, self.origin.longitude / 1e7)
         p, v, a = setpoint
         east, north = own.to_local(*self._plans.to_geodetic(p[:2]))
         home = (self._home(position) - self.origin.altitude) / 1000

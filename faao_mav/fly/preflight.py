@@ -8,16 +8,14 @@ from dataclasses import replace
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import addressee_mistake
-from faao_mav.autopilot.vehicle_type import FenceAction
+from faao_mav.autopilot.manners import FenceAction
 from faao_mav.fly.seen import Flight, Seen
 from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.validate.rule import Finding, Level
 from faao_mav.validate.words import counted
-from faao_mav.wire.modes import modes_of
 from faao_mav.wire.parameters import close, number_in
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.setpoints import setpoint_rules
 from faao_mav.wire.transfer.verify import compare
 from faao_mav.wire.whereabouts import (
     FIRST_AWAY,
@@ -132,7 +130,7 @@ def _state(flight: Flight, seen: Seen) -> Iterator[Finding]:
             f"another ground station is on the link ({'; '.join(sorted(seen.stations))})",
             "close it, or let it start the mission",
         )
-    if not flight.streamed and seen.mode in modes_of(seen.vehicle).not_to_arm_in:
+    if not flight.streamed and seen.mode in seen.vehicle.modes.not_to_arm_in:
         yield _error(
             "mode",
             f"it is in mode {seen.mode_name}, in which it is not armed, or flies as soon as it is",
@@ -287,7 +285,7 @@ def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
             action = "set what it is to do, unless that is meant: see docs/first-flight.md"
             yield _warning(rule, f"{failsafe.loss}: it {told.text}", action)
     if flight.streamed:
-        rules = setpoint_rules(seen.vehicle.family)
+        rules = seen.vehicle.family.setpoints
         if (refusal := rules.refusal(values)) is not None:
             yield _error("on-setpoints-lost", *refusal)
         else:

@@ -10,11 +10,9 @@ from faao_mav.errors import InputError
 from faao_mav.mission.item import Home, Mission
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import HomePosition, WireItem
-from faao_mav.wire.modes import modes_of
 from faao_mav.wire.parameters import Names, Reading, ReadParameters
 from faao_mav.wire.protocol import HOME_POSITION, MavResult, MissionType
 from faao_mav.wire.questions import AskFor
-from faao_mav.wire.setpoints import setpoint_rules
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import download_lists
@@ -59,8 +57,8 @@ def names_of(vehicle: VehicleType) -> tuple[Names, ...]:
     """Return the parameters of `vehicle` that a flight depends on, each with all of its names."""
     flown = [tuple(each.names) for each in vehicle.parameters.values()]
     decided = [(name,) for each in vehicle.failsafes for name in each.defaults]
-    rules = setpoint_rules(vehicle.family)
-    streamed = [(name,) for name in rules.defaults if modes_of(vehicle).guided is not None]
+    rules = vehicle.family.setpoints
+    streamed = [(name,) for name in rules.defaults if vehicle.modes.guided is not None]
     return tuple(dict.fromkeys([*flown, *decided, *streamed]))
 
 

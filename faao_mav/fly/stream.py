@@ -28,7 +28,6 @@ from faao_mav.wire.messages import (
     Timesync,
 )
 from faao_mav.wire.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
-from faao_mav.wire.setpoints import setpoint_rules
 from faao_mav.wire.transfer.exchange import Peer
 
 _STREAMED = 1.5
@@ -106,7 +105,7 @@ class Stream(Watch):
         if self._modes.guided is None or peer.vehicle is None:
             raise InputError("--stream: only copters fly by setpoints")
         self._family, self._guided = peer.vehicle.family, self._modes.guided
-        self._rules = setpoint_rules(self._family)
+        self._rules = self._family.setpoints
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if lands else "hold"]
         self._solution = solution

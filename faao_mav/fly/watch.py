@@ -18,7 +18,6 @@ from faao_mav.wire.messages import (
     MissionCurrent,
     WireItem,
 )
-from faao_mav.wire.modes import mode_command, modes_of
 from faao_mav.wire.protocol import (
     LOCAL_POSITION,
     MISSION_COMPLETE,
@@ -107,7 +106,7 @@ class Watch(Machine[Ending]):
             raise ValueError("watch: a vehicle that is known is needed")
         if arm and readiness is None:
             raise ValueError("watch: nothing is armed without the gate before a flight")
-        self._peer, self._modes = peer, modes_of(peer.vehicle)
+        self._peer, self._modes = peer, peer.vehicle.modes
         self._family = peer.vehicle.family
         self._first = home_items(peer.vehicle, MissionType.MISSION)
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
@@ -404,7 +403,7 @@ class Watch(Machine[Ending]):
 
     def _mode(self, mode: int) -> Message:
         again = max(0, self._sent - 1)
-        params = mode_command(self._family, mode)
+        params = self._family.mode_parameters(mode)
         return CommandLong(self._peer.address, MavCommand.SET_MODE, again, *params)
 
     def _say(self, command: Callable[[], Message], now: float) -> Sequence[Message]:

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Literal, TypeAlias
 
+from faao_mav.autopilot.manners import SetpointRules
 from faao_mav.fly.telemetry import Telemetry
-from faao_mav.wire.setpoints import SetpointRules
 
 Flier: TypeAlias = Literal["setpoints", "failsafe", "others", "unknown"]
 

@@ -11,7 +11,6 @@ from faao_mav.autopilot import AutopilotFamily, VehicleType
 from faao_mav.autopilot.dialect import BESIDE
 from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.wire.manners import manners_of
 from faao_mav.wire.messages import CommandLong, Envelope, Message, Statustext, WireItem
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.wire_items import home_items, mission_item, wire_item
@@ -136,7 +135,7 @@ class MockFirmware(ABC):
         flying: Callable[[], bool],
     ) -> None:
         self._lists, self._behaviour = lists, behaviour
-        self._manners = manners_of(lists.vehicle)
+        self._manners = lists.vehicle.family.manners
         self._ready, self._flying = ready, flying
         self._legacy = behaviour.legacy_first
         self.reset()

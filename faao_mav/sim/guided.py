@@ -12,15 +12,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from faao_mav.autopilot import AutopilotFamily, Vehicle
+from faao_mav.autopilot.manners import Modes, SetpointRules
 from faao_mav.fly.course import Course, Setpoint
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.item import Home
 from faao_mav.sim.firmware import whole
 from faao_mav.sim.flight import Posture
-from faao_mav.wire.local_frame import frame_of
 from faao_mav.wire.messages import SetPositionTargetLocalNed
-from faao_mav.wire.modes import Modes
-from faao_mav.wire.setpoints import SetpointRules
 
 _STEP, _STEPS, _LONGEST_STEP = 0.05, 1000, 0.5
 """Seconds between two steps of the flight; after a longer silence it is about so many steps, none
@@ -206,7 +204,7 @@ class Guided:
     def _setpoint(self, message: SetPositionTargetLocalNed) -> Setpoint:
         """Return what `message` says in metres east, north and up of home."""
         home = self._home
-        frame = frame_of(self._family, home.latitude, home.longitude)
+        frame = self._family.local_frame(home.latitude, home.longitude)
         own = LocalFrame(home.latitude, home.longitude)
         level = own.to_local(*frame.to_geodetic([message.y, message.x]))
         moves = (

@@ -40,7 +40,6 @@ from faao_mav.wire.messages import (
     SysStatus,
     Timesync,
 )
-from faao_mav.wire.modes import modes_of
 from faao_mav.wire.protocol import (
     ARMED,
     CURRENT_MODE,
@@ -56,7 +55,6 @@ from faao_mav.wire.protocol import (
     MavState,
     MissionType,
 )
-from faao_mav.wire.setpoints import setpoint_rules
 from faao_mav.wire.wire_items import home_items, mission_of
 
 Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
@@ -120,10 +118,10 @@ class MockAutopilot(Machine[None]):
         self._battery = battery
         self.behaviour, self.address, self.home = behaviour, address, home
         self.vehicle = vehicle_type(behaviour.family.key, aircraft)
-        self._modes = modes_of(self.vehicle)
+        self._modes = self.vehicle.modes
         self._mode = self._wanted = self._modes.rest
         self.lists = StoredLists(self.vehicle, home)
-        rules = setpoint_rules(behaviour.family)
+        rules = behaviour.family.setpoints
         self._comes_back = bool(rules.loss)
         self._tells_wanted = False  # only once it is asked for CURRENT_MODE
         known = self.vehicle.defaults() | dict(rules.defaults)

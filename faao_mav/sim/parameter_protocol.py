@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 
 from faao_mav.autopilot import VehicleType
-from faao_mav.autopilot.px4 import PX4
 from faao_mav.wire.messages import (
     Message,
     ParamRequestList,
@@ -57,7 +56,7 @@ class ParameterServer:
 
     def _set(self, message: ParamSet) -> list[Message]:
         name, kind = message.param_id, message.param_type
-        if self._vehicle.family == PX4 and kind != self._kind(name):
+        if self._vehicle.family.whole_as_bits and kind != self._kind(name):
             return []
         told = ParamValue(name, message.param_value, kind, 0, 0)
         value = setting_in(told, self._vehicle).value

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from faao_mav.autopilot.px4 import PX4
+from faao_mav.autopilot.px4 import PX4, px4_mode
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, POLYGON, Command, Frame
 from faao_mav.mission.item import Mission
 from faao_mav.sim.firmware import MockFirmware, is_custom, whole
@@ -20,7 +20,6 @@ from faao_mav.wire.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.wire.modes import px4_mode
 from faao_mav.wire.protocol import (
     ALL_TYPES,
     NOBODY,

@@ -13,7 +13,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot import Track, Vehicle
-from faao_mav.autopilot.vehicle_type import FenceAction
+from faao_mav.autopilot.manners import FenceAction
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import FreeArea, areas_of

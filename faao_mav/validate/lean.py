@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.autopilot import Vehicle
-from faao_mav.autopilot.ardupilot import ARDUPILOT
-from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
+from faao_mav.autopilot.body import CopterBody
+from faao_mav.autopilot.vehicle_type import lean_acceleration
 from faao_mav.optimizer.solution import Solution
 from faao_mav.power import GRAVITY
 
@@ -42,17 +42,18 @@ def beyond_lean(solution: Solution, vehicle: Vehicle) -> Lean | None:
 
     with the drag of its body. Others are not known to lack any.
     """
-    if vehicle.type.family != ARDUPILOT or vehicle.type.kind != "copter":
+    body = vehicle.airframe
+    if not vehicle.type.models_wind or not isinstance(body, CopterBody):
         return None
-    limits = ArduCopterLimits.from_vehicle(vehicle)
+    allowed = vehicle.value("lean_angle")
     pushes = []
     for v in (solution.v[:-1] - solution.plan.wind, solution.v[1:] - solution.plan.wind):
         speed = np.linalg.norm(v, axis=1, keepdims=True)
-        drag = (limits.body.linear_drag + limits.body.quadratic_drag * speed) * v
+        drag = (body.linear_drag + body.quadratic_drag * speed) * v
         pushes.append(np.linalg.norm(solution.a[:-1] + drag, axis=1))
     push, slot = np.maximum(*pushes), float(solution.t[1])
-    missing = np.maximum(push - limits.lean, 0.0)
+    missing = np.maximum(push - lean_acceleration(allowed), 0.0)
     if slot * missing.sum() < _LEAST:
         return None
     needed = math.atan(float(push.max()) / GRAVITY)
-    return Lean(needed, limits.lean_angle, slot * int((missing > 0).sum()))
+    return Lean(needed, allowed, slot * int((missing > 0).sum()))

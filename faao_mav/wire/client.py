@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypedDict, TypeVar, Unpack
 
-from faao_mav.autopilot.ardupilot import ARDUPILOT
+from faao_mav.autopilot import families
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
@@ -24,6 +24,7 @@ from faao_mav.wire.protocol import (
     Address,
     MavResult,
     MissionType,
+    meaning,
 )
 from faao_mav.wire.questions import AskAlive, AskFor
 from faao_mav.wire.signing import Verdict, read_signing, remember
@@ -295,9 +296,11 @@ class Session:
             "or a recording of it?"
         )
         if self.link.speaks_old(self.found.address):
+            known = [each for each in families() if each.mavlink_2]
+            ports = "; ".join(f"{each.name}: {each.mavlink_2}" for each in known)
             why = (
                 "it speaks MAVLink 1 only, and does not answer MAVLink 2: set its port to MAVLink "
-                "2 (ArduPilot: SERIALn_PROTOCOL 2; PX4: MAV_PROTO_VER 2)"
+                f"2 ({ports})"
             )
         raise LinkError(f"{connection}: {self.found}: {why}")
 
@@ -311,7 +314,7 @@ class Session:
         """Return in words why a list was not read."""
         why = "the vehicle stopped answering"
         if outcome.result is not None:
-            why = f"refused: {self.peer.manners.meaning(outcome.result)}"
+            why = f"refused: {meaning(outcome.result, self.peer.manners.meanings)}"
         elif part is MissionType.MISSION:
             why += self.why_silent()
         return f"{part.title}: not read: {why}"
@@ -320,10 +323,8 @@ class Session:
         """Return why the vehicle may never answer, in words; "" where nothing hints at it."""
         if self._signing is None and "signed" in self.link.heard:
             return "; it signs its packets, and may want them signed: --signing-key"
-        if self.found.family == ARDUPILOT:
-            only = "only MAV_GCS_SYSID (SYSID_ENFORCE, MAV_OPTIONS)"
-            return f"; where it takes orders of {only}, give that number: --own-system"
-        return ""
+        family = self.found.family
+        return f"; {family.only_one_station}" if family and family.only_one_station else ""
 
     def run(self, machine: Machine[T]) -> T:
         """Run `machine` to its end and return the outcome."""

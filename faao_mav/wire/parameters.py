@@ -12,7 +12,6 @@ from typing import Any, TypeAlias
 
 from faao_mav.autopilot import VehicleType, vehicle_types
 from faao_mav.autopilot.parameter import Parameter
-from faao_mav.autopilot.px4 import PX4
 from faao_mav.errors import InputError
 from faao_mav.wire.machine import AskingMachine, Machine, Progress
 from faao_mav.wire.messages import Envelope, Message, ParamRequestRead, ParamSet, ParamValue
@@ -61,14 +60,14 @@ class Reading:
 def setting_in(message: ParamValue, vehicle: VehicleType | None) -> Setting:
     """Return what `message` of `vehicle` says, in whose manner whole numbers are sent."""
     value, kind = message.param_value, message.param_type
-    if vehicle is not None and vehicle.family == PX4 and kind == _INT32:
+    if vehicle is not None and vehicle.family.whole_as_bits and kind == _INT32:
         (value,) = struct.unpack("<i", struct.pack("<f", value))
     return Setting(value, kind)
 
 
 def on_the_wire(setting: Setting, vehicle: VehicleType | None) -> float:
     """Return the number that carries `setting` to `vehicle`: the reverse of `setting_in`."""
-    if vehicle is not None and vehicle.family == PX4 and setting.kind == _INT32:
+    if vehicle is not None and vehicle.family.whole_as_bits and setting.kind == _INT32:
         whole = min(max(round(setting.value), -(2**31)), 2**31 - 1)
         (bits,) = struct.unpack("<f", struct.pack("<i", whole))
         return float(bits)

@@ -3,6 +3,7 @@
 Source: MAVLink developer guide, "Mission Protocol", and the MAVLink common set.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -43,6 +44,36 @@ class MavResult(IntEnum):
     INVALID_SEQUENCE = 13
     DENIED = 14
     OPERATION_CANCELLED = 15
+
+
+_MEANINGS = {
+    MavResult.UNSUPPORTED_FRAME: "the frame of an item is not supported",
+    MavResult.UNSUPPORTED: "a command, or this kind of list, is not supported",
+    MavResult.INVALID: "an item, or this kind of list, is invalid",
+    MavResult.INVALID_PARAM1: "param1 of an item is invalid",
+    MavResult.INVALID_PARAM2: "param2 of an item is invalid",
+    MavResult.INVALID_PARAM3: "param3 of an item is invalid",
+    MavResult.INVALID_PARAM4: "param4 of an item is invalid",
+    MavResult.INVALID_PARAM5_X: "the latitude (param5) of an item is out of range",
+    MavResult.INVALID_PARAM6_Y: "the longitude (param6) of an item is out of range",
+    MavResult.INVALID_PARAM7: "the altitude (param7) of an item is invalid",
+    MavResult.INVALID_SEQUENCE: "an item came out of turn",
+    MavResult.OPERATION_CANCELLED: "the vehicle gave the transfer up",
+}
+
+
+def meaning(result: int, own: Mapping[str, str]) -> str:
+    """Return a MAV_MISSION_RESULT by its name, and what it says; `own` are an autopilot's meanings.
+
+    >>> meaning(13, {}), meaning(5, {"INVALID": "command 0 or 1"}), meaning(99, {})
+    ('INVALID_SEQUENCE (an item came out of turn)', 'INVALID (command 0 or 1)', 'result 99')
+    """
+    try:
+        known = MavResult(result)
+    except ValueError:
+        return f"result {result}"
+    text = own.get(known.name) or _MEANINGS.get(known)
+    return f"{known.name} ({text})" if text else known.name
 
 
 _COMMAND_RESULTS = {

@@ -16,7 +16,6 @@ from faao_mav.mission.command import FLOWN_TO, Frame
 from faao_mav.mission.fence import RallyPoint, check_place
 from faao_mav.mission.fence_items import fence_items, fence_of, rally_items
 from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
-from faao_mav.wire.manners import autopilot_name
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
 
@@ -142,3 +141,8 @@ def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireIt
 
 def _finite_or_nan(value: float) -> float:
     return value if math.isfinite(value) else math.nan
+
+
+def autopilot_name(vehicle: VehicleType | None) -> str:
+    """Return what people call the autopilot of `vehicle`."""
+    return "an autopilot unknown here" if vehicle is None else vehicle.family.name

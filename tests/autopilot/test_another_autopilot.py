@@ -19,6 +19,7 @@ from faao_mav.autopilot import (
 from faao_mav.autopilot.dialect import Dialect, Limit, SpeedChange
 from faao_mav.autopilot.files import autopilot_of, parameter_path
 from faao_mav.autopilot.flight_path import VerticalProfile
+from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
 from faao_mav.autopilot.px4.flight_model import Px4
 from faao_mav.errors import PlanError
@@ -84,6 +85,7 @@ COPTER = VehicleType(
     kind="copter",
     name="ToyCopter",
     mav_types=(2,),
+    modes=Modes(rest=0, mission=1, hold=2),
     hovers=True,
     parameters=TABLE,
     dialect=Dialect(

@@ -10,7 +10,7 @@ from mock_flights import fly
 from stations import HOME, VEHICLE, Desk, a_mission, rows_for, vehicle_of
 
 from faao_mav.autopilot.ardupilot import ARDUPILOT
-from faao_mav.autopilot.px4 import PX4
+from faao_mav.autopilot.px4 import PX4, px4_mode
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
@@ -34,7 +34,6 @@ from faao_mav.wire.messages import (
     SetMode,
     Statustext,
 )
-from faao_mav.wire.modes import mode_command, px4_mode
 from faao_mav.wire.parameters import setting_in
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.wire.wire_items import wire_items
@@ -170,14 +169,14 @@ def test_a_mode_is_asked_for_as_each_autopilot_has_it() -> None:
     """PX4 accepts what is no mode to it, and changes nothing: the mode itself has to tell."""
     copter, px4 = desk_for("ardupilot"), desk_for("px4")
     rest = px4.machine.mode
-    assert result(copter.tell(command(176, *mode_command(ARDUPILOT, 17)))) == 0
+    assert result(copter.tell(command(176, *ARDUPILOT.mode_parameters(17)))) == 0
     assert copter.machine.mode == 17
     assert result(copter.tell(command(176, 0, 4))) == 2  # not a custom mode
     assert copter.machine.mode == 17
     for params in ((1, px4_mode(6, 0)), (0, 4, 4), (1, 300, 4)):
         assert result(px4.tell(command(176, *params))) == 0
         assert px4.machine.mode == rest
-    assert result(px4.tell(command(176, *mode_command(PX4, px4_mode(4, 6))))) == 0
+    assert result(px4.tell(command(176, *PX4.mode_parameters(px4_mode(4, 6))))) == 0
     assert px4.machine.mode == px4_mode(4, 6)
 
 

@@ -13,6 +13,7 @@ from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, v
 from faao_mav import parse_plan, plan_mission
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import MadeFor
+from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.fly.preflight import LEAST_BATTERY, preflight
 from faao_mav.fly.seen import Flight, Held, Seen
 from faao_mav.fly.watch import Watch
@@ -23,7 +24,6 @@ from faao_mav.sim import MockAutopilot
 from faao_mav.validate import Finding, Level
 from faao_mav.wire.faults import Faults
 from faao_mav.wire.messages import CommandLong, Envelope, ParamSet
-from faao_mav.wire.modes import px4_mode
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
 from faao_mav.wire.transfer.exchange import Outcome
 from faao_mav.wire.wire_items import wire_items

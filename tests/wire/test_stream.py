@@ -15,6 +15,7 @@ from stations import FOREIGN, HOME, a_mission, peer_of, vehicle_of
 
 from faao_mav import optimize, parse_plan
 from faao_mav.autopilot import vehicle_type
+from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.fly.course import Course
 from faao_mav.fly.readiness import Readiness
@@ -25,9 +26,7 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.wire.faults import Faults
-from faao_mav.wire.local_frame import frame_of
 from faao_mav.wire.messages import CommandLong, Envelope, SetPositionTargetLocalNed
-from faao_mav.wire.modes import px4_mode
 from faao_mav.wire.parameters import Reading
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand
 from faao_mav.wire.transfer.exchange import Peer
@@ -307,7 +306,7 @@ def test_local_frames_go_there_and_back(
 ) -> None:
     vehicle = vehicle_of(kind)
     assert vehicle is not None
-    frame = frame_of(vehicle.family, latitude, 179.99)
+    frame = vehicle.family.local_frame(latitude, 179.99)
     there = np.array([east, north])
     np.testing.assert_allclose(frame.to_local(*frame.to_geodetic(there)), there, atol=1e-5)
     own = LocalFrame(latitude, 179.99)

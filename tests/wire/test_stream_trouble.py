@@ -14,8 +14,8 @@ from test_gate import CAP, swift
 from test_stream import KINDS, LOITER, low, setpoints, under
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.ardupilot import ARDUPILOT
-from faao_mav.autopilot.px4 import PX4
+from faao_mav.autopilot import family
+from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.fly.gate import LEVEL, NEAR
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.optimizer.solution import Solution
@@ -28,9 +28,7 @@ from faao_mav.wire.messages import (
     Message,
     SetPositionTargetLocalNed,
 )
-from faao_mav.wire.modes import px4_mode
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand
-from faao_mav.wire.setpoints import setpoint_rules
 
 HOLD = {"ardupilot": 17, "px4": px4_mode(4, 3)}
 GUIDED = {"ardupilot": 4, "px4": px4_mode(6, 0)}
@@ -345,7 +343,7 @@ def test_it_does_not_stream_to_what_would_not_be_safe_without(
 @KINDS
 @pytest.mark.parametrize("value", [math.nan, 2.5])
 def test_what_is_no_number_of_an_action_or_no_time_is_refused(kind: str, value: float) -> None:
-    rules = setpoint_rules(ARDUPILOT if kind == "ardupilot" else PX4)
+    rules = family(kind).setpoints
     values = rules.defaults | {rules.timeout: 1.0}
     assert rules.refusal(values) is None
     assert rules.refusal(values | {rules.loss or rules.timeout: value}) is not None
@@ -353,7 +351,7 @@ def test_what_is_no_number_of_an_action_or_no_time_is_refused(kind: str, value: 
 
 @KINDS
 def test_nor_to_one_that_does_not_tell(kind: str) -> None:
-    rules = setpoint_rules(ARDUPILOT if kind == "ardupilot" else PX4)
+    rules = family(kind).setpoints
     scene = Scene(kind, solution=low(), untold=rules.defaults)
     assert scene.run() == "refused"
     assert f"it does not tell {' and '.join(rules.defaults)}" in scene.watch.outcome.text

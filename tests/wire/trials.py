@@ -21,7 +21,6 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home
 from faao_mav.optimizer.solution import Solution
 from faao_mav.wire.faults import Faults
-from faao_mav.wire.local_frame import frame_of
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import (
     CommandLong,
@@ -185,7 +184,7 @@ class Judge(Counted):
         assert solution is not None
         assert told is not None
         plan = solution.plan
-        own = frame_of(self.machine._family, self.home.latitude, self.home.longitude)
+        own = self.machine._family.local_frame(self.home.latitude, self.home.longitude)
         plans = LocalFrame(plan.origin.latitude, plan.origin.longitude)
         to = plans.to_local(*own.to_geodetic([setpoint.y, setpoint.x]))
         place = plans.to_local(told.lat / 1e7, told.lon / 1e7)

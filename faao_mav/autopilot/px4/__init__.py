@@ -18,6 +18,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import PX4_BODY
 from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule, plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
 from faao_mav.autopilot.px4.dialect import DIALECT
@@ -30,14 +31,34 @@ from faao_mav.autopilot.vehicle_type import (
     OVERSPEED,
     AutopilotFamily,
     Ceiling,
-    FenceAction,
     FenceResponse,
     VehicleType,
     lean_acceleration,
 )
+from faao_mav.geodesy import LocalFrame
 
 _HOME_OUTSIDE_FENCE = "PX4 says so (Geofence invalid), and flies the mission all the same"
 """Measured on PX4 1.16.1."""
+
+_RADIUS = 6_371_000.0
+"""The radius of PX4's Earth, m."""
+
+
+def px4_mode(main: int, sub: int) -> int:
+    """Return PX4's custom mode for a main and a sub mode; 0 for numbers that are none."""
+    return main << 16 | sub << 24 if 0 <= main < 256 and 0 <= sub < 256 else 0
+
+
+def _mode_parameters(mode: int) -> tuple[float, float, float]:
+    """PX4 is told main and sub mode apart.
+
+    >>> _mode_parameters(px4_mode(4, 3))
+    (1.0, 4.0, 3.0)
+    """
+    return 1.0, float(mode >> 16 & 255), float(mode >> 24)
+
+
+_HOLD, _RETURN, _LAND = (px4_mode(4, sub) for sub in (3, 5, 6))
 
 PX4 = AutopilotFamily(
     key="px4",
@@ -46,8 +67,53 @@ PX4 = AutopilotFamily(
     parameter_suffix=".params",
     parameter_style="qgroundcontrol",
     parameter_prefixes=("MPC_", "NAV_", "COM_", "EKF2_"),
+    manners=Manners(
+        request_period=0.25,
+        patience=5.0,
+        ignores_other_items=True,
+        reminder=-1,
+        final_acks=2,  # until it hears one, nobody else can begin a transfer for 5 s
+        meanings={
+            "ERROR": (
+                "busy with another transfer, storage failed, a fence polygon of fewer than 3 "
+                "vertices, or fence items in a mission"
+            ),
+            "INVALID": "this kind of list is unknown to it",
+        },
+    ),
+    mode_parameters=_mode_parameters,
+    setpoints=SetpointRules(
+        "COM_OF_LOSS_T",
+        most_timeout=60.0,  # the greatest value that it takes
+        loss="COM_OBL_RC_ACT",
+        actions={  # without sticks PX4 1.16.1 sank in Position by 0.7 m/s to the ground
+            0: LossAction("Position", px4_mode(3, 0), by_sticks=True),
+            1: LossAction("Altitude", px4_mode(2, 0), by_sticks=True),
+            2: LossAction("Stabilized", px4_mode(7, 0), by_sticks=True),
+            3: LossAction("Return", _RETURN),
+            4: LossAction("Land", _LAND),
+            5: LossAction("Hold", _HOLD),
+        },
+        forbidden={6: "terminates the flight", 7: "stops its motors"},
+        streamed=1.0,
+        defaults={"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0},
+    ),
+    local_frame=lambda latitude, longitude: LocalFrame(latitude, longitude, _RADIUS),
+    whole_as_bits=True,
+    mavlink_2="MAV_PROTO_VER 2",
 )
-"""PX4, whatever it flies."""
+"""PX4, whatever it flies. Manners: `mavlink_mission.cpp` (behaviour only), and what it did in its
+simulator."""
+
+_MODES = Modes(
+    rest=_HOLD,
+    mission=px4_mode(4, 4),
+    hold=_HOLD,
+    at_fence={"hold": _HOLD, "return": _RETURN, "land": _LAND},
+    guided=px4_mode(6, 0),
+    not_to_arm_in=frozenset(px4_mode(4, sub) for sub in (2, 5, 6, 9)),
+)
+"""PX4 1.16 does not arm in Return, Land and Precision Land, and takes off in Takeoff."""
 
 _AT_FENCE: tuple[FenceAction, ...] = ("nothing", "report", "hold", "return", "terminate", "land")
 """What each value of GF_ACTION means."""
@@ -168,6 +234,7 @@ PX4_COPTER = VehicleType(
     kind="copter",
     name="PX4",
     mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
+    modes=_MODES,
     hovers=True,
     parameters=COPTER_TABLE,
     dialect=DIALECT,
@@ -192,6 +259,7 @@ PX4_PLANE = VehicleType(
     kind="plane",
     name="PX4",
     mav_types=(1,),
+    modes=replace(_MODES, guided=None),
     hovers=False,
     parameters=PLANE_TABLE,
     dialect=DIALECT,

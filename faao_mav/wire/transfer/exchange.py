@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from faao_mav.autopilot import VehicleType
+from faao_mav.autopilot.manners import Manners
 from faao_mav.wire.machine import AskingMachine, Progress
-from faao_mav.wire.manners import Manners, manners_of
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
@@ -49,7 +49,7 @@ class Peer:
     @property
     def manners(self) -> Manners:
         """How the other end behaves in transfers."""
-        return manners_of(self.vehicle)
+        return Manners() if self.vehicle is None else self.vehicle.family.manners
 
     def ack(self, result: MavResult, mission_type: MissionType) -> MissionAck:
         """Return the acknowledgement to send to the vehicle."""

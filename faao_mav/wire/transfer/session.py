@@ -9,15 +9,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, TypeVar
 
 from faao_mav.wire.machine import Machine
-from faao_mav.wire.manners import autopilot_name
 from faao_mav.wire.messages import WireItem
-from faao_mav.wire.protocol import MavResult, MissionType
+from faao_mav.wire.protocol import MavResult, MissionType, meaning
 from faao_mav.wire.transfer.download import Download
 from faao_mav.wire.transfer.exchange import TENTATIVE, Clear, Outcome, Peer
 from faao_mav.wire.transfer.pace import Budget, Timeouts
 from faao_mav.wire.transfer.upload import Upload
 from faao_mav.wire.transfer.verify import Difference, compare
-from faao_mav.wire.wire_items import home_items
+from faao_mav.wire.wire_items import autopilot_name, home_items
 
 T = TypeVar("T")
 Job: TypeAlias = Generator[Machine[Any], Outcome, T]
@@ -228,7 +227,7 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
             text += "" if report.result is None else " by the vehicle"
         case _:
             assert report.result is not None
-            text += f"refused: {peer.manners.meaning(report.result)}"
+            text += f"refused: {meaning(report.result, peer.manners.meanings)}"
             if report.result == MavResult.NO_SPACE:
                 text += f": {report.items + home} rows"
                 text += " with home" if home else ""

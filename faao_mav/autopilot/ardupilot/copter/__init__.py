@@ -19,6 +19,7 @@ from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.flight_path import VerticalProfile
+from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
 from faao_mav.autopilot.vehicle_type import Ceiling, VehicleType
@@ -39,6 +40,19 @@ _LIVELIEST_JERK = 20.0
 """The jerk, m/s³, for bends at speed, with the greatest acceleration: its documented maximum.
 Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5, with a jerk of 10
 4.4."""
+
+
+_BRAKE = 17
+_MODES = Modes(
+    rest=0,
+    mission=3,
+    hold=_BRAKE,
+    at_fence={"return": 6, "land": 9, "hold": _BRAKE},
+    guided=4,
+    not_to_arm_in=frozenset({6, 7, 9, 14, 15, _BRAKE, 18, 21, 27}),
+)
+"""COPTER_MODE of MAVLink. ArduCopter 4.7 does not arm in RTL, CIRCLE, LAND, FLIP, AUTOTUNE, BRAKE,
+SMART_RTL and AUTO_RTL (in AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW."""
 
 
 def _vertical(vehicle: ParameterValues) -> VerticalProfile:
@@ -108,6 +122,7 @@ ARDUCOPTER = VehicleType(
     kind="copter",
     name="ArduCopter",
     mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
+    modes=_MODES,
     hovers=True,
     parameters=TABLE,
     dialect=COPTER_DIALECT,

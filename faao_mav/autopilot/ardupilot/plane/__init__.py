@@ -14,9 +14,14 @@ from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlaneLegs
 from faao_mav.autopilot.ardupilot.plane.parameters import TABLE, ArduPlaneLimits
 from faao_mav.autopilot.body import ARDUPLANE_BODY
 from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues
 from faao_mav.autopilot.vehicle_type import Ceiling, SpeedRates, VehicleType, lean_acceleration
+
+_LOITER, _RTL = 12, 11
+_MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
+"""PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL."""
 
 
 def _vertical(vehicle: ParameterValues) -> VerticalProfile:
@@ -59,6 +64,7 @@ ARDUPLANE = VehicleType(
     kind="plane",
     name="ArduPlane",
     mav_types=(1,),
+    modes=_MODES,
     hovers=False,
     parameters=TABLE,
     dialect=PLANE_DIALECT,

@@ -1,14 +1,71 @@
-"""How autopilots follow setpoints, and what they do when no more come."""
+"""What the wire shows of an autopilot: its modes, how it takes lists and setpoints."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple, Protocol, TypeAlias
 
-from faao_mav.autopilot import AutopilotFamily
-from faao_mav.autopilot.ardupilot import ARDUPILOT
-from faao_mav.autopilot.px4 import PX4
-from faao_mav.wire.modes import px4_mode
+from numpy.typing import ArrayLike
+
+from faao_mav.arrays import Real
+
+FenceAction: TypeAlias = Literal["nothing", "report", "hold", "return", "land", "terminate"]
+"""What a vehicle does that leaves its fence: flies on, says so and flies on, and so forth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """Custom modes of an autopilot that flies one type of vehicle.
+
+    `rest` is one to stand on the ground in, `mission` flies the mission, `hold` stays at the place
+    (a plane circles there) without sticks, `guided` flies by setpoints (None: streams are not flown
+    by that type). `at_fence` are those that hold, return and land, as after a breach of the fence.
+    In the modes `not_to_arm_in` the autopilot does not arm, or takes off as soon as it has.
+    """
+
+    rest: int
+    mission: int
+    hold: int
+    at_fence: Mapping[FenceAction, int] = field(default_factory=dict)
+    guided: int | None = None
+    not_to_arm_in: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Manners:
+    """How an autopilot behaves in transfers; the defaults are those of one that is not known.
+
+    `patience` is how long it waits for the next packet of a transfer before it gives up, s.
+
+    In uploads: `request_period` is how long after its last request it asks again, s. An item that
+    it did not ask for it passes over without a word (`ignores_other_items`), or answers
+    INVALID_SEQUENCE and goes on waiting. `reminder` is the item, counted from the end (-1: the
+    last one), to send again when the last acknowledgement is missing, None if none is safe.
+
+    In downloads: `any_request_order` tells that it answers each request by itself, so that several
+    can be under way, and `final_acks` how many acknowledgements it is sent at the end.
+
+    `meanings` say what a MAV_MISSION_RESULT means, by its name, if it is this autopilot's.
+    """
+
+    request_period: float = math.inf
+    patience: float = math.inf
+    ignores_other_items: bool = False
+    reminder: int | None = None
+    any_request_order: bool = False
+    final_acks: int = 1
+    meanings: Mapping[str, str] = field(default_factory=dict)
+
+
+class Frame(Protocol):
+    """East and north, m, of an origin on Earth: what `LocalFrame` does."""
+
+    def to_local(self, latitude: ArrayLike, longitude: ArrayLike) -> Real:
+        """Return positions (..., 2) in metres."""
+
+    def to_geodetic(self, positions: ArrayLike) -> tuple[Real, Real]:
+        """Return latitude and longitude in degrees."""
+
 
 _LEAST_TIMEOUT = 0.5
 """Seconds for which an autopilot has to do without setpoints at least; chosen: the slowest come
@@ -18,7 +75,7 @@ four times a second, irregularly."""
 class LossAction(NamedTuple):
     """What is done without setpoints: the name of a mode, its custom mode, whether sticks fly it.
 
-    Where there are no sticks PX4 1.16.1 sank in Position by 0.7 m/s to the ground, in simulation.
+    Without sticks the aircraft may sink in a mode that they fly.
     """
 
     name: str
@@ -31,7 +88,8 @@ class SetpointRules:
     """The rules of an autopilot for flights by setpoints.
 
     Attributes:
-        timeout: the parameter that says for how many seconds it does without setpoints.
+        timeout: the parameter that says for how many seconds it does without setpoints; "": it is
+            not flown by them.
         least_timeout: the least time, s, whatever that parameter says.
         most_timeout: the longest time, s, with which it is flown by setpoints.
         loss: the parameter that says which of `actions`, by their values, it then does; "": it
@@ -44,7 +102,7 @@ class SetpointRules:
         defaults: the values of these parameters that it comes with.
     """
 
-    timeout: str
+    timeout: str = ""
     least_timeout: float = 0.0
     most_timeout: float = math.inf
     loss: str = ""
@@ -106,35 +164,3 @@ class SetpointRules:
         else:
             name, back = action.name, ", until they come again"
         return f"it changes to {name} after {after:g} s ({told}){back}"
-
-
-_RULES = {
-    ARDUPILOT: SetpointRules(
-        "GUID_TIMEOUT",
-        least_timeout=0.1,
-        most_timeout=1.0,  # at 8 m/s it flies 24 m on with its default
-        carries_on=True,
-        defaults={"GUID_TIMEOUT": 3.0},
-    ),
-    PX4: SetpointRules(
-        "COM_OF_LOSS_T",
-        most_timeout=60.0,  # the greatest value that it takes
-        loss="COM_OBL_RC_ACT",
-        actions={
-            0: LossAction("Position", px4_mode(3, 0), by_sticks=True),
-            1: LossAction("Altitude", px4_mode(2, 0), by_sticks=True),
-            2: LossAction("Stabilized", px4_mode(7, 0), by_sticks=True),
-            3: LossAction("Return", px4_mode(4, 5)),
-            4: LossAction("Land", px4_mode(4, 6)),
-            5: LossAction("Hold", px4_mode(4, 3)),
-        },
-        forbidden={6: "terminates the flight", 7: "stops its motors"},
-        streamed=1.0,
-        defaults={"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0},
-    ),
-}
-
-
-def setpoint_rules(family: AutopilotFamily) -> SetpointRules:
-    """Return the rules of `family`."""
-    return _RULES[family]
