@@ -55,6 +55,11 @@ class ValidationContext:
         """Yield index and item of the items with one of `commands`."""
         return ((k, item) for k, item in enumerate(self.items) if item.command in commands)
 
+    @property
+    def flying(self) -> Iterator[tuple[int, int]]:
+        """Index and command of the items that fly, in order."""
+        return ((k, item.command) for k, item in enumerate(self.items) if item.command <= NAV_LAST)
+
     @cached_property
     def frame(self) -> LocalFrame | None:
         """The local frame: about home, else about the first place that it flies to."""
@@ -192,19 +197,16 @@ class ValidationContext:
         east, north = rally[chosen].tolist()
         return PlacedItem(home.index, east, north, math.nan)
 
-    def stored(self, index: int) -> MissionItem | None:
-        """Return what the vehicle gives back for the item at `index`, None if it refuses it."""
-        if index not in self._stored:
-            item, dialect = self.items[index], self.vehicle.type.dialect
-            sent = dialect.sent(item)
-            taken = fits_message(item) and not dialect.refusal(sent)
-            self._stored[index] = dialect.stored(sent) if taken else None
-        return self._stored[index]
-
     @cached_property
-    def _stored(self) -> dict[int, MissionItem | None]:
-        """What `stored` has found: three rules ask."""
-        return {}
+    def stored(self) -> tuple[tuple[int, MissionItem, MissionItem], ...]:
+        """Index of the items that the vehicle takes, the item, and what it gives back for it."""
+        dialect = self.vehicle.type.dialect
+        sent = ((k, item, dialect.sent(item)) for k, item in enumerate(self.items))
+        return tuple(
+            (k, item, dialect.stored(own))
+            for k, item, own in sent
+            if fits_message(item) and not dialect.refusal(own)
+        )
 
     def jump_target(self, index: int) -> int | None:
         """Return the index that the jump at `index` goes to, None if there is no such item."""

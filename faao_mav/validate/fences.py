@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from faao_mav.autopilot import ARDUCOPTER
 from faao_mav.mission.fence_area import Area
 from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Rules
@@ -14,7 +13,7 @@ from faao_mav.validate.straight import HOME
 from faao_mav.vector import lengths
 
 RULES = Rules()
-_ARDUPILOT = Rules(ARDUCOPTER.family)
+_ARDUPILOT = Rules("ardupilot")
 
 LEAST_MARGIN = 2.0
 """The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
@@ -50,7 +49,7 @@ def _home(context: ValidationContext) -> Iterator[Issue]:
     if context.home is not None:
         for issue in _points(context, [("home", (0.0, 0.0))], "move home or the fence"):
             then = context.vehicle.type.home_outside_fence
-            yield replace(issue, message="; ".join(filter(None, (issue.message, then))))
+            yield replace(issue, says="; ".join(filter(None, (issue.says, then))))
 
 
 @RULES.error("fence-rally", _GEOMETRY)

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Iterator
 
-from faao_mav.autopilot import PX4_COPTER
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, number
 from faao_mav.validate.rule import Issue, Level, Rules
 from faao_mav.validate.straight import PlacedItem
 
-RULES = Rules(PX4_COPTER.family)
+RULES = Rules("px4")
 
 _CHECKER = "PX4 1.16 FeasibilityChecker::"
 _CONDITION_GATE = 4501

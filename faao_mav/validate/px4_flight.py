@@ -4,13 +4,12 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
-from faao_mav.autopilot import PX4_COPTER
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero, number
 from faao_mav.validate.rule import Issue, Level, Rules
 from faao_mav.validate.straight import HOME, Straight
 
-RULES = Rules(PX4_COPTER.family)
+RULES = Rules("px4")
 
 _ROI = (80, Command.DO_SET_ROI)
 _ROI_WITH_PLACE, _ROI_WITHOUT_PLACE = (0, 3), (0, 1, 2)

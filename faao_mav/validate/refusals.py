@@ -125,9 +125,8 @@ _YAW = 3
 @RULES.warning("hold-changed", _SOURCE)
 def _hold(context: ValidationContext) -> Iterator[Issue]:
     """A hold is not stored as it is written."""
-    for index, item in context.each(*_HELD):
-        stored = context.stored(index)
-        if stored is not None and not _same(item.params[0], stored.params[0]):
+    for index, item, stored in context.stored:
+        if item.command in _HELD and not _same(item.params[0], stored.params[0]):
             flies_on = not context.vehicle.type.hovers and item.command == Command.NAV_WAYPOINT
             yield Issue(
                 index,
@@ -143,9 +142,8 @@ def _hold(context: ValidationContext) -> Iterator[Issue]:
 def _dropped(context: ValidationContext) -> Iterator[Issue]:
     """A parameter is not stored as it is written."""
     found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
-    for index, item in context.each(*FLOWN_TO):
-        stored = context.stored(index)
-        if stored is None:
+    for index, item, stored in context.stored:
+        if item.command not in FLOWN_TO:
             continue
         for n, (value, kept) in enumerate(zip(item.params, stored.params, strict=True)):
             if n == 0 and item.command in _HELD:

@@ -1,12 +1,12 @@
 """What a rule is and finds, and how the modules of rules list theirs."""
 
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Collection, Container, Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partialmethod
 from typing import TYPE_CHECKING, TypeAlias
 
-from faao_mav.autopilot import AutopilotFamily, Vehicle
+from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.item import MissionItem
 
@@ -45,11 +45,14 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Issue:
-    """What a check found, at the index of an item in `Mission.items` or at none."""
+    """Where a rule holds: at the index of an item in `Mission.items`, or at none.
 
-    index: int | None
-    message: str
-    action: str
+    `says` and `do` are what the finding says and what to do; "" for the rule's own.
+    """
+
+    index: int | None = None
+    says: str = ""
+    do: str = ""
 
 
 Check: TypeAlias = Callable[["ValidationContext"], Iterable[Issue]]
@@ -60,57 +63,69 @@ class Rule:
     """One thing that is checked.
 
     `id` is short and stays the same from version to version. `summary` says in a line what is
-    wrong when the rule speaks. `source` names where the rule comes from: a function or document of
-    the autopilot with its version, a measurement, or the limits that were set. `family` and `kind`
-    are the autopilot and the type of vehicle that it is about, None: all.
+    wrong when the rule speaks, and `do` what to do about it. `source` names where the rule comes
+    from: a function or document of the autopilot with its version, a measurement, or the limits
+    that were set. `autopilot` and `kind` are the autopilot and the type of vehicle that it is
+    about, None: all.
     """
 
     id: str
     level: Level
     summary: str
+    do: str
     source: str
     check: Check
-    family: AutopilotFamily | None = None
+    autopilot: str | None = None
     kind: str | None = None
-
-    @property
-    def autopilot(self) -> str | None:
-        """The name of the autopilot that it is about, None: all."""
-        return self.family.key if self.family is not None else None
 
     def applies_to(self, vehicle: Vehicle) -> bool:
         """Say whether the rule is about `vehicle`."""
-        own = vehicle.type
-        return self.family in (None, own.family) and self.kind in (None, own.kind)
+        return self.autopilot in (None, vehicle.autopilot) and self.kind in (None, vehicle.kind)
 
     def findings(self, context: "ValidationContext") -> Iterator[Finding]:
         """Yield what the rule finds in `context`."""
-        for issue in self.check(context):
-            item = None if issue.index is None else issue.index + 1
-            yield Finding(self.level, self.id, item, issue.message, issue.action)
-
-
-Decorator: TypeAlias = Callable[[Check], Check]
+        for found in self.check(context):
+            item = None if found.index is None else found.index + 1
+            yield Finding(
+                self.level, self.id, item, found.says or self.summary, found.do or self.do
+            )
 
 
 class Rules(list[Rule]):
-    """The rules of one module, in the order of its functions; all about `family`, if given."""
+    """The rules of one module, in order; all about the `autopilot`, if given."""
 
-    def __init__(self, family: AutopilotFamily | None = None) -> None:
+    def __init__(self, autopilot: str | None = None) -> None:
         super().__init__()
-        self._family = family
+        self._autopilot = autopilot
 
     def add(
-        self, level: Level, name: str, source: str, *, summary: str = "", kind: str | None = None
-    ) -> Decorator:
+        self,
+        level: Level,
+        name: str,
+        source: str,
+        do: str = "",
+        *,
+        summary: str = "",
+        kind: str | None = None,
+    ) -> Callable[[Check], Check]:
         """Return a decorator that makes a rule of a check; for the arguments see `Rule`.
 
-        Without a `summary` the check's docstring is it.
+        The check's docstring is the summary; `{NAME}` in it is a constant of the check's module.
         """
 
         def register(check: Check) -> Check:
-            told = summary or _summary_of(check)
-            self.append(Rule(name, level, told, source, check, self._family, kind))
+            self.append(
+                Rule(
+                    name,
+                    level,
+                    summary or _summary_of(check),
+                    do,
+                    source,
+                    check,
+                    self._autopilot,
+                    kind,
+                )
+            )
             return check
 
         return register
@@ -145,9 +160,28 @@ class Rules(list[Rule]):
 
         self.add(level, name, source, summary=summary, kind=kind)(check)
 
+    def items(
+        self,
+        level: Level,
+        name: str,
+        says: str,
+        do: str,
+        source: str,
+        commands: Collection[int],
+        where: Callable[[MissionItem], bool] = lambda _: True,
+        *,
+        kind: str | None = None,
+    ) -> None:
+        """Add a rule about each item with one of `commands` for which `where` holds."""
+
+        def check(context: "ValidationContext") -> Iterator[Issue]:
+            return (Issue(index) for index, item in context.each(*commands) if where(item))
+
+        self.append(Rule(name, level, says, do, source, check, self._autopilot, kind))
+
 
 def _summary_of(check: Check) -> str:
     """Return the docstring of `check` as the end of a sentence: "A leg." becomes "a leg"."""
-    told = (check.__doc__ or "").removesuffix(".")
+    told = (check.__doc__ or "").removesuffix(".").format_map(check.__globals__)
     first = told.partition(" ")[0]
     return told[:1].lower() + told[1:] if first[1:].islower() or len(first) == 1 else told

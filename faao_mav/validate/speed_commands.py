@@ -3,12 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from faao_mav.autopilot import ARDUCOPTER, PX4_COPTER
 from faao_mav.mission.command import Command
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Issue, Rules
 
-_COPTERS, _ARDUPILOT, _PX4 = Rules(), Rules(ARDUCOPTER.family), Rules(PX4_COPTER.family)
+_COPTERS, _ARDUPILOT, _PX4 = Rules(), Rules("ardupilot"), Rules("px4")
 
 _MEASURED = "measured on PX4 1.16.1"
 
