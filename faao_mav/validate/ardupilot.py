@@ -7,7 +7,7 @@ from itertools import pairwise
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, at_zero
-from faao_mav.validate.rule import Issue, Level, Rules
+from faao_mav.validate.rule import Issue, Rules
 
 RULES = Rules("ardupilot")
 
@@ -34,6 +34,7 @@ _REQUIRED = {
 """The items that bits of ARMING_MIS_ITEMS ask for."""
 
 _RALLY_BIT = 32
+_WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 
 _SAME_HEIGHT = 1.0
 """The height, m, by which home may be moved in flight: less does not matter. Chosen; at home's own
@@ -106,17 +107,18 @@ def _takeoff_first(context: ValidationContext) -> Iterator[Issue]:
         yield Issue(takeoff, told, f"move the take-off before item {before}")
 
 
-@RULES.error(
+RULES.error_where(
     "ardupilot-land-start",
-    _ARMING,
+    "DO_LAND_START, but RTL_AUTOLAND is 0: ArduPlane does not arm",
     "set RTL_AUTOLAND to 2 (a return lands here) or 3 (it does not), or remove the item",
+    _ARMING,
+    lambda context: (
+        k
+        for k, _ in context.each(Command.DO_LAND_START)
+        if context.vehicle.value("return_lands") == 0
+    ),
     kind="plane",
 )
-def _land_start(context: ValidationContext) -> Iterator[Issue]:
-    """DO_LAND_START, but RTL_AUTOLAND is 0: ArduPlane does not arm."""
-    if context.vehicle.value("return_lands") == 0:
-        for index, _ in context.each(Command.DO_LAND_START):
-            yield Issue(index)
 
 
 @RULES.error(
@@ -175,46 +177,40 @@ def _set_home(context: ValidationContext) -> Iterator[Issue]:
             yield Issue(index)
 
 
-RULES.items(
-    Level.WARNING,
+RULES.warning_where(
     "ardupilot-guided",
     "NAV_GUIDED_ENABLE: the aircraft hovers there for good, unless another computer leads it on",
     "remove the item, if no companion computer is meant to take over",
     "measured on ArduCopter 4.7: it hovers there for good",
-    (Command.NAV_GUIDED_ENABLE,),
-    lambda item: item.params[0] > 0,
+    lambda context: (
+        k for k, item in context.each(Command.NAV_GUIDED_ENABLE) if item.params[0] > 0
+    ),
     kind="copter",
 )
-RULES.items(
-    Level.WARNING,
+RULES.warning_where(
     "ardupilot-stays",
     "latitude and longitude are 0: the aircraft stays where it is",
     "give the coordinates, or remove the item",
     "ArduPilot 4.7 ModeAuto::loc_from_cmd, Plane::set_next_WP; measured",
-    (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT),
-    at_zero,
+    lambda context: (k for k, item in context.each(*_WAYPOINTS) if at_zero(item)),
 )
-RULES.items(
-    Level.WARNING,
+RULES.warning_where(
     "ardupilot-frame-mission",
     "frame 2 says that there is no place, but ArduPilot flies there, z above sea level",
     "use frame 3 for heights above home, 0 for heights above sea level",
     "ArduPilot 4.7 AP_Mission::mavlink_int_to_mission_cmd; measured",
-    FLOWN_TO,
-    lambda item: item.frame == Frame.MISSION,
+    lambda context: (k for k, item in context.each(*FLOWN_TO) if item.frame == Frame.MISSION),
 )
-
-
-@RULES.warning(
+RULES.warning_where(
     "ardupilot-command-skipped",
-    "measured; ArduCopter 4.7 ModeAuto::start_command, ArduPlane 4.7 Plane::start_command",
+    "ArduPilot stores this command, but this kind of aircraft does nothing with it",
     "remove the item, or check that --type is right",
+    "measured; ArduCopter 4.7 ModeAuto::start_command, ArduPlane 4.7 Plane::start_command",
+    lambda context: (
+        (k, name_of(item.command)) for k, item in context.each(*_SKIPPED[context.vehicle.kind])
+    ),
+    "{} is stored, and skipped by this kind of aircraft",
 )
-def _skipped(context: ValidationContext) -> Iterator[Issue]:
-    """ArduPilot stores this command, but this kind of aircraft does nothing with it."""
-    for index, item in context.each(*_SKIPPED[context.vehicle.kind]):
-        told = f"{name_of(item.command)} is stored, but a {context.vehicle.kind} skips it"
-        yield Issue(index, told)
 
 
 @RULES.error(

@@ -1,7 +1,7 @@
 """What the rules look at: a mission, its vehicle, and what follows from both."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -99,6 +99,10 @@ class ValidationContext:
                 continue
             places.append(PlacedItem(k, *here, self.height(item)))
         return tuple(places)
+
+    def places_of(self, commands: Collection[int]) -> Iterator[PlacedItem]:
+        """Yield the places of the items with one of `commands`."""
+        return (each for each in self.places if self.items[each.index].command in commands)
 
     def _is_place(self, item: MissionItem) -> bool:
         if item.command not in FLOWN_TO or not on_earth(item):
@@ -207,6 +211,11 @@ class ValidationContext:
             for k, item, own in sent
             if fits_message(item) and not dialect.refusal(own)
         )
+
+    @property
+    def jumps(self) -> Iterator[tuple[int, MissionItem, int | None]]:
+        """Index of each jump, the item, and the index that it goes to; None: there is none."""
+        return ((k, item, self.jump_target(k)) for k, item in self.each(*JUMPS))
 
     def jump_target(self, index: int) -> int | None:
         """Return the index that the jump at `index` goes to, None if there is no such item."""

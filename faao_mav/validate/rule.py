@@ -1,10 +1,10 @@
 """What a rule is and finds, and how the modules of rules list theirs."""
 
-from collections.abc import Callable, Collection, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partialmethod
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.dialect import name_of
@@ -55,6 +55,7 @@ class Issue:
     do: str = ""
 
 
+Hit: TypeAlias = int | tuple[Any, ...] | None
 Check: TypeAlias = Callable[["ValidationContext"], Iterable[Issue]]
 
 
@@ -160,24 +161,33 @@ class Rules(list[Rule]):
 
         self.add(level, name, source, summary=summary, kind=kind)(check)
 
-    def items(
+    def where(
         self,
         level: Level,
         name: str,
-        says: str,
+        summary: str,
         do: str,
         source: str,
-        commands: Collection[int],
-        where: Callable[[MissionItem], bool] = lambda _: True,
+        where: Callable[["ValidationContext"], Iterable[Hit]],
+        says: str = "",
         *,
         kind: str | None = None,
     ) -> None:
-        """Add a rule about each item with one of `commands` for which `where` holds."""
+        """Add a rule that holds at the hits of `where`; for the other arguments see `Rule`.
+
+        A hit is the index of an item, or that and values to put into `says` and `do`.
+        """
 
         def check(context: "ValidationContext") -> Iterator[Issue]:
-            return (Issue(index) for index, item in context.each(*commands) if where(item))
+            for hit in where(context):
+                index, *values = hit if isinstance(hit, tuple) else (hit,)
+                yield Issue(index, says.format(*values), do.format(*values))
 
-        self.append(Rule(name, level, says, do, source, check, self._autopilot, kind))
+        self.append(Rule(name, level, summary, do, source, check, self._autopilot, kind))
+
+    error_where = partialmethod(where, Level.ERROR)
+    warning_where = partialmethod(where, Level.WARNING)
+    note_where = partialmethod(where, Level.NOTE)
 
 
 def _summary_of(check: Check) -> str:
