@@ -2,20 +2,7 @@
 
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.mission.item import Mission
-from faao_mav.validate import (
-    ardupilot,
-    cages,
-    delivery,
-    extent,
-    fences,
-    items,
-    px4_checks,
-    px4_flight,
-    refusals,
-    shape,
-    speed_commands,
-    speeds,
-)
+from faao_mav.validate import ardupilot, delivery, extent, fences, items, px4, speeds
 from faao_mav.validate.context import ValidationContext as ValidationContext
 from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
@@ -24,16 +11,12 @@ from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
+from faao_mav.validate.rule import rules_of
 
-RULES: tuple[Rule, ...] = tuple(
-    rule
-    for module in (
-        *(items, refusals, ardupilot, px4_checks, px4_flight, cages, speed_commands),
-        *(speeds, shape, extent, fences, delivery),
-    )
-    for rule in module.RULES
-)
-"""All rules, in the order in which findings about one item are given."""
+_MODULES = (ardupilot, delivery, extent, fences, items, px4, speeds)
+
+RULES = tuple(rules_of({name: each for module in _MODULES for name, each in module.checks.items()}))
+"""All rules, in the order of their table, in which findings about one item are given."""
 
 _ORDER = {Level.ERROR: 0, Level.WARNING: 1, Level.NOTE: 2}
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle
+from faao_mav.autopilot.dialect import SpeedChange
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
@@ -222,26 +223,35 @@ class ValidationContext:
         return jump_target(self.items, index)
 
     @cached_property
+    def changes(self) -> tuple[SpeedChange | None, ...]:
+        """What each item changes about the speed."""
+        change, its = self.vehicle.type.dialect.speed_change, Command.DO_CHANGE_SPEED
+        return tuple(change(item) if item.command == its else None for item in self.items)
+
+    @cached_property
     def speeds(self) -> tuple[float, ...]:
         """The speed over ground commanded for the leg to each item, m/s."""
         cruise = self.vehicle.value("cruise_speed")
         speed, speeds = cruise, []
-        for item in self.items:
-            change = None
-            if item.command == Command.DO_CHANGE_SPEED:
-                change = self.vehicle.type.dialect.speed_change(item)
+        for change in self.changes:
             if change is not None and change.axis in ("horizontal", "airspeed"):
                 speed = cruise if change.speed is None else change.speed
             speeds.append(speed)
         return tuple(speeds)
 
+    def parameter(self, key: str) -> tuple[float, str]:
+        """Return the value of the vehicle's parameter `key`, and the name that sets it."""
+        return self.vehicle.value(key), self.vehicle.name_of(key)
+
     @cached_property
-    def fence(self) -> FenceMap | None:
-        """The fence in the local frame, None without one."""
+    def fences(self) -> tuple[FenceMap, ...]:
+        """The fence in the local frame, or nothing."""
+        if not self.mission.fence:
+            return ()
         any_inclusion = self.vehicle.type.fence_needs_one_inclusion(self.vehicle)
         flown = (self.track_positions, self.track.item if self.track is not None else None)
-        circles = dict(self._circles())
-        return fence_map(self.mission.fence, self.frame, any_inclusion, self.legs, circles, *flown)
+        ways = (self.legs, dict(self._circles()), *flown)
+        return (fence_map(self.mission.fence, self.frame, any_inclusion, *ways),)
 
     @cached_property
     def track_positions(self) -> Real | None:

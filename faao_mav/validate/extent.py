@@ -1,21 +1,20 @@
 """How high, how far and how long the mission goes."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
 from faao_mav.plan.energy import Battery
 from faao_mav.power import JOULES_PER_WH
-from faao_mav.validate.context import ValidationContext, number
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.rule import Checks, Hits, at
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
 
-RULES = Rules()
+checks = Checks()
 
-FAR = 10_000.0
-"""The distance from home or from item to item, m, that is hardly meant. Chosen."""
+FAR = 10.0
+"""The distance from home or from item to item, km, that is hardly meant. Chosen."""
 
 COMMON_CEILING = 120.0
 """The height, m above ground, that many countries allow without a permission."""
@@ -30,46 +29,6 @@ HIGHEST = 20_000.0
 _WOBBLE = 1.0
 """By how much, m or s, the predicted flight may exceed a limit: aircraft wobble. Chosen."""
 
-_GIVEN = "the limit that was given"
-_CEILING, _RANGE = "m above home; --max-altitude is", "m from home; --max-distance is"
-_CHANGE = "change the item, or raise the limit if you may"
-_HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
-_DELAYS = (*_HOLDS, Command.NAV_DELAY)
-
-
-@RULES.error(
-    "below-home",
-    "measured on ArduCopter and ArduPlane 4.7: on the ground, armed; on PX4 1.16.1: the same",
-)
-def _below_home(context: ValidationContext) -> Iterator[Issue]:
-    """An item below home: on level ground the aircraft flies into it."""
-    for place in context.places:
-        if place.up < 0 and context.items[place.index].command not in LANDINGS | TAKEOFFS:
-            yield _too_low(context, place, f"{-place.up:g} m below home")
-
-
-@RULES.warning(
-    "near-ground",
-    "measured on ArduCopter 4.7 and PX4 1.16.1",
-    summary=f"an item less than {LEAST_HEIGHT:g} m above home",
-)
-def _near_ground(context: ValidationContext) -> Iterator[Issue]:
-    for place in context.places:
-        command = context.items[place.index].command
-        if command in LANDINGS or (place.up < 0 and command not in TAKEOFFS):
-            continue
-        if place.up < LEAST_HEIGHT:
-            yield _too_low(context, place, f"{place.up:g} m above home")
-
-
-def _too_low(context: ValidationContext, place: PlacedItem, how: str) -> Issue:
-    item, home = context.items[place.index], context.mission.home
-    if item.frame in ABOVE_HOME or home is None:
-        return Issue(place.index, how, "raise the item, unless the ground there is lower than home")
-    sea = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: "
-    return Issue(place.index, sea + how, "use frame 3, height above home, or raise the item")
-
-
 _SWAPPED = 1.0
 """Degrees from home within which a place lies if its exchanged coordinates are the slip. Chosen."""
 
@@ -77,165 +36,185 @@ _FARTHEST = {True: 100.0, False: 1_000.0}
 """Kilometres from home that no copter, and no plane, flies to. Chosen: twice what they do in the
 hours that flights are predicted."""
 
+_HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
+_DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
-@RULES.error("too-far", "common sense", summary="farther from home than any vehicle of its kind")
-def _too_far(context: ValidationContext) -> Iterator[Issue]:
+
+@checks("below-home")
+def _(context: ValidationContext) -> Hits:
     for place in context.places:
-        away = place.from_origin / 1000
-        if context.home is None or away <= _FARTHEST[context.vehicle.type.hovers]:
-            continue
-        item, home = context.items[place.index], context.mission.home
-        assert home is not None
-        swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < _SWAPPED
-        slip = "latitude and longitude look exchanged: correct them" if swapped else "correct it"
-        yield Issue(place.index, f"its place is {away:,.0f} km from home", slip)
+        if place.up < 0 and context.items[place.index].command not in LANDINGS | TAKEOFFS:
+            yield at(place.index, below=-place.up, **_raised(context, place))
 
 
-@RULES.error("too-high", "common sense", summary=f"higher than {HIGHEST / 1000:g} km above home")
-def _too_high(context: ValidationContext) -> Iterator[Issue]:
+@checks("near-ground")
+def _(context: ValidationContext) -> Hits:
     for place in context.places:
-        if place.up > HIGHEST:
-            yield Issue(
-                place.index,
-                f"{place.up / 1000:g} km above home: no aircraft of this kind gets there",
-                "correct the height; it counts in metres",
-            )
+        command = context.items[place.index].command
+        meant = command in LANDINGS or (place.up < 0 and command not in TAKEOFFS)
+        if place.up < LEAST_HEIGHT and not meant:
+            yield at(place.index, up=place.up, **_raised(context, place))
 
 
-@RULES.error("above-ceiling", _GIVEN)
-def _above_ceiling(context: ValidationContext) -> Iterator[Issue]:
-    """An item higher than the ceiling that was set."""
-    limit = context.limits.max_altitude
+def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
+    """Return what to do about a height, and what it is above the sea if it counts from there."""
+    item, home = context.items[place.index], context.mission.home
+    if item.frame in ABOVE_HOME or home is None:
+        return {"sea": "", "instead": "raise the item, unless the ground there is lower than home"}
+    sea = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: "
+    return {"sea": sea, "instead": "use frame 3, height above home, or raise the item"}
+
+
+@checks("too-far")
+def _(context: ValidationContext) -> Hits:
+    home, farthest = context.mission.home, _FARTHEST[context.vehicle.type.hovers]
     for place in context.places:
+        away, item = place.from_origin / 1000, context.items[place.index]
+        if home is not None and away > farthest:
+            swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < _SWAPPED
+            slip = "latitude and longitude look exchanged: correct them"
+            yield at(place.index, away=away, slip=slip if swapped else "correct it")
+
+
+@checks("too-high")
+def _(context: ValidationContext) -> Hits:
+    return _above(context, HIGHEST)
+
+
+@checks("above-ceiling")
+def _(context: ValidationContext) -> Hits:
+    return _above(context, context.limits.max_altitude)
+
+
+@checks("beyond-distance")
+def _(context: ValidationContext) -> Hits:
+    return _beyond(context, context.limits.max_distance)
+
+
+def _above(context: ValidationContext, limit: float | None) -> Hits:
+    for place in context.places if limit is not None else ():
         if limit is not None and place.up > limit:
-            yield Issue(place.index, f"{place.up:.6g} {_CEILING} {limit:g} m", _CHANGE)
+            yield at(place.index, up=place.up, limit=limit)
 
 
-@RULES.error("beyond-distance", _GIVEN)
-def _beyond(context: ValidationContext) -> Iterator[Issue]:
-    """An item farther from home than was set."""
-    limit = context.limits.max_distance
-    for place in context.places:
-        if limit is not None and context.home is not None and place.from_origin > limit:
-            yield Issue(place.index, f"{place.from_origin:.6g} {_RANGE} {limit:g} m", _CHANGE)
+def _beyond(context: ValidationContext, limit: float | None) -> Hits:
+    for place in context.places if context.home is not None else ():
+        if limit is not None and place.from_origin > limit:
+            yield at(place.index, away=place.from_origin, limit=limit)
 
 
-@RULES.warning("predicted-beyond", f"{_GIVEN}; predicted flight")
-def _predicted_beyond(context: ValidationContext) -> Iterator[Issue]:
-    """The predicted flight goes higher, farther or on for longer than was set."""
+def _fenced(context: ValidationContext, key: str, bit: int) -> float | None:
+    """Return the bound `key`, m, if FENCE_ENABLE and the `bit` of FENCE_TYPE switch it on."""
+    value = context.vehicle.value
+    on = value("fence_enable") != 0 and int(value("fence_type")) & bit
+    return value(key) if on else None
+
+
+@checks("ardupilot-fence-ceiling")
+def _(context: ValidationContext) -> Hits:
+    return _above(context, _fenced(context, "fence_ceiling", bit=1))
+
+
+@checks("ardupilot-fence-floor")
+def _(context: ValidationContext) -> Hits:
+    limit = _fenced(context, "fence_floor", bit=8)
+    for place in context.places if limit is not None else ():
+        lands = context.items[place.index].command == Command.NAV_LAND
+        if limit is not None and place.up < limit and not lands:
+            yield at(place.index, up=place.up, limit=limit)
+
+
+@checks("ardupilot-fence-circle")
+def _(context: ValidationContext) -> Hits:
+    return _beyond(context, _fenced(context, "fence_radius", bit=2))
+
+
+@checks("px4-max-horizontal")
+def _(context: ValidationContext) -> Hits:
+    return _beyond(context, max(context.vehicle.value("fence_distance"), 0.0) or None)
+
+
+@checks("px4-max-vertical")
+def _(context: ValidationContext) -> Hits:
+    return _above(context, max(context.vehicle.value("fence_height"), 0.0) or None)
+
+
+@checks("predicted-beyond")
+def _(context: ValidationContext) -> Hits:
     track, positions, limits = context.track, context.track_positions, context.limits
     if track is None or positions is None or not len(track.t):
         return
     away = np.hypot(*positions[:, :2].T) * (context.home is not None)
-    for limit, flown, shown in (
-        (limits.max_altitude, track.position[:, 2], _CEILING),
-        (limits.max_distance, away, _RANGE),
-        (limits.max_duration, track.t, "s long; --max-duration is"),
+    for limit, flown, what in (
+        (limits.max_altitude, track.position[:, 2], "m above home; --max-altitude"),
+        (limits.max_distance, away, "m from home; --max-distance"),
+        (limits.max_duration, track.t, "s long; --max-duration"),
     ):
         worst = int(np.argmax(flown))
         if limit is not None and flown[worst] > limit + _WOBBLE:
-            told = f"the predicted flight gets {flown[worst]:.1f} {shown} {limit:g}"
-            yield Issue(int(track.item[worst]), told, _CHANGE)
+            yield at(int(track.item[worst]), worst=flown[worst], what=what, limit=limit)
 
 
-@RULES.note(
-    "above-120-m",
-    "EU 2019/947 (open category), FAA part 107 (400 ft)",
-    summary=f"higher than {COMMON_CEILING:g} m above home, what many countries allow",
-)
-def _above_common(context: ValidationContext) -> Iterator[Issue]:
+@checks("above-120-m")
+def _(context: ValidationContext) -> Hits:
     high = [place for place in context.places if place.up > COMMON_CEILING]
     if high and context.limits.max_altitude is None:
         top = max(high, key=lambda place: place.up)
-        yield Issue(
-            top.index,
-            f"{top.up:g} m above home; many countries allow {COMMON_CEILING:g} m above ground",
-            "make sure that you may; --max-altitude sets your ceiling",
-        )
+        yield at(top.index, up=top.up)
 
 
-@RULES.warning("return-above-ceiling", "RTL_ALT, RTL_ALTITUDE (ArduPilot), RTL_RETURN_ALT (PX4)")
-def _return_above(context: ValidationContext) -> Iterator[Issue]:
-    """On a return to launch the aircraft climbs above the ceiling that was set."""
-    ceiling = context.limits.max_altitude
-    vehicle = context.vehicle
-    height, name = vehicle.value("return_height"), vehicle.name_of("return_height")
-    newest = vehicle.type.parameters["return_height"].newest_name
+@checks("return-above-ceiling")
+def _(context: ValidationContext) -> Hits:
+    ceiling, (height, name) = context.limits.max_altitude, context.parameter("return_height")
+    newest = context.vehicle.type.parameters["return_height"].newest_name
     if ceiling is not None and height > ceiling:
-        yield Issue(
-            None,
-            f"a return to launch, also after a failure, goes up to {height:g} m "
-            f"({name}); the ceiling is {ceiling:g} m",
-            f"set {newest} to {ceiling:g} m or less",
-        )
+        yield at(height=height, name=name, ceiling=ceiling, newest=newest)
 
 
-@RULES.warning("far-from-home", "common sense", summary=f"farther than {FAR / 1000:g} km from home")
-def _far(context: ValidationContext) -> Iterator[Issue]:
-    if context.home is None or context.limits.max_distance is not None:
-        return
-    for place in context.places:
-        distance = place.from_origin
-        if FAR < distance <= 1000 * _FARTHEST[context.vehicle.type.hovers]:
-            yield Issue(
-                place.index,
-                f"{distance / 1000:.1f} km from home",
-                "check the coordinates and home; --max-distance sets your limit",
-            )
+@checks("far-from-home")
+def _(context: ValidationContext) -> Hits:
+    if context.home is not None and context.limits.max_distance is None:
+        for place in context.places:
+            away = place.from_origin / 1000
+            if FAR < away <= _FARTHEST[context.vehicle.type.hovers]:
+                yield at(place.index, away=away)
 
 
-@RULES.warning("long-leg", "common sense", summary=f"a leg of more than {FAR / 1000:g} km")
-def _long(context: ValidationContext) -> Iterator[Issue]:
+@checks("long-leg")
+def _(context: ValidationContext) -> Hits:
+    farthest = 1000 * _FARTHEST[context.vehicle.type.hovers]
     for leg in context.legs:
-        near = (
-            max(leg.start.from_origin, leg.end.from_origin)
-            <= 1000 * _FARTHEST[context.vehicle.type.hovers]
-        )
-        if leg.length > FAR and near and leg.start.index != HOME and leg.end.index != HOME:
-            yield Issue(
-                leg.index,
-                f"{leg.length / 1000:.1f} km from item {number(leg.start.index)} to item "
-                f"{number(leg.end.index)}",
-                "check the coordinates",
-            )
+        near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
+        start, end = leg.start.index, leg.end.index
+        if leg.length > 1000 * FAR and near and HOME not in (start, end):
+            yield at(leg.index, length=leg.length / 1000, start=start + 1, end=end + 1)
 
 
-@RULES.error("too-long", f"{_GIVEN}; the commanded speeds")
-def _too_long(context: ValidationContext) -> Iterator[Issue]:
-    """The flight takes longer than was set, whatever the aircraft."""
+@checks("too-long")
+def _(context: ValidationContext) -> Hits:
     limit = context.limits.max_duration
     if limit is not None and (least := least_duration(context)) > limit:
-        yield Issue(
-            None,
-            f"the flight takes at least {least:.0f} s; the limit is {limit:g} s",
-            "shorten the mission, or raise --max-duration",
-        )
+        yield at(least=least, limit=limit)
 
 
-@RULES.error("battery-reserve", "the plan's vehicle.power and vehicle.battery; commanded speeds")
-def _reserve(context: ValidationContext) -> Iterator[Issue]:
-    """The flight leaves less than the reserve of the plan's battery, whatever the aircraft."""
+@checks("battery-reserve")
+def _(context: ValidationContext) -> Hits:
     if (energy := context.energy) is not None:
         least = least_duration(context) * energy.least_power / JOULES_PER_WH
-        yield from _short(energy.battery, "takes at least", least)
+        yield from _short(energy.battery, least)
 
 
-@RULES.warning("battery-tight", "the plan's vehicle.power and vehicle.battery; predicted flight")
-def _tight(context: ValidationContext) -> Iterator[Issue]:
-    """The flight is predicted to leave less than the reserve of the plan's battery."""
-    if context.energy is not None:
-        yield from _short(context.energy.battery, "is predicted to take", context.energy.total)
+@checks("battery-tight")
+def _(context: ValidationContext) -> Hits:
+    energy = context.energy
+    return _short(energy.battery, energy.total) if energy is not None else ()
 
 
-def _short(battery: Battery | None, takes: str, watt_hours: float) -> Iterator[Issue]:
-    """Yield that a flight which `takes` so many Wh leaves less than the reserve, if it does."""
-    if battery is not None and watt_hours > battery.usable:
-        yield Issue(
-            None,
-            f"the flight {takes} {watt_hours:.4g} Wh; of {battery.capacity_wh:g} Wh "
-            f"{battery.usable:.4g} are above the reserve of {battery.reserve:g} %",
-            "plan with less flight.duration or a nearer start and end, or give a larger battery",
-        )
+def _short(battery: Battery | None, takes: float) -> Hits:
+    """Tell of a flight that `takes` so many Wh and leaves less than the reserve."""
+    if battery is not None and takes > battery.usable:
+        capacity, usable, reserve = battery.capacity_wh, battery.usable, battery.reserve
+        yield at(takes=takes, capacity=capacity, usable=usable, reserve=reserve)
 
 
 def least_duration(context: ValidationContext) -> float:
@@ -246,11 +225,8 @@ def least_duration(context: ValidationContext) -> float:
     """
     climb, track = context.vehicle.value("climb_speed"), context.track
     flying = sum(_leg_duration(leg, climb) for leg in context.legs if not leg.jump)
-    waiting = sum(
-        item.params[0]
-        for k, item in context.each(*_DELAYS)
-        if item.params[0] > 0 and k not in context.orbits
-    )
+    holds = (item.params[0] for k, item in context.each(*_DELAYS) if k not in context.orbits)
+    waiting = sum(hold for hold in holds if hold > 0)
     circling = sum(
         orbit.lasting(context.speeds[k]) for k, orbit in context.orbits.items() if not orbit.endless
     )

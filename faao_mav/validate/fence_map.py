@@ -1,13 +1,15 @@
 """What of a mission and its flight leaves the fence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from itertools import islice
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from faao_mav.arrays import Integers, Real
+from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, areas_of, free_area
@@ -16,178 +18,158 @@ from faao_mav.validate.straight import Straight
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
+Shapes: TypeAlias = NDArray[np.object_]
+"""Geometries of the local frame."""
+
 _NAMED = 3
-"""Parts of the fence that a path is told to break, at most; chosen: more help nobody."""
-
-
-def _lines(starts: Real, ends: Real) -> NDArray[np.object_]:
-    """Return the straights from `starts` to `ends`, each (n, 2), as an array of n geometries."""
-    import shapely
-
-    paths: NDArray[np.object_] = np.asarray(
-        shapely.linestrings(np.stack([starts, ends], axis=1)), dtype=object
-    )
-    still = (starts == ends).all(axis=1)
-    paths[still] = shapely.points(starts[still])
-    return paths
+"""Parts of the fence that a way is told to break, at most; chosen: more help nobody."""
 
 
 @dataclass(frozen=True, slots=True)
-class Broken:
-    """Which of n paths leave the fence, `any` (n,), and by which of its parts, up to three, `by`.
+class _Part:
+    """What of a fence is not to be left, an `inclusion`, or not to be entered.
 
-    A part of None stands for several inclusions of which one would be enough.
+    `broken` is what who breaks it is, as in "inside exclusion circle".
     """
 
-    any: NDArray[np.bool_]
-    by: tuple[tuple[Area | None, NDArray[np.bool_]], ...]
+    broken: str
+    inclusion: bool
+    shape: "BaseGeometry"
 
-    def parts(self, k: int) -> list[Area | None]:
-        """Return the parts that path `k` breaks."""
-        return [part for part, broken in self.by if broken[k]]
+    def broken_by(self, ways: Shapes) -> Flags:
+        """Return which of `ways` (n,) break it; to touch its edge does not."""
+        import shapely
+
+        if self.inclusion:
+            return np.asarray(~shapely.covers(self.shape, ways))
+        inside = shapely.intersects(self.shape, ways)
+        inside[inside] = ~shapely.touches(self.shape, ways[inside])
+        return np.asarray(inside)
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """Ways (n,), to the items at the indices `index` (n,), and which of them `leave` the fence."""
+
+    index: Integers
+    shapes: Shapes
+    leave: Flags
 
 
 @dataclass(frozen=True)
 class FenceMap:
-    """A fence in the plane, with the mission's way: `straights`, circles, the predicted flight.
+    """A fence in the plane of `frame`, with the mission's `legs`, `circles` and predicted `flight`.
 
-    `circles` are outlines (k, 2), m, by the index of the item that is circled at.
-
-    The flight is at `positions` (n, 3), m, on the way to the items at the indices `heading_for`
-    (n,); both are None where it is not predicted. `free` is where the inclusions let the aircraft
-    be, None if there are none. `any_inclusion`: one inclusion is enough, as PX4 and ArduPilot's
-    FENCE_OPTIONS 2 have it; else all have to hold.
+    `free` is where the inclusions let the aircraft be, None if there are none.
     """
 
     frame: LocalFrame
     areas: tuple[Area, ...]
     free: "BaseGeometry | None"
-    any_inclusion: bool
-    straights: tuple[Straight, ...]
-    circles: dict[int, Real]
-    positions: Real | None
-    heading_for: Integers | None
+    parts: tuple[_Part, ...]
+    legs: Ways
+    circles: Ways
+    flight: Ways
 
-    @cached_property
-    def rings(self) -> NDArray[np.object_]:
-        """The circles, in order, as geometries."""
+    def leave(self, shapes: Shapes) -> Flags:
+        """Return which of `shapes` (n,) leave the fence."""
+        return _leaving(self.parts, shapes)
+
+    def broken_by(self, shape: "BaseGeometry") -> list[tuple[str, float]]:
+        """Return the first parts of the fence that `shape` breaks, and by which length of it, m."""
         import shapely
 
-        return np.array([shapely.LineString(each) for each in self.circles.values()], dtype=object)
+        broken = (part for part in self.parts if part.broken_by(np.array([shape])).any())
+        return [
+            (
+                part.broken,
+                shapely.length(shape - part.shape if part.inclusion else shape & part.shape),
+            )
+            for part in islice(broken, _NAMED)
+        ]
 
     @cached_property
-    def legs(self) -> NDArray[np.object_]:
-        """The straights, in order, as geometries."""
-        legs = self.straights
-        starts = np.array([[leg.start.east, leg.start.north] for leg in legs]).reshape(-1, 2)
-        ends = np.array([[leg.end.east, leg.end.north] for leg in legs]).reshape(-1, 2)
-        return _lines(starts, ends)
-
-    @cached_property
-    def flight(self) -> NDArray[np.object_]:
-        """The predicted flight from sample to sample, as geometries; none without a track."""
-        positions = self.positions
-        if positions is None or len(positions) < 2:
-            return np.empty(0, dtype=object)
-        return _lines(positions[:-1, :2], positions[1:, :2])
-
-    @cached_property
-    def flight_items(self) -> NDArray[np.int_]:
-        """The index of the item of each part of `flight`."""
-        if self.heading_for is None or not len(self.flight):
-            return np.empty(0, dtype=int)
-        return self.heading_for[1:]
-
-    @cached_property
-    def broken_legs(self) -> Broken:
-        """Which legs leave the fence."""
-        return self.broken(self.legs)
-
-    @cached_property
-    def broken_flight(self) -> Broken:
-        """Which parts of the predicted flight leave the fence."""
-        return self.broken(self.flight)
-
-    @cached_property
-    def broken_rings(self) -> Broken:
-        """Which circles leave the fence."""
-        return self.broken(self.rings)
-
-    def broken(self, paths: Any) -> Broken:
-        """Return which of `paths` (n,), geometries of the local frame, leave the fence.
-
-        Of a path that breaks several parts the first `_NAMED` are told.
-        """
-        import shapely
-
-        by: list[tuple[Area | None, NDArray[np.bool_]]] = []
-        counts = np.zeros(len(paths), dtype=int)
-
-        def note(part: Area | None, tried: Integers, breaks: NDArray[np.bool_]) -> None:
-            broken = np.zeros(len(paths), dtype=np.bool_)
-            broken[tried[breaks]] = True
-            counts[broken] += 1
-            by.append((part, broken))
-
-        inclusions = [area for area in self.areas if area.inclusion]
-        one_is_enough = self.any_inclusion and len(inclusions) > 1
-        if one_is_enough:
-            note(None, np.arange(len(paths)), ~shapely.covers(self.free, paths))
-        for area in () if one_is_enough else inclusions:
-            tried = np.flatnonzero(counts < _NAMED)
-            note(area, tried, ~shapely.covers(area.shape, paths[tried]))
-        for area in self.areas:
-            if not area.inclusion:
-                tried = np.flatnonzero(counts < _NAMED)
-                inside = shapely.intersects(area.shape, paths[tried])
-                inside[inside] = ~shapely.touches(area.shape, paths[tried[inside]])
-                note(area, tried, inside)
-        return Broken(counts > 0, tuple(by))
-
-    @cached_property
-    def nearest(self) -> tuple[float, int] | None:
-        """The least margin of legs, circles and flight, m, and the index of its item.
+    def nearest(self) -> tuple[int, float] | None:
+        """The index of the item at which legs, circles and flight come nearest, and how near, m.
 
         None if there are no legs, or if anything leaves the fence.
         """
         import shapely
 
-        broken = (self.broken_legs, self.broken_rings, self.broken_flight)
-        if not len(self.legs) or any(each.any.any() for each in broken):
+        ways = (self.legs, self.circles, self.flight)
+        if not len(self.legs.shapes) or any(each.leave.any() for each in ways):
             return None
-        paths = np.concatenate([self.legs, self.rings, self.flight])
-        ordered = [*(leg.index for leg in self.straights), *self.circles]
-        items = [*ordered, *self.flight_items.tolist()]
-        edges = [area.shape for area in self.areas if not area.inclusion]
+        index = np.concatenate([each.index for each in ways])
+        edges = [part.shape for part in self.parts if not part.inclusion]
         if self.free is not None:
             edges.append(self.free.boundary)
-        (_, found), margins = shapely.STRtree(paths).query_nearest(edges, return_distance=True)
+        tree = shapely.STRtree(np.concatenate([each.shapes for each in ways]))
+        (_, found), margins = tree.query_nearest(edges, return_distance=True)
         if not len(margins):  # exclusions that enclose nothing
             return None
         nearest = int(np.argmin(margins))
-        return float(margins[nearest]), items[found[nearest]]
+        return int(index[found[nearest]]), float(margins[nearest])
 
 
 def fence_map(
     fence: Fence,
     frame: LocalFrame | None,
     any_inclusion: bool,
-    straights: tuple[Straight, ...],
+    straights: Sequence[Straight],
     circles: dict[int, Real],
     positions: Real | None,
     heading_for: Integers | None,
-) -> FenceMap | None:
-    """Return `fence` in the plane of `frame`, else of its own first place; None without a fence.
+) -> FenceMap:
+    """Return `fence`, which has places, in the plane of `frame`, else of its own first place.
 
-    The other arguments are those of `FenceMap`.
+    `any_inclusion`: one inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else
+    all have to hold. `circles` are outlines (k, 2), m, by the index of the item that is circled at.
+    The flight is at `positions` (n, 3), m, on the way to the items at the indices `heading_for`
+    (n,); both are None where it is not predicted.
     """
-    if not fence:
-        return None
     import shapely
 
     frame = frame or LocalFrame(*fence.place)
     areas = areas_of(fence, frame)
     free = free_area(areas, any_inclusion=any_inclusion)
-    shapely.prepare([area.shape for area in areas])
-    shapely.prepare(free)
-    return FenceMap(frame, areas, free, any_inclusion, straights, circles, positions, heading_for)
+    inclusions = [_Part(f"outside {a.name}", True, a.shape) for a in areas if a.inclusion]
+    if free is not None and any_inclusion and len(inclusions) > 1:
+        inclusions = [_Part("outside all inclusions", True, free)]
+    exclusions = [_Part(f"inside {a.name}", False, a.shape) for a in areas if not a.inclusion]
+    parts = (*inclusions, *exclusions)
+    shapely.prepare([part.shape for part in parts])
+    ends = np.array([[leg.start.ground, leg.end.ground] for leg in straights]).reshape(-1, 2, 2)
+    flown = np.empty((0, 2)) if positions is None else positions[:, :2]
+    heading = np.empty(0, dtype=int) if heading_for is None else heading_for
+
+    def ways(index: Any, shapes: Any) -> Ways:
+        shapes = np.array([*shapes], dtype=object)
+        return Ways(np.array(index, dtype=int), shapes, _leaving(parts, shapes))
+
+    return FenceMap(
+        frame,
+        areas,
+        free,
+        parts,
+        ways([leg.index for leg in straights], _lines(ends)),
+        ways([*circles], map(shapely.LineString, circles.values())),
+        ways(heading[1:], _lines(np.stack([flown[:-1], flown[1:]], axis=1))),
+    )
+
+
+def _leaving(parts: Sequence[_Part], ways: Shapes) -> Flags:
+    """Return which of `ways` (n,) break any of `parts`."""
+    broken = np.zeros(len(ways), dtype=np.bool_)
+    for part in parts:
+        broken |= part.broken_by(ways)
+    return broken
+
+
+def _lines(ends: Real) -> Shapes:
+    """Return the straights between `ends` (n, 2, 2), m; a point where both are the same."""
+    import shapely
+
+    lines = np.asarray(shapely.linestrings(ends), dtype=object)
+    still = (ends[:, 0] == ends[:, 1]).all(axis=1)
+    lines[still] = shapely.points(ends[still, 0])
+    return lines

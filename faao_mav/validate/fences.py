@@ -1,19 +1,19 @@
 """The fence: what of the mission leaves it, how near it comes, whether the vehicle keeps it."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from faao_mav.mission.fence_area import Area
-from faao_mav.validate.context import ValidationContext, number
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.arrays import Real
+from faao_mav.mission.fence import RallyPoint
+from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.fence_map import FenceMap
+from faao_mav.validate.rule import Checks, Hits, at
 from faao_mav.validate.straight import HOME
 from faao_mav.vector import lengths
 
-RULES = Rules()
-_ARDUPILOT = Rules("ardupilot")
+checks = Checks()
 
 LEAST_MARGIN = 2.0
 """The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
@@ -22,219 +22,133 @@ what a change costs is not measured."""
 _STILL = 0.1
 """The speed, m/s, below which an aircraft heads nowhere. Chosen."""
 
-_GEOMETRY = "plane geometry about home; ArduPilot AC_Fence, PX4 Geofence"
+
+@checks("fence-crosses-itself")
+def _(context: ValidationContext) -> Hits:
+    areas = (area for fence in context.fences for area in fence.areas)
+    return (at(name=area.name) for area in areas if area.crosses_itself)
 
 
-def _what(part: Area | None) -> str:
-    if part is None:
-        return "outside all inclusions"
-    return f"{'outside' if part.inclusion else 'inside'} {part.name}"
+@checks("fence-home")
+def _(context: ValidationContext) -> Hits:
+    then = context.vehicle.type.home_outside_fence
+    for fence in context.fences if context.home is not None else ():
+        if where := _where(fence, (0.0, 0.0)):
+            yield at(where=where, then=f"; {then}" if then else "")
 
 
-@RULES.error("fence-crosses-itself", _GEOMETRY)
-def _crosses(context: ValidationContext) -> Iterator[Issue]:
-    """A fence polygon crosses itself."""
-    for area in context.fence.areas if context.fence else ():
-        if area.crosses_itself:
-            yield Issue(
-                None,
-                f"{area.name} crosses or touches itself: what counts as inside is not what you see",
-                "put its corners in order around the area",
-            )
+@checks("fence-rally")
+def _(context: ValidationContext) -> Hits:
+    for fence in context.fences:
+        for n, point in enumerate(context.mission.rally, start=1):
+            if where := _where(fence, _local(fence, point)):
+                yield at(n=n, where=where)
 
 
-@RULES.error("fence-home", _GEOMETRY)
-def _home(context: ValidationContext) -> Iterator[Issue]:
-    """Home lies outside the fence."""
-    if context.home is not None:
-        for issue in _points(context, [("home", (0.0, 0.0))], "move home or the fence"):
-            then = context.vehicle.type.home_outside_fence
-            yield replace(issue, says="; ".join(filter(None, (issue.says, then))))
-
-
-@RULES.error("fence-rally", _GEOMETRY)
-def _rally(context: ValidationContext) -> Iterator[Issue]:
-    """A rally point lies outside the fence."""
-    if context.fence is not None:
-        points = [
-            (f"rally point {n}", context.fence.frame.to_local(point.latitude, point.longitude))
-            for n, point in enumerate(context.mission.rally, start=1)
-        ]
-        yield from _points(context, points, "move the rally point or the fence")
-
-
-@RULES.error("fence-return", _GEOMETRY)
-def _return(context: ValidationContext) -> Iterator[Issue]:
-    """The breach return point lies outside the fence."""
+@checks("fence-return")
+def _(context: ValidationContext) -> Hits:
     point = context.mission.fence.breach_return
-    if context.fence is not None and point is not None:
-        local = context.fence.frame.to_local(point.latitude, point.longitude)
-        yield from _points(context, [("the breach return point", local)], "move it inside")
+    for fence in context.fences:
+        if point is not None and (where := _where(fence, _local(fence, point))):
+            yield at(where=where)
 
 
-def _points(
-    context: ValidationContext, points: list[tuple[str, Any]], action: str
-) -> Iterator[Issue]:
-    if context.fence is None or not points:
-        return
+def _local(fence: FenceMap, point: RallyPoint) -> Real:
+    return fence.frame.to_local(point.latitude, point.longitude)
+
+
+def _where(fence: FenceMap, place: Any) -> str:
+    """Return where `place` (2,), m, is if it is not within the fence, else ""."""
     import shapely
 
-    broken = context.fence.broken(shapely.points([place for _, place in points]))
-    for k in np.flatnonzero(broken.any).tolist():
-        yield Issue(None, f"{points[k][0]} is {' and '.join(map(_what, broken.parts(k)))}", action)
+    return _broken(fence, shapely.Point(place))
 
 
-@RULES.error("fence-leg", _GEOMETRY)
-def _legs(context: ValidationContext) -> Iterator[Issue]:
-    """A leg leaves the fence."""
-    fence = context.fence
-    if fence is None or not context.legs:
-        return
-    import shapely
-
-    for k in np.flatnonzero(fence.broken_legs.any).tolist():
-        leg = context.legs[k]
-        start = "home" if leg.start.index == HOME else f"item {number(leg.start.index)}"
-        parts = []
-        for part in fence.broken_legs.parts(k):
-            shape = fence.free if part is None else part.shape
-            inside = shapely.intersection(shape, fence.legs[k]).length
-            length = inside if part is not None and not part.inclusion else leg.length - inside
-            parts.append(f"{max(length, 0.0):.1f} m of it {_what(part)}")
-        jump = " by a jump" if leg.jump else ""
-        yield Issue(
-            leg.index,
-            f"the leg from {start}{jump} is {leg.length:.0f} m long, {' and '.join(parts)}",
-            "go around with another waypoint, or change the fence",
-        )
+def _broken(fence: FenceMap, shape: Any) -> str:
+    """Return in words which parts of the fence `shape` breaks, "" if none."""
+    return " and ".join(broken for broken, _ in fence.broken_by(shape))
 
 
-@RULES.error("fence-circle", _GEOMETRY)
-def _circles(context: ValidationContext) -> Iterator[Issue]:
-    """A circle that an item is flown in leaves the fence."""
-    fence = context.fence
-    if fence is None or not fence.circles:
-        return
-    for k in np.flatnonzero(fence.broken_rings.any).tolist():
-        index = list(fence.circles)[k]
-        parts = " and ".join(map(_what, fence.broken_rings.parts(k)))
-        yield Issue(
-            index,
-            f"the circle that is flown there is partly {parts}",
-            "give a smaller radius or another centre, or change the fence",
-        )
+@checks("fence-leg")
+def _(context: ValidationContext) -> Hits:
+    for fence in context.fences:
+        for k in np.flatnonzero(fence.legs.leave).tolist():
+            leg = context.legs[k]
+            start = "home" if leg.start.index == HOME else f"item {leg.start.index + 1}"
+            broken = fence.broken_by(fence.legs.shapes[k])
+            parts = " and ".join(f"{length:.1f} m of it {what}" for what, length in broken)
+            jump = " by a jump" if leg.jump else ""
+            yield at(leg.index, start=start, jump=jump, length=leg.length, parts=parts)
 
 
-@RULES.warning("fence-flight", f"{_GEOMETRY}; predicted flight")
-def _flight(context: ValidationContext) -> Iterator[Issue]:
-    """The predicted flight leaves the fence."""
-    fence, track = context.fence, context.track
-    if fence is None or track is None or not len(fence.flight):
-        return
-    told = set()
-    if context.legs:
-        told = {context.legs[k].index for k in np.flatnonzero(fence.broken_legs.any)}
-        told |= {list(fence.circles)[k] for k in np.flatnonzero(fence.broken_rings.any)}
-    broken = fence.broken_flight
-    for index in sorted(set(fence.flight_items[broken.any].tolist()) - told):
-        first = int(np.flatnonzero(broken.any & (fence.flight_items == index))[0])
-        yield Issue(
-            index,
-            f"the predicted flight gets {' and '.join(map(_what, broken.parts(first)))}, first at "
-            f"{track.t[first]:.0f} s",
-            "fly slower there or keep more room, or change the fence",
-        )
+@checks("fence-circle")
+def _(context: ValidationContext) -> Hits:
+    for fence in context.fences:
+        for k in np.flatnonzero(fence.circles.leave).tolist():
+            yield at(int(fence.circles.index[k]), where=_broken(fence, fence.circles.shapes[k]))
 
 
-@RULES.warning("fence-close", _GEOMETRY, summary=f"less than {LEAST_MARGIN:g} m from the fence")
-def _close(context: ValidationContext) -> Iterator[Issue]:
-    nearest = context.fence.nearest if context.fence else None
-    if nearest is not None and nearest[0] < LEAST_MARGIN:
-        yield Issue(
-            nearest[1],
-            f"{nearest[0]:.1f} m from the edge of the fence; less than {LEAST_MARGIN:g} m is "
-            "within the error of the aircraft's position",
-            "keep more room",
-        )
+@checks("fence-flight")
+def _(context: ValidationContext) -> Hits:
+    for fence in context.fences:
+        told = [each.index[each.leave] for each in (fence.legs, fence.circles)]
+        leave = fence.flight.leave & ~np.isin(fence.flight.index, np.concatenate(told))
+        for index, first in _firsts(leave, fence.flight.index):
+            time = context.track.t[first] if context.track is not None else 0.0
+            yield at(index, where=_broken(fence, fence.flight.shapes[first]), time=time)
 
 
-@RULES.note("fence-margin", _GEOMETRY)
-def _margin(context: ValidationContext) -> Iterator[Issue]:
-    """How near the mission comes to the fence."""
-    nearest = context.fence.nearest if context.fence else None
-    if nearest is not None and nearest[0] >= LEAST_MARGIN:
-        yield Issue(
-            nearest[1],
-            f"{nearest[0]:.1f} m from the edge of the fence, the nearest that the mission comes",
-            "",
-        )
+def _firsts(marked: Any, index: Any) -> Iterator[tuple[int, int]]:
+    """Yield each item at `index` (n,) of which a sample is `marked` (n,), and the first sample."""
+    samples = np.flatnonzero(marked)
+    items, first = np.unique(index[samples], return_index=True)
+    return zip(items.tolist(), samples[first].tolist(), strict=True)
 
 
-@RULES.note(
-    "fence-not-kept", "FENCE_ENABLE, FENCE_TYPE, FENCE_ACTION (ArduPilot 4.7); GF_ACTION (PX4 1.16)"
-)
-def _not_kept(context: ValidationContext) -> Iterator[Issue]:
-    """The vehicle's parameters let it fly on where it leaves the fence."""
+def _nearest(context: ValidationContext) -> list[tuple[int, float]]:
+    """Return the item at which the mission comes nearest to the fence, and how near, m."""
+    return [fence.nearest for fence in context.fences if fence.nearest is not None]
+
+
+@checks("fence-close")
+def _(context: ValidationContext) -> Hits:
+    return (at(k, margin=margin) for k, margin in _nearest(context) if margin < LEAST_MARGIN)
+
+
+@checks("fence-margin")
+def _(context: ValidationContext) -> Hits:
+    return (at(k, margin=margin) for k, margin in _nearest(context) if margin >= LEAST_MARGIN)
+
+
+@checks("ardupilot-fence-margin")
+def _(context: ValidationContext) -> Hits:
+    keep, name = context.parameter("fence_margin")
+    near = ((k, margin) for k, margin in _nearest(context) if margin < keep)
+    return (at(k, margin=margin, keep=keep, name=name) for k, margin in near)
+
+
+@checks("fence-not-kept")
+def _(context: ValidationContext) -> Hits:
     response = context.vehicle.type.at_fence(context.vehicle)
-    if context.fence is None or response.keeps or not response.parameter:
+    if context.fences and response.parameter and not response.keeps:
+        value, name = context.parameter(response.parameter)
+        does = "says so, and flies on" if response.action == "report" else "flies on"
+        parameter = name.partition(",")[0]
+        yield at(does=does, name=name, value=value, parameter=parameter, to=response.set_to)
+
+
+@checks("fence-ahead")
+def _(context: ValidationContext) -> Hits:
+    vehicle, track, positions = context.vehicle, context.track, context.track_positions
+    if track is None or positions is None or not vehicle.type.at_fence(vehicle).keeps:
         return
-    value = context.vehicle.value(response.parameter)
-    name = context.vehicle.name_of(response.parameter)
-    does = "says so, and flies on" if response.action == "report" else "flies on"
-    yield Issue(
-        None,
-        f"a vehicle that leaves the fence {does} ({name} {value:g})",
-        f"set {name.partition(',')[0]} to {response.set_to} for the vehicle to turn back",
-    )
-
-
-@_ARDUPILOT.note(
-    "ardupilot-fence-margin",
-    "measured on ArduCopter 4.7: in AUTO it flies on, at 1 m with FENCE_MARGIN 2 too",
-)
-def _fence_margin(context: ValidationContext) -> Iterator[Issue]:
-    """The mission comes nearer to the fence than FENCE_MARGIN."""
-    nearest = context.fence.nearest if context.fence else None
-    margin = context.vehicle.value("fence_margin")
-    if nearest is not None and nearest[0] < margin:
-        name = context.vehicle.name_of("fence_margin")
-        yield Issue(
-            nearest[1],
-            f"{nearest[0]:.1f} m from the edge of the fence; {name} is {margin:g} m: in AUTO "
-            "ArduPilot flies there all the same, in modes that avoid the fence it does not",
-            "keep more room, or set FENCE_MARGIN to less",
-        )
-
-
-@RULES.warning(
-    "fence-ahead",
-    "GF_PREDICT: PX4 1.16 GeofenceBreachAvoidance; measured: at 7 m/s it stopped 32 m before",
-)
-def _ahead(context: ValidationContext) -> Iterator[Issue]:
-    """The vehicle takes a flight towards the fence for one that leaves it."""
-    vehicle, fence, track = context.vehicle, context.fence, context.track
-    if fence is None or track is None or context.track_positions is None:
-        return
-    velocity, positions = track.velocity[:, :2], context.track_positions[:, :2]
-    speed = lengths(velocity)
+    velocity, speed = track.velocity[:, :2], lengths(track.velocity[:, :2])
     ahead = vehicle.type.fence_ahead(vehicle, speed)
-    if not ahead.any() or not vehicle.type.at_fence(vehicle).keeps:
-        return
-    import shapely
+    for fence in context.fences if ahead.any() else ():
+        import shapely
 
-    moving = speed > _STILL
-    tested = positions[moving] + velocity[moving] * (ahead[moving] / speed[moving])[:, None]
-    outside = np.zeros(len(speed), dtype=bool)
-    outside[moving] = fence.broken(shapely.points(tested)).any
-    for index in np.unique(track.item[outside]).tolist():
-        first = int(np.flatnonzero(outside & (track.item == index))[0])
-        yield Issue(
-            index,
-            f"at {track.t[first]:.0f} s the flight is at {speed[first]:.1f} m/s, and "
-            f"{ahead[first]:.0f} m straight on it were outside the fence: the vehicle "
-            "breaks off the mission there",
-            "set GF_PREDICT to 0, or fly slower there and keep more room",
-        )
-
-
-RULES += _ARDUPILOT
+        heading = velocity / np.maximum(speed, _STILL)[:, None]
+        tested = shapely.points(positions[:, :2] + heading * ahead[:, None])
+        outside = fence.leave(np.asarray(tested)) & (speed > _STILL)
+        for index, k in _firsts(outside, track.item):
+            yield at(index, time=track.t[k], speed=speed[k], ahead=ahead[k])

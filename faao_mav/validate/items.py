@@ -1,191 +1,238 @@
-"""Rules about items and their order that hold for every autopilot."""
+"""Items and their order, and what any autopilot refuses or loses of them."""
 
 import math
-from collections.abc import Iterator
 
 from faao_mav.autopilot.dialect import name_of
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, TAKEOFFS, Command
-from faao_mav.mission.jumps import JUMPS
-from faao_mav.validate.context import NAV_LAST, ValidationContext, number
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.mission.command import (
+    ABOVE_HOME,
+    ABOVE_SEA,
+    FLOWN_TO,
+    LANDINGS,
+    TAKEOFFS,
+    Command,
+    Frame,
+)
+from faao_mav.mission.item import MissionItem
+from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
+from faao_mav.validate.rule import Checks, Hits, at
 from faao_mav.validate.straight import HOME
 
-RULES = Rules()
+checks = Checks()
 
-_COMMON = "MAVLink: mission protocol"
-_RETURN_PATH_START = 188
-_ENDINGS = LANDINGS | {Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM}
-
-
-@RULES.error("empty", _COMMON)
-def _empty(context: ValidationContext) -> Iterator[Issue]:
-    """The mission has no items."""
-    if not context.items:
-        yield Issue(
-            None,
-            "the mission has no items: uploading it clears what the vehicle has",
-            "add a take-off, waypoints and a landing",
-        )
-
-
-@RULES.warning("no-home", _COMMON)
-def _no_home(context: ValidationContext) -> Iterator[Issue]:
-    """The file says nothing about home."""
-    if context.items and context.mission.home is None:
-        yield Issue(
-            None,
-            "the file has no home position: distances from home, heights above sea level and the "
-            "way back are not checked",
-            "set the planned home in the ground station, or fill row 0 of the file",
-        )
-
+_LANDING_SEQUENCES = (Command.DO_LAND_START, 188)
+_ENDINGS = (*LANDINGS, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM)
 
 _LAND = (-430.0, 8849.0)
 """The lowest and the highest land on Earth, m above sea level: the Dead Sea's shore, Everest."""
 
 
-@RULES.warning("home-height", "geography")
-def _home_height(context: ValidationContext) -> Iterator[Issue]:
-    """The height of home is not known, or that of no place on land."""
+@checks("empty")
+def _(context: ValidationContext) -> Hits:
+    return () if context.items else (at(),)
+
+
+@checks("no-home")
+def _(context: ValidationContext) -> Hits:
+    return (at(),) if context.items and context.mission.home is None else ()
+
+
+@checks("home-height")
+def _(context: ValidationContext) -> Hits:
     home = context.mission.home
-    if home is None or _LAND[0] <= home.altitude <= _LAND[1]:
-        return
-    action = "set the height of the planned home, metres above sea level"
-    if math.isnan(home.altitude):
-        told = "the file has no height of home: heights above sea level are not checked"
-        yield Issue(None, told, action)
-    else:
+    if home is not None and not _LAND[0] <= home.altitude <= _LAND[1]:
         told = f"home is {home.altitude:,.0f} m above sea level, where no land is"
-        yield Issue(None, told, f"{action}, not feet or millimetres")
+        if math.isnan(home.altitude):
+            told = "the file has no height of home: heights above sea level are not checked"
+        yield at(told=told)
 
 
-@RULES.warning("rally-height", _COMMON)
-def _rally_height(context: ValidationContext) -> Iterator[Issue]:
-    """A place to return to has no height."""
-    action, back = "give its height, metres above home", context.mission.fence.breach_return
+@checks("rally-height")
+def _(context: ValidationContext) -> Hits:
     for n, point in enumerate(context.mission.rally, start=1):
         if math.isnan(point.altitude):
-            yield Issue(None, f"rally point {n} has no altitude: `upload` refuses it", action)
+            yield at(place=f"rally point {n}", then="`upload` refuses it")
+    back = context.mission.fence.breach_return
     if back is not None and math.isnan(back.altitude):
-        told = "the return point after a breach has no altitude: the vehicle's parameters set it"
-        yield Issue(None, told, action)
+        yield at(place="the return point after a breach", then="the vehicle's parameters set it")
 
 
-@RULES.warning("unreachable", "measured on ArduCopter and ArduPlane 4.7 and PX4 1.16.1")
-def _unreachable(context: ValidationContext) -> Iterator[Issue]:
-    """Items stand after one that ends the mission."""
+@checks("unreachable")
+def _(context: ValidationContext) -> Hits:
     end = next((k for k in range(len(context.items)) if _ends(context, k)), len(context.items))
-    after = context.items[end + 1 :]
-    rest = [k for k, item in enumerate(after, end + 1) if item.command <= NAV_LAST]
+    rest = [k for k, _ in context.flying if k > end]
     # A landing sequence, or the target of a jump, is there on purpose.
-    if any(item.command in (Command.DO_LAND_START, _RETURN_PATH_START) for item in after):
-        return
-    targets = [context.jump_target(index) or 0 for index, _ in context.each(*JUMPS)]
-    if rest and max(targets, default=0) <= end:
-        span = f"items {number(rest[0])} to {number(rest[-1])} are" if rest[1:] else "this item is"
-        yield Issue(
-            rest[0],
-            f"{span} never flown: item {number(end)} ends the mission",
-            f"remove item {number(end)}, or what follows it",
-        )
+    meant = any(k > end for k, _ in context.each(*_LANDING_SEQUENCES))
+    if rest and not meant and not any((target or 0) > end for _, _, target in context.jumps):
+        yield at(rest[0], end=end + 1)
 
 
 def _ends(context: ValidationContext, index: int) -> bool:
     """Tell whether nothing behind the item at `index` is flown."""
     command, dialect = context.items[index].command, context.vehicle.type.dialect
     if command in LANDINGS and dialect.flies_on(context.vehicle):
-        after = (item.command for item in context.items[index + 1 :] if item.command <= NAV_LAST)
-        return next(after, 0) not in TAKEOFFS
+        return next((after for k, after in context.flying if k > index), 0) not in TAKEOFFS
     return command in dialect.endings
 
 
-@RULES.warning("flies-on", "measured on ArduCopter 4.7 (MIS_OPTIONS 4) and PX4 1.16.1")
-def _flies_on(context: ValidationContext) -> Iterator[Issue]:
-    """Items stand after a landing: the aircraft takes off again by itself."""
-    for index, _ in context.each(*LANDINGS):
-        flown = any(item.command <= NAV_LAST for item in context.items[index + 1 :])
-        if flown and not any(_ends(context, k) for k in range(index + 1)):
-            yield Issue(
-                index,
-                "the landing is not the end: the aircraft lands, takes off by itself and flies on",
-                "remove what follows, unless everyone on the ground knows",
-            )
-            return
+@checks("flies-on")
+def _(context: ValidationContext) -> Hits:
+    landing = next((k for k, _ in context.each(*LANDINGS)), len(context.items))
+    flown = any(k > landing for k, _ in context.flying)
+    if flown and not any(_ends(context, k) for k in range(landing + 1)):
+        yield at(landing)
 
 
-@RULES.note("no-ending", _COMMON)
-def _no_ending(context: ValidationContext) -> Iterator[Issue]:
-    """The mission ends neither in a landing nor in a return."""
-    if context.items and not any(item.command in _ENDINGS for item in context.items):
-        what = "hovers" if context.vehicle.type.hovers else "circles"
-        yield Issue(
-            len(context.items) - 1,
-            f"after the last item the aircraft {what} where it is until someone takes over",
-            "add NAV_RETURN_TO_LAUNCH or NAV_LAND, unless that is what you want",
-        )
+@checks("no-ending")
+def _(context: ValidationContext) -> Hits:
+    if context.items and not any(context.each(*_ENDINGS)):
+        does = "hovers" if context.vehicle.type.hovers else "circles"
+        yield at(len(context.items) - 1, does=does)
 
 
-@RULES.note("mixed-heights", _COMMON)
-def _mixed_heights(context: ValidationContext) -> Iterator[Issue]:
-    """Some heights count from sea level, others from home."""
-    frames = [(k, item.frame) for k, item in context.each(*FLOWN_TO)]
-    sea = next((k for k, frame in frames if frame in ABOVE_SEA), None)
-    home = next((k for k, frame in frames if frame in ABOVE_HOME), None)
-    if sea is not None and home is not None:
-        yield Issue(
-            sea,
-            f"the height counts from sea level (frame {context.items[sea].frame}), that of item "
-            f"{number(home)} from home (frame {context.items[home].frame})",
-            "use one of both, unless you mean it",
-        )
+@checks("mixed-heights")
+def _(context: ValidationContext) -> Hits:
+    sea, home = (
+        [k for k, item in context.each(*FLOWN_TO) if item.frame in frames]
+        for frames in (ABOVE_SEA, ABOVE_HOME)
+    )
+    if sea and home:
+        yield at(sea[0], other=home[0] + 1)
 
 
-@RULES.error("jump-target", _COMMON)
-def _jump_target(context: ValidationContext) -> Iterator[Issue]:
-    """A jump goes to an item that does not exist."""
-    for index, item in context.each(*JUMPS):
-        if context.jump_target(index) is not None:
-            continue
-        if item.command == Command.DO_JUMP_TAG:
-            yield Issue(
-                index,
-                f"DO_JUMP_TAG goes to tag {item.params[0]:g}, which no JUMP_TAG has",
-                "add the JUMP_TAG, or correct the number",
-            )
-        else:
-            yield Issue(
-                index,
-                f"DO_JUMP goes to item {item.params[0]:g}; there are items 1 to "
-                f"{len(context.items)}",
-                "correct param1",
-            )
+@checks("jump-target")
+def _(context: ValidationContext) -> Hits:
+    for index, item, target in context.jumps:
+        if target is None:
+            yield at(index, name=name_of(item.command), target=item.params[0])
 
 
-@RULES.warning("jump-forever", _COMMON)
-def _jump_forever(context: ValidationContext) -> Iterator[Issue]:
-    """A jump repeats without end."""
-    for index, item in context.each(*JUMPS):
-        target = context.jump_target(index)
-        if target is not None and target <= index and item.params[1] < 0:
-            yield Issue(
-                index,
-                f"{name_of(item.command)} to item {number(target)} has the repeat count "
-                f"{item.params[1]:g}: it never ends and what follows is never flown",
-                "give the number of repeats in param2, or be ready to take over",
-            )
+@checks("jump-forever")
+def _(context: ValidationContext) -> Hits:
+    for index, item, target in context.jumps:
+        count = item.params[1]
+        if target is not None and target <= index and count < 0:
+            yield at(index, name=name_of(item.command), target=target + 1, count=count)
 
 
-@RULES.note("same-place", _COMMON)
-def _same_place(context: ValidationContext) -> Iterator[Issue]:
-    """Two waypoints in a row are the same place."""
+@checks("same-place")
+def _(context: ValidationContext) -> Hits:
     for leg in context.legs:
         start, end = leg.start.index, leg.end.index
         if HOME in (start, end) or leg.jump or leg.length >= 0.05:
             continue
         both = {context.items[start].command, context.items[end].command}
         if both == {Command.NAV_WAYPOINT} and abs(leg.rise) < 0.05:
-            yield Issue(
-                end,
-                f"the same place as item {number(start)}, {leg.length:.2f} m away",
-                "remove one of both; to wait there, give the first a hold (param1)",
-            )
+            yield at(end, before=start + 1, length=leg.length)
+
+
+@checks("refused-on-upload")
+def _(context: ValidationContext) -> Hits:
+    dialect = context.vehicle.type.dialect
+    for index, item in enumerate(context.items):
+        if (refusal := dialect.refusal(dialect.sent(item))) is not None:
+            reason, _, instead = refusal.partition("; ")
+            yield at(index, reason=reason, instead=instead or _replacement(item))
+
+
+def _replacement(item: MissionItem) -> str:
+    if item.command == Command.NAV_SPLINE_WAYPOINT:
+        return "replace it by plain waypoints"
+    if item.command in FLOWN_TO and item.frame == Frame.MISSION:
+        return "set the frame to 3: height above home"
+    if item.command not in FLOWN_TO and item.frame != Frame.MISSION:
+        return "set the frame to 2, or remove the item"
+    return "remove the item, or use a command that the autopilot has"
+
+
+@checks("not-set")
+def _(context: ValidationContext) -> Hits:
+    dialect = context.vehicle.type.dialect
+    for index, item in enumerate(context.items):
+        refusal = dialect.refusal(item)
+        if refusal is not None and dialect.refusal(dialect.sent(item)) is None:
+            reason, _, instead = refusal.partition("; ")
+            yield at(index, reason=reason, instead=instead)
+
+
+@checks("number-too-large")
+def _(context: ValidationContext) -> Hits:
+    for index, item in enumerate(context.items):
+        if not fits_message(item):
+            largest = max(abs(v) for v in (*item.params, item.z) if not math.isnan(v))
+            yield at(index, largest=largest, LARGEST=LARGEST)
+
+
+@checks("storage-full")
+def _(context: ValidationContext) -> Hits:
+    return _too_many(context, context.vehicle.type.dialect.items.most, math.inf)
+
+
+@checks("storage-tight")
+def _(context: ValidationContext) -> Hits:
+    limit = context.vehicle.type.dialect.items
+    return _too_many(context, limit.sure, limit.most)
+
+
+def _too_many(context: ValidationContext, sure: int, most: float) -> Hits:
+    """Tell of more than `sure` rows, and no more than `most`."""
+    own, dialect = context.vehicle.type, context.vehicle.type.dialect
+    rows = len(context.items) + dialect.home_row
+    if sure < rows <= most and not dialect.unlimited(context.vehicle):
+        room = f", or {dialect.make_room}" if dialect.make_room else ""
+        home = " with home" if dialect.home_row else ""
+        yield at(rows=rows, home=home, name=own.name, sure=sure, room=room)
+
+
+@checks("many-jumps")
+def _(context: ValidationContext) -> Hits:
+    limit, jumps = context.vehicle.type.dialect.jumps, [index for index, _, _ in context.jumps]
+    if limit is not None and len(jumps) > limit.sure:
+        yield at(jumps[limit.sure], count=len(jumps), sure=limit.sure, most=limit.most)
+
+
+_HELD = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
+_RADIUS, _YAW = 1, 3
+_MEANING = {_RADIUS: " (acceptance radius)", 2: " (pass-by radius)", _YAW: " (yaw)"}
+"""What the parameters of a waypoint mean, counted from 0."""
+_INSTEAD = {
+    _RADIUS: "set WPNAV_RADIUS (WP_RADIUS_M), which holds for all waypoints",
+    _YAW: "put a CONDITION_YAW before the waypoint",
+}
+"""What to do for them where the vehicle hovers."""
+
+
+@checks("hold-changed")
+def _(context: ValidationContext) -> Hits:
+    for index, item, stored in context.stored:
+        if item.command not in _HELD or _same(item.params[0], stored.params[0]):
+            continue
+        instead = "use whole seconds from 0 to 65535, or a NAV_DELAY after a plain waypoint"
+        if not context.vehicle.type.hovers and item.command == Command.NAV_WAYPOINT:
+            instead = "use NAV_LOITER_TIME: a plane waits in a circle"
+        yield at(index, hold=item.params[0], kept=stored.params[0], instead=instead)
+
+
+@checks("value-dropped")
+def _(context: ValidationContext) -> Hits:
+    found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
+    for index, item, stored in context.stored:
+        for n, (value, kept) in enumerate(zip(item.params, stored.params, strict=True)):
+            if item.command not in FLOWN_TO or (n == 0 and item.command in _HELD):
+                continue  # a hold is the rule above's
+            turned = n == _YAW and _same(value % 360, kept)
+            if value != 0 and not turned and not _same(value, kept):
+                found.setdefault((item.command, n), []).append((index, value, kept))
+    for (command, n), places in found.items():
+        index, value, kept = places[0]
+        told = {"name": name_of(command), "n": n + 1, "value": value, "kept": kept}
+        waypoint = command == Command.NAV_WAYPOINT
+        meaning = _MEANING.get(n, "") if waypoint else ""
+        more = f", and so in {len(places)} items" if places[1:] else ""
+        instead = _INSTEAD.get(n) if waypoint and context.vehicle.type.hovers else None
+        instead = instead or "write what can be stored"
+        yield at(index, **told, meaning=meaning, more=more, instead=instead)
+
+
+def _same(value: float, kept: float) -> bool:
+    """Say whether `value` is kept; where it is not set, nothing is lost."""
+    return math.isnan(value) or abs(value - kept) <= 1e-4 + 1e-6 * abs(value)

@@ -1,14 +1,12 @@
-"""What a rule is and finds, and how the modules of rules list theirs."""
+"""What a rule is and finds; the table of all rules, and how modules give the checks of its rows."""
 
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partialmethod
-from typing import TYPE_CHECKING, Any, TypeAlias
+from importlib.resources import files
+from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
-from faao_mav.autopilot.dialect import name_of
-from faao_mav.mission.item import MissionItem
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
@@ -44,40 +42,46 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Issue:
+class Hit:
     """Where a rule holds: at the index of an item in `Mission.items`, or at none.
 
-    `says` and `do` are what the finding says and what to do; "" for the rule's own.
+    `values` go into the texts of the rule, by their names.
     """
 
-    index: int | None = None
-    says: str = ""
-    do: str = ""
+    index: int | None
+    values: Mapping[str, object]
 
 
-Hit: TypeAlias = int | tuple[Any, ...] | None
-Check: TypeAlias = Callable[["ValidationContext"], Iterable[Issue]]
+def at(index: int | None = None, **values: object) -> Hit:
+    """Return that a rule holds at the item `index`, None for no single item."""
+    return Hit(index, values)
+
+
+Hits: TypeAlias = Iterable[Hit]
+Check: TypeAlias = Callable[["ValidationContext"], Hits]
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
     """One thing that is checked.
 
-    `id` is short and stays the same from version to version. `summary` says in a line what is
-    wrong when the rule speaks, and `do` what to do about it. `source` names where the rule comes
-    from: a function or document of the autopilot with its version, a measurement, or the limits
-    that were set. `autopilot` and `kind` are the autopilot and the type of vehicle that it is
-    about, None: all.
+    `id` is short and stays the same from version to version. `autopilot` and `kind` are the
+    autopilot and the type of vehicle that it is about, None: all. `summary` says in a line what is
+    wrong when the rule speaks. `says` is that with the values of a hit, "" where there are none,
+    and `do` what to do about it; a name in braces stands for a value of the hit, or for a constant
+    of the check's module. `source` names where the rule comes from: a function or document of the
+    autopilot with its version, a measurement, or the limits that were set.
     """
 
-    id: str
     level: Level
+    id: str
+    autopilot: str | None
+    kind: str | None
     summary: str
+    says: str
     do: str
     source: str
     check: Check
-    autopilot: str | None = None
-    kind: str | None = None
 
     def applies_to(self, vehicle: Vehicle) -> bool:
         """Say whether the rule is about `vehicle`."""
@@ -85,113 +89,33 @@ class Rule:
 
     def findings(self, context: "ValidationContext") -> Iterator[Finding]:
         """Yield what the rule finds in `context`."""
-        for found in self.check(context):
-            item = None if found.index is None else found.index + 1
-            yield Finding(
-                self.level, self.id, item, found.says or self.summary, found.do or self.do
-            )
+        for hit in self.check(context):
+            values = {**self.check.__globals__, **hit.values}
+            item = None if hit.index is None else hit.index + 1
+            says, do = (text.format_map(values) for text in (self.says or self.summary, self.do))
+            yield Finding(self.level, self.id, item, says, do)
 
 
-class Rules(list[Rule]):
-    """The rules of one module, in order; all about the `autopilot`, if given."""
+class Checks(dict[str, Check]):
+    """The checks of one module, by the rules' ids: an instance decorates them."""
 
-    def __init__(self, autopilot: str | None = None) -> None:
-        super().__init__()
-        self._autopilot = autopilot
-
-    def add(
-        self,
-        level: Level,
-        name: str,
-        source: str,
-        do: str = "",
-        *,
-        summary: str = "",
-        kind: str | None = None,
-    ) -> Callable[[Check], Check]:
-        """Return a decorator that makes a rule of a check; for the arguments see `Rule`.
-
-        The check's docstring is the summary; `{NAME}` in it is a constant of the check's module.
-        """
+    def __call__(self, rule: str) -> Callable[[Check], Check]:
+        """Return a decorator that makes a function the check of `rule`."""
 
         def register(check: Check) -> Check:
-            self.append(
-                Rule(
-                    name,
-                    level,
-                    summary or _summary_of(check),
-                    do,
-                    source,
-                    check,
-                    self._autopilot,
-                    kind,
-                )
-            )
+            self[rule] = check
             return check
 
         return register
 
-    error = partialmethod(add, Level.ERROR)
-    warning = partialmethod(add, Level.WARNING)
-    note = partialmethod(add, Level.NOTE)
 
-    def commands(
-        self,
-        level: Level,
-        name: str,
-        summary: str,
-        source: str,
-        commands: Container[int],
-        message: str,
-        action: str,
-        *,
-        where: Callable[[MissionItem], bool] = lambda _: True,
-        kind: str | None = None,
-    ) -> None:
-        """Add a rule about each item with one of `commands` for which `where` holds.
-
-        In `message`, `{name}` is the command, `{item}` the item and `{kind}` the type of vehicle.
-        """
-
-        def check(context: "ValidationContext") -> Iterator[Issue]:
-            for index, item in enumerate(context.items):
-                if item.command in commands and where(item):
-                    told = {"name": name_of(item.command), "kind": context.vehicle.kind}
-                    yield Issue(index, message.format(item=item, **told), action)
-
-        self.add(level, name, source, summary=summary, kind=kind)(check)
-
-    def where(
-        self,
-        level: Level,
-        name: str,
-        summary: str,
-        do: str,
-        source: str,
-        where: Callable[["ValidationContext"], Iterable[Hit]],
-        says: str = "",
-        *,
-        kind: str | None = None,
-    ) -> None:
-        """Add a rule that holds at the hits of `where`; for the other arguments see `Rule`.
-
-        A hit is the index of an item, or that and values to put into `says` and `do`.
-        """
-
-        def check(context: "ValidationContext") -> Iterator[Issue]:
-            for hit in where(context):
-                index, *values = hit if isinstance(hit, tuple) else (hit,)
-                yield Issue(index, says.format(*values), do.format(*values))
-
-        self.append(Rule(name, level, summary, do, source, check, self._autopilot, kind))
-
-    error_where = partialmethod(where, Level.ERROR)
-    warning_where = partialmethod(where, Level.WARNING)
-    note_where = partialmethod(where, Level.NOTE)
-
-
-def _summary_of(check: Check) -> str:
-    """Return the docstring of `check` as the end of a sentence: "A leg." becomes "a leg"."""
-    told = (check.__doc__ or "").removesuffix(".").format_map(check.__globals__)
-    first = told.partition(" ")[0]
-    return told[:1].lower() + told[1:] if first[1:].islower() or len(first) == 1 else told
+def rules_of(checks: Mapping[str, Check]) -> Iterator[Rule]:
+    """Yield the rules of the table beside this module, each with its check; "-" is nothing."""
+    table = files("faao_mav.validate").joinpath("rules.tsv").read_text(encoding="utf-8")
+    for row in table.splitlines()[1:]:
+        level, name, *rest = row.split("\t")
+        autopilot, kind, summary, says, do, source = ("" if each == "-" else each for each in rest)
+        check = checks[name]
+        summary = summary.format_map(check.__globals__)
+        whose = (autopilot or None, kind or None)
+        yield Rule(Level(level), name, *whose, summary, says, do, source, check)

@@ -1,214 +1,267 @@
-"""Whether the speeds that are asked for can be flown."""
+"""Whether the speeds that are asked for, and the path's corners and climbs, can be flown."""
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 
 from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.mission.command import Command
-from faao_mav.validate.context import ValidationContext, number
-from faao_mav.validate.rule import Issue, Rules
+from faao_mav.power import GRAVITY
+from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.rule import Checks, Hits, at
 from faao_mav.validate.straight import HOME, Straight
 
-RULES = Rules()
+checks = Checks()
 
-REACHED_SHARE = 0.8
-"""The share of the commanded speed below which a leg is reported. Chosen."""
+REACHED_PERCENT = 80.0
+"""The share of the commanded speed, %, below which a leg is reported. Chosen."""
 
 TIME_LOST = 2.0
 """The least time, s, that a reported run of slow legs loses: in less, corners are taken and speeds
 are changed. Chosen."""
 
-CRAWL_SHARE = 0.5
-"""The share of the commanded speed below which a row of legs is a crawl. Chosen."""
+CRAWL_PERCENT = 50.0
+"""The share of the commanded speed, %, below which a row of legs is a crawl. Chosen."""
 
 CRAWL_LEGS = 5
 """The least number of legs in a row that make a crawl. Chosen."""
 
-_LIMIT = "the plan's vehicle.max_speed"
-_MEASURED = "flight models measured on ArduCopter 4.7 and PX4 1.16.1; the predicted flight"
+SPARE_PERCENT = 100 * (OVERSPEED - 1)
+"""By how much, %, a mission may command more than the plan's max_speed."""
+
 _SHORTEST = 1.0
-"""The length, m, below which a leg is a correction and not one to speed up on. Chosen."""
+"""The length, m, below which a leg is a correction: it has no direction, and nobody speeds up on
+it. Chosen."""
 
 _SLOWEST = 0.1
 """The least speed that is reckoned with, m/s, so that times stay finite."""
 
+SHARP = 45.0
+"""The turn, degrees, above which a copter slows down for a corner. Measured on ArduCopter and
+PX4."""
 
-@dataclass(frozen=True, slots=True)
-class _Run:
-    """Neighbouring legs that stay below their commanded speed, and what they reach, m/s."""
+_SLOW = 3.0
+"""The commanded speed, m/s, up to which corners hardly matter. Chosen."""
 
-    legs: list[Straight]
-    reached: list[float]
+_CLIMB_SHARE = 0.8
+"""The share of the climbing time that the way over ground may fall short to: less, and the leg is
+steep. Chosen."""
 
-    @property
-    def crawls(self) -> bool:
-        """Whether the run is long and slow enough to be called a crawl."""
-        commanded = sum(leg.speed for leg in self.legs)
-        return len(self.legs) >= CRAWL_LEGS and sum(self.reached) < CRAWL_SHARE * commanded
 
-    @property
-    def time_lost(self) -> float:
-        """Seconds at least that the run takes longer than at the commanded speeds."""
-        return sum(
-            leg.length * (1 / max(reached, _SLOWEST) - 1 / leg.speed)
-            for leg, reached in zip(self.legs, self.reached, strict=True)
+def _asked(context: ValidationContext) -> Iterator[tuple[int, float, float]]:
+    """Return index, type and speed, m/s, of each DO_CHANGE_SPEED."""
+    return ((k, *item.params[:2]) for k, item in context.each(Command.DO_CHANGE_SPEED))
+
+
+@checks("speed-lean")
+def _(context: ValidationContext) -> Hits:
+    vehicle, top = context.vehicle, context.vehicle.top_airspeed
+    changes = ((change, -k) for k, change in enumerate(context.changes) if change is not None)
+    level = ((change.speed or 0.0, k) for change, k in changes if change.axis == "horizontal")
+    fastest, k = max(level, default=(0.0, 0))
+    if fastest > top:
+        angle, name = context.parameter("lean_angle")
+        told = {"angle": math.degrees(angle), "name": name, "assumption": vehicle.assumption}
+        yield at(-k, speed=fastest, top=top, **told)
+
+
+@checks("ardupilot-speed-ignored")
+def _(context: ValidationContext) -> Hits:
+    own = context.vehicle.type
+    for index, item in context.each(Command.DO_CHANGE_SPEED):
+        throttle = 0.0 if own.hovers else item.params[2]
+        if own.dialect.speed_change(item) is None and not throttle > 0:
+            yield at(index, type=item.params[0], speed=item.params[1])
+
+
+@checks("ardupilot-plane-speed")
+def _(context: ValidationContext) -> Hits:
+    return _airspeeds(context, (0,))
+
+
+@checks("px4-plane-speed")
+def _(context: ValidationContext) -> Hits:
+    return _airspeeds(context, ())
+
+
+def _airspeeds(context: ValidationContext, kinds: tuple[float, ...]) -> Hits:
+    """Yield the airspeeds outside those that a plane flies, asked for by one of `kinds`, or any."""
+    least, top = context.vehicle.value("min_speed"), context.vehicle.value("max_speed")
+    for index, kind, speed in _asked(context):
+        if (kind in kinds or not kinds) and speed > 0 and not least <= speed <= top:
+            yield at(index, speed=speed, least=least, top=top)
+
+
+@checks("px4-speed-default")
+def _(context: ValidationContext) -> Hits:
+    default, name = context.parameter("cruise_speed")
+    for index, _, speed in _asked(context):
+        if not speed > 0:
+            yield at(index, speed=speed, default=default, name=name)
+
+
+@checks("px4-speed-type")
+def _(context: ValidationContext) -> Hits:
+    for index, kind, speed in _asked(context):
+        if kind in (2, 3) and speed > 0:
+            yield at(index, type=kind, speed=speed)
+
+
+@checks("px4-speed-capped")
+def _(context: ValidationContext) -> Hits:
+    limit, name = context.parameter("max_speed")
+    for index, _, speed in _asked(context):
+        if speed > limit:
+            yield at(index, speed=speed, limit=limit, name=name)
+
+
+@checks("speed-not-reached")
+def _(context: ValidationContext) -> Hits:
+    # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
+    for legs, reached in _slow_runs(context) if context.link is None else ():
+        times = (
+            leg.length * (1 / max(v, _SLOWEST) - 1 / leg.speed)
+            for leg, v in zip(legs, reached, strict=True)
         )
-
-    @property
-    def last(self) -> int:
-        """The number of the last item."""
-        return number(self.legs[-1].index)
-
-    @property
-    def mean_speed(self) -> float:
-        """The mean of what the legs reach, m/s."""
-        return sum(self.reached) / len(self.reached)
+        if sum(times) >= TIME_LOST and not _crawls(legs, reached):
+            where = f"on this leg of {legs[0].length:.0f} m"
+            if len(legs) > 1:
+                where = f"on the {len(legs)} legs from here to item {legs[-1].index + 1}"
+            span = " to ".join(dict.fromkeys(f"{each(reached):.1f}" for each in (min, max)))
+            yield at(legs[0].index, where=where, span=span, asked=max(leg.speed for leg in legs))
 
 
-@RULES.warning(
-    "speed-not-reached",
-    _MEASURED,
-    summary=f"legs that stay below {100 * REACHED_SHARE:g} % of the commanded speed and lose "
-    f"{TIME_LOST:g} s or more by it; with a plan its own clock is compared instead",
-    kind="copter",
-)
-def _not_reached(context: ValidationContext) -> Iterator[Issue]:
-    for run in _slow_runs(context):
-        # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
-        if run.crawls or run.time_lost < TIME_LOST or context.link is not None:
-            continue
-        first, low, high = run.legs[0], min(run.reached), max(run.reached)
-        if len(run.legs) == 1:
-            what = f"on this leg of {first.length:.0f} m the aircraft gets to {low:.1f} m/s"
-        else:
-            span = f"{low:.1f}" if high - low < 0.05 else f"{low:.1f} to {high:.1f}"
-            what = (
-                f"on the {len(run.legs)} legs from here to item {run.last} the aircraft gets to "
-                f"{span} m/s"
-            )
-        yield Issue(
-            first.index,
-            f"{what}, not to the commanded {max(leg.speed for leg in run.legs):g} m/s",
-            "ask for what it reaches, or make the legs longer",
-        )
+@checks("crawl")
+def _(context: ValidationContext) -> Hits:
+    for legs, reached in _slow_runs(context):
+        if _crawls(legs, reached):
+            spacing, mean = (float(np.mean(x)) for x in ([leg.length for leg in legs], reached))
+            told = {"count": len(legs), "last": legs[-1].index + 1, "spacing": spacing}
+            yield at(legs[0].index, **told, mean=mean, asked=max(leg.speed for leg in legs))
 
 
-@RULES.warning(
-    "crawl",
-    _MEASURED,
-    summary=f"waypoints so dense that {CRAWL_LEGS} legs or more stay below "
-    f"{100 * CRAWL_SHARE:g} % of the commanded speed",
-    kind="copter",
-)
-def _crawl(context: ValidationContext) -> Iterator[Issue]:
-    for run in _slow_runs(context):
-        if run.crawls:
-            spacing = sum(leg.length for leg in run.legs) / len(run.legs)
-            yield Issue(
-                run.legs[0].index,
-                f"the {len(run.legs)} legs from here to item {run.last} are {spacing:.1f} m long "
-                f"on average: the aircraft crawls at about {run.mean_speed:.1f} m/s of the "
-                f"commanded {max(leg.speed for leg in run.legs):g}",
-                "thin the waypoints: keep those that the shape of the path needs",
-            )
+def _crawls(legs: list[Straight], reached: list[float]) -> bool:
+    """Tell whether a run of legs is long and slow enough to be called a crawl."""
+    commanded = sum(leg.speed for leg in legs)
+    return len(legs) >= CRAWL_LEGS and 100 * sum(reached) < CRAWL_PERCENT * commanded
 
 
-def _slow_runs(context: ValidationContext) -> Iterator[_Run]:
-    """Yield the runs of neighbouring legs that stay below their commanded speed."""
-    pairs = zip(*_reached_speeds(context), strict=True)
-    for slow, run in groupby(pairs, lambda pair: pair[1] < REACHED_SHARE * pair[0].speed):
+def _slow_runs(context: ValidationContext) -> Iterator[tuple[list[Straight], list[float]]]:
+    """Yield neighbouring legs that stay below their commanded speed, and what they reach, m/s."""
+    pairs = _reached_speeds(context)
+    for slow, run in groupby(pairs, lambda pair: 100 * pair[1] < REACHED_PERCENT * pair[0].speed):
         if slow:
             legs, reached = zip(*run, strict=True)
-            yield _Run(list(legs), list(reached))
+            yield list(legs), list(reached)
 
 
-def _reached_speeds(context: ValidationContext) -> tuple[list[Straight], list[float]]:
+def _reached_speeds(context: ValidationContext) -> list[tuple[Straight, float]]:
     """Return the level legs between waypoints, and the speed that each reaches, m/s.
 
     That is the greatest speed of the predicted flight towards the leg's end. Without one it is
     what the leg's length allows by the model of a single leg, of which splines have none.
     """
-    legs = [
-        leg
-        for leg in context.legs
-        if leg.start.index != HOME
-        and not leg.jump
-        and leg.length >= _SHORTEST
-        and context.items[leg.index].command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
-    ]
-    if context.track is not None:
-        fastest = np.full(len(context.items), -np.inf)
-        np.maximum.at(fastest, context.track.item, np.hypot(*context.track.velocity[:, :2].T))
-        legs = [leg for leg in legs if fastest[leg.index] >= 0]  # the others are not flown
-        return legs, [float(fastest[leg.index]) for leg in legs]
-    legs = [leg for leg in legs if not leg.spline]
-    lengths = np.array([leg.length for leg in legs], dtype=float)
-    reachable = context.vehicle.legs.reachable_speed(lengths)
-    return legs, [min(float(v), leg.speed) for v, leg in zip(reachable, legs, strict=True)]
+    waypoints = {k for k, _ in context.each(Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)}
+    legs = [leg for leg in _long_legs(context) if leg.index in waypoints]
+    legs = [leg for leg in legs if leg.start.index != HOME and not leg.jump]
+    if context.track is None:
+        legs = [leg for leg in legs if not leg.spline]
+        reachable = context.vehicle.legs.reachable_speed(np.array([leg.length for leg in legs]))
+        return [(leg, min(float(v), leg.speed)) for leg, v in zip(legs, reachable, strict=True)]
+    fastest = np.full(len(context.items), -np.inf)
+    np.maximum.at(fastest, context.track.item, np.hypot(*context.track.velocity[:, :2].T))
+    flown = (leg for leg in legs if fastest[leg.index] >= 0)
+    return [(leg, float(fastest[leg.index])) for leg in flown]
 
 
-@RULES.error(
-    "speed-above-limit",
-    _LIMIT,
-    summary=f"faster than the vehicle's max_speed by more than {100 * (OVERSPEED - 1):.0f} %",
-)
-def _above_limit(context: ValidationContext) -> Iterator[Issue]:
-    limit = context.limits.max_speed
-    if limit is not None:
-        for index, speed in _faster_than(OVERSPEED * limit, context):
-            yield Issue(
-                index,
-                f"{speed:g} m/s from here on; the vehicle's max_speed is {limit:g} m/s",
-                f"put a DO_CHANGE_SPEED of {limit:g} m/s or less before this item",
-            )
+def _long_legs(context: ValidationContext) -> Iterator[Straight]:
+    return (leg for leg in context.legs if leg.length >= _SHORTEST)
 
 
-@RULES.note(
-    "speed-headroom",
-    _LIMIT,
-    summary=f"faster than the vehicle's max_speed by up to {100 * (OVERSPEED - 1):.0f} %",
-)
-def _headroom(context: ValidationContext) -> Iterator[Issue]:
-    limit = context.limits.max_speed
-    if limit is None:
-        return
-    above = [found for found in _faster_than(limit, context) if found[1] <= OVERSPEED * limit]
-    if above:
-        index, speed = max(above, key=lambda found: found[1])
-        yield Issue(
-            index,
-            f"up to {speed:g} m/s is commanded; the vehicle's max_speed is {limit:g} m/s",
-            "nothing, if the vehicle may; else plan with a lower vehicle.max_speed",
-        )
+@checks("speed-above-limit")
+def _(context: ValidationContext) -> Hits:
+    return (at(k, speed=v, limit=limit) for k, v, limit in _faster_than(context, OVERSPEED))
 
 
-def _faster_than(speed: float, context: ValidationContext) -> Iterator[tuple[int, float]]:
-    """Yield the index of each leg on which a speed above `speed` begins, and that speed, m/s."""
-    before = None
-    for leg in (leg for leg in context.legs if leg.length >= _SHORTEST):
-        if leg.speed > speed and leg.speed != before:
-            yield leg.index, leg.speed
+@checks("speed-headroom")
+def _(context: ValidationContext) -> Hits:
+    above = ((v, -k, limit) for k, v, limit in _faster_than(context, 1.0) if v <= OVERSPEED * limit)
+    for speed, index, limit in sorted(above)[-1:]:
+        yield at(-index, speed=speed, limit=limit)
+
+
+def _faster_than(context: ValidationContext, share: float) -> Iterator[tuple[int, float, float]]:
+    """Yield where a speed above `share` of the limit begins: the leg's index, speed, limit, m/s."""
+    before, limit = None, context.limits.max_speed or math.inf
+    for leg in _long_legs(context):
+        if leg.speed > share * limit and leg.speed != before:
+            yield leg.index, leg.speed, limit
         before = leg.speed
 
 
-@RULES.warning(
-    "acceleration-above-limit", "the plan's vehicle.max_acceleration; the predicted flight"
-)
-def _acceleration(context: ValidationContext) -> Iterator[Issue]:
-    """The predicted flight accelerates more than the vehicle's max_acceleration."""
+@checks("acceleration-above-limit")
+def _(context: ValidationContext) -> Hits:
     limit, track = context.limits.max_acceleration, context.track
     if limit is None or track is None or len(track.t) < 3:
         return
-    change = np.gradient(track.velocity[:, :2], track.t, axis=0)
-    acceleration = np.hypot(*change.T)
+    acceleration = np.hypot(*np.gradient(track.velocity[:, :2], track.t, axis=0).T)
     worst = int(np.argmax(acceleration))
     if acceleration[worst] > 1.05 * limit:
-        yield Issue(
-            int(track.item[worst]),
-            f"the predicted flight accelerates by {acceleration[worst]:.1f} m/s^2 at "
-            f"{track.t[worst]:.0f} s; the vehicle's max_acceleration is {limit:g} m/s^2",
-            "lower the autopilot's acceleration (WPNAV_ACCEL, MPC_ACC_HOR)",
-        )
+        told = {"acceleration": acceleration[worst], "time": track.t[worst], "limit": limit}
+        yield at(int(track.item[worst]), **told)
+
+
+def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, float]]:
+    """Yield the legs before and after each plain waypoint that is passed, and the turn, rad."""
+    # A return to launch starts from a stop.
+    legs = (leg for leg in _long_legs(context) if not leg.jump and leg.end.index != HOME)
+    for before, after in pairwise(legs):
+        item = context.items[before.index]
+        passed = item.command == Command.NAV_WAYPOINT and not item.params[0] > 0
+        if passed and after.start == before.end and not after.spline:
+            yield before, after, before.turn(after)
+
+
+@checks("sharp-corners")
+def _(context: ValidationContext) -> Hits:
+    at_speed = [
+        (math.degrees(turn), leg) for leg, _, turn in _corners(context) if leg.speed > _SLOW
+    ]
+    sharp = [(turn, leg) for turn, leg in at_speed if turn > SHARP]
+    if sharp:
+        turn, leg = max(sharp, key=lambda corner: corner[0])
+        slow, passing = "", context.vehicle.type.corner_speed
+        if passing is not None:
+            slow = f", passed at about {passing(context.vehicle, math.radians(turn)):.1f} m/s"
+        count = "1 corner" if len(sharp) == 1 else f"{len(sharp)} corners"
+        yield at(leg.index, count=count, turn=turn, speed=leg.speed, slow=slow)
+
+
+@checks("turn-too-tight")
+def _(context: ValidationContext) -> Hits:
+    bank = context.vehicle.value("roll_limit")
+    for before, after, turn in _corners(context):
+        radius = before.speed * before.speed / (GRAVITY * math.tan(bank))
+        needed = radius * math.tan(min(turn, math.radians(179)) / 2)
+        room = min(before.length, after.length)
+        if needed > room:
+            told = {"turn": math.degrees(turn), "speed": before.speed, "bank": math.degrees(bank)}
+            yield at(before.index, **told, needed=needed, room=room)
+
+
+@checks("steep-leg")
+def _(context: ValidationContext) -> Hits:
+    climb, descent = (context.vehicle.value(each) for each in ("climb_speed", "descent_speed"))
+    waypoints = {k for k, _ in context.each(Command.NAV_WAYPOINT)}
+    for leg in _long_legs(context):
+        way, limit = ("climbs", climb) if leg.rise > 0 else ("descends", descent)
+        level, vertical = leg.length / leg.speed, abs(leg.rise) / limit
+        steep = math.isfinite(vertical) and level < _CLIMB_SHARE * vertical
+        if steep and leg.index in waypoints and leg.start.index != HOME:
+            told = {"way": way, "rise": abs(leg.rise), "length": leg.length, "limit": limit}
+            slower = leg.length / vertical
+            yield at(
+                leg.index, **told, vertical=vertical, level=level, speed=leg.speed, slower=slower
+            )

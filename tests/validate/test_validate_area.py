@@ -48,8 +48,7 @@ def distance_to_segment(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> floa
 
 
 def broken(case: ValidationContext) -> list[bool]:
-    assert case.fence is not None
-    return [bool(leaves) for leaves in case.fence.broken_legs.any]
+    return [bool(leaves) for leaves in case.fences[0].legs.leave]
 
 
 @given(a=places, b=places, center=places, radius=st.floats(1, 300))
