@@ -173,7 +173,7 @@ class Stream(Watch):
             return ()
         lean = beyond_lean(self._solution, self._solution.plan.aircraft)
         if lean is not None:
-            self.seen.told.append(str(lean))
+            self.seen.told.append(lean)
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
         self.phase = "engaging"
         if self._rules.takes_off_by_setpoints:

@@ -18,7 +18,7 @@ _MODULES = (ardupilot, delivery, extent, fences, items, px4, speeds)
 RULES = tuple(rules_of({name: each for module in _MODULES for name, each in module.checks.items()}))
 """All rules, in the order of their table, in which findings about one item are given."""
 
-_ORDER = {Level.ERROR: 0, Level.WARNING: 1, Level.NOTE: 2}
+_WORST_FIRST = list(Level)
 
 
 def validate(
@@ -45,7 +45,6 @@ def validate(
     ['empty']
     """
     context = ValidationContext(mission, vehicle, track, limits or Limits(), link, airborne, energy)
-    found = [
-        finding for rule in RULES if rule.applies_to(vehicle) for finding in rule.findings(context)
-    ]
-    return tuple(sorted(found, key=lambda f: (_ORDER[f.level], -1 if f.item is None else f.item)))
+    about = (rule for rule in RULES if rule.applies_to(vehicle))
+    found = (finding for rule in about for finding in rule.findings(context))
+    return tuple(sorted(found, key=lambda f: (_WORST_FIRST.index(f.level), f.item or 0)))

@@ -74,13 +74,7 @@ def check(
         energy = energy_use(solution.plan, track, wind)
     airborne = solution is not None and not solution.plan.mission.takeoff
     findings = validate(
-        mission,
-        vehicle,
-        track=track,
-        limits=limits,
-        link=link,
-        airborne=airborne,
-        energy=energy,
+        mission, vehicle, track=track, limits=limits, link=link, airborne=airborne, energy=energy
     )
     return Check(mission, vehicle, track, unpredicted, link, findings, wind, energy, prediction)
 

@@ -14,6 +14,7 @@ from faao_mav.schedule.initial_route import begins_at_speed, set_out
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.schedule.schedule import passing, positions_at
 from faao_mav.schedule.timing import MOST_LEAD
+from faao_mav.validate.context import positions_in
 from faao_mav.validate.demands import LinkCheck, Stretch
 from faao_mav.vector import distances_to_path, lengths
 
@@ -32,16 +33,11 @@ _LEAST = 1e-6
 def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Prediction]:
     """Return what the flight `track` makes of the plan that `solution` solves.
 
-    The plan's clock is put on the flight's: the plan begins when the flight leaves the item nearest
-    to w_I, or up to `MOST_LEAD` later, for that lead for which plan and flight are closest at equal
-    times, rms: a mission does not say its lead. So is the item, where several are as near. A plan
-    that begins at speed does when the flight passes w_I. A flight that is nowhere near the plan is
-    compared all the same.
+    A flight that is nowhere near the plan is compared all the same.
     """
     t, w = on_the_plans_clock(solution, track)
-    flown = price_flight(solution, t, w)
+    flown, plan = price_flight(solution, t, w), solution.plan
     during = np.interp(solution.t, t, track.position[:, 2])
-    plan = solution.plan
     link = LinkCheck(
         planned_rate=solution.rates.R_avg,
         predicted_rate=flown.rates.R_avg,
@@ -66,24 +62,19 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
 def on_the_plans_clock(solution: Solution, track: Track) -> tuple[Real, Real]:
     """Return times (k,), s, and positions (k, 2), m, of `track` on the plan's clock, in its frame.
 
-    How the clock is put: see `compare_with_plan`.
+    The plan begins when the flight leaves the item nearest to w_I, or up to `MOST_LEAD` later, for
+    that lead for which plan and flight are closest at equal times, rms: a mission does not say its
+    lead. So is the item, where several are as near. A plan that begins at speed does when the
+    flight passes w_I.
     """
-    w = _in_frame_of(solution, track)
+    origin = solution.plan.origin
+    w = positions_in(LocalFrame(origin.latitude, origin.longitude), track)[:, :2]
     return track.t - _start(solution, track, w), w
 
 
-def _in_frame_of(solution: Solution, track: Track) -> Real:
-    """Return the positions (k, 2) of `track` in the plan's local metres."""
-    own = LocalFrame(solution.plan.origin.latitude, solution.plan.origin.longitude)
-    if track.frame == own:
-        return track.position[:, :2]
-    return own.to_local(*track.frame.to_geodetic(track.position[:, :2]))
-
-
 def _start(solution: Solution, track: Track, w: Real) -> float:
-    """Return the time, s, on the clock of `track` at which the plan begins."""
+    """Return the time, s, on the clock of `track`, at `w` (k, 2), m, at which the plan begins."""
     waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
-    moving = waited == 0 and begins_at_speed(solution.t, solution.w)
     left = track.reached[np.isfinite(track.reached)]
     if len(left) == 0:
         return float(track.t[0])
@@ -95,9 +86,9 @@ def _start(solution: Solution, track: Track, w: Real) -> float:
         return float(np.mean(np.sum((at - solution.w) ** 2, axis=1)))
 
     nearest = min(map(float, near), key=apart)
-    if moving:
+    if waited == 0 and begins_at_speed(solution.t, solution.w):
         return passing(track.t, w, solution.w[0], nearest)
-    return min((nearest + each for each in map(float, _LEADS)), key=apart)
+    return min((nearest + lead for lead in map(float, _LEADS)), key=apart)
 
 
 def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
@@ -105,15 +96,12 @@ def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
     loss = _lost_in_slots(solution, flown)
     lost = np.concatenate([[0.0], np.cumsum(loss)]) / len(loss)
     # The sum from slot i to slot j - 1 is lost[j] - lost[i], the greatest over the least before.
-    least = np.minimum.accumulate(lost)
-    end = int(np.argmax(lost - least))
+    end = int(np.argmax(lost - np.minimum.accumulate(lost)))
     begin = int(np.argmin(lost[: end + 1]))
     if lost[end] - lost[begin] < _LEAST:
         return None
-    step = float(solution.t[1] - solution.t[0])
-    return Stretch(
-        float(solution.t[begin]), float(solution.t[end - 1]) + step, float(lost[end] - lost[begin])
-    )
+    ends = solution.t[end - 1] + solution.t[1] - solution.t[0]
+    return Stretch(float(solution.t[begin]), float(ends), float(lost[end] - lost[begin]))
 
 
 def _lost_in_slots(solution: Solution, flown: Prediction) -> Real:
@@ -130,4 +118,4 @@ def _lost_in_slots(solution: Solution, flown: Prediction) -> Real:
     emptied = int(np.flatnonzero(flown.relayed.forwarded >= flown.relayed.queue)[-1])
     loss = np.where(np.arange(len(in_first)) < emptied, in_first, in_second)
     loss[emptied] = 0.0
-    return np.asarray(loss)
+    return loss

@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -61,6 +62,40 @@ class ValidationContext:
         """Index and command of the items that fly, in order."""
         return ((k, item.command) for k, item in enumerate(self.items) if item.command <= NAV_LAST)
 
+    @property
+    def jumps(self) -> Iterator[tuple[int, MissionItem, int | None]]:
+        """Index of each jump, the item, and the index that it goes to; None: there is none."""
+        return ((k, item, jump_target(self.items, k)) for k, item in self.each(*JUMPS))
+
+    @cached_property
+    def stored(self) -> tuple[tuple[int, MissionItem, MissionItem], ...]:
+        """Index of the items that the vehicle takes, the item, and what it gives back for it."""
+        dialect = self.vehicle.type.dialect
+        sent = ((k, item, dialect.sent(item)) for k, item in enumerate(self.items))
+        taken = (each for each in sent if fits_message(each[1]) and not dialect.refusal(each[2]))
+        return tuple((k, item, dialect.stored(own)) for k, item, own in taken)
+
+    def parameter(self, key: str) -> tuple[float, str]:
+        """Return the value of the vehicle's parameter `key`, and the name that sets it."""
+        return self.vehicle.value(key), self.vehicle.name_of(key)
+
+    @cached_property
+    def changes(self) -> tuple[SpeedChange | None, ...]:
+        """What each item changes about the speed."""
+        change, its = self.vehicle.type.dialect.speed_change, Command.DO_CHANGE_SPEED
+        return tuple(change(item) if item.command == its else None for item in self.items)
+
+    @cached_property
+    def speeds(self) -> tuple[float, ...]:
+        """The speed over ground commanded for the leg to each item, m/s."""
+        cruise = self.vehicle.value("cruise_speed")
+        speed, speeds = cruise, []
+        for change in self.changes:
+            if change is not None and change.axis in ("horizontal", "airspeed"):
+                speed = cruise if change.speed is None else change.speed
+            speeds.append(speed)
+        return tuple(speeds)
+
     @cached_property
     def frame(self) -> LocalFrame | None:
         """The local frame: about home, else about the first place that it flies to."""
@@ -82,42 +117,59 @@ class ValidationContext:
         """
         if self.frame is None:
             return ()
-        here = (0.0, 0.0)
         dialect = self.vehicle.type.dialect
-        indices = [k for k, item in enumerate(self.items) if self._is_place(item)]
-        local = self.frame.to_local(
-            [self.items[k].x for k in indices], [self.items[k].y for k in indices]
-        )
-        places = []
-        for k, (east, north) in zip(indices, local.tolist(), strict=True):
-            item = self.items[k]
-            if at_zero(item):
-                if not dialect.zero_means_here:
-                    continue
-            elif math.isfinite(east) and math.isfinite(north):  # not so at the antipode
+        placed = [
+            (k, item)
+            for k, item in self.each(*FLOWN_TO)
+            if abs(item.x) <= 90
+            and abs(item.y) <= 180
+            and (item.frame != Frame.MISSION or dialect.placed_in_mission_frame)
+            and (dialect.zero_means_here or not at_zero(item))
+        ]
+        local = self.frame.to_local([item.x for _, item in placed], [item.y for _, item in placed])
+        here, places = (0.0, 0.0), []
+        for (k, item), (east, north) in zip(placed, local.tolist(), strict=True):
+            if not at_zero(item):
                 here = (east, north)
-            else:
-                continue
-            places.append(PlacedItem(k, *here, self.height(item)))
+            if all(map(math.isfinite, here)):  # not so at the antipode
+                places.append(PlacedItem(k, *here, self.height(item)))
         return tuple(places)
 
     def places_of(self, commands: Collection[int]) -> Iterator[PlacedItem]:
         """Yield the places of the items with one of `commands`."""
         return (each for each in self.places if self.items[each.index].command in commands)
 
-    def _is_place(self, item: MissionItem) -> bool:
-        if item.command not in FLOWN_TO or not on_earth(item):
-            return False
-        return item.frame != Frame.MISSION or self.vehicle.type.dialect.placed_in_mission_frame
-
     def height(self, item: MissionItem) -> float:
         """Return metres above home to `item`, NaN where nothing tells them."""
         if item.frame in ABOVE_HOME:
             return item.z
         above_sea = item.frame in ABOVE_SEA or item.frame == Frame.MISSION
-        if above_sea and self.mission.home is not None:
-            return item.z - self.mission.home.altitude
-        return math.nan
+        home = self.mission.home
+        return item.z - home.altitude if above_sea and home is not None else math.nan
+
+    @cached_property
+    def orbits(self) -> dict[int, Orbit]:
+        """How the vehicle circles, by the index of the item."""
+        own = self.vehicle.type
+        found = {k: own.orbits(self.vehicle, own.dialect.sent(i)) for k, i in self.each(*FLOWN_TO)}
+        return {k: orbit for k, orbit in found.items() if orbit is not None}
+
+    @cached_property
+    def circles(self) -> dict[int, Real]:
+        """The outlines (k, 2), m, of circles by the index of their item.
+
+        What cannot hover circles where a return ends, and where a mission without an end does.
+        """
+        placed = (place for place in self.places if place.index in self.orbits)
+        circles = {place.index: self.orbits[place.index].outline(place.ground) for place in placed}
+        unlimited = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL)
+        waiting = self.vehicle.type.orbits(self.vehicle, unlimited)
+        for last in self.legs[-1:] if waiting is not None else ():
+            returns = self.items[last.index].command == Command.NAV_RETURN_TO_LAUNCH
+            ends = self.items[last.index].command in LANDINGS or last.jump
+            if waiting and (returns or not (ends or last.end.index in self.orbits)):
+                circles[last.index] = waiting.outline(last.end.ground)
+        return circles
 
     @cached_property
     def legs(self) -> tuple[Straight, ...]:
@@ -126,34 +178,27 @@ class ValidationContext:
         They lead to circles and away from them at their nearest places. A return to launch ends at
         home, or at the rally point that the vehicle chooses.
         """
-        return tuple(self._legs())
+        return tuple(
+            replace(leg, start=self._edge(leg.start, leg.end), end=self._edge(leg.end, leg.start))
+            for leg in self._legs()
+        )
 
-    @cached_property
-    def orbits(self) -> dict[int, Orbit]:
-        """How the vehicle circles, by the index of the item."""
-        own = self.vehicle.type
-        found = {k: self._orbit(own.dialect.sent(item)) for k, item in self.each(*FLOWN_TO)}
-        return {k: orbit for k, orbit in found.items() if orbit is not None}
-
-    def _orbit(self, item: MissionItem) -> Orbit | None:
-        return self.vehicle.type.orbits(self.vehicle, item)
-
-    def _circles(self) -> Iterator[tuple[int, Real]]:
-        """Yield the outlines (k, 2), m, of circles by the index of their item.
-
-        What cannot hover circles where a return ends, and where a mission without an end does.
-        """
-        for place in self.places:
-            if place.index in self.orbits:
-                yield place.index, self.orbits[place.index].outline(place.ground)
-        waiting = self._orbit(MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL))
-        if waiting is None or not self.legs:
-            return
-        last = self.legs[-1]
-        returns = self.items[last.index].command == Command.NAV_RETURN_TO_LAUNCH
-        ends = self.items[last.index].command in LANDINGS or last.jump
-        if returns or not (ends or last.end.index in self.orbits):
-            yield last.index, waiting.outline(last.end.ground)
+    def _legs(self) -> Iterator[Straight]:
+        """Yield the straights between the centres of circles."""
+        by_index = {place.index: place for place in self.places}
+        targets = {k: target for k, _, target in self.jumps if target is not None}
+        here = self.home
+        for k, item in enumerate(self.items):
+            speed, place = self.speeds[k], by_index.get(k)
+            if here is not None and place is not None:
+                spline = item.command == Command.NAV_SPLINE_WAYPOINT
+                yield Straight(k, here, place, speed, spline=spline)
+            elif here is not None and self.home and item.command == Command.NAV_RETURN_TO_LAUNCH:
+                yield Straight(k, here, self._returns_to(here, self.home), speed)
+            elif here is not None and k in targets:
+                after = (place for place in self.places if place.index >= targets[k])
+                yield from (Straight(k, here, end, speed, jump=True) for end in islice(after, 1))
+            here = place or here
 
     def _edge(self, place: PlacedItem, towards: PlacedItem) -> PlacedItem:
         """Return where a straight from `towards` meets the circle at `place`; it, without one."""
@@ -163,85 +208,13 @@ class ValidationContext:
         east, north = orbit.edge(place.ground, towards.ground).tolist()
         return replace(place, east=east, north=north)
 
-    def _legs(self) -> Iterator[Straight]:
-        by_index = {place.index: place for place in self.places}
-        here = self.home
-        for k, item in enumerate(self.items):
-            speed = self.speeds[k]
-            place = by_index.get(k)
-            if place is not None:
-                if here is not None:
-                    spline = item.command == Command.NAV_SPLINE_WAYPOINT
-                    yield self._straight(k, here, place, speed, spline=spline)
-                here = place
-            elif here is None:
-                continue
-            elif item.command == Command.NAV_RETURN_TO_LAUNCH:
-                if self.home is not None:
-                    yield self._straight(k, here, self._returns_to(here, self.home), speed)
-            elif item.command in JUMPS:
-                target = self.jump_target(k)
-                reached = range(len(self.items))[target:] if target is not None else ()
-                after = next((by_index[j] for j in reached if j in by_index), None)
-                if after is not None:
-                    yield self._straight(k, here, after, speed, jump=True)
-
-    def _straight(
-        self, index: int, start: PlacedItem, end: PlacedItem, speed: float, **how: bool
-    ) -> Straight:
-        return Straight(index, self._edge(start, end), self._edge(end, start), speed, **how)
-
     def _returns_to(self, here: PlacedItem, home: PlacedItem) -> PlacedItem:
         """Return where a return from `here` ends, at a height that nothing tells."""
         assert self.frame is not None
         rally = [self.frame.to_local(p.latitude, p.longitude) for p in self.mission.rally]
-        rule = self.vehicle.type.rally(self.vehicle)
-        chosen = rule.chosen(here.ground, home.ground, rally)
-        if chosen is None:
-            return replace(home, up=math.nan)
-        east, north = rally[chosen].tolist()
-        return PlacedItem(home.index, east, north, math.nan)
-
-    @cached_property
-    def stored(self) -> tuple[tuple[int, MissionItem, MissionItem], ...]:
-        """Index of the items that the vehicle takes, the item, and what it gives back for it."""
-        dialect = self.vehicle.type.dialect
-        sent = ((k, item, dialect.sent(item)) for k, item in enumerate(self.items))
-        return tuple(
-            (k, item, dialect.stored(own))
-            for k, item, own in sent
-            if fits_message(item) and not dialect.refusal(own)
-        )
-
-    @property
-    def jumps(self) -> Iterator[tuple[int, MissionItem, int | None]]:
-        """Index of each jump, the item, and the index that it goes to; None: there is none."""
-        return ((k, item, self.jump_target(k)) for k, item in self.each(*JUMPS))
-
-    def jump_target(self, index: int) -> int | None:
-        """Return the index that the jump at `index` goes to, None if there is no such item."""
-        return jump_target(self.items, index)
-
-    @cached_property
-    def changes(self) -> tuple[SpeedChange | None, ...]:
-        """What each item changes about the speed."""
-        change, its = self.vehicle.type.dialect.speed_change, Command.DO_CHANGE_SPEED
-        return tuple(change(item) if item.command == its else None for item in self.items)
-
-    @cached_property
-    def speeds(self) -> tuple[float, ...]:
-        """The speed over ground commanded for the leg to each item, m/s."""
-        cruise = self.vehicle.value("cruise_speed")
-        speed, speeds = cruise, []
-        for change in self.changes:
-            if change is not None and change.axis in ("horizontal", "airspeed"):
-                speed = cruise if change.speed is None else change.speed
-            speeds.append(speed)
-        return tuple(speeds)
-
-    def parameter(self, key: str) -> tuple[float, str]:
-        """Return the value of the vehicle's parameter `key`, and the name that sets it."""
-        return self.vehicle.value(key), self.vehicle.name_of(key)
+        chosen = self.vehicle.type.rally(self.vehicle).chosen(here.ground, home.ground, rally)
+        east, north = (home.ground if chosen is None else rally[chosen]).tolist()
+        return PlacedItem(HOME, east, north, math.nan)
 
     @cached_property
     def fences(self) -> tuple[FenceMap, ...]:
@@ -250,7 +223,7 @@ class ValidationContext:
             return ()
         any_inclusion = self.vehicle.type.fence_needs_one_inclusion(self.vehicle)
         flown = (self.track_positions, self.track.item if self.track is not None else None)
-        ways = (self.legs, dict(self._circles()), *flown)
+        ways = (self.legs, self.circles, *flown)
         return (fence_map(self.mission.fence, self.frame, any_inclusion, *ways),)
 
     @cached_property
@@ -258,21 +231,15 @@ class ValidationContext:
         """The track's positions (n, 3) in the local frame, or None without a track."""
         if self.track is None or self.frame is None:
             return None
-        if self.track.frame == self.frame:
-            return self.track.position
-        latitude, longitude = self.track.frame.to_geodetic(self.track.position[:, :2])
-        ground = self.frame.to_local(latitude, longitude)
-        return np.column_stack([ground, self.track.position[:, 2]])
+        return positions_in(self.frame, self.track)
 
 
-def number(index: int) -> int:
-    """Return the number of the item at `index` that people see."""
-    return index + 1
-
-
-def on_earth(item: MissionItem) -> bool:
-    """Say whether x and y are a latitude and a longitude."""
-    return abs(item.x) <= 90 and abs(item.y) <= 180
+def positions_in(frame: LocalFrame, track: Track) -> Real:
+    """Return the positions (n, 3), m, of `track` in another `frame`."""
+    if track.frame == frame:
+        return track.position
+    ground = frame.to_local(*track.frame.to_geodetic(track.position[:, :2]))
+    return np.column_stack([ground, track.position[:, 2]])
 
 
 def at_zero(item: MissionItem) -> bool:

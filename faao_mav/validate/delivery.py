@@ -68,16 +68,16 @@ def _(context: ValidationContext) -> Hits:
 
 @checks("link-path")
 def _(context: ValidationContext) -> Hits:
-    far = (x for x in _links(context) if x.path_error > x.path_tolerance + PATH_ALLOWANCE)
-    return (at(link=link) for link in far)
+    for link in _links(context):
+        if link.path_error > link.path_tolerance + PATH_ALLOWANCE:
+            yield at(link=link)
 
 
 @checks("link-late")
 def _(context: ValidationContext) -> Hits:
     for link in _links(context):
-        late = link.predicted_duration - link.planned_duration
-        if late > max(LATE, LATE_PERCENT / 100 * link.planned_duration):
-            yield at(link=link, late=late)
+        if link.late > max(LATE, LATE_PERCENT / 100 * link.planned_duration):
+            yield at(link=link)
 
 
 @checks("link-apart")
@@ -92,6 +92,4 @@ def _(context: ValidationContext) -> Hits:
 
 @checks("link-timing")
 def _(context: ValidationContext) -> Hits:
-    for link in _links(context):
-        late = link.predicted_duration - link.planned_duration
-        yield at(link=link, late=late, percent=100 * link.share)
+    return (at(link=link, percent=100 * link.share) for link in _links(context))

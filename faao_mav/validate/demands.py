@@ -81,6 +81,11 @@ class LinkCheck:
         return self.away > ELSEWHERE
 
     @property
+    def late(self) -> float:
+        """By how many seconds the predicted flight takes longer than planned."""
+        return self.predicted_duration - self.planned_duration
+
+    @property
     def predicted_mbytes(self) -> float | None:
         """What is predicted to be delivered in all, 10^6 bytes; None without a bandwidth."""
         if self.bandwidth_mhz is None:
@@ -93,10 +98,6 @@ class LinkCheck:
 
         It is the delivered rate. A plan for R_avg promises that as well: the smaller part counts.
         """
-        delivered = _part(self.predicted_delivered, self.planned_delivered)
-        average = _part(self.predicted_rate, self.planned_rate)
-        return delivered if self.causal else min(delivered, average)
-
-
-def _part(predicted: float, planned: float) -> float:
-    return predicted / planned if planned > 0 else 1.0
+        rates = [(self.predicted_delivered, self.planned_delivered)]
+        rates += [] if self.causal else [(self.predicted_rate, self.planned_rate)]
+        return min(flown / planned if planned > 0 else 1.0 for flown, planned in rates)

@@ -58,13 +58,12 @@ def energy_use(plan: Plan, track: Track, wind: Vector) -> EnergyUse | None:
     The velocities are those through the air, which moves with `wind`, m/s. The relay's transmit
     power counts for as long as the flight lasts.
     """
-    model = plan.power_model
+    model, relay = plan.power_model, plan.radio.relay.power
     if model is None or len(track.t) < 2:
         return None
     air = track.velocity - np.array([*wind, 0.0])
-    acceleration = np.gradient(air, track.t, axis=0)
-    power = model(air, acceleration) + plan.radio.relay.power
-    least = model.least_power(_AIRSPEEDS)[1] + plan.radio.relay.power
+    power = model(air, np.gradient(air, track.t, axis=0)) + relay
     steps = np.diff(track.t) * (power[1:] + power[:-1]) / 2
     used = np.concatenate([[0.0], np.cumsum(steps)]) / JOULES_PER_WH
+    least = model.least_power(_AIRSPEEDS)[1] + relay
     return EnergyUse(track.t, power, used, plan.vehicle.battery, track.lands, least)

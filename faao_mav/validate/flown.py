@@ -39,7 +39,6 @@ _METRES_PER_SECOND = 0.5
 """How many metres off the planned path weigh as much as a second before or after its time, where
 the path comes by a place more than once, or rests there: as for the end of a flight."""
 
-
 _AT_END, _AROUND_END = 5.0, 5.0
 """The relay flight ends within so many metres of w_F, and not more than so many seconds before its
 time. Chosen."""
@@ -104,12 +103,12 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     the plan's own, which setpoints follow. What the flight does later does not move the clock: who
     pauses on the way is late from there on.
     """
-    lines = (predicted, planned_line(solution))
-    found = filter(None, (_departure(solution, line, flight) for line in lines))
-    return min(found, default=(0.0, None))[1]
+    found = [_departure(solution, line, flight) for line in (predicted, planned_line(solution))]
+    off, start = min(found)
+    return start if off <= _ALIKE else None
 
 
-def _departure(solution: Solution, line: Line, flight: Line) -> tuple[float, float] | None:
+def _departure(solution: Solution, line: Line, flight: Line) -> tuple[float, float]:
     """Return the departure of `flight` that is most like that of `line`, as `plan_start` has it.
 
     How far it is from it, as a share of the way looked at, and when the clock of `line` read 0.
@@ -122,22 +121,21 @@ def _departure(solution: Solution, line: Line, flight: Line) -> tuple[float, flo
     end = float(line.t[after][np.argmax(away >= reach)])
     t = np.linspace(begin, end, max(2, round((end - begin) / 0.2)))
     w = positions_at(t, *line)
-
-    def apart(starts: Real) -> Real:
-        at = positions_at((starts[:, None] + t).ravel(), *flight).reshape(len(starts), *w.shape)
-        return np.asarray(np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1))
-
     first, last = float(flight.t[0]) - begin, float(flight.t[-1]) - end
     if last < first:
-        return None
+        return math.inf, 0.0
+
+    def nearest(starts: Real) -> tuple[float, float]:
+        """Return the least mean square distance of these `starts`, m², and the one that has it."""
+        at = positions_at((starts[:, None] + t).ravel(), *flight).reshape(len(starts), *w.shape)
+        squares = np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1)
+        return float(squares.min()), float(starts[np.argmin(squares)])
+
     coarse = np.arange(first, last + _COARSE, _COARSE)
-    blocks = np.array_split(coarse, 1 + len(coarse) * len(t) // _BLOCK)
-    near = coarse[np.argmin(np.concatenate([apart(block) for block in blocks]))]
+    near = min(map(nearest, np.array_split(coarse, 1 + len(coarse) * len(t) // _BLOCK)))[1]
     fine = np.clip(near + np.arange(-2 * _COARSE, 2 * _COARSE, _FINE), first, last)
-    errors = apart(fine)
-    best = int(np.argmin(errors))
-    off = math.sqrt(errors[best]) / reach
-    return (off, float(fine[best])) if off <= _ALIKE else None
+    square, start = nearest(fine)
+    return math.sqrt(square) / reach, start
 
 
 def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
@@ -146,15 +144,15 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
     It is priced as a predicted flight is (`price_flight`): as it was flown until now, and as it is
     predicted from where the plan stands.
     """
-    now, place = float(flight.t[-1]), flight.w[-1]
+    now, place, ends = float(flight.t[-1]), flight.w[-1], float(solution.t[-1])
     behind = late(solution, now, place)
     ahead = predicted.t + behind > now
     t = np.concatenate([flight.t, predicted.t[ahead] + behind])
     priced = price_flight(solution, t, np.concatenate([flight.w, predicted.w[ahead]]))
     step = float(solution.t[1] - solution.t[0])
     slot = int(np.clip(now / step, 0, len(solution.t) - 1))
-    forwarded = step * priced.relayed.forwarded
-    over = slot if now < solution.plan.flight.duration else len(solution.t)
+    forwarded, time_up = step * priced.relayed.forwarded, now >= solution.plan.flight.duration
+    around_end = flight.w[flight.t >= ends - _AROUND_END]
     return Standing(
         time=now,
         late=behind,
@@ -162,9 +160,9 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
         astray=float(distances_to_path(place[None], solution.w)[0]),
         I_U=float(priced.I_U[slot]),
         I_G=float(priced.I_G[slot]),
-        delivered=float(forwarded[:over].sum()),
+        delivered=float(forwarded[: None if time_up else slot].sum()),
         expected=float(forwarded.sum()),
-        over=now >= solution.plan.flight.duration and _has_arrived(solution, flight),
+        over=time_up and bool((lengths(around_end - solution.w[-1]) < _AT_END).any()),
     )
 
 
@@ -185,12 +183,6 @@ def debriefing(
         missing=max(0.0, float(solution.t[-1] - t[-1])),
         altitude_error=float(np.abs(during - solution.plan.flight.altitude).max()),
     )
-
-
-def _has_arrived(solution: Solution, flight: Line) -> bool:
-    """Tell whether `flight`, on the plan's clock, has come to w_F when it should, or later."""
-    due = flight.t >= solution.t[-1] - _AROUND_END
-    return bool((lengths(flight.w[due] - solution.w[-1]) < _AT_END).any())
 
 
 def late(solution: Solution, now: float, place: Real) -> float:

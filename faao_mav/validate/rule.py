@@ -41,20 +41,14 @@ class Finding:
     action: str
 
 
-@dataclass(frozen=True, slots=True)
-class Hit:
-    """Where a rule holds: at the index of an item in `Mission.items`, or at none.
-
-    `values` go into the texts of the rule, by their names.
-    """
-
-    index: int | None
-    values: Mapping[str, object]
+Hit: TypeAlias = tuple[int | None, Mapping[str, object]]
+"""Where a rule holds: the index of an item in `Mission.items`, None for none, and the values that
+go into the rule's texts, by their names."""
 
 
 def at(index: int | None = None, **values: object) -> Hit:
-    """Return that a rule holds at the item `index`, None for no single item."""
-    return Hit(index, values)
+    """Return that a rule holds at the item `index`, with `values`."""
+    return index, values
 
 
 Hits: TypeAlias = Iterable[Hit]
@@ -89,11 +83,10 @@ class Rule:
 
     def findings(self, context: "ValidationContext") -> Iterator[Finding]:
         """Yield what the rule finds in `context`."""
-        for hit in self.check(context):
-            values = {**self.check.__globals__, **hit.values}
-            item = None if hit.index is None else hit.index + 1
-            says, do = (text.format_map(values) for text in (self.says or self.summary, self.do))
-            yield Finding(self.level, self.id, item, says, do)
+        for index, values in self.check(context):
+            told = {**self.check.__globals__, **values}
+            says, do = (text.format_map(told) for text in (self.says or self.summary, self.do))
+            yield Finding(self.level, self.id, None if index is None else index + 1, says, do)
 
 
 class Checks(dict[str, Check]):

@@ -16,9 +16,10 @@ def count_of(findings: Sequence[Finding], level: Level) -> str:
 
 def by_rule(findings: Sequence[Finding]) -> Iterator[list[Finding]]:
     """Yield the findings with those of one rule together, in the order of the first of each."""
-    order = {finding.rule: n for n, finding in reversed(list(enumerate(findings)))}
-    for _, group in groupby(sorted(findings, key=lambda f: order[f.rule]), lambda f: f.rule):
-        yield list(group)
+    groups: dict[str, list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault(finding.rule, []).append(finding)
+    yield from groups.values()
 
 
 def line_of(group: Sequence[Finding]) -> str:
@@ -43,15 +44,12 @@ def message_of(group: Sequence[Finding]) -> str:
 def items_of(group: Sequence[Finding]) -> str:
     """Return the items' numbers, runs as `4-9`; nothing where it is about no item."""
     numbers = sorted({finding.item for finding in group if finding.item is not None})
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    shown = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
+    shown = []
+    for _, run in groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
+        first, *rest = (number for _, number in run)
+        shown.append(f"{first}-{rest[-1]}" if rest else str(first))
     if len(shown) > _MAX_RUNS_SHOWN:
-        shown = [*shown[:_MAX_RUNS_SHOWN], "..."]
+        shown[_MAX_RUNS_SHOWN:] = ["..."]
     return ", ".join(shown)
 
 
