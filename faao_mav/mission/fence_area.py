@@ -33,10 +33,6 @@ _BAR, _INTO = 0.01, 5.0
 """Half the width of a bar across the area, and how far it begins inside the obstacle, m. Chosen:
 the bar has to meet the obstacle, from which a way may keep some metres."""
 
-_MOST_CROSSING = 100
-"""The corners of the largest outline that may cross itself, an error in any case. Chosen: each pair
-of edges may cross, and the parts that 100 make take 0.2 s, those of 400 two seconds and 190 MB."""
-
 FARTHEST = 1e6
 """Half the side, m, of the square that stands for the plane where a fence has no inclusion."""
 
@@ -47,9 +43,8 @@ class Area:
 
     Circles become polygons, inside the circle for inclusions and outside for exclusions, so that
     what is found to stay within the fence does so. `crosses_itself`: its outline does; what counts
-    as inside is then what an odd number of outlines encloses, as the autopilots count, and of an
-    outline of more than `_MOST_CROSSING` corners the safe side: nothing, or all of an exclusion.
-    `disc` is the center and the radius of a circle.
+    as inside is then what an odd number of turns encloses, as the autopilots count. `disc` is the
+    center and the radius of a circle.
     """
 
     name: str
@@ -67,10 +62,7 @@ def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
     for name, polygon in zip(_names(fence.polygons, "polygon"), fence.polygons, strict=True):
         outline = shapely.Polygon(frame.to_local(*np.transpose(polygon.vertices)))
         crosses = not shapely.is_valid(outline)
-        if crosses and len(polygon.vertices) > _MOST_CROSSING:
-            shape = shapely.Polygon() if polygon.inclusion else outline.convex_hull
-        else:
-            shape = _enclosed(outline) if crosses else outline
+        shape = _enclosed(outline) if crosses else outline
         areas.append(Area(name, polygon.inclusion, shape, crosses))
     for name, circle in zip(_names(fence.circles, "circle"), fence.circles, strict=True):
         east, north = map(float, frame.to_local(*circle.center))

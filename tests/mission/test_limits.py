@@ -1,6 +1,7 @@
 """What no autopilot keeps is refused by every format, at the same count, in one line."""
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -116,6 +117,50 @@ def test_a_fence_has_one_limit_in_all_formats(
         with pytest.raises(InputError, match=rf"x\.(fence\.)?[a-z]+: fence: {told}") as caught:
             read(path)
         assert "\n" not in str(caught.value)
+
+
+def comb(teeth: int, *, across: bool) -> tuple[LatLon, ...]:
+    """Return the corners of a comb of 200 m; its teeth cross each of one `across` four times."""
+    corners = [(-35.361, 149.17)]
+    for k in range(teeth):
+        near, far = -35.361 + 0.002 * k / teeth, -35.361 + 0.002 * (k + 0.5) / teeth
+        corners += [(near, 149.171), (near, 149.173), (far, 149.173), (far, 149.171)]
+    corners.append((-35.359, 149.17))
+    return tuple((b - 184.532, a + 184.532) for a, b in corners) if across else tuple(corners)
+
+
+@pytest.mark.parametrize("write", FORMATS)
+def test_areas_that_cross_everywhere_are_refused_in_all_formats(
+    write: Callable[[Zones, Path], Path], tmp_path: Path
+) -> None:
+    read, tangled = FORMATS[write], (comb(249, across=False), comb(249, across=True))
+    with pytest.raises(InputError, match=r"its outlines cross at more than 50,000 places"):
+        read(write(tangled, tmp_path))
+    if write is not as_yaml:  # such a plan leaves no way
+        read(write((comb(100, across=False), comb(100, across=True)), tmp_path))
+
+
+def test_the_parts_of_a_drawing_that_cross_everywhere_are_not_joined(tmp_path: Path) -> None:
+    parts = [
+        [[list(place[::-1]) for place in comb(249, across=across)]] for across in (True, False)
+    ]
+    geometry = {"type": "MultiPolygon", "coordinates": parts}
+    feature = {"type": "Feature", "properties": {"name": "field"}, "geometry": geometry}
+    (tmp_path / "x.geojson").write_text(json.dumps(feature))
+    with pytest.raises(InputError, match=r"x\.geojson: geometry: fence: its outlines cross at"):
+        read_fence(tmp_path / "x.geojson")
+
+
+def test_circles_and_outlines_that_cross_themselves_count_too() -> None:
+    star = [(math.cos(2.4 * k) / 1e3, math.sin(2.4 * k) / 1e3) for k in range(100)]
+    assert Fence((Polygon(tuple(star), False),) * 3)
+    with pytest.raises(InputError, match="cross at more than 50,000 places"):
+        Fence((Polygon(tuple(star), False),) * 81)
+    teeth = Polygon(comb(1_000, across=False), False)
+    circles = tuple(Circle((-35.36, 149.172), 50.0 + k / 10, False) for k in range(100))
+    assert Fence((teeth,), circles[:5])
+    with pytest.raises(InputError, match="cross at more than 50,000 places"):
+        Fence((teeth,), circles)
 
 
 def test_each_kind_of_area_is_counted_by_itself() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from faao_mav.errors import InputError, MissionFileError, quote
-from faao_mav.mission.fence import Fence, LatLon, Polygon
+from faao_mav.mission.fence import Fence, LatLon, Polygon, check_outlines
 
 _NOT_DENIED = r"(?<!\bnot )(?<!\bnon )(?<!\bun )\b"
 
@@ -160,6 +160,7 @@ def _joined(parts: list[tuple[Ring, Sequence[Ring]]]) -> list[tuple[Ring, Sequen
         return parts
     import shapely
 
+    check_outlines([Polygon(_open(r), True) for outline, holes in parts for r in (outline, *holes)])
     first = parts[0][0][0][1]
 
     def flat(ring: Ring) -> list[tuple[float, float]]:
@@ -167,8 +168,6 @@ def _joined(parts: list[tuple[Ring, Sequence[Ring]]]) -> list[tuple[Ring, Sequen
 
     shapes = []
     for outline, holes in parts:
-        for ring in (outline, *holes):
-            Polygon(_open(ring), True)  # three corners on Earth
         shapes.append(shapely.Polygon(flat(outline), [flat(hole) for hole in holes]))
         if not shapely.is_valid(shapes[-1]):
             raise MissionFileError("a part crosses or touches itself; put its corners in order")
