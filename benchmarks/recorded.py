@@ -66,7 +66,7 @@ def wind_of(name: str) -> Wind:
 
 def read(folder: Path, name: str, *, home_row: bool) -> Recorded:
     """Read a mission and its track; `home_row`: whether the current item counts home as 0."""
-    mission = read_wpl((folder / f"{mission_of(name)}.waypoints").read_text(), name).mission
+    mission = read_wpl((folder / f"{mission_of(name)}.waypoints").read_text()).mission
     assert mission.home is not None
     frame = LocalFrame(mission.home.latitude, mission.home.longitude)
     items, points, speeds, holds, radii, splines = [], [], [], [], [], []

@@ -5,10 +5,13 @@ The command line, the reports, the studies and Python users all call `plan_missi
 
 import time
 from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from faao_mav.arrays import Real
 from faao_mav.autopilot import autopilots
 from faao_mav.autopilot.files import parameter_path, plan_target
 from faao_mav.autopilot.predict import predict
@@ -17,6 +20,7 @@ from faao_mav.files import check_writable, write_together
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.formats import fence_path, render_files
 from faao_mav.mission.formats.beside import check_replaceable, comment_for, remove_outdated
+from faao_mav.mission.formats.kml import write_kml
 from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.optimizer.pricing import (
     FreshRates,
@@ -135,7 +139,7 @@ class Result:
         contents: dict[str | Path, bytes] = (
             {mission: draw_mission(self.solution, conversion).encode()}
             if drawn
-            else render_files(conversion.mission, mission, plan_target(conversion.vehicle))
+            else render_files(conversion.mission, mission, plan_target(conversion.vehicle)).contents
         )
         parameters = parameter_path(mission, plan.vehicle.autopilot)
         if parameters in beside:
@@ -380,27 +384,27 @@ def draw_mission(solution: Solution, conversion: Conversion) -> str:
 
     The flight begins at `DRAWING_START`.
     """
-    from faao_mav.mission.formats.kml import Station, TimedTrack, write_kml
-
     plan = solution.plan
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     ground = plan.origin.elevation
-    stations = []
-    for name, place in (
-        ("base station", plan.radio.base_station.position),
-        ("ground user", plan.radio.ground_user.position),
-    ):
-        latitude, longitude = frame.to_geodetic(place)
-        stations.append(Station(name, float(latitude), float(longitude), ground))
+    stations = {
+        "base station": plan.radio.base_station.position,
+        "ground user": plan.radio.ground_user.position,
+    }
     track = predict(
         conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP, wind=plan.wind
     )
-    latitudes, longitudes = frame.to_geodetic(track.position[:, :2])
-    heights = track.position[:, 2] + ground
-    spots = list(zip(latitudes.tolist(), longitudes.tolist(), heights.tolist(), strict=True))
+
+    def spots(places: Real) -> list[tuple[float, float, float]]:
+        latitudes, longitudes = frame.to_geodetic(places[:, :2])
+        heights = places[:, 2] + ground
+        return list(zip(latitudes.tolist(), longitudes.tolist(), heights.tolist(), strict=True))
+
+    moments = [DRAWING_START + timedelta(seconds=t) for t in track.t.tolist()]
+    places = np.array([(*place, 0.0) for place in stations.values()])
     return write_kml(
         conversion.mission,
         name=plan.name or "relay flight",
-        stations=stations,
-        track=TimedTrack(DRAWING_START, track.t.tolist(), spots),
+        stations=dict(zip(stations, spots(places), strict=True)),
+        flight=list(zip(moments, spots(track.position), strict=True)),
     )

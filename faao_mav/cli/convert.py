@@ -34,7 +34,6 @@ def convert(
     from faao_mav.mission.formats import (
         check_readable,
         check_suffix,
-        losses_in,
         read_mission_file,
         write_mission,
     )
@@ -49,12 +48,11 @@ def convert(
     told = told_vehicle(mission_file, read, None, None, (autopilot, None, None))
     vehicle = Vehicle(autopilot, kind) if autopilot else told[0] if told is not None else None
     target = plan_target(vehicle)
-    lost = losses_in(read.mission, out, target)
     written = write_mission(read.mission, out, target)
-    for line in (*read.warnings, *(f"{out}: {line}" for line in lost)):
+    for line in (*read.warnings, *(f"{out}: {line}" for line in written.lost)):
         note(line)
     items = len(read.mission.items)
     if as_json:
-        typer.echo(json.dumps({"items": items, "lost": lost, "written": str(out)}))
+        typer.echo(json.dumps({"items": items, "lost": written.lost, "written": str(out)}))
     else:
-        typer.echo(f"{items} items written to {' and '.join(map(str, written))}")
+        typer.echo(f"{items} items written to {' and '.join(map(str, written.contents))}")

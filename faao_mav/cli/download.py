@@ -42,7 +42,7 @@ def download(
     from faao_mav.autopilot.files import plan_target
     from faao_mav.cli.progress import transfer_progress
     from faao_mav.files import check_writable
-    from faao_mav.mission.formats import check_suffix, losses_in, write_mission
+    from faao_mav.mission.formats import check_suffix, write_mission
     from faao_mav.wire.client import holdings
 
     check_suffix(out)
@@ -62,14 +62,14 @@ def download(
     found, mission = held.vehicle, held.mission
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
     written = write_mission(mission, out, target)
-    for line in losses_in(mission, out, target):
+    for line in written.lost:
         note(f"{out}: {line}")
     areas = len(mission.fence.polygons) + len(mission.fence.circles)
     told = {"fence": f"{areas} fence areas", "rally points": f"{len(mission.rally)} rally points"}
     told |= {part: f"{part} not read" for part in mission.unread}
     typer.echo(f"vehicle      {found}")
     typer.echo(f"mission      {len(mission.items)} items, {', '.join(told.values())}")
-    for path in written:
+    for path in written.contents:
         typer.echo(f"written      {path}")
     for problem in held.problems:
         note(problem)

@@ -64,11 +64,16 @@ class MissionItem:
             raise InputError(f"mission item: frame {self.frame}; expected 0 to 255")
         if len(self.params) != 4:
             raise InputError(f"mission item: {len(self.params)} parameters; expected 4")
-        if any(map(math.isinf, (*self.params, self.x, self.y, self.z))):
+        if any(map(math.isinf, self.numbers)):
             raise InputError(
                 f"mission item: params {self.params}, x {self.x}, y {self.y}, z {self.z}; "
                 "expected finite numbers, or NaN for what is not set"
             )
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """All seven numbers: `params`, `x`, `y` and `z`."""
+        return (*self.params, self.x, self.y, self.z)
 
 
 BESIDE = ("fence", "rally points")

@@ -17,7 +17,7 @@ from faao_mav.fly.log_messages import messages
 from faao_mav.fly.record import FlightRecord
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import FreeArea, areas_of
-from faao_mav.mission.formats import losses_in, read_mission_file, render_mission
+from faao_mav.mission.formats import read_mission_file, render_files
 from faao_mav.mission.formats.fence_file import read_fence
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.optimizer.solution import load_solution, save_solution
@@ -128,10 +128,7 @@ def _logs() -> dict[str, bytes]:
 def _mission(path: Path) -> object:
     """Read a mission and write it in every format."""
     mission = read_mission_file(path).mission
-    return [
-        (render_mission(mission, f"out{ending}"), losses_in(mission, f"out{ending}"))
-        for ending in (".waypoints", ".plan", ".kml")
-    ]
+    return [render_files(mission, f"out{ending}") for ending in (".waypoints", ".plan", ".kml")]
 
 
 def _fence(path: Path) -> object:

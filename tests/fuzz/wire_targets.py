@@ -13,7 +13,7 @@ from faao_mav.cli.upload import as_dict
 from faao_mav.errors import FaaoError
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
-from faao_mav.mission.formats import losses_in, render_mission
+from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.serve import predicted
 from faao_mav.wire.client import UploadReport
@@ -158,8 +158,7 @@ def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
     if isinstance(outcome, Lists):
         mission = mission_of(outcome.items, peer.vehicle)
         for ending in (".waypoints", ".plan", ".kml"):
-            render_mission(mission, f"m{ending}")
-            losses_in(mission, f"m{ending}")
+            render_files(mission, f"m{ending}")
     elif isinstance(outcome, tuple):
         problems = tuple(explain(each, peer, 650, str) for each in outcome if not each.verified)
         report = UploadReport(found, outcome, 1.0, problems)

@@ -14,7 +14,7 @@ from faao_mav.mission.fence import MAX_CORNERS, Circle, Fence, LatLon, Polygon, 
 from faao_mav.mission.fence_items import fence_items
 from faao_mav.mission.formats import read_mission, write_mission
 from faao_mav.mission.formats.fence_file import read_fence
-from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
+from faao_mav.mission.formats.qgc_plan import read_qgc_plan
 from faao_mav.mission.item import MAX_ITEMS, Mission, MissionItem
 from faao_mav.plan import parse_plan, read_plan, yaml_text
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml
@@ -227,8 +227,8 @@ def test_endless_lists_of_a_plan_file_are_not_read_to_their_end(
     }[key]
     text = as_plan((), tmp_path).read_text()
     text = text[:-1] + ', "rallyPoints": {"version": 2, "points": []}}'
-    with pytest.raises(InputError, match=rf"x: {key}: more than {most:,} values"):
-        read_qgc_plan(text.replace(inside, inside + ", ".join([one] * (most + 1))), "x")
+    with pytest.raises(InputError, match=rf"{key}: more than {most:,} values"):
+        read_qgc_plan(text.replace(inside, inside + ", ".join([one] * (most + 1))))
 
 
 def test_a_plan_of_too_many_values_is_not_read_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,8 +5,8 @@ error that says how to tell.
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from faao_mav.errors import InputError, MissionFileError, quote
 from faao_mav.mission.fence import Fence, LatLon, Polygon, check_outlines
@@ -32,7 +32,8 @@ _FIELD = re.compile(
 """Whole words of a zone to stay in, where none of `_OUT` says what kind of one it is: "restricted
 field", "exclusion fence"."""
 
-_TRUE, _FALSE = ("true", "1", "yes"), ("false", "0", "no")
+_TRUTH = dict.fromkeys(("true", "1", "yes"), True) | dict.fromkeys(("false", "0", "no"), False)
+"""What words of a property say, in lower case."""
 
 _HOW = (
     "name it as an inclusion or an exclusion, or give it a property inclusion: true (stay in) or "
@@ -57,58 +58,66 @@ class DrawnZone:
     around: Sequence[str]
     parts: Sequence[Sequence[Ring]]
 
-    def polygons(self) -> list[Polygon]:
-        """Return the zone as polygons of a fence; holes of an inclusion are exclusions.
 
-        The parts of an inclusion are one area, which autopilots would intersect: they are joined.
-        Raises `MissionFileError` for a zone of which nothing tells whether to stay in or out, and
-        for an exclusion with a hole, which no autopilot has; `InputError` as `Polygon` does.
-        """
+def fence_of(zones: Iterable[DrawnZone]) -> Fence:
+    """Return the fence of `zones`; holes of an inclusion are exclusions.
+
+    The parts of an inclusion are one area, which autopilots would intersect: they are joined. The
+    fence's notes name the polygons without corners, passed over. Raises `MissionFileError` for a
+    zone of which nothing tells whether to stay in or out, and for an exclusion with a hole, which
+    no autopilot has; `InputError` as `Fence` does.
+    """
+    polygons: list[Polygon] = []
+    notes = []
+    for zone in zones:
+        parts = [[_open(ring) for ring in part] for part in zone.parts if part and part[0]]
+        if len(parts) < len(zone.parts):
+            name = f" {quote(zone.name)}" if zone.name else ""
+            notes.append(f"{zone.place}{name}: a polygon without corners, passed over")
         try:
-            inclusion = self._inclusion()
-            outlines = [(part[0], part[1:]) for part in self.parts]
-            if inclusion:
-                outlines = _joined(outlines)
-            elif any(holes for _, holes in outlines):
-                raise MissionFileError(
-                    "an exclusion with a hole, which no autopilot knows; cut it in two"
-                )
-            return [
-                *(Polygon(_open(ring), inclusion, self.name) for ring, _ in outlines),
-                *(
-                    Polygon(_open(hole), False, f"hole of {self.name}" if self.name else "")
-                    for _, holes in outlines
-                    for hole in holes
-                ),
-            ]
+            polygons += _polygons(zone, parts) if parts else []
         except InputError as error:
-            raise MissionFileError(f"{self.place}: {error}") from None
-
-    def _inclusion(self) -> bool:
-        """Return whether the aircraft is to stay in the zone."""
-        for key, meaning in (("inclusion", True), ("exclusion", False)):
-            told = next((v for k, v in self.properties.items() if k.casefold() == key), None)
-            if told is not None:
-                return _truth(told, key) == meaning
-        texts = [value for value in self.properties.values() if isinstance(value, str)]
-        true = [k for k, v in self.properties.items() if str(v).strip().casefold() in _TRUE]
-        own = _meaning([self.name, *texts, *true])
-        around = _meaning(self.around)
-        if own is None:
-            own = around
-        elif own and around is False:
-            raise MissionFileError(
-                f"{quote(self.name)} is to stay in, what it is in ({_shown(self.around)}) to stay "
-                f"out; {_HOW}"
-            )
-        if own is None:
-            raise MissionFileError(
-                f"{quote(self.name)}: nothing tells whether to stay in it or out of it; {_HOW}"
-            )
-        return own
+            raise MissionFileError(f"{zone.place}: {error}") from None
+    return Fence(tuple(polygons), notes=tuple(notes))
 
 
-def _meaning(texts: Iterable[str]) -> bool | None:
+def _polygons(zone: DrawnZone, parts: list[list[Ring]]) -> Iterator[Polygon]:
+    inclusion = _inclusion(zone)
+    if inclusion:
+        parts = _joined(parts)
+    elif any(len(part) > 1 for part in parts):
+        raise MissionFileError("an exclusion with a hole, which no autopilot knows; cut it in two")
+    for outline, *holes in parts:
+        yield Polygon(tuple(outline), inclusion, zone.name)
+        for hole in holes:
+            yield Polygon(tuple(hole), False, f"hole of {zone.name}" if zone.name else "")
+
+
+def _inclusion(zone: DrawnZone) -> bool:
+    """Return whether the aircraft is to stay in the zone."""
+    words = {key: str(told).strip().casefold() for key, told in zone.properties.items()}
+    for key, told in zone.properties.items():
+        if key.casefold() in ("inclusion", "exclusion") and told is not None:
+            if words[key] not in _TRUTH:
+                raise MissionFileError(f"property {key}: {quote(told)}; expected true or false")
+            return _TRUTH[words[key]] is (key.casefold() == "inclusion")
+    texts = [told for told in zone.properties.values() if isinstance(told, str)]
+    true = [key for key, word in words.items() if _TRUTH.get(word)]
+    own, around = _meaning([zone.name, *texts, *true]), _meaning(zone.around)
+    if own and around is False:
+        raise MissionFileError(
+            f"{quote(zone.name)} is to stay in, what it is in ({_shown(zone.around)}) to stay "
+            f"out; {_HOW}"
+        )
+    told_by = around if own is None else own
+    if told_by is None:
+        raise MissionFileError(
+            f"{quote(zone.name)}: nothing tells whether to stay in it or out of it; {_HOW}"
+        )
+    return told_by
+
+
+def _meaning(texts: Sequence[str]) -> bool | None:
     """Return whether `texts` tell to stay in, False to stay out, None for neither.
 
     Raises `MissionFileError` where they tell both.
@@ -116,16 +125,13 @@ def _meaning(texts: Iterable[str]) -> bool | None:
     >>> _meaning(["No-Fly_Zone 3"]), _meaning(["unrestricted area"]), _meaning(["School"])
     (False, True, None)
     """
-    kept = list(texts)
-    folded = " | ".join(_folded(text) for text in kept)
+    folded = " | ".join(_folded(text) for text in texts)
     out, inside = _OUT.search(folded), _IN.search(folded)
     if out and inside:
         raise MissionFileError(
-            f"{_shown(kept)} tells both to stay in ({inside[1]}) and to stay out ({out[1]}); {_HOW}"
+            f"{_shown(texts)} tells both to stay in ({inside[1]}) and out ({out[1]}); {_HOW}"
         )
-    if out:
-        return False
-    return True if inside or _FIELD.search(folded) else None
+    return False if out else True if inside or _FIELD.search(folded) else None
 
 
 def _folded(text: str) -> str:
@@ -138,64 +144,40 @@ def _folded(text: str) -> str:
     return " ".join(re.findall(r"[^\W_]+", parted.casefold()))
 
 
-def _truth(told: object, key: str) -> bool:
-    word = str(told).strip().casefold()
-    if word not in (*_TRUE, *_FALSE):
-        raise MissionFileError(f"property {key}: {quote(told)}; expected true or false")
-    return word in _TRUE
-
-
 def _shown(texts: Iterable[str]) -> str:
     return ", ".join(quote(text) for text in texts if text)
 
 
-def _open(ring: Ring) -> tuple[LatLon, ...]:
+def _open(ring: Ring) -> Ring:
     """Return the corners of a ring without the last one where that is the first again."""
-    return tuple(ring[:-1] if ring[:1] == ring[-1:] else ring)
+    return ring[:-1] if ring[:1] == ring[-1:] else ring
 
 
-def _joined(parts: list[tuple[Ring, Sequence[Ring]]]) -> list[tuple[Ring, Sequence[Ring]]]:
+def _joined(parts: list[list[Ring]]) -> list[list[Ring]]:
     """Return the union of `parts`, each an outline and its holes, also across the date line."""
     if len(parts) == 1:
         return parts
     import shapely
 
-    check_outlines([Polygon(_open(r), True) for outline, holes in parts for r in (outline, *holes)])
+    check_outlines([Polygon(tuple(ring), True) for part in parts for ring in part])
     first = parts[0][0][0][1]
-
-    def flat(ring: Ring) -> list[tuple[float, float]]:
-        return [(latitude, first + _turn(longitude - first)) for latitude, longitude in ring]
-
     shapes = []
-    for outline, holes in parts:
-        shapes.append(shapely.Polygon(flat(outline), [flat(hole) for hole in holes]))
+    for part in parts:
+        outline, *holes = (
+            [(north, first + _turn(east - first)) for north, east in r] for r in part
+        )
+        shapes.append(shapely.Polygon(outline, holes))
         if not shapely.is_valid(shapes[-1]):
             raise MissionFileError("a part crosses or touches itself; put its corners in order")
-    union = shapely.get_parts(shapely.union_all(shapes))
-
-    def places(ring: shapely.LinearRing) -> Ring:
-        return [(latitude, _turn(longitude)) for latitude, longitude in ring.coords]
-
-    return [(places(each.exterior), [places(hole) for hole in each.interiors]) for each in union]
+    return [
+        [
+            _open([(north, _turn(east)) for north, east in ring.coords])
+            for ring in shapely.get_rings(u)
+        ]
+        for u in shapely.get_parts(shapely.union_all(shapes))
+    ]
 
 
 def _turn(degrees: float) -> float:
     """Return an angle as one of -180 to 180 degrees."""
     return degrees if abs(degrees) <= 180 else (degrees + 180) % 360 - 180
-
-
-def fence_of(zones: Iterable[DrawnZone]) -> Fence:
-    """Return the fence of `zones`; its notes name the polygons without corners, passed over.
-
-    Raises what `DrawnZone.polygons` raises.
-    """
-    polygons: list[Polygon] = []
-    notes = []
-    for zone in zones:
-        parts = [part for part in zone.parts if part and part[0]]
-        if len(parts) < len(zone.parts):
-            name = f" {quote(zone.name)}" if zone.name else ""
-            notes.append(f"{zone.place}{name}: a polygon without corners, passed over")
-        if parts:
-            polygons += replace(zone, parts=parts).polygons()
-    return Fence(tuple(polygons), notes=tuple(notes))

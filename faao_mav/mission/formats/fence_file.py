@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-from faao_mav.errors import InputError, MissionFileError
+from faao_mav.errors import MissionFileError
 from faao_mav.files import read_bytes, read_text
 from faao_mav.mission.fence import Fence
-
-FENCE_SUFFIXES = (".plan", ".kml", ".kmz", ".geojson", ".json")
-"""What the name of a file with a fence may end in."""
+from faao_mav.mission.formats import naming, read_mission
 
 MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
@@ -20,34 +18,24 @@ def read_fence(path: Path) -> Fence:
     tell: see `drawn_zones`. Raises `MissionFileError` if the ending is unknown or the file cannot
     be read, is too large, holds no fence, or leaves open what a polygon means.
     """
-    suffix = path.suffix.lower()
-    if suffix not in FENCE_SUFFIXES:
-        shown = repr(path.suffix) if path.suffix else "no ending"
-        raise MissionFileError(f"{path}: {shown}; expected a .plan, .kml, .kmz or .geojson file")
-    if suffix == ".plan":
-        from faao_mav.mission.formats.qgc_plan_reader import read_qgc_plan
+    from faao_mav.mission.formats.drawn_zones import fence_of
+    from faao_mav.mission.formats.geojson import geojson_zones
+    from faao_mav.mission.formats.kml_zones import kml_zones
 
-        text = read_text(path, MAX_BYTES, "a fence", MissionFileError)
-        fence = read_qgc_plan(text, str(path)).mission.fence
-    else:
-        fence = _drawing(path, suffix)
+    match path.suffix.lower():
+        case ".plan":
+            fence = read_mission(path).fence
+        case ".kml" | ".kmz":
+            content = read_bytes(path, MAX_BYTES, "a fence", MissionFileError)
+            fence = naming(path, lambda: fence_of(kml_zones(content, MAX_BYTES)))
+        case ".geojson" | ".json":
+            text = read_text(path, MAX_BYTES, "a fence", MissionFileError)
+            fence = naming(path, lambda: fence_of(geojson_zones(text)))
+        case suffix:
+            shown = repr(suffix) if suffix else "no ending"
+            raise MissionFileError(
+                f"{path}: {shown}; expected a .plan, .kml, .kmz or .geojson file"
+            )
     if not fence:
         raise MissionFileError(f"{path}: holds no fence; expected polygons")
     return fence
-
-
-def _drawing(path: Path, suffix: str) -> Fence:
-    from faao_mav.mission.formats.drawn_zones import fence_of
-
-    if suffix in (".kml", ".kmz"):
-        from faao_mav.mission.formats.kml_zones import kml_zones
-
-        zones = kml_zones(read_bytes(path, MAX_BYTES, "a fence", MissionFileError), MAX_BYTES)
-    else:
-        from faao_mav.mission.formats.geojson import geojson_zones
-
-        zones = geojson_zones(read_text(path, MAX_BYTES, "a fence", MissionFileError))
-    try:
-        return fence_of(zones)
-    except InputError as error:
-        raise MissionFileError(f"{path}: {error}") from None

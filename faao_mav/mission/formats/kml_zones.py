@@ -15,19 +15,28 @@ from faao_mav.mission.fence import LatLon
 from faao_mav.mission.formats.drawn_zones import DrawnZone, Ring
 
 _MAX_DEPTH = 50
-"""Levels of nesting that are read; chosen: folders in folders need some ten."""
+"""Levels of named folders that are read; chosen: folders in folders need some ten."""
 
 
 def kml_zones(content: bytes, most: int) -> Iterator[DrawnZone]:
     """Yield the zones of a KML file, or of a KMZ archive that holds one of at most `most` bytes.
 
-    Placemarks without polygons are passed over.
-
     The polygons of a placemark are one zone; its name, description and ExtendedData, and the names
-    of the folders around it, say which kind. Raises `MissionFileError` that names the placemark.
+    of the folders around it, say which kind. Placemarks without polygons are passed over. Raises
+    `MissionFileError` that names the placemark.
     """
     zipped = content.startswith(b"PK\x03\x04")
-    yield from _zones(_tree(_unzipped(content, most) if zipped else content), (), _MAX_DEPTH)
+    ahead = [(_tree(_unzipped(content, most) if zipped else content), tuple[str, ...]())]
+    while ahead:
+        element, around = ahead.pop()
+        if element.tag == "Placemark":
+            yield from _zone(element, around)
+            continue
+        own = _text(element, "name")
+        inside = (*around, own) if own else around
+        if len(inside) > _MAX_DEPTH:
+            raise MissionFileError(f"folders nested more than {_MAX_DEPTH} deep")
+        ahead += [(each, inside) for each in reversed(element)]
 
 
 def _unzipped(content: bytes, most: int) -> bytes:
@@ -46,12 +55,17 @@ def _unzipped(content: bytes, most: int) -> bytes:
 
 
 def _tree(content: bytes) -> Xml.Element:
-    """Return the elements of `content`, whose tags keep their prefixes, declared or not."""
-    builder = Xml.TreeBuilder()
-    parser = expat.ParserCreate()
+    """Return the elements of `content`, without prefixes, which need not be declared."""
+    builder, parser = Xml.TreeBuilder(), expat.ParserCreate()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        builder.start(tag.rpartition(":")[2], attributes)
+
+    def end(tag: str) -> None:
+        builder.end(tag.rpartition(":")[2])
+
     parser.buffer_text = True
-    parser.StartElementHandler = builder.start
-    parser.EndElementHandler = builder.end
+    parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = _refuse_doctype
     try:
@@ -66,60 +80,27 @@ def _refuse_doctype(*_: object) -> None:
     raise MissionFileError("a document type or entities; expected plain KML")
 
 
-def _zones(element: Xml.Element, around: tuple[str, ...], depth: int) -> Iterator[DrawnZone]:
-    """Yield the zones below `element`, which is in what is named `around`."""
-    if depth == 0:
-        raise MissionFileError(f"nested more than {_MAX_DEPTH} deep")
-    if _tag(element) == "Placemark":
-        yield from _placemark(element, around, depth)
-        return
-    own = _text(element, "name")
-    inside = (*around, own) if own else around
-    for each in element:
-        yield from _zones(each, inside, depth - 1)
-
-
-def _placemark(element: Xml.Element, around: tuple[str, ...], depth: int) -> Iterator[DrawnZone]:
-    polygons = list(_polygons(element, depth))
-    if not polygons:
-        return
-    name = _text(element, "name")
+def _zone(placemark: Xml.Element, around: tuple[str, ...]) -> Iterator[DrawnZone]:
+    """Yield the polygons of a placemark, those of geometries in geometries too, as one zone."""
+    name = _text(placemark, "name")
     place = f"polygon {quote(name)}" if name else "a polygon without a name"
-    properties: dict[str, object] = {"description": _text(element, "description")}
-    for data in element.iter():
-        key = data.get("name")
-        if key is not None and _tag(data) == "Data":
-            properties[key] = _text(data, "value")
-        elif key is not None and _tag(data) == "SimpleData":
-            properties[key] = (data.text or "").strip()
-    yield DrawnZone(place, name, properties, around, [_rings(each, place) for each in polygons])
-
-
-def _polygons(element: Xml.Element, depth: int) -> Iterator[Xml.Element]:
-    """Yield the polygons in a placemark, those of geometries in geometries too."""
-    if depth == 0:
-        raise MissionFileError(f"nested more than {_MAX_DEPTH} deep")
-    if _tag(element) == "Polygon":
-        yield element
-        return
-    for each in element:
-        yield from _polygons(each, depth - 1)
+    properties: dict[str, object] = {"description": _text(placemark, "description")}
+    for data in placemark.iter("Data"):
+        properties[data.get("name", "")] = _text(data, "value")
+    for data in placemark.iter("SimpleData"):
+        properties[data.get("name", "")] = (data.text or "").strip()
+    parts = [_rings(polygon, place) for polygon in placemark.iter("Polygon")]
+    if parts:
+        yield DrawnZone(place, name, properties, around, parts)
 
 
 def _rings(polygon: Xml.Element, place: str) -> list[Ring]:
     """Return the outline of a polygon and its holes; none for a polygon without an outline."""
-    outlines = list(_boundaries(polygon, "outerBoundaryIs", place))
+    outlines = polygon.findall("outerBoundaryIs/LinearRing")
     if len(outlines) > 1:
         raise MissionFileError(f"{place}: expected one outerBoundaryIs")
-    return [*outlines, *_boundaries(polygon, "innerBoundaryIs", place)] if outlines else []
-
-
-def _boundaries(polygon: Xml.Element, boundary: str, place: str) -> Iterator[Ring]:
-    for side in polygon:
-        if _tag(side) == boundary:
-            for ring in side:
-                if _tag(ring) == "LinearRing":
-                    yield [_corner(each, place) for each in _text(ring, "coordinates").split()]
+    rings = [*outlines, *polygon.findall("innerBoundaryIs/LinearRing")] if outlines else []
+    return [[_corner(each, place) for each in _text(r, "coordinates").split()] for r in rings]
 
 
 def _corner(told: str, place: str) -> LatLon:
@@ -134,9 +115,4 @@ def _corner(told: str, place: str) -> LatLon:
 
 def _text(element: Xml.Element, tag: str) -> str:
     """Return the text of the first `tag` in `element`, without spaces around it."""
-    return next(((each.text or "").strip() for each in element if _tag(each) == tag), "")
-
-
-def _tag(element: Xml.Element) -> str:
-    """Return the name of an element without its prefix, which differs from writer to writer."""
-    return str(element.tag).rpartition(":")[2]
+    return (element.findtext(tag) or "").strip()

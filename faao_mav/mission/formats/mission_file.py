@@ -1,8 +1,14 @@
-"""What a mission file tells, and whom it is for."""
+"""What a mission file tells, what it does not hold, and whom it is for."""
 
+import math
 from dataclasses import dataclass
 
 from faao_mav.mission.item import Mission
+
+_NAMES = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude")
+
+_SHOWN_ITEMS = 5
+"""Values that a line names before it counts the rest; chosen to fit two lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -10,7 +16,7 @@ class MissionFile:
     """A mission, for whom it was made as far as the file says it, and what was odd about it.
 
     `firmware` is a MAV_AUTOPILOT and `vehicle_type` a MAV_TYPE, which only `.plan` files hold.
-    `warnings` are lines that name file and place.
+    `warnings` are lines that name the place.
     """
 
     mission: Mission
@@ -29,3 +35,35 @@ class PlanTarget:
     firmware: int
     vehicle_type: int
     takes_null: bool = True
+
+
+def not_read(mission: Mission) -> list[str]:
+    """Return what of a vehicle's mission was not read from it, one line each."""
+    return [
+        f"without the {part} that the vehicle may hold: not read from it" for part in mission.unread
+    ]
+
+
+def rally_left_out(mission: Mission, name: str) -> list[str]:
+    """Return that the format `name` holds no rally points, if the mission has any."""
+    count = len(mission.rally)
+    points = f"{count} point{'' if count == 1 else 's'}"
+    return [f"{name} holds no rally points: {points} left out"] if count else []
+
+
+def zero_for_not_set(mission: Mission) -> list[str]:
+    """Return which values are not set, by item, if any: they are written as 0."""
+    places = [
+        f"item {number} {name}"
+        for number, item in enumerate(mission.items, start=1)
+        for name, value in zip(_NAMES, item.numbers, strict=True)
+        if math.isnan(value)
+    ]
+    more = f" and {len(places) - _SHOWN_ITEMS} more" if len(places) > _SHOWN_ITEMS else ""
+    shown = ", ".join(places[:_SHOWN_ITEMS])
+    return [f"not set (NaN) becomes 0: {shown}{more}"] if places else []
+
+
+def no_home(mission: Mission) -> list[str]:
+    """Return that no home is known, if so."""
+    return [] if mission.home else ["no home is known: the file says 0, 0, 0, which means none"]

@@ -1,0 +1,126 @@
+"""Values of JSON files that know where they stand, so that every complaint can name its place."""
+
+import json
+import math
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from faao_mav.errors import InputError, MissionFileError, place_of, quote
+
+Made = TypeVar("Made")
+
+
+class Json:
+    """A value of a JSON file, and the keys and numbers that lead to it.
+
+    What it is asked for and is not, it tells as a `MissionFileError` with its place, itself and
+    what is expected.
+    """
+
+    def __init__(self, value: Any, *steps: str | int) -> None:
+        self.value, self.steps = value, steps
+
+    @classmethod
+    def parsed(cls, text: str) -> "Json":
+        """Return what `text` holds; raise `MissionFileError` where a key is there twice."""
+        try:
+            return cls(json.loads(text, object_pairs_hook=_unique))
+        except json.JSONDecodeError as error:
+            where = f"line {error.lineno}, column {error.colno}"
+            raise MissionFileError(f"{where}: not JSON: {error.msg}") from None
+        except RecursionError:
+            raise MissionFileError("nested too deep for a plan or a fence") from None
+        except ValueError:  # an integer of thousands of digits
+            raise MissionFileError("a number of thousands of digits") from None
+
+    @property
+    def place(self) -> str:
+        """Where the value stands, as messages name it."""
+        return place_of(self.steps)
+
+    def wrong(self, expected: str) -> MissionFileError:
+        """Return the complaint that the value is not what is `expected`."""
+        return MissionFileError(
+            f"{self.place}: {quote(self.value)}; expected {expected}".removeprefix(": ")
+        )
+
+    def get(self, key: str) -> "Json | None":
+        """Return what the object has under `key`, None for nothing or null."""
+        if not isinstance(self.value, dict):
+            raise self.wrong("an object")
+        value = self.value.get(key)
+        return None if value is None else Json(value, *self.steps, key)
+
+    def __getitem__(self, key: str) -> "Json":
+        if (found := self.get(key)) is None:
+            raise MissionFileError(f"{place_of((*self.steps, key))}: is missing")
+        return found
+
+    def each(self, most: int | None = None) -> "list[Json]":
+        """Return the values of the list, `most` at most."""
+        if not isinstance(self.value, list):
+            raise self.wrong("a list")
+        if most is not None and len(self.value) > most:
+            raise MissionFileError(
+                f"{self.place}: more than {most:,} values, and no autopilot keeps so many"
+            )
+        return [Json(value, *self.steps, k) for k, value in enumerate(self.value)]
+
+    def one_of(self, *words: str) -> str:
+        """Return the value, one of `words`."""
+        if self.value not in words:
+            raise self.wrong(" or ".join(map(repr, words)))
+        return str(self.value)
+
+    def whole(self, most: int) -> int:
+        """Return the whole number from 0 to `most`; some writers have 3.0 for 3."""
+        if not (
+            _is_number(self.value) and 0 <= self.value <= most and self.value == int(self.value)
+        ):
+            raise self.wrong(f"a whole number from 0 to {most}")
+        return int(self.value)
+
+    def flag(self) -> bool:
+        """Return true or false."""
+        if not isinstance(self.value, bool):
+            raise self.wrong("true or false")
+        return self.value
+
+    def number(self, expected: str = "a finite number") -> float:
+        """Return the number; a message says that it is `expected`."""
+        if not _is_number(self.value):
+            raise self.wrong(expected)
+        return float(self.value)
+
+    def numbers(self, count: int, null: str = "") -> list[float]:
+        """Return so many numbers; with `null`, which says what it means, NaN for a null."""
+        values = self.each()
+        if len(values) != count:
+            raise self.wrong(f"a list of {count} values")
+        expected = f"a finite number or null ({null})" if null else "a finite number"
+        return [
+            math.nan if null and each.value is None else each.number(expected) for each in values
+        ]
+
+    def made(self, make: Callable[..., Made], *arguments: Any) -> Made:
+        """Return `make(*arguments)`, with its `InputError` as a complaint about this place."""
+        try:
+            return make(*arguments)
+        except InputError as error:
+            raise MissionFileError(f"{self.place}: {error}") from None
+
+
+def _is_number(value: Any) -> bool:
+    """Return whether `value` is a finite number that a float can be."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and abs(value) <= sys.float_info.max
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in made:
+            raise MissionFileError(f"key {quote(key)}: is there twice in one object; remove one")
+        made[key] = value
+    return made

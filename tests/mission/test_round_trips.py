@@ -1,0 +1,183 @@
+"""Any mission is read back as it was written; any text is read, or refused in one line."""
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from relay_flights import STEADY
+
+from faao_mav.errors import InputError
+from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission.formats import PlanTarget, render_files, write_qgc_plan
+from faao_mav.mission.formats.drawn_zones import fence_of
+from faao_mav.mission.formats.geojson import geojson_zones
+from faao_mav.mission.formats.kml_zones import kml_zones
+from faao_mav.mission.formats.qgc_plan import read_qgc_plan
+from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, write_wpl, write_wpl_fence
+
+PX4, ARDUPILOT = PlanTarget(12, 2), PlanTarget(3, 2, takes_null=False)
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+settable = numbers | st.just(math.nan)
+latitudes, longitudes = st.floats(-90, 90), st.floats(-180, 180)
+places = st.tuples(latitudes, longitudes)
+points = st.builds(RallyPoint, latitudes, longitudes, numbers)
+circles = st.builds(Circle, places, st.floats(1e-3, 1e6), st.booleans())
+polygons = st.builds(Polygon, st.lists(places, min_size=3, max_size=5).map(tuple), st.booleans())
+fences = st.builds(
+    Fence, st.lists(polygons, max_size=2).map(tuple), st.lists(circles, max_size=2).map(tuple)
+)
+homes = st.builds(Home, latitudes, longitudes, st.floats(1, 9000))
+
+
+@st.composite
+def items(draw: st.DrawFn) -> MissionItem:
+    frame = draw(st.integers(0, 255))
+    x, y = (numbers, numbers) if frame == 2 else (latitudes, longitudes)
+    command = draw(st.integers(0, 65_535).filter(lambda number: number != 177))
+    params = draw(st.tuples(settable, settable, settable, settable))
+    x, y = x | st.just(math.nan), y | st.just(math.nan)
+    return MissionItem(
+        command, frame, params, draw(x), draw(y), draw(settable), draw(st.booleans())
+    )
+
+
+@st.composite
+def missions(draw: st.DrawFn) -> Mission:
+    flown: list[MissionItem] = draw(st.lists(items(), max_size=5))
+    with_jump: bool = draw(st.booleans())
+    if flown and with_jump:
+        target: int = draw(st.integers(1, len(flown) + 1))
+        flown.append(MissionItem(177, 2, (float(target), draw(numbers), 0.0, math.nan)))
+    fence = dataclasses.replace(draw(fences), breach_return=draw(st.none() | points))
+    rally = tuple(draw(st.lists(points, max_size=2)))
+    return Mission(tuple(flown), draw(st.none() | homes), fence, rally)
+
+
+def zeroed(mission: Mission) -> tuple[MissionItem, ...]:
+    """Return the items of `mission` with 0 for what is not set."""
+
+    def item(each: MissionItem) -> MissionItem:
+        a, b, c, d, x, y, z = (0.0 if math.isnan(value) else value for value in each.numbers)
+        return dataclasses.replace(each, params=(a, b, c, d), x=x, y=y, z=z)
+
+    return tuple(map(item, mission.items))
+
+
+@STEADY
+@given(missions(), st.sampled_from([PX4, None, ARDUPILOT]))
+def test_a_plan_is_read_back_bit_for_bit(mission: Mission, target: PlanTarget | None) -> None:
+    read = read_qgc_plan(write_qgc_plan(mission, target))
+    if target is ARDUPILOT:  # which refuses null
+        mission = dataclasses.replace(mission, items=zeroed(mission))
+    # repr tells NaN and the sign of zero, which == does not.
+    assert repr(read.mission) == repr(mission)
+    numbers = (target.firmware, target.vehicle_type) if target else (0, 0)
+    assert (read.firmware, read.vehicle_type) == numbers
+
+
+@STEADY
+@given(missions())
+def test_text_files_are_read_back_bit_for_bit(mission: Mission) -> None:
+    read = read_wpl(write_wpl(mission)).mission
+    assert repr((read.items, read.home)) == repr((zeroed(mission), mission.home))
+    bare = dataclasses.replace(mission.fence, breach_return=None)
+    text = write_wpl_fence(dataclasses.replace(mission, fence=bare), "for m.waypoints")
+    if bare:
+        assert read_wpl_fence(text) == bare
+
+
+@STEADY
+@given(missions(), st.sampled_from(["x.txt", "x.plan"]))
+def test_what_becomes_0_is_told(mission: Mission, name: str) -> None:
+    lost = render_files(mission, name, ARDUPILOT).lost
+    unset = any(math.isnan(value) for item in mission.items for value in item.numbers)
+    assert unset == any("not set (NaN) becomes 0" in line for line in lost)
+    assert any("no home is known" in line for line in lost) == (mission.home is None)
+
+
+WPL = write_wpl(Mission((MissionItem(16, 3, x=47.5, y=8.6, z=50.0),), Home(47.4, 8.5, 400.0)))
+PLAN = write_qgc_plan(
+    Mission(
+        (
+            MissionItem(16, 3, (0.0, 0.0, 0.0, math.nan), 1.0, 2.0, 3.0),
+            MissionItem(177, 2, (1.0, 2.0, 0.0, 0.0)),
+        ),
+        Home(1.0, 2.0, 3.0),
+        Fence(
+            (Polygon(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), True),),
+            (Circle((0.0, 0.0), 1.0, False),),
+        ),
+        (RallyPoint(0.0, 0.0, 1.0),),
+    ),
+    PX4,
+)
+PATCHES = ["null", "true", "1e999", "-1", "[]", "{}", '""', "0.5", "1e9", "[[]]", '{"a": 0}', "NaN"]
+leaves = st.none() | st.booleans() | numbers | st.text()
+trees = st.recursive(leaves, lambda part: st.lists(part) | st.dictionaries(st.text(), part))
+
+
+def read_or_refused(read: Callable[[str], Mission], text: str) -> Mission | None:
+    try:
+        return read(text)
+    except InputError as error:
+        assert str(error)
+        assert "\n" not in str(error)
+        return None
+
+
+@STEADY
+@given(st.data())
+def test_a_mutated_plan_is_read_or_refused(data: st.DataObject) -> None:
+    """Every value in turn becomes another, or goes missing."""
+    plan = json.loads(PLAN)
+    for _ in range(data.draw(st.integers(1, 2))):
+        node, key = plan, None
+        while isinstance(node, dict | list) and node and data.draw(st.integers(0, 4)):
+            parent = node
+            keys = sorted(node) if isinstance(node, dict) else range(len(node))
+            key = data.draw(st.sampled_from(keys))
+            node = parent[key]
+        if key is None:
+            continue
+        if data.draw(st.booleans()):
+            del parent[key]
+        else:
+            parent[key] = json.loads(data.draw(st.sampled_from(PATCHES)))
+    read = read_or_refused(lambda text: read_qgc_plan(text).mission, json.dumps(plan))
+    if read is not None:
+        assert repr(read_qgc_plan(write_qgc_plan(read, PX4)).mission) == repr(read)
+
+
+@STEADY
+@given(st.data())
+def test_a_mutated_text_file_is_read_or_refused(data: st.DataObject) -> None:
+    text = WPL
+    for _ in range(data.draw(st.integers(1, 4))):
+        begin = data.draw(st.integers(0, len(text)))
+        end = min(len(text), begin + data.draw(st.integers(0, 6)))
+        patch = data.draw(st.text("0123456789.-+eEnaif\t\n\r #\x00", max_size=6))
+        text = text[:begin] + patch + text[end:]
+    read = read_or_refused(lambda text: read_wpl(text).mission, text)
+    if read is not None:
+        written = read_wpl(write_wpl(read)).mission
+        assert repr(written.items) == repr(zeroed(read))
+
+
+@STEADY
+@given(st.text() | trees.map(json.dumps))
+def test_any_text_is_refused(text: str) -> None:
+    for read in (
+        lambda: read_qgc_plan(text),
+        lambda: read_wpl("QGC WPL 110\n" + text),
+        lambda: fence_of(geojson_zones(text)),
+        lambda: fence_of(kml_zones(text.encode(), 100_000)),
+    ):
+        with pytest.raises(InputError) as caught:
+            read()
+        assert "\n" not in str(caught.value)
