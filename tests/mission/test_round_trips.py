@@ -15,8 +15,7 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import PlanTarget, render_files, write_qgc_plan
 from faao_mav.mission.formats.drawn_zones import fence_of
-from faao_mav.mission.formats.geojson import geojson_zones
-from faao_mav.mission.formats.kml_zones import kml_zones
+from faao_mav.mission.formats.fence_file import geojson_zones, kml_zones
 from faao_mav.mission.formats.qgc_plan import read_qgc_plan
 from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, write_wpl, write_wpl_fence
 
@@ -176,7 +175,7 @@ def test_any_text_is_refused(text: str) -> None:
         lambda: read_qgc_plan(text),
         lambda: read_wpl("QGC WPL 110\n" + text),
         lambda: fence_of(geojson_zones(text)),
-        lambda: fence_of(kml_zones(text.encode(), 100_000)),
+        lambda: fence_of(kml_zones(text.encode())),
     ):
         with pytest.raises(InputError) as caught:
             read()

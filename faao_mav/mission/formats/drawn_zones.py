@@ -94,27 +94,22 @@ def _polygons(zone: DrawnZone, parts: list[list[Ring]]) -> Iterator[Polygon]:
 
 
 def _inclusion(zone: DrawnZone) -> bool:
-    """Return whether the aircraft is to stay in the zone."""
-    words = {key: str(told).strip().casefold() for key, told in zone.properties.items()}
+    """Return whether the aircraft is to stay in the zone: as a property or else its words tell."""
+    texts = [zone.name, *zone.around]
     for key, told in zone.properties.items():
-        if key.casefold() in ("inclusion", "exclusion") and told is not None:
-            if words[key] not in _TRUTH:
+        truth = _TRUTH.get(str(told).strip().casefold())
+        if told is not None and key.casefold() in ("inclusion", "exclusion"):
+            if truth is None:
                 raise MissionFileError(f"property {key}: {quote(told)}; expected true or false")
-            return _TRUTH[words[key]] is (key.casefold() == "inclusion")
-    texts = [told for told in zone.properties.values() if isinstance(told, str)]
-    true = [key for key, word in words.items() if _TRUTH.get(word)]
-    own, around = _meaning([zone.name, *texts, *true]), _meaning(zone.around)
-    if own and around is False:
-        raise MissionFileError(
-            f"{quote(zone.name)} is to stay in, what it is in ({_shown(zone.around)}) to stay "
-            f"out; {_HOW}"
-        )
-    told_by = around if own is None else own
-    if told_by is None:
+            return truth is (key.casefold() == "inclusion")
+        texts += [told] if isinstance(told, str) else []
+        texts += [key] if truth else []
+    meaning = _meaning(texts)
+    if meaning is None:
         raise MissionFileError(
             f"{quote(zone.name)}: nothing tells whether to stay in it or out of it; {_HOW}"
         )
-    return told_by
+    return meaning
 
 
 def _meaning(texts: Sequence[str]) -> bool | None:
@@ -125,11 +120,12 @@ def _meaning(texts: Sequence[str]) -> bool | None:
     >>> _meaning(["No-Fly_Zone 3"]), _meaning(["unrestricted area"]), _meaning(["School"])
     (False, True, None)
     """
-    folded = " | ".join(_folded(text) for text in texts)
+    folded = " | ".join(map(_folded, texts))
     out, inside = _OUT.search(folded), _IN.search(folded)
     if out and inside:
+        shown = ", ".join(quote(text) for text in texts if text)
         raise MissionFileError(
-            f"{_shown(texts)} tells both to stay in ({inside[1]}) and out ({out[1]}); {_HOW}"
+            f"{shown} tells both to stay in ({inside[1]}) and to stay out ({out[1]}); {_HOW}"
         )
     return False if out else True if inside or _FIELD.search(folded) else None
 
@@ -142,10 +138,6 @@ def _folded(text: str) -> str:
     """
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
     return " ".join(re.findall(r"[^\W_]+", parted.casefold()))
-
-
-def _shown(texts: Iterable[str]) -> str:
-    return ", ".join(quote(text) for text in texts if text)
 
 
 def _open(ring: Ring) -> Ring:
@@ -163,18 +155,17 @@ def _joined(parts: list[list[Ring]]) -> list[list[Ring]]:
     first = parts[0][0][0][1]
     shapes = []
     for part in parts:
-        outline, *holes = (
-            [(north, first + _turn(east - first)) for north, east in r] for r in part
-        )
-        shapes.append(shapely.Polygon(outline, holes))
+        rings = [[(north, first + _turn(east - first)) for north, east in ring] for ring in part]
+        shapes.append(shapely.Polygon(rings[0], rings[1:]))
         if not shapely.is_valid(shapes[-1]):
             raise MissionFileError("a part crosses or touches itself; put its corners in order")
+    union = shapely.get_parts(shapely.union_all(shapes))
     return [
         [
-            _open([(north, _turn(east)) for north, east in ring.coords])
-            for ring in shapely.get_rings(u)
+            [(north, _turn(east)) for north, east in ring.coords[:-1]]
+            for ring in shapely.get_rings(each)
         ]
-        for u in shapely.get_parts(shapely.union_all(shapes))
+        for each in union
     ]
 
 

@@ -40,15 +40,21 @@ _OLD_HEADERS = {
 """What to do with files of earlier versions, by their header."""
 
 _PARAMS = ("param1", "param2", "param3", "param4")
-_PLACE = ("latitude", "longitude", "altitude")
-_FIELDS = ("index", "current", "frame", "command", *_PARAMS, *_PLACE, "autocontinue")
-_LARGEST = {"index": 65_535, "current": 1, "frame": 255, "command": 65_535, "autocontinue": 1}
-"""The largest value of each field of whole numbers."""
+_FIELDS = {
+    "index": 65_535,
+    "current": 1,
+    "frame": 255,
+    "command": 65_535,
+    **dict.fromkeys(_PARAMS, math.inf),
+    "latitude": 90,
+    "longitude": 180,
+    "altitude": math.inf,
+    "autocontinue": 1,
+}
+"""The fields of a row, and the largest value of each."""
 
-_DEGREES = {"latitude": 90.0, "longitude": 180.0}
 _FENCE = frozenset({FENCE_RETURN_POINT, *POLYGON.values(), *CIRCLE.values()})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
-_WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 
 
 def write_wpl(mission: Mission) -> str:
@@ -101,9 +107,9 @@ def read_wpl(text: str) -> MissionFile:
     `MissionFileError` for anything else; it names line, field, value and what is expected.
     """
     rows = _rows(text)
-    current = [row for row in rows if row.whole("current")]
+    current = [row for row in rows if row["current"]]
     if len(current) > 1:
-        raise current[1].error(
+        raise current[1].wrong(
             "current", f"expected 0: line {current[0].number} is already current"
         )
     mission = Mission(tuple(row.item() for row in rows[1:]), rows[0].home())
@@ -116,27 +122,25 @@ def read_wpl_fence(text: str) -> Fence:
     A first row that is no fence item is the home row. What is tolerated is as in `read_wpl`.
     """
     rows = _rows(text)
-    if rows[0].whole("command") not in _FENCE:
+    if rows[0]["command"] not in _FENCE:
         rows.pop(0).home()
     for row in rows:
-        if row.whole("command") not in _FENCE:
-            raise row.error("command", "expected 5000 to 5004: a file of a fence holds no others")
+        if row["command"] not in _FENCE:
+            raise row.wrong("command", "expected 5000 to 5004: a file of a fence holds no others")
     return fence_of([row.item() for row in rows])
 
 
 def _oddities(rows: "Sequence[_Row]", mission: Mission) -> Iterator[str]:
     """Yield what is odd about a file that is read nevertheless."""
-    if rows[0].whole("frame") in ABOVE_HOME and mission.home is not None:
-        yield rows[0].place("frame") + (
-            ": row 0 is the home position; its altitude is taken as above mean sea level"
-        )
-    odd = [row for index, row in enumerate(rows) if row.whole("index") != index]
+    if rows[0]["frame"] in ABOVE_HOME and mission.home is not None:
+        told = "row 0 is the home position; its altitude is taken as above mean sea level"
+        yield f"{rows[0].place('frame')}: {told}"
+    odd = [row for index, row in enumerate(rows) if row["index"] != index]
     if odd:
         jumps = any(item.command == Command.DO_JUMP for item in mission.items)
-        yield odd[0].place("index") + (
-            ": indexes do not count up; rows are taken in the file's order"
-            f"{', in which targets of DO_JUMP count too' if jumps else ''}"
-        )
+        too = ", in which targets of DO_JUMP count too" if jumps else ""
+        told = f"indexes do not count up; rows are taken in the file's order{too}"
+        yield f"{odd[0].place('index')}: {told}"
 
 
 def _rows(text: str) -> "list[_Row]":
@@ -161,7 +165,7 @@ def _rows(text: str) -> "list[_Row]":
 
 
 class _Row:
-    """A line's fields, read on demand so that every complaint can name its place."""
+    """A line's fields as text, each a number when it is asked for."""
 
     def __init__(self, number: int, line: str) -> None:
         self.number, texts = number, re.split(r"[ \t]+", line)
@@ -175,42 +179,45 @@ class _Row:
     def place(self, field: str) -> str:
         return f"line {self.number}, field {field}: {quote(self._texts[field])}"
 
-    def error(self, field: str, expected: str) -> MissionFileError:
+    def wrong(self, field: str, expected: str) -> MissionFileError:
         return MissionFileError(f"{self.place(field)}; {expected}")
 
-    def whole(self, field: str) -> int:
-        text = self._texts[field]
-        if not _WHOLE.fullmatch(text) or int(text) > _LARGEST[field]:
-            raise self.error(field, f"expected a whole number from 0 to {_LARGEST[field]}")
+    def __getitem__(self, field: str) -> int:
+        text, largest = self._texts[field], _FIELDS[field]
+        if not (text.isascii() and text.isdigit() and float(text) <= largest):
+            raise self.wrong(field, f"expected a whole number from 0 to {largest}")
         return int(text)
 
-    def real(self, field: str, largest: float = math.inf) -> float:
-        text = self._texts[field]
+    def real(self, field: str, *, on_earth: bool = True) -> float:
+        text, largest = self._texts[field], _FIELDS[field] if on_earth else math.inf
         if field in _PARAMS and text.lower() == "nan":
             return math.nan
         value = float(text) if _NUMBER.fullmatch(text) else math.nan
         if not (math.isfinite(value) and abs(value) <= largest):
-            span = f" from {-largest:g} to {largest:g} degrees" if largest < math.inf else ""
+            span = f" from {-largest} to {largest} degrees" if largest < math.inf else ""
             point = " with a decimal point, not a comma" if "," in text else ""
             unset = " or nan" if field in _PARAMS else ""
-            raise self.error(field, f"expected a finite number{point}{span}{unset}")
+            raise self.wrong(field, f"expected a finite number{point}{span}{unset}")
         return value
 
     def item(self) -> MissionItem:
         # In the mission frame the three coordinates are plain parameters.
-        largest = {} if self.whole("frame") == Frame.MISSION else _DEGREES
+        on_earth = self["frame"] != Frame.MISSION
         param1, param2, param3, param4 = map(self.real, _PARAMS)
-        x, y, z = (self.real(field, largest.get(field, math.inf)) for field in _PLACE)
-        params, last = (param1, param2, param3, param4), bool(self.whole("autocontinue"))
-        return MissionItem(self.whole("command"), self.whole("frame"), params, x, y, z, last)
+        x, y = self.real("latitude", on_earth=on_earth), self.real("longitude", on_earth=on_earth)
+        params, last = (param1, param2, param3, param4), bool(self["autocontinue"])
+        return MissionItem(
+            self["command"], self["frame"], params, x, y, self.real("altitude"), last
+        )
 
     def home(self) -> Home | None:
         # Every reader takes row 0 for home: an item there would never be flown.
-        if self.whole("command") not in (0, Command.NAV_WAYPOINT):
-            raise self.error("command", "expected 16: row 0 is the home position, not an item")
-        if self.whole("frame") not in (Frame.GLOBAL, *ABOVE_HOME):
-            raise self.error("frame", "expected 0: row 0 is the home position, not an item")
-        latitude, longitude, altitude = (
-            self.real(field, _DEGREES.get(field, math.inf)) for field in _PLACE
-        )
-        return Home(latitude, longitude, altitude) if latitude or longitude or altitude else None
+        for field, known in (
+            ("command", (Command.NAV_WAYPOINT, 0)),
+            ("frame", (Frame.GLOBAL, *ABOVE_HOME)),
+        ):
+            if self[field] not in known:
+                expected = f"expected {known[0]:d}: row 0 is the home position, not an item"
+                raise self.wrong(field, expected)
+        place = self.real("latitude"), self.real("longitude"), self.real("altitude")
+        return Home(*place) if any(place) else None
