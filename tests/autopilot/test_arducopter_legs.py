@@ -1,4 +1,4 @@
-"""ArduCopter's legs and corners against kinematics in closed form and their limits."""
+"""ArduCopter's legs and corners against kinematics in closed form, measurements and limits."""
 
 import math
 from dataclasses import replace
@@ -8,72 +8,60 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from faao_mav.autopilot.ardupilot.copter.leg import at_speed, planned
+from faao_mav.arrays import Flags, Real
+from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs, ramp
 from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
-from faao_mav.autopilot.ardupilot.copter.ramp import LegBounds
-from faao_mav.autopilot.ardupilot.copter.route import half_overlap
+from faao_mav.autopilot.ardupilot.copter.target import Target
+from faao_mav.autopilot.stepper import STEP
 
-LIMITS = LegBounds(speed=8.0, acceleration=2.5, jerk=1.0, rise=0.3)
-
-limits = st.builds(
-    LegBounds,
-    speed=st.floats(0.5, 15),
-    acceleration=st.floats(0.5, 8),
-    jerk=st.floats(0.5, 20),
-    rise=st.floats(0.2, 0.6),
-)
+MODELS = st.builds(ArduCopterLimits, acceleration=st.floats(0.5, 8), jerk=st.floats(0.5, 20))
 
 
-@given(limits, st.floats(0.01, 500))
-def test_a_leg_keeps_its_limits_and_ends_at_rest(bounds: LegBounds, length: float) -> None:
-    leg = planned(length, bounds)
-    t = np.linspace(0, leg.duration, 801)
-    s, v, a = np.array([leg.at(x) for x in t]).T
-    jerk = np.gradient(a, t)
-    assert s[0] == 0
-    assert s[-1] == pytest.approx(length, rel=1e-6)
-    assert v[-1] == pytest.approx(0, abs=1e-6 * bounds.speed)
-    assert np.all(np.diff(s) > -1e-9)
-    assert v.max() <= bounds.speed * (1 + 1e-9)
-    assert abs(a).max() <= bounds.acceleration * (1 + 1e-9)
-    assert abs(jerk).max() <= bounds.jerk * (1 + 1e-3)
+def ends_at_rest(points: int) -> Flags:
+    stops = np.zeros(points, dtype=bool)
+    stops[[0, -1]] = True
+    return stops
 
 
-@given(limits, st.floats(0.01, 500))
-def test_distance_is_the_integral_of_speed_and_speed_that_of_acceleration(
-    bounds: LegBounds, length: float
-) -> None:
-    leg = planned(length, bounds)
-    t = np.linspace(0, leg.duration, 2001)
-    s, v, a = np.array([leg.at(x) for x in t]).T
+def target_of(points: Real, speeds: Real, stops: Flags, limits: ArduCopterLimits) -> Target:
+    return Target(points, speeds, np.zeros(len(points), dtype=bool), stops, limits)
+
+
+@given(MODELS, st.floats(0.01, 15))
+def test_a_ramp_keeps_its_limits_and_adds_up(limits: ArduCopterLimits, change: float) -> None:
+    one = ramp(limits, np.array([change]), limits.acceleration)
+    t = np.linspace(0, float(one.duration[0]), 2001)
+    s, v, a = change * one[np.zeros(2001, dtype=int)].at(t)
     h = t[1]
-    slack = bounds.jerk * h * h  # of the trapezoidal rule
-    assert np.abs(np.cumsum(a[1:] + a[:-1]) * h / 2 - v[1:]).max() <= 4 * slack
-    assert np.abs(np.cumsum(v[1:] + v[:-1]) * h / 2 - s[1:]).max() <= 4 * slack * t[-1]
+    assert (s[0], v[0]) == (0, 0)
+    assert v[-1] == pytest.approx(change)
+    assert s[-1] == pytest.approx(change * t[-1] / 2)  # it is symmetric about its middle
+    assert abs(a).max() <= limits.acceleration * (1 + 1e-9)
+    assert np.abs(np.diff(a)).max() / h <= limits.jerk * (1 + 1e-6)
+    assert np.diff(v) / h == pytest.approx((a[1:] + a[:-1]) / 2, abs=2 * limits.jerk * h)
+    assert np.diff(s) / h == pytest.approx((v[1:] + v[:-1]) / 2, abs=limits.jerk * h**2)
+
+
+@given(MODELS, st.floats(0.3, 12), st.floats(1, 400), st.floats(0, 50))
+def test_the_target_reaches_what_a_leg_has_room_for_and_ends_at_rest(
+    limits: ArduCopterLimits, speed: float, length: float, rise: float
+) -> None:
+    points = np.array([[0.0, 0.0, 30.0], [0.0, length, 30.0 + rise]])
+    target = target_of(points, np.array([speed]), ends_at_rest(2), limits)
+    level = np.abs(target.motion[:, 4])
+    assert target.motion[-1, :3] == pytest.approx(points[1])
+    assert np.abs(target.motion[-1, 3:]).max() < 1e-9
+    assert level.max() <= speed + 1e-6
+    assert target.motion[:, 5].max() <= limits.climb_speed + 1e-6
+    moved = np.diff(target.motion[:, 1]) / STEP
+    assert moved == pytest.approx((level[1:] + level[:-1]) / 2, abs=limits.jerk * STEP**2)
 
 
 def test_a_long_leg_has_two_full_ramps_and_a_cruise() -> None:
-    # D = dv/A + A/J + t_j, S = v/2 D, T = 2 D + (L - 2 S)/v
+    # D = v/A + A/J + t_j, T = 2 D + (L - v D)/v
     duration = 8 / 2.5 + 2.5 / 1 + 0.3
-    leg = planned(200, LIMITS)
-    assert leg.up.duration == pytest.approx(duration)
-    assert leg.up.length == pytest.approx(4 * duration)
-    assert leg.duration == pytest.approx(2 * duration + (200 - 8 * duration) / 8)
-    assert planned(400, LIMITS).duration - leg.duration == pytest.approx(200 / 8)
-
-
-def test_a_ramp_that_never_reaches_the_acceleration() -> None:
-    # a²/J + a t_j = v, D = 2 (a/J + t_j)
-    a = (math.sqrt(0.3**2 + 4 * 2) - 0.3) / 2
-    leg = planned(100, replace(LIMITS, speed=2.0))
-    assert leg.up.peak == pytest.approx(a)
-    assert leg.up.duration == pytest.approx(2 * (a + 0.3))
-
-
-def test_measured_lengths_that_reach_8_metres_per_second() -> None:
-    assert 48 < 2 * planned(500, LIMITS).up.length < 50
-    quick = LegBounds(8.0, 4.0, 10.0, 0.3)
-    assert 21 < 2 * planned(500, quick).up.length < 23
+    legs = StraightLegs(np.array([200.0]), np.array([False]), ArduCopterLimits())
+    assert legs.flown(np.array([8.0]))[1] == pytest.approx(duration + 200 / 8)
 
 
 @pytest.mark.parametrize(
@@ -84,9 +72,10 @@ def test_measured_speeds_after_a_change_on_a_short_leg(
     length: float, before: float, told: float, reached: float
 ) -> None:
     """As ArduCopter's log has them: legs of a mission with WPNAV_ACCEL 400 and WPNAV_JERK 20."""
-    own = ArduCopterLimits(acceleration=4.0, jerk=20.0)
-    leg = at_speed(planned(length, LegBounds(before, 4.0, 20.0, own.rise)), told, elapsed=0.3)
-    assert max(v for _, v, _ in leg.states) == pytest.approx(reached, abs=0.03)
+    legs = StraightLegs(
+        np.array([length]), np.array([True]), ArduCopterLimits(acceleration=4.0, jerk=20.0)
+    )
+    assert legs.speeds(np.array([before]), np.array([told]))[2] == pytest.approx(reached, abs=0.04)
 
 
 def test_the_jerk_rises_no_faster_than_the_aircraft_leans() -> None:
@@ -97,44 +86,57 @@ def test_the_jerk_rises_no_faster_than_the_aircraft_leans() -> None:
     assert ArduCopterLimits(jerk=20, roll_acceleration=0, pitch_acceleration=0).rise == 0.3
 
 
-@given(limits, st.floats(20, 300), st.floats(0.3, 15), st.floats(0, 1))
-def test_a_speed_change_keeps_what_was_flown_and_the_end(
-    bounds: LegBounds, length: float, speed: float, share: float
-) -> None:
-    before = planned(length, bounds)
-    elapsed = share * before.up.duration / 2
-    after = at_speed(before, speed, elapsed)
-    t = np.linspace(0, elapsed, 30) if elapsed > 0 else np.zeros(1)
-    if elapsed > 0:
-        flown = [before.at(x) for x in t]
-        np.testing.assert_allclose([after.at(x) for x in t], flown, atol=1e-6, rtol=1e-6)
-    assert after.at(after.duration)[0] == pytest.approx(length, rel=1e-6)
-    assert max(v for _, v, _ in after.states) <= max(speed, bounds.speed) * (1 + 1e-9)
-
-
-@given(limits, st.floats(0.01, 300), st.floats(0, 12), st.floats(0, 12))
-def test_a_leg_between_splines_has_its_length(
-    bounds: LegBounds, length: float, start: float, end: float
-) -> None:
-    leg = planned(length, bounds, start=start, end=end)
-    assert leg.states[-1][0] == pytest.approx(length, rel=1e-6)
-    assert leg.states[-1][1] == pytest.approx(leg.final, abs=1e-6)
-    assert leg.states[0][1] <= start
-
-
 @pytest.mark.parametrize("degrees", [5, 30, 90, 150])
 def test_corners_are_as_early_as_their_limits_allow(degrees: float) -> None:
-    angle = math.radians(degrees)
-    u, w = (1.0, 0.0, 0.0), (math.cos(angle), math.sin(angle), 0.0)
-    leg = planned(100, LIMITS)
-    bounds = ArduCopterLimits(radius=2.0, corner_acceleration=5.0, climb_acceleration=1.0)
-    h = half_overlap(leg, u, leg, w, bounds)
-    left = 100 - leg.at(leg.duration - h)[0]
-    apart = 2 * left * math.sin(angle / 2)
-    speed = 2 * leg.at(h)[1] * math.cos(angle / 2)
-    assert apart <= 2.0 + 1e-6
-    assert speed <= 8.0 + 1e-6
-    whole_ramp = h == pytest.approx(leg.up.duration / 2)
-    assert whole_ramp or max(apart / 2, speed / 8) == pytest.approx(1, abs=1e-6)
-    tight = half_overlap(leg, u, leg, w, replace(bounds, radius=0.5))
-    assert tight <= h
+    turn = 100 * np.exp(1j * np.radians(degrees))
+    points = np.array([[0.0, 0, 30], [100, 0, 30], [100 + turn.real, turn.imag, 30]])
+
+    def nearest(radius: float) -> tuple[float, Real]:
+        limits = ArduCopterLimits(radius=radius, corner_acceleration=5.0)
+        target = target_of(points, np.array([8.0, 8.0]), ends_at_rest(3), limits)
+        k = target.passed[1] / STEP
+        place = [np.interp(k, np.arange(len(target.motion)), x) for x in target.motion.T]
+        assert np.hypot(*target.motion[:, 3:5].T).max() <= 8 + 1e-3
+        return float(np.hypot(place[0] - 100, place[1])), target.passed
+
+    apart, passed = nearest(2.0)
+    tight, later = nearest(0.5)
+    assert tight <= 0.51
+    assert apart <= 2.01
+    assert tight < apart or apart < 0.51
+    assert later[2] >= passed[2] - 1e-9
+
+
+def test_legs_take_as_long_as_the_target_takes() -> None:
+    rng, worst = np.random.default_rng(1), []
+    for _ in range(300):
+        count = int(rng.integers(2, 7))
+        lengths, stops = rng.uniform(8, 120, count), ends_at_rest(count + 1)
+        stops[1:-1] = rng.random(count - 1) < 0.2
+        speeds = rng.uniform(1.5, 10, count)
+        limits = ArduCopterLimits(acceleration=rng.uniform(1.5, 5), jerk=rng.uniform(5, 20))
+        points = np.zeros((count + 1, 3))
+        points[1:, 0] = np.cumsum(lengths)
+        joined = ~stops[:-1]
+        told = StraightLegs(lengths, joined, limits).flown(speeds)[1]
+        moved = np.diff(target_of(points, speeds, stops, limits).passed)
+        worst.append(np.abs(told - moved).max())
+    assert np.median(worst) < 0.05
+    assert np.quantile(worst, 0.9) < 0.3
+
+
+def test_a_command_counts_up_to_what_a_leg_or_the_next_comes_to() -> None:
+    limits, lengths = ArduCopterLimits(acceleration=4.0, jerk=10.0), np.array([12.0, 40.0, 6.0])
+    alone, joined = (
+        StraightLegs(lengths, np.array([False, follows, follows]), limits)
+        for follows in (False, True)
+    )
+    speeds = np.array([20.0, 20.0, 20.0])
+    assert alone.most == pytest.approx(alone.flown(speeds)[0])
+    assert joined.most == pytest.approx(alone.most[[1, 1, 2]])
+    assert joined.flown(speeds)[1] == pytest.approx(joined.flown(joined.most)[1])
+    many = np.random.default_rng(0).uniform(1, 9, (2, 4, 3))
+    one = [[joined.flown(each)[1] for each in row] for row in many]
+    assert joined.flown(many)[1] == pytest.approx(np.array(one))
+    nowhere = replace(joined, lengths=np.zeros(3)).flown(speeds)
+    assert np.isfinite(nowhere).all()

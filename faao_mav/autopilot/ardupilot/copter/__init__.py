@@ -11,9 +11,9 @@ from faao_mav.autopilot.ardupilot import (
     needs_one_inclusion,
     rally_rule,
 )
-from faao_mav.autopilot.ardupilot.copter.durations import StraightDurations
 from faao_mav.autopilot.ardupilot.copter.flight_model import ArduCopter as ArduCopter
-from faao_mav.autopilot.ardupilot.copter.leg import ArduCopterLegs as ArduCopterLegs
+from faao_mav.autopilot.ardupilot.copter.legs import ArduCopterLegs as ArduCopterLegs
+from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs
 from faao_mav.autopilot.ardupilot.copter.parameters import TABLE, ArduCopterLimits
 from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
@@ -91,8 +91,8 @@ def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
     )
 
 
-def _leg_durations(vehicle: ParameterValues, lengths: Real, joined: Flags) -> StraightDurations:
-    return StraightDurations(lengths, joined, ArduCopterLegs.from_vehicle(vehicle).bounds)
+def _leg_durations(vehicle: ParameterValues, lengths: Real, joined: Flags) -> StraightLegs:
+    return StraightLegs(lengths, joined, ArduCopterLimits.from_vehicle(vehicle))
 
 
 def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:

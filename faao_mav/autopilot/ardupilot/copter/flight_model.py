@@ -1,17 +1,24 @@
-"""ArduCopter as a flight model."""
+"""ArduCopter as a flight model: a target on its course, a controller, and an airframe."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot.copter.course import Course, grid_of, motion_of
-from faao_mav.autopilot.ardupilot.copter.follow import pursue
 from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
-from faao_mav.autopilot.ardupilot.copter.route import Router
+from faao_mav.autopilot.ardupilot.copter.target import Target
 from faao_mav.autopilot.flight_path import FlightPath, Flown
+from faao_mav.autopilot.stepper import STEP, Copter, Samples
 from faao_mav.errors import InputError
+
+_MARGIN = 0.05
+"""The share by which an aircraft may be slower than its target before the target's clock waits for
+it. The autopilot's own."""
+
+_HEADED = 0.5
+"""The speed of the target, m/s, above which the aircraft's nose is along the target's way. Chosen;
+what a change costs is not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +33,10 @@ class ArduCopter(ArduCopterLimits):
     whole seconds (fractions are dropped), delays are kept to the fraction.
     """
 
-    _routers: list[Router] = field(default_factory=list, init=False, repr=False, compare=False)
-    """The last one: flights along the same points come one after the other."""
-
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
 
+        The flight begins in a hover, nose to the north, held against the wind by the integral.
         Raises `InputError` for speeds that are not positive, for what is not finite, and for a
         flight that takes more than `path.longest`.
         """
@@ -40,50 +45,130 @@ class ArduCopter(ArduCopterLimits):
         stopping = waits > 0
         stopping[[0, -1]] = True
         scale = np.array([self.east_metre, self.north_metre, 1.0])
-        router = self._router(path.points * scale, path.splines, stopping)
-        course = router.course(path.speeds.tolist(), waits.tolist())
-        flown = self._followed(course, path, step)
+        target = Target(path.points * scale, path.speeds, path.splines, stopping, self)
+        clock = _Clock(self, target.passed, waits, stopping)
+        samples = Samples(path.longest)
+        shown = self._follow(target.motion, clock, path, samples)
+        arrivals = np.interp(target.passed, shown, STEP * np.arange(len(shown)))
+        arrivals[stopping] = clock.arrivals
+        flown = samples.flown(arrivals, arrivals + waits, step)
         return replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
 
-    def _router(self, points: Real, splines: Flags, stopping: Flags) -> Router:
-        """Return what knows the legs along `points` already, if they are those of the last call."""
-        if not (self._routers and self._routers[0].leads_along(points, splines, stopping)):
-            self._routers[:] = [Router(points, splines, stopping, self)]
-        return self._routers[0]
+    def _follow(
+        self, motion: Real, clock: "_Clock", path: FlightPath, samples: Samples
+    ) -> list[float]:
+        """Follow the target's `motion` (n, 9), keep `samples`, return what the clock shows at each.
 
-    def _followed(self, course: Course, path: FlightPath, step: float) -> Flown:
-        """Return the flight of the aircraft after its target."""
-        grid = grid_of(course)
-        target = motion_of(course, grid)
-        pursuit = pursue(
-            course,
-            target,
-            self,
-            wind=path.wind,
-            longest=path.longest,
-        )
-        arrivals = np.interp(course.passed, pursuit.clock, pursuit.t)
-        departures = _stopped(course, arrivals, pursuit.arrivals)
-        motion = np.column_stack(
-            [
-                pursuit.position,
-                np.interp(pursuit.clock, grid, target[:, 2]),
-                pursuit.velocity,
-                pursuit.rate * np.interp(pursuit.clock, grid, target[:, 5]),
-            ]
-        )
-        t = step * np.arange(math.ceil(departures[-1] / step - 1e-9) + 1)
-        flown = np.column_stack([np.interp(t, pursuit.t, column) for column in motion.T])
-        return Flown(arrivals, departures, t, flown[:, :3], flown[:, 3:])
+        The target's height is the aircraft's.
+        """
+        place = motion[:, ::3] + 1j * motion[:, 1::3]
+        rows = list(zip(*place.T.tolist(), *motion[:, 2:6:3].T.tolist(), strict=True))
+        passed = [*clock.passed[1:], math.inf]
+        speeds = np.append(path.speeds, path.speeds[-1:]).tolist() or [self.cruise_speed]
+        body = Copter(self.body, rows[0][0], complex(*path.wind))
+        controller, leg, farthest = _Controller(self, body.lean), -1, math.inf
+        shown: list[float] = []
+        while True:
+            k = min(int(clock.time / STEP), len(rows) - 2)
+            share = clock.time / STEP - k
+            place, velocity, push, height, climb = (
+                a + share * (b - a) for a, b in zip(rows[k], rows[k + 1], strict=True)
+            )
+            now = STEP * len(shown)
+            samples.add(now, body.place, height, body.velocity, clock.rate * climb)
+            shown.append(clock.time)
+            if not clock.runs(now):
+                return shown
+            if now < clock.resume:  # at rest, though samples on both sides are not
+                velocity, push, climb = 0j, 0j, 0.0
+            while leg < 0 or clock.time >= passed[leg]:
+                leg += 1
+                farthest = self.farthest(speeds[leg])
+            error = place - body.place
+            error *= farthest / max(farthest, abs(error))
+            clock.adapt(controller.pace(error, velocity, climb, body.velocity))
+            if abs(velocity) > _HEADED:
+                body.nose = velocity / abs(velocity)
+            body.move(controller.asked(error, velocity, push, body.velocity), STEP)
+            clock.run(now, now + STEP)
 
 
-def _stopped(course: Course, arrivals: Real, stops: Real) -> Real:
-    """Put the arrivals at `stops`, s, into `arrivals` (m,); return the departures (m,)."""
-    departures = arrivals.copy()
-    arrivals[0], departures[0] = 0.0, course.wait
-    for stop, arrival in zip(course.stops, stops.tolist(), strict=True):
-        arrivals[stop.point], departures[stop.point] = arrival, arrival + stop.wait
-    return departures
+class _Clock:
+    """The target's clock, which slows down for an aircraft behind and stands at stops.
+
+    Its `time`, s, goes on at the `rate`, which follows what is asked for with the time constant
+    A/J; at stops it goes on when the flight has taken `resume` s. `passed` are the times at which
+    points count as reached, `arrivals`, s of the flight, are those at the stops so far.
+    """
+
+    def __init__(
+        self, limits: ArduCopterLimits, passed: Real, waits: Real, stopping: Flags
+    ) -> None:
+        self.time, self.rate, self.resume = 0.0, 1.0, float(waits[0])
+        self.passed, self.arrivals = passed.tolist(), [0.0]
+        self._adapting = -math.expm1(-STEP * limits.jerk / limits.acceleration)
+        self._stops = list(zip(passed[stopping].tolist(), waits[stopping].tolist(), strict=True))
+
+    def runs(self, now: float) -> bool:
+        """Tell whether the flight, `now` s old, is not over."""
+        return len(self.arrivals) < len(self._stops) or now < self.resume
+
+    def adapt(self, pace: float) -> None:
+        """Let the rate go towards `pace` for a step."""
+        self.rate += (pace - self.rate) * self._adapting
+
+    def run(self, begin: float, end: float) -> None:
+        """Go on from `begin` to `end`, s of the flight, but for what part of it is a stop."""
+        free = max(begin, self.resume)
+        while free < end and len(self.arrivals) < len(self._stops):
+            stop, wait = self._stops[len(self.arrivals)]
+            if (ahead := self.time + self.rate * (end - free)) < stop:
+                self.time = ahead
+                return
+            free += (stop - self.time) / self.rate if self.rate > 0 else 0.0
+            self.arrivals.append(free)
+            self.time, self.resume = stop, free + wait
+            free = self.resume
+
+
+class _Controller:
+    """The position controller: what it asks of the aircraft.
+
+    It asks for the target's acceleration plus what the errors call for, up to the lean limit, where
+    the `integral`, m/s², does not grow.
+    """
+
+    def __init__(self, limits: ArduCopterLimits, integral: complex) -> None:
+        self._integral, self._limits, self._lean = integral, limits, limits.lean
+
+    def pace(self, error: complex, target: complex, climb: float, velocity: complex) -> float:
+        """Return the rate asked of the target's clock, 0 to 1.
+
+        It is the aircraft's speed along the target's, less the position error times its gain, over
+        the target's speed, plus a margin.
+        """
+        square = abs(target) ** 2 + climb**2
+        if square <= 1e-9:
+            return 1.0
+        kept = (velocity - self._limits.position_gain * error) * target.conjugate()
+        return min(max(_MARGIN + (kept.real + climb**2) / square, 0.0), 1.0)
+
+    def asked(self, error: complex, target: complex, push: complex, velocity: complex) -> complex:
+        """Return the acceleration that is asked for, m/s²; `push` is the target's."""
+        limits, held = self._limits, self._integral
+        lack = target + limits.position_gain * error - velocity
+        asked = push + limits.velocity_gain * lack + held
+        self._integral += limits.velocity_integral * lack * STEP
+        if abs(asked) <= self._lean:
+            return asked
+        self._integral *= abs(held) / max(abs(held), abs(self._integral), 1e-9)
+        if abs(target) < 1e-6:
+            return asked * self._lean / abs(asked)
+        way = target / abs(target)
+        turned = asked * way.conjugate()  # what is across the target's way comes first
+        across = min(self._lean, max(-self._lean, turned.imag))
+        most = math.sqrt(self._lean**2 - across**2)
+        return complex(min(most, max(-most, turned.real)), across) * way
 
 
 def _check(path: FlightPath, waits: Real, step: float) -> None:

@@ -1,0 +1,203 @@
+"""How ArduCopter's target moves along straight legs: ramps, cruises, overlaps at corners.
+
+A ramp changes the speed by d within the acceleration A and the jerk J, which takes t_j s to rise.
+Its acceleration grows for r s, stays at a, and falls as it grew; in all it takes D s:
+
+    r = a/J + t_j,    a = min(A, d/r),    D = d/a + r
+
+The autopilot's jerk rises along half a cosine; here it steps, half of t_j later.
+
+A leg of l metres is planned from rest to rest at the speed that is in force when it begins: that of
+the leg before, where they are joined. Its own comes into force half-way through their overlap. A
+lower one shortens what is left of the first ramp, which ends at p then; from p a second ramp leads
+to the speed e, if the cruise has room for one. A last ramp ends at rest.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from faao_mav.arrays import Flags, Real
+from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
+
+_JERK_TIMES = 12.0
+"""The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
+which none is longer than a second: the autopilot's own rule."""
+
+_FASTEST = 40.0
+"""The speed, m/s, that no leg comes to. Chosen above all that is commanded."""
+
+_HALVINGS = 9
+"""How often an interval is halved that holds what is sought, before it lies on a line between both
+ends. Chosen: of 40 m/s 0.08 are left."""
+
+_SLOWEST = 0.75
+"""The least speed that is commanded, m/s. Measured, flown and planned, m rms, on a plan with two
+hovers at 9 m/s: with 0.4 6.0, with 0.75 1.6, with 1.5 1.3; with 1.5 other plans need more items and
+twice the time to convert."""
+
+_SHORTEST = 4.0
+"""The least length of a leg, m, where the path needs no shorter one: on such centimetres decide how
+long the target waits for an aircraft that has passed it. Flown: a mission with 1.1 m before a hover
+left there 4.1 s late, one with 2.3 m 0.4 s."""
+
+
+def largest(function: Callable[[Real], Real], value: Real, most: Real | float) -> Real:
+    """Return the largest x, 0 to `most`, at which the rising `function` is at most `value`."""
+    low = np.zeros(np.broadcast_shapes(np.shape(value), np.shape(most)))
+    high = low + most
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        under = function(middle) <= value
+        low, high = np.where(under, middle, low), np.where(under, high, middle)
+    begin, end = function(low), function(high)
+    share = np.clip((value - begin) / np.maximum(end - begin, 1e-12), 0.0, 1.0)
+    found: Real = low + share * (high - low)
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ramp:
+    """Ramps: how long they last, `duration`, and their accelerations grow, `edge`, s, one shape.
+
+    For `dead` seconds, t_j / 2, at either end of what grows hardly anything happens.
+    """
+
+    duration: Real
+    edge: Real
+    dead: float
+
+    def __getitem__(self, which: Any) -> "Ramp":
+        """Return some of them."""
+        return Ramp(self.duration[which], self.edge[which], self.dead)
+
+    def at(self, t: Real) -> Real:
+        """Return distance, speed and acceleration at `t` s from their beginnings, for d = 1 m/s.
+
+        They are (3, ...). Before all are 0, afterwards the speed is 1.
+        """
+        x = np.clip(t, 0.0, self.duration)
+        y = np.minimum(x, self.duration - x) - self.dead  # the second half mirrors the first
+        edge = np.maximum(self.edge - 2 * self.dead, 1e-9)
+        rising, peak = np.clip(y, 0.0, edge), 1 / (self.duration - self.edge)
+        steady = np.maximum(y, 0.0) - rising
+        way = rising**3 / edge / 6 + steady * (edge + steady) / 2
+        speed = rising**2 / edge / 2 + steady
+        acceleration = peak * rising / edge
+        late = x > self.duration / 2
+        distance = np.where(late, x - self.duration / 2, 0.0) + peak * way + np.maximum(t - x, 0.0)
+        return np.array([distance, np.where(late, 1 - peak * speed, peak * speed), acceleration])
+
+
+@dataclass(frozen=True, slots=True)
+class ArduCopterLegs(ArduCopterLimits):
+    """How ArduCopter flies a leg between plain waypoints."""
+
+    least: ClassVar[float] = _SHORTEST
+    slowest: ClassVar[float] = _SLOWEST
+    run_in: ClassVar[float] = 1.2
+
+    def shortest_leg(self, speed: Real) -> Real:
+        """Return the least length of a leg that reaches `speed`, m: two ramps; same shape.
+
+        >>> float(ArduCopterLegs().shortest_leg(np.array(8.0)).round(1))
+        48.0
+        """
+        return speed * ramp(self, speed, self.acceleration).duration
+
+    def reachable_speed(self, length: Real) -> Real:
+        """Return the speed that legs of `length`, m, reach, m/s; same shape."""
+        return largest(self.shortest_leg, length, _FASTEST)
+
+    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
+        """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
+        return np.zeros_like(turn)
+
+
+def ramp(limits: ArduCopterLimits, change: Real, acceleration: Real | float) -> Ramp:
+    """Return ramps by `change` >= 0, m/s, within an `acceleration`, m/s²."""
+    jerk, rise = limits.jerk, limits.rise
+    free = (rise + np.sqrt(rise**2 + 4 * change / jerk)) / 2
+    full = acceleration / jerk + rise
+    steady = change > acceleration * full
+    duration = np.where(steady, change / acceleration + full, 2 * free) * (change > 0)
+    return Ramp(duration, np.where(steady, full, free), rise / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class StraightLegs:
+    """Legs of `lengths` (m - 1,), m, along which `accelerations`, m/s², are the greatest.
+
+    `joined` (m - 1,) marks those that follow one without a stop.
+
+    >>> joined, limits = np.array([False, True, True]), ArduCopterLimits(acceleration=3.0, jerk=5.0)
+    >>> legs = StraightLegs(np.array([50.0, 12.0, 50.0]), joined, limits)
+    >>> flown, durations = legs.flown(np.array([4.0, 8.0, 8.0]))
+    >>> flown, durations.round(1)  # the second leg is too short to be faster than the first
+    (array([4., 4., 8.]), array([13.6,  3. ,  8.7]))
+    """
+
+    lengths: Real
+    joined: Flags
+    limits: ArduCopterLimits
+    accelerations: Real | None = None
+
+    def ramp(self, change: Real) -> Ramp:
+        """Return ramps by `change` (..., m - 1), m/s."""
+        own = self.limits.acceleration if self.accelerations is None else self.accelerations
+        return ramp(self.limits, change, own)
+
+    @cached_property
+    def top(self) -> Real:
+        """The greatest speeds that the legs come to, (m - 1,), m/s; above 0 without a length."""
+        found = largest(lambda v: v * self.ramp(v).duration, self.lengths, _FASTEST)
+        return np.maximum(found, 1e-3)
+
+    @property
+    def most(self) -> Real:
+        """The greatest commands that make a difference, (m - 1,), m/s.
+
+        A command above what a leg comes to still tells how the next one begins.
+        """
+        following: Real = np.append(self.top[1:] * self.joined[1:], 0.0)
+        return np.maximum(self.top, following)
+
+    def speeds(
+        self, begun: Real, told: Real, elapsed: Real | None = None
+    ) -> tuple[Real, Real, Real]:
+        """Return the speeds that the legs are planned at, p and e, (..., m - 1), m/s.
+
+        `begun` are those in force when they begin, `told` their own, m/s, of one shape.
+        """
+        begun = np.minimum(begun, self.top)
+        first = self.ramp(begun)
+        elapsed = first.duration / 2 if elapsed is None else elapsed
+        edge, rest = first.edge, first.duration - first.edge
+        lowered = begun * np.maximum(elapsed, edge) / rest
+        planned = np.minimum(begun, np.maximum(told, lowered))
+        cruise = self.lengths - planned * self.ramp(planned).duration
+        room = cruise / (_JERK_TIMES * min(self.limits.rise, 1.0))
+        wanted = np.where(room > planned, np.minimum(told, room), planned)
+        slower, change = np.minimum(planned, wanted), np.abs(wanted - planned)
+        fits = largest(lambda d: (slower + d / 2) * self.ramp(d).duration, cruise / 2, change)
+        return begun, planned, planned + np.copysign(fits, wanted - planned)
+
+    def flown(self, speeds: Real) -> tuple[Real, Real]:
+        """Return e, m/s, and how long the legs take, s, at level commands `speeds` (..., m - 1).
+
+        That is from passing one end to passing the other. An overlap is as long as the shorter of
+        its ramps; that it is shorter in a sharp corner is left out.
+        """
+        begun = speeds.copy()
+        begun[..., 1:] = np.where(self.joined[1:], speeds[..., :-1], speeds[..., 1:])
+        begun, planned, top = self.speeds(begun, speeds)
+        first, second, last = (self.ramp(d).duration for d in (planned, abs(top - planned), top))
+        lasting = self.lengths / top + last / 2 + first * (1 - planned / (2 * top))
+        lasting += second * (top - planned) / (2 * top)
+        half = np.minimum(last[..., :-1], self.ramp(begun).duration[..., 1:]) / 2 * self.joined[1:]
+        lasting[..., :-1] -= half
+        lasting[..., 1:] -= half
+        return top, lasting
