@@ -205,7 +205,7 @@ def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: b
 def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:
     port = free_port()
     mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1)
-    mock.armed = True
+    mock.flight.arm(0.0)
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock, f"udpin:127.0.0.1:{port}"):
         refused = run(plan, "--out", out, "--upload", connection)
@@ -303,8 +303,8 @@ def test_the_mock_flies_by_its_parameters(
     slow.write_text("WPNAV_ACCEL,50\nWPNAV_SPEED,300\n")
     assert run("autopilot", *listen, "--parameters", out.with_suffix(".param")).exit_code == 0
     assert run("autopilot", *listen, "--parameters", slow).exit_code == 0
-    flights = [mock._fly(mission, mock._vehicle_now()) for mock in made if mock._fly is not None]
-    quick, late = (flight.t[-1] for flight in flights)
+    flights = [mock.flight.predict(mission) for mock in made]
+    quick, late = (flight.t[-1] for flight in flights if flight is not None)
     assert late > quick + 20
     (answer,) = made[1].parameters.on(ParamRequestRead(Address(1, 1), "WPNAV_ACCEL", -1))
     assert isinstance(answer, ParamValue)

@@ -1,159 +1,277 @@
-"""A mock autopilot in flight: telemetry along a predicted track."""
+"""How a mock autopilot flies: what its mode, its mission, its fence and setpoints have it do.
+
+Measured in simulation. At the fence, at 8 m/s: ArduCopter 4.7 (FENCE_ENABLE 1, FENCE_ACTION 1)
+changed to RTL 1 m outside, got 15 m outside, went home and landed; PX4 1.16.1 (GF_ACTION 2) changed
+to hold 4 m outside and stayed 2 m outside. By setpoints: ArduCopter takes off in GUIDED by a
+command, and stops when they cease; PX4 enters Offboard after a second of them, takes off by them,
+and changes its mode when they cease, by default to Position, where it sinks without sticks. Both
+take up a mission in flight, without its take-off.
+"""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import Literal, TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Real
-from faao_mav.autopilot import Track
-from faao_mav.mission.item import Home, MissionItem
-from faao_mav.sim.turn_back import Breach
-from faao_mav.wire.messages import (
-    Attitude,
-    GlobalPositionInt,
-    LocalPositionNed,
-    Message,
-    MissionItemReached,
-)
+from faao_mav.arrays import Flags, Real
+from faao_mav.autopilot import Track, Vehicle, VehicleType
+from faao_mav.autopilot.vehicle_type import FenceAction
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import FreeArea, areas_of
+from faao_mav.mission.item import Home, Mission
+from faao_mav.sim.follower import Follower
+from faao_mav.wire.local_frame import frame_of
+from faao_mav.wire.messages import SetPositionTargetLocalNed
+from faao_mav.wire.modes import modes_of
+from faao_mav.wire.setpoints import setpoint_rules
 
-_FIRST_DO = 176  # below: navigation and conditions, which take time
+Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
+"""How a vehicle with the parameters that it has flies a mission."""
+
+_FIRST_DO = 176
+"""The first command that is done at once; those before take time."""
+
+_EARLY = 1e-6
+"""Seconds by which an event may come early, rather than a tick late; chosen."""
+
+_FARTHEST = 1e6
+"""Setpoints farther away, m, or beyond that in m/s or m/s² are none; chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class Posture:
-    """Where the aircraft is and how it moves: east, north, up of home, m and m/s."""
+class Flight:
+    """What a mock autopilot's mode and motors are, and what it therefore does with its aircraft.
 
-    position: Real
-    velocity: Real
-    item: int
-
-
-class MockFlight:
-    """One flight along `track`, begun at `started`, flown `speedup` times as fast as predicted.
-
-    `breach` is where it leaves the fence.
+    It flies missions along the track of `fly`, and follows setpoints in GUIDED and Offboard. In
+    another mode it returns, lands or holds its place. `values` are its parameters, `wind` is in
+    m/s east and north. Times are seconds on its own clock.
     """
 
     def __init__(
         self,
-        track: Track,
-        items: Sequence[MissionItem],
-        started: float,
-        speedup: float,
-        breach: Breach | None = None,
+        vehicle_type: VehicleType,
+        values: Mapping[str, float],
+        home: Home,
+        fly: Fly | None,
+        wind: tuple[float, float],
     ) -> None:
-        self._track, self._started, self._speedup = track, started, speedup
-        self._breach = breach
-        self._over = False
-        self._pending = sorted(
-            (float(time), _reached_number(items, index))
-            for index, time in enumerate(track.reached)
-            if math.isfinite(time) and index < len(items)
-        )
+        self._type, self._values, self._home, self._fly = vehicle_type, values, home, fly
+        self.modes, self.rules = modes_of(vehicle_type), setpoint_rules(vehicle_type.family)
+        self.mode = self.asked_mode = self.modes.rest
+        self.aircraft = Follower(wind)
+        self._first_heard = self._last_heard = -math.inf
+        self.stop()
 
     @property
-    def end(self) -> float:
-        """When the track ends, on the clock of `started`."""
-        return self._started + float(self._track.t[-1]) / self._speedup
+    def vehicle(self) -> Vehicle:
+        """The vehicle with its parameters; useless ones do not count."""
+        return Vehicle(self._type.family.key, self._type.kind, self._values).usable()
+
+    def predict(self, mission: Mission) -> Track | None:
+        """Return its flight of `mission`; None if it flies none, or not this one."""
+        try:
+            return None if self._fly is None else self._fly(mission, self.vehicle)
+        except InputError:
+            return None
+
+    def stop(self) -> None:
+        """Stand at home with the motors off."""
+        self.aircraft.stand()
+        self.land()
+
+    def land(self) -> None:
+        """Turn the motors off where it stands."""
+        self.armed = self.on_mission = self._follows = False
+        self._track: Track | None = None
+
+    def arm(self, now: float) -> None:
+        """Turn the motors on."""
+        self.armed = True
+        self._do("hold", now)
+
+    def enter(self, mode: int, now: float) -> None:
+        """Change to `mode`, and do what it asks for; a mission is begun apart."""
+        self.mode = self.asked_mode = mode
+        if mode == self.modes.guided:
+            self._track = None
+        if mode != self.modes.mission and self.armed:
+            self._break_off(now)
+            self._do(self._action_of(mode), now)
+
+    def _action_of(self, mode: int) -> FenceAction:
+        """Return what is done in a mode that is not the mission's."""
+        return next((act for act, own in self.modes.at_fence.items() if own == mode), "hold")
+
+    def _do(self, action: FenceAction | Literal["sink"], now: float) -> None:
+        """Return, land, sink or hold, from where it is."""
+        self._follows = False
+        vehicle, (east, north, up) = self.vehicle, self.aircraft.at(now).position
+        vertical, legs = vehicle.vertical, list[tuple[Real, float]]()
+        if not self.aircraft.flies(now) or action == "hold":
+            self.aircraft.hold(now, vehicle.top_airspeed)
+            return
+        if action == "return":
+            high = vertical.returns_at(up)
+            legs.append((np.array([east, north, high]), vertical.climb_speed))
+            east, north, up = 0.0, 0.0, high
+            legs.append((np.array([east, north, up]), vehicle.value("cruise_speed")))
+        if action != "return" or vertical.lands_on_return:
+            low = up if action == "sink" else min(up, vertical.landing_height)
+            legs.append((np.array([east, north, low]), vertical.descent_speed))
+            legs.append((np.array([east, north, 0.0]), vertical.landing_speed))
+        self.aircraft.go(now, *legs)
+
+    # ---- the mission and the fence
+
+    def begin(self, mission: Mission, now: float) -> bool:
+        """Fly `mission`, or the rest of the one that was broken off; tell whether it can be flown.
+
+        It flies straight to where that begins: in the air, where the first item is done.
+        """
+        if not self.armed or self.on_mission:
+            return self._fly is not None
+        vehicle, flies = self.vehicle, self.aircraft.flies(now)
+        if self._track is None:
+            self._track = self.predict(mission)
+            if self._track is None:
+                return False
+            self._pending = _reached(self._track, mission)
+            self._leaves = _leaves(self._track, mission.fence, vehicle)
+            self._since = self._pending[0][0] if flies and self._pending else 0.0
+        track, here = self._track, self.aircraft.at(now).position
+        k = min(int(np.searchsorted(track.t, self._since)), len(track.t) - 1)
+        way = float(np.linalg.norm(track.position[k] - here)) if flies else 0.0
+        self._begun = now + way / vehicle.value("cruise_speed") - float(track.t[k])
+        times, items = np.append(now, track.t[k:] + self._begun), track.item[k:]
+        places = np.vstack([here, track.position[k:]])
+        self.aircraft.play(times, places, np.append(items[0], items))
+        self._follows, self.on_mission = False, True
+        return True
 
     @property
     def next_event(self) -> float:
-        """When the next item is reached, the fence is left, or the track ends; inf after that."""
-        if self._over:
-            return math.inf
-        times = [time for time, _ in self._pending[:1]]
-        times += [self._breach.time] if self._breach is not None else []
-        return min([self._started + time / self._speedup for time in times] + [self.end])
+        """When the next item is reached, the fence is left, or it comes to the end of its way."""
+        events = [self._leaves, *(time for time, _ in self._pending[:1])] if self.on_mission else []
+        return min([self._begun + time for time in events] + [self.aircraft.arrives])
 
-    def breached(self, now: float) -> Breach | None:
-        """Return the breach of the fence since the last call, if there is one."""
-        breach = self._breach
-        # A little early rather than a tick late, as in `reached`.
-        if breach is None or (now - self._started) * self._speedup < breach.time - 1e-6:
-            return None
-        self._breach = None
-        return breach
-
-    def ended(self, now: float) -> bool:
-        """Tell whether the track has ended, which is no event any more then."""
-        self._over = now >= self.end
-        return self._over
-
-    def delay(self, seconds: float) -> None:
-        """Let the rest of the flight be `seconds` later, after a break."""
-        self._started += seconds
-
-    @property
-    def lands(self) -> bool:
-        """Whether it ends on the ground."""
-        return self._track.lands
-
-    def at(self, now: float) -> Posture:
-        """Return the posture at `now`; after the end, the last one at rest."""
-        track, time = self._track, (now - self._started) * self._speedup
-        if time >= track.t[-1]:
-            return Posture(track.position[-1], np.zeros(3), int(track.item[-1]))
-        position, velocity = (
-            np.array([np.interp(time, track.t, values[:, axis]) for axis in range(3)])
-            for values in (track.position, track.velocity)
-        )
-        sample = int(np.searchsorted(track.t, time, side="right")) - 1
-        return Posture(position, velocity, int(track.item[max(sample, 0)]))
-
-    def reached(self, now: float, first: int) -> list[Message]:
-        """Return what has been reached since the last call; `first` is the first item's number."""
-        time = (now - self._started) * self._speedup
-        # A little early rather than a tick late: the clock was asked for exactly this time.
-        due = [number for when, number in self._pending if when <= time + 1e-6]
+    def reached(self, now: float) -> list[int]:
+        """Return the items of the mission that were reached since the last call."""
+        if not self.on_mission:
+            return []
+        due = [number for time, number in self._pending if self._begun + time <= now + _EARLY]
         self._pending = self._pending[len(due) :]
-        return [MissionItemReached(number + first) for number in due]
+        return due
+
+    def at_fence(self, now: float) -> FenceAction | None:
+        """Break off a mission that leaves the fence; return what is done, once."""
+        if not self.on_mission or self._begun + self._leaves > now + _EARLY:
+            return None
+        self._leaves = math.inf
+        action = self._type.at_fence(self.vehicle).action
+        if action != "report":
+            self._break_off(now)
+            self.mode = self.asked_mode = self.modes.at_fence.get(action, self.mode)
+            self._do(action, now)
+        return action
+
+    def home_outside(self, fence: Fence) -> bool:
+        """Tell whether home lies outside a `fence` that it does something about."""
+        vehicle, frame = self.vehicle, LocalFrame(self._home.latitude, self._home.longitude)
+        acts = fence and self._type.at_fence(vehicle).action != "nothing"
+        return bool(acts) and not _covered(fence, frame, vehicle, np.zeros((1, 2))).all()
+
+    def _break_off(self, now: float) -> None:
+        if self.on_mission:
+            self._since, self.on_mission = now - self._begun, False
+
+    # ---- setpoints
+
+    def accepts_guided(self, now: float) -> bool:
+        """Tell whether it enters that mode: PX4 only once setpoints have come for some time."""
+        streamed = now - self._first_heard > self.rules.streamed and not self._late(now)
+        return streamed or not self.rules.takes_off_by_setpoints
+
+    def hear(self, message: SetPositionTargetLocalNed, now: float) -> bool:
+        """Take a setpoint; tell whether it ends the failsafe for lost ones."""
+        if self._late(now):
+            self._first_heard = now
+        self._last_heard = now
+        guided = self.armed and self.asked_mode == self.modes.guided
+        comes_back = guided and self.mode != self.asked_mode
+        if comes_back:
+            self.mode = self.asked_mode
+        flies = self.rules.takes_off_by_setpoints or self.aircraft.flies(now)
+        if guided and flies and (np.abs(_rows(message)) < _FARTHEST).all():
+            self._follows, airspeed = True, self.vehicle.top_airspeed
+            carries_on = self.rules.carries_on
+            self.aircraft.pursue(now, self.aim(message), airspeed, carries_on=carries_on)
+        return comes_back
+
+    def aim(self, message: SetPositionTargetLocalNed) -> Real:
+        """Return what `message` says, (3, 3), in metres east, north and up of home."""
+        origin, aim = (self._home.latitude, self._home.longitude), _rows(message)
+        frame = frame_of(self._type.family, *origin)
+        aim[0, :2] = LocalFrame(*origin).to_local(*frame.to_geodetic(aim[0, :2]))
+        return aim
+
+    def lose_setpoints(self, now: float) -> None:
+        """Do what is to be done when setpoints have ceased, if they have."""
+        if not self._follows or not self._late(now):
+            return
+        by_sticks = False
+        if self.rules.loss:
+            done = self.rules.actions.get(self._values[self.rules.loss])
+            self.mode = self.modes.hold if done is None else done.mode
+            by_sticks = done is not None and done.by_sticks
+        self._do("sink" if by_sticks else self._action_of(self.mode), now)
+
+    def take_off(self, height: float, now: float) -> bool:
+        """Climb to `height`, m, on the command; tell whether it does."""
+        ready = self.armed and self.mode == self.modes.guided and not self.aircraft.flies(now)
+        if not ready or self.rules.takes_off_by_setpoints or not math.isfinite(height):
+            return False
+        up = np.append(self.aircraft.at(now).position[:2], height)
+        self.aircraft.go(now, (up, self.vehicle.vertical.climb_speed))
+        return True
+
+    def _late(self, now: float) -> bool:
+        """Tell whether there was no setpoint for as long as its parameter allows."""
+        allowed = max(self._values[self.rules.timeout], self.rules.least_timeout)
+        return now - self._last_heard > allowed
 
 
-def telemetry(posture: Posture, home: Home, since_boot: float) -> list[Message]:
-    """Return the position reports of `posture`, `since_boot` seconds after start-up."""
-    milliseconds = int(since_boot * 1000) % 2**32
-    east, north, up = (float(value) for value in posture.position)
-    v_east, v_north, v_up = (float(value) for value in posture.velocity)
-    latitude, longitude = _geodetic(home, east, north)
-    heading = math.atan2(v_east, v_north)
-    return [
-        GlobalPositionInt(
-            milliseconds,
-            round(latitude * 1e7),
-            round(longitude * 1e7),
-            _fitted((home.altitude + up) * 1000, 32),
-            _fitted(up * 1000, 32),
-            _fitted(100 * v_north, 16),
-            _fitted(100 * v_east, 16),
-            _fitted(-100 * v_up, 16),
-            round(math.degrees(heading) % 360 * 100) % 36_000,
-        ),
-        LocalPositionNed(milliseconds, north, east, -up, v_north, v_east, -v_up),
-        Attitude(milliseconds, 0.0, 0.0, heading, 0.0, 0.0, 0.0),
-    ]
+def _rows(message: SetPositionTargetLocalNed) -> Real:
+    """Return position, velocity and acceleration of `message`, each east, north, up."""
+    m = message
+    rows = [m.y, m.x, -m.z], [m.vy, m.vx, -m.vz], [m.afy, m.afx, -m.afz]
+    return np.array(rows, dtype=float)
 
 
-def _fitted(value: float, bits: int) -> int:
-    """What a field of so many bits holds: 300 m/s and more are cut."""
-    most = (1 << bits - 1) - 1
-    return round(min(max(value, -most), most))
+def _reached(track: Track, mission: Mission) -> list[tuple[float, int]]:
+    """Return when items are reached, s on `track`, and the numbers that are told, in order.
+
+    Where a DO follows an item, both autopilots tell the number of the DO.
+    """
+    do = [item.command >= _FIRST_DO for item in mission.items[1:]] + [False]
+    done = enumerate(track.reached[: len(do)])
+    return sorted((float(t), index + do[index]) for index, t in done if math.isfinite(t))
 
 
-def _geodetic(home: Home, east: float, north: float) -> tuple[float, float]:
-    if not (east or north):
-        return home.latitude, home.longitude
-    from faao_mav.geodesy import LocalFrame
+def _leaves(track: Track, fence: Fence, vehicle: Vehicle) -> float:
+    """Return when `track` leaves `fence`, s, inf if never or if `vehicle` does not care.
 
-    frame = LocalFrame(home.latitude, home.longitude)
-    latitude, longitude = frame.to_geodetic([east, north])
-    return float(latitude), float(longitude)
+    A flight that starts outside leaves the fence once it has been inside.
+    """
+    if not fence or vehicle.type.at_fence(vehicle).action == "nothing":
+        return math.inf
+    out = ~_covered(fence, track.frame, vehicle, track.position[:, :2])
+    left = np.flatnonzero(out & np.logical_or.accumulate(~out))
+    return float(track.t[left[0]]) if len(left) else math.inf
 
 
-def _reached_number(items: Sequence[MissionItem], index: int) -> int:
-    """Return the number that is told for item `index`: both autopilots name a DO that follows."""
-    following = index + 1
-    if following < len(items) and items[following].command >= _FIRST_DO:
-        return following
-    return index
+def _covered(fence: Fence, frame: LocalFrame, vehicle: Vehicle, places: Real) -> Flags:
+    """Return at which `places` (n, 2), m in `frame`, `vehicle` is inside `fence`, (n,)."""
+    any_inclusion = vehicle.type.fence_needs_one_inclusion(vehicle)
+    return FreeArea.of(areas_of(fence, frame), any_inclusion=any_inclusion).covers(places)

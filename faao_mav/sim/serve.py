@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.mission.item import Mission
-from faao_mav.sim.mock_autopilot import Fly, MockAutopilot
+from faao_mav.sim.flight import Fly
+from faao_mav.sim.mock_autopilot import MockAutopilot
 from faao_mav.wire.faults import Faults, FaultyTransport
 from faao_mav.wire.link import WireLink
 from faao_mav.wire.signing import Signing

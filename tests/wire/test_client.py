@@ -119,7 +119,7 @@ def test_no_space_says_the_limit_and_the_count(port: int) -> None:
 def test_the_mission_of_an_armed_vehicle_is_left_alone(port: int) -> None:
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock_of("px4"), f"udpin:127.0.0.1:{port}") as mock:
-        mock.armed = True
+        mock.flight.arm(0.0)
         changes = (upload, a_mission(5), connection), (clear, connection)
         for change, *arguments in changes:
             with pytest.raises(LinkError, match="armed vehicle is not replaced; disarm it"):

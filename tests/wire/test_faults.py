@@ -298,7 +298,8 @@ def test_an_armed_vehicle_gets_no_fence_after_its_mission(may_be_armed: bool, wh
 
     def arm(envelope: Envelope, _: float) -> None:
         counted = isinstance(envelope.message, MissionCount)
-        mock.armed = mock.armed or when == "before" or counted
+        if when == "before" or counted:
+            mock.flight.arm(0.0)
 
     simulate(
         Station(script, GROUND_STATION),

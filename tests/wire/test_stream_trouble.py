@@ -48,17 +48,17 @@ class Flown:
     @classmethod
     def of(cls, kind: str, solution: Solution, **options: Any) -> "Flown":
         flown = cls(Scene(kind, solution=solution, **options))
-        guided = flown.scene.mock._guided
-        hear = guided.hear
+        flight = flown.scene.mock.flight
+        hear = flight.hear
 
-        def heard(message: SetPositionTargetLocalNed, mode: int, now: float) -> None:
-            if guided.flying:
+        def heard(message: SetPositionTargetLocalNed, now: float) -> bool:
+            if flight.armed:
                 flown.times.append(now)
-                flown.sent.append(guided._setpoint(message).position)
-                flown.places.append(guided.at(now).position)
-            hear(message, mode, now)
+                flown.sent.append(flight.aim(message)[0])
+                flown.places.append(flight.aircraft.at(now).position)
+            return bool(hear(message, now))
 
-        guided.hear = heard
+        flight.hear = heard
         return flown
 
     @property
@@ -103,9 +103,9 @@ def during(
 def test_after_px4s_landing_failsafe_it_climbs_before_it_goes_on() -> None:
     flown = Flown.of("px4", swift(), parameters={"COM_OBL_RC_ACT": 4})
     heights = list[float]()
-    events = [(57.5, lambda _: heights.append(flown.scene.mock._guided._p[2]))]
+    events = [(57.5, lambda _: heights.append(flown.scene.mock.posture(57.5).position[2]))]
     assert flown.scene.run(Faults(outages=((46.0, 57.4),)), events=events) == "finished"
-    assert 1.0 < heights[0] < 12.0
+    assert 1.0 < heights[0] < 20.0
     assert flown.scene.told("it is in its failsafe")
     assert flown.scene.told("off its flight, and led back to it")
     flown.assert_gated()
@@ -120,7 +120,7 @@ def test_after_px4s_landing_failsafe_it_climbs_before_it_goes_on() -> None:
 def test_an_aircraft_that_its_failsafe_has_landed_is_not_taken_off_again() -> None:
     flown = Flown.of("px4", swift(), parameters={"COM_OBL_RC_ACT": 4})
     mock = flown.scene.mock
-    mock._guided.landed = lambda _: False  # it does not disarm
+    mock.flight.aircraft.landed = lambda _: False  # it does not disarm
     assert flown.scene.run(Faults(outages=((46.0, 90.0),)), until=120.0) == ""
     assert flown.scene.told("setpoints end: it has come down to the ground")
     assert flown.scene.watch.phase == "aside"
@@ -150,7 +150,7 @@ def test_where_no_way_leads_back_it_is_left_to_its_failsafe() -> None:
     over = list[float]()
 
     def silent(message: Message, now: float) -> Sequence[Message]:
-        place = mock._posture(now).position[None, :2]
+        place = mock.posture(now).position[None, :2]
         if now > 60.0 and not over and not area.covers(place).all():
             over.append(now)
         return [message] if now < 60.0 or over else []
@@ -166,15 +166,9 @@ def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> 
     """It was in that mode for want of setpoints before: the last that was heard is a failsafe."""
     flown = Flown.of("px4", swift(), parameters={"COM_OBL_RC_ACT": 5})
     deaf = [False]
-    hear = flown.scene.mock._guided.hear
-
-    def heard(message: SetPositionTargetLocalNed, mode: int, now: float) -> None:
-        if not deaf[0]:
-            hear(message, mode, now)
-
-    flown.scene.mock._guided.hear = heard
-    come_back = flown.scene.mock._come_back
-    flown.scene.mock._come_back = lambda: [] if deaf[0] else come_back()
+    flight = flown.scene.mock.flight
+    hear = flight.hear
+    flight.hear = lambda *told: False if deaf[0] else hear(*told)
     modes = Heartbeat | CurrentMode  # which come after positions, when the link is back
     flown.scene.tells(
         lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :]
@@ -208,7 +202,7 @@ def test_a_hold_is_asked_for_until_it_is_confirmed(kind: str, action: int, silen
     """However long nothing is heard, and whatever its failsafe does meanwhile."""
     flown = Flown.of(kind, swift(), parameters={"COM_OBL_RC_ACT": action})
     scene, modes = flown.scene, list[int]()
-    scene.mock._guided.landed = lambda _: False  # it does not disarm
+    scene.mock.flight.aircraft.landed = lambda _: False  # it does not disarm
     end = 44.0 + silence
     events = [
         (45.0, interrupt(scene)),
