@@ -3,18 +3,18 @@
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from faao_mav.sim.ardupilot_firmware import ArduPilotFirmware
+from faao_mav.sim.ardupilot_firmware import MOCK_ARDUPILOT
 from faao_mav.sim.firmware import COUNT as COUNT
 from faao_mav.sim.firmware import Behaviour as Behaviour
 from faao_mav.sim.mock_autopilot import MockAutopilot as MockAutopilot
-from faao_mav.sim.px4_firmware import Px4Firmware
+from faao_mav.sim.px4_firmware import MOCK_PX4
 
 MockKind: TypeAlias = Literal["ardupilot", "px4", "px4-legacy-first"]
 
 _BEHAVIOURS: dict[MockKind, Behaviour] = {
-    "ardupilot": Behaviour(ArduPilotFirmware, legacy_first=True),
-    "px4": Behaviour(Px4Firmware),
-    "px4-legacy-first": Behaviour(Px4Firmware, legacy_first=True),
+    "ardupilot": MOCK_ARDUPILOT,
+    "px4": MOCK_PX4,
+    "px4-legacy-first": replace(MOCK_PX4, legacy_first=True),
 }
 
 

@@ -1,18 +1,26 @@
-"""What the firmwares of mock autopilots have in common: what they store, what they refuse."""
+"""What the mocks of different autopilots have in common, and the data in which they differ."""
 
 import struct
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
 
 from faao_mav.autopilot import AutopilotFamily, VehicleType
 from faao_mav.autopilot.dialect import BESIDE
 from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.wire.messages import CommandLong, Envelope, Message, Statustext, WireItem
-from faao_mav.wire.protocol import MavResult, MissionType
+from faao_mav.wire.manners import manners_of
+from faao_mav.wire.messages import (
+    CommandLong,
+    Envelope,
+    Message,
+    MissionAck,
+    MissionRequestInt,
+    Statustext,
+    WireItem,
+)
+from faao_mav.wire.protocol import Address, MavResult, MissionType
 from faao_mav.wire.wire_items import home_items, mission_item, wire_item
 
 COUNT = -1
@@ -26,35 +34,24 @@ class StoredLists:
     """What is stored: items as the vehicle gives them back."""
 
     def __init__(self, vehicle: VehicleType, home: Home) -> None:
-        self.vehicle, self.home = vehicle, home
-        self._items: dict[MissionType, list[WireItem]] = {part: [] for part in MissionType}
+        self.vehicle, self._home = vehicle, home
+        self._items: dict[MissionType, tuple[WireItem, ...]] = dict.fromkeys(MissionType, ())
 
     def items(self, part: MissionType) -> tuple[WireItem, ...]:
         """Return what a download gives."""
-        return tuple(self._items[part])
+        return self._items[part]
 
-    def put(self, part: MissionType, seq: int, item: WireItem) -> None:
-        """Store `item` in place of the one at `seq`, or behind the last one."""
-        self._items[part][seq : seq + 1] = [self.kept(part, seq, item)]
+    def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
+        """Store all of `items`, which are as `kept` gives them, in place of the list."""
+        self._items[part] = tuple(items)
 
     def kept(self, part: MissionType, seq: int, item: WireItem) -> WireItem:
         """Return what becomes of `item`; a home item is the vehicle's own, whatever is sent."""
         if seq < home_items(self.vehicle, part):
-            return self._home_item()
+            h = self._home
+            return wire_item(MissionItem(16, 0, x=h.latitude, y=h.longitude, z=h.altitude), seq)
         stored = self.vehicle.dialect.stored(mission_item(item))
         return wire_item(stored, seq, current=seq == 0 and not self.vehicle.dialect.home_row)
-
-    def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
-        """Store all of `items`, which are as `kept` gives them, in place of the list."""
-        self._items[part] = list(items)
-
-    def truncate(self, part: MissionType, count: int) -> None:
-        """Forget what is beyond `count`."""
-        del self._items[part][count:]
-
-    def clear(self, part: MissionType) -> None:
-        """Forget all, home too."""
-        self.truncate(part, 0)
 
     def number(self, part: MissionType) -> int:
         """Return a number that tells this list from others: a checksum; 0 when empty."""
@@ -64,143 +61,165 @@ class StoredLists:
         )
         return zlib.crc32(packed)
 
-    def _home_item(self) -> WireItem:
-        home = self.home
-        place = (round(home.latitude * 1e7), round(home.longitude * 1e7), home.altitude)
-        return WireItem(16, 0, (0.0, 0.0, 0.0, 0.0), *place)
 
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Behaviour:
-    """How a mock autopilot takes lists.
-
-    `refusals` are results to answer an item (or `COUNT`) with, whatever it says. `legacy_first`: it
-    asks with MISSION_REQUEST; PX4 until it is sent MISSION_ITEM_INT. `complete_only`: PX4
-    acknowledges a repeated last item only if it has all items (older ones acknowledge a repeated
-    item of an upload that they gave up).
-    """
-
-    firmware: "type[MockFirmware]"
-    refusals: Mapping[tuple[int, int], MavResult] = field(default_factory=dict)
-    legacy_first: bool = False
-    complete_only: bool = True
-
-    @property
-    def family(self) -> AutopilotFamily:
-        """The autopilot that is mocked."""
-        return self.firmware.family
-
-
-class MockFirmware(ABC):
-    """The part of a mock autopilot that differs from one autopilot to the next.
-
-    `ready` tells whether booting is over, `flying` whether the mission is being flown. What
-    derives from it answers the messages of the mission protocol, and says:
+    """The autopilot that a mock is, and how that differs from others.
 
     Attributes:
-        family: the autopilot that is mocked.
+        family: the autopilot.
+        lists: what answers the messages about lists.
         mission_limit: how many items of a mission it holds, home included.
-        parameters: what ground stations look for beside the parameters that the package knows.
         misplaced: the answer to an item of a fence, or a rally point, in a mission.
         nonsense: the answer to commands 0 and 1.
+        beside: the answer to an item of a fence or of rally points that is on Earth.
+        requested_mode: the custom mode that DO_SET_MODE asks for, None if it asks for none.
+        infeasible: why a mission is not flown though it was taken, "" if it is.
+        parameters: what ground stations look for beside the parameters that the package knows.
         silent_at_boot: it answers nothing about lists before it is ready.
         numbers_missions: its MISSION_CURRENT has a number for the mission.
+        tells_no_place: it tells latitude and longitude 0 as long as it knows none; else nothing.
         returns_by_mode: the types of vehicle that change their mode when a mission has them return.
         fence_texts: what it says when it leaves the fence.
         armed_inside_only: it does not arm where home lies outside the fence.
         mode_denied, no_mode: the MAV_RESULT of a mode that it does not enter, and of no such mode.
         not_armed, not_armed_text: the MAV_RESULT with which it does not arm, and what it says.
+        refusals: results to answer an item (or `COUNT`) with, whatever it says.
+        legacy_first: it asks with MISSION_REQUEST; PX4 until it is sent MISSION_ITEM_INT.
+        complete_only: PX4 acknowledges a repeated last item only if it has all items; older ones
+            acknowledge a repeated item of an upload that they gave up.
     """
 
-    family: ClassVar[AutopilotFamily]
-    mission_limit: ClassVar[int]
-    parameters: ClassVar[Mapping[str, float]] = {}
-    misplaced: ClassVar[MavResult]
-    nonsense: ClassVar[MavResult]
-    silent_at_boot: ClassVar[bool] = False
-    numbers_missions: ClassVar[bool] = False
-    returns_by_mode: ClassVar[frozenset[str]] = frozenset()
-    fence_texts: ClassVar[tuple[Statustext, ...]]
-    armed_inside_only: ClassVar[bool] = False
-    mode_denied: ClassVar[int]
-    no_mode: ClassVar[int]
-    not_armed: ClassVar[int]
-    not_armed_text: ClassVar[str]
+    family: AutopilotFamily
+    lists: "type[ListServer]"
+    mission_limit: int
+    misplaced: MavResult
+    nonsense: MavResult
+    beside: Callable[[MissionType, WireItem], MavResult]
+    requested_mode: Callable[[CommandLong], int | None]
+    infeasible: Callable[[Mission], str] = lambda _: ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    silent_at_boot: bool = False
+    numbers_missions: bool = False
+    tells_no_place: bool = False
+    returns_by_mode: frozenset[str]
+    fence_texts: tuple[Statustext, ...]
+    armed_inside_only: bool = False
+    mode_denied: int
+    no_mode: int
+    not_armed: int
+    not_armed_text: str
+    refusals: Mapping[tuple[int, int], MavResult] = field(default_factory=dict)
+    legacy_first: bool = False
+    complete_only: bool = True
+
+
+@dataclass(slots=True)
+class Transfer:
+    """A list on its way: with whom, how many of its `count` items have passed, and when."""
+
+    partner: Address
+    part: MissionType
+    count: int
+    heard: float
+    sending: bool = False
+    passed: int = 0
+    asked: float = 0.0
+    items: tuple[WireItem, ...] = ()
+
+
+class ListServer(ABC):
+    """What takes and gives lists; `ready` tells if booting is over, `flying` if a mission is flown.
+
+    What derives from it answers the messages of the mission protocol.
+    """
 
     def __init__(
         self,
-        lists: StoredLists,
+        stored: StoredLists,
         behaviour: Behaviour,
         ready: Callable[[], bool],
         flying: Callable[[], bool],
     ) -> None:
-        self._lists, self._behaviour = lists, behaviour
-        self._manners = lists.vehicle.family.manners
+        self._stored, self._behaviour = stored, behaviour
+        self._manners = manners_of(stored.vehicle)
         self._ready, self._flying = ready, flying
         self._legacy = behaviour.legacy_first
         self.reset()
 
-    @property
-    @abstractmethod
-    def deadline(self) -> float | None:
-        """When the next request or the end of patience is due."""
-
-    @abstractmethod
     def reset(self) -> None:
         """Forget what is under way, as a reboot does."""
+        self._transfers: dict[MissionType, Transfer] = {}
+
+    @property
+    def deadline(self) -> float | None:
+        """When the next request or the end of patience is due."""
+        return min(map(self._due, self._transfers.values()), default=None)
+
+    def _due(self, transfer: Transfer) -> float:
+        end = transfer.heard + self._manners.patience
+        return end if transfer.sending else min(end, transfer.asked + self._manners.request_period)
+
+    def tick(self, now: float) -> list[Message]:
+        """Ask again, or give up."""
+        out: list[Message] = []
+        for part, transfer in list(self._transfers.items()):
+            if now >= transfer.heard + self._manners.patience:
+                del self._transfers[part]
+                out += self._given_up(transfer)
+            elif now >= self._due(transfer):
+                out += self._ask(transfer, now)
+        return out
 
     @abstractmethod
     def on(self, envelope: Envelope, now: float) -> list[Message]:
         """Answer a message of the mission protocol."""
 
     @abstractmethod
-    def tick(self, now: float) -> list[Message]:
-        """Ask again, or give up."""
+    def _given_up(self, transfer: Transfer) -> list[Message]:
+        """Return what is said when nothing more comes."""
 
-    def requested_mode(self, command: CommandLong) -> int | None:
-        """Return the custom mode that DO_SET_MODE asks for, None if it asks for none."""
-        number = whole(command.param2)
-        return number if is_custom(command) and number >= 0 else None
+    def _begin(self, transfer: Transfer) -> list[Message]:
+        self._transfers[transfer.part] = transfer
+        return self._ask(transfer, transfer.heard)
 
-    def without_place(self, reports: list[Message]) -> list[Message]:
-        """Return what it tells of position `reports` as long as it does not know where it is."""
-        return reports[:0]
+    def _ask(self, transfer: Transfer, now: float) -> list[Message]:
+        transfer.asked = now
+        part, seq = transfer.part, transfer.passed
+        return [MissionRequestInt(transfer.partner, part, seq, self._legacy)]
 
-    def infeasible(self, mission: Mission) -> str | None:  # noqa: ARG002
-        """Return why `mission` is not flown though it was taken, None if it is."""
-        return None
+    def _cleared(self, sender: Address, mission_type: int, *parts: MissionType) -> list[Message]:
+        for part in parts:
+            self._transfers.pop(part, None)
+            self._stored.replace(part, ())
+        return [MissionAck(sender, mission_type, MavResult.ACCEPTED)]
 
-    def check_count(self, part: MissionType, count: int) -> MavResult:
-        """Return what it answers to the announcement of `count` items."""
-        if (refusal := self._behaviour.refusals.get((part, COUNT))) is not None:
-            return refusal
-        fits = self._ready() and count <= self.size_limit(part)
-        return MavResult.ACCEPTED if fits else MavResult.NO_SPACE
-
-    def size_limit(self, part: MissionType) -> int:
+    def _size_limit(self, part: MissionType) -> int:
         """Return how many items of that list it holds."""
-        dialect = self._lists.vehicle.dialect
-        return (self.mission_limit, dialect.fence_rows, dialect.rally_rows)[part]
+        dialect = self._stored.vehicle.dialect
+        return (self._behaviour.mission_limit, dialect.fence_rows, dialect.rally_rows)[part]
 
-    def check_item(self, part: MissionType, seq: int, item: WireItem) -> MavResult:
+    def _check_count(self, part: MissionType, count: int) -> MavResult:
+        """Return what it answers to the announcement of `count` items."""
+        fits = self._ready() and count <= self._size_limit(part)
+        result = MavResult.ACCEPTED if fits else MavResult.NO_SPACE
+        return self._behaviour.refusals.get((part, COUNT), result)
+
+    def _check_item(self, part: MissionType, seq: int, item: WireItem) -> MavResult:
         """Return what it answers to `item`, number `seq` of that list."""
         if (refusal := self._behaviour.refusals.get((part, seq))) is not None:
             return refusal
         if part is MissionType.MISSION:
             if item.command in BESIDE:
-                return self.misplaced
+                return self._behaviour.misplaced
             if item.command in (0, 1):
-                return self.nonsense
-            return _check_mission_item(mission_item(item), self._lists.vehicle)
-        if (result := self.check_beside(part, item)) != MavResult.ACCEPTED:
+                return self._behaviour.nonsense
+            return _check_mission_item(mission_item(item), self._stored.vehicle)
+        if (result := self._behaviour.beside(part, item)) != MavResult.ACCEPTED:
             return result
         if abs(item.x) > 900_000_000:
             return MavResult.INVALID_PARAM5_X
         return MavResult.INVALID_PARAM6_Y if abs(item.y) > 1_800_000_000 else MavResult.ACCEPTED
-
-    @abstractmethod
-    def check_beside(self, part: MissionType, item: WireItem) -> MavResult:
-        """Return what it answers to `item` of a fence or of rally points that is on Earth."""
 
 
 def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> MavResult:

@@ -124,28 +124,31 @@ class Follower:
         self._p[2] = max(self._p[2], 0.0)
 
 
-def telemetry(posture: Posture, home: Home, since_boot: float) -> list[Message]:
-    """Return the position reports of `posture`, `since_boot` seconds after start-up."""
-    milliseconds = int(since_boot * 1000) % 2**32
-    east, north, up = map(float, posture.position)
-    v_east, v_north, v_up = map(float, posture.velocity)
+def global_position(posture: Posture, home: Home, since_boot: float) -> GlobalPositionInt:
+    """Return where `posture` is on Earth, `since_boot` seconds after start-up."""
+    (east, north, up), (v_east, v_north, v_up) = map(list, (posture.position, posture.velocity))
     frame = LocalFrame(home.latitude, home.longitude)
     latitude, longitude = map(float, frame.to_geodetic([east, north]))
-    heading = math.atan2(v_east, v_north)
+    return GlobalPositionInt(
+        int(since_boot * 1000) % 2**32,
+        round(latitude * 1e7),
+        round(longitude * 1e7),
+        _fitted((home.altitude + up) * 1000, 32),
+        _fitted(up * 1000, 32),
+        _fitted(100 * v_north, 16),
+        _fitted(100 * v_east, 16),
+        _fitted(-100 * v_up, 16),
+        round(math.degrees(math.atan2(v_east, v_north)) % 360 * 100) % 36_000,
+    )
+
+
+def local_reports(posture: Posture, since_boot: float) -> list[Message]:
+    """Return where `posture` is from home, and where it heads."""
+    time = int(since_boot * 1000) % 2**32
+    (east, north, up), (v_east, v_north, v_up) = map(list, (posture.position, posture.velocity))
     return [
-        GlobalPositionInt(
-            milliseconds,
-            round(latitude * 1e7),
-            round(longitude * 1e7),
-            _fitted((home.altitude + up) * 1000, 32),
-            _fitted(up * 1000, 32),
-            _fitted(100 * v_north, 16),
-            _fitted(100 * v_east, 16),
-            _fitted(-100 * v_up, 16),
-            round(math.degrees(heading) % 360 * 100) % 36_000,
-        ),
-        LocalPositionNed(milliseconds, north, east, -up, v_north, v_east, -v_up),
-        Attitude(milliseconds, 0.0, 0.0, heading, 0.0, 0.0, 0.0),
+        LocalPositionNed(time, north, east, -up, v_north, v_east, -v_up),
+        Attitude(time, 0.0, 0.0, math.atan2(v_east, v_north), 0.0, 0.0, 0.0),
     ]
 
 

@@ -10,7 +10,7 @@ from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.firmware import Behaviour, StoredLists, whole
 from faao_mav.sim.flight import Flight, Fly
-from faao_mav.sim.follower import Posture, telemetry
+from faao_mav.sim.follower import Posture, global_position, local_reports
 from faao_mav.sim.parameter_protocol import ParameterServer
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import (
@@ -117,10 +117,10 @@ class MockAutopilot(Machine[None]):
         known = self.vehicle.defaults() | dict(setpoint_rules(behaviour.family).defaults)
         for failsafe in self.vehicle.failsafes:
             known |= dict(failsafe.defaults)
-        known |= dict(behaviour.firmware.parameters)
+        known |= behaviour.parameters
         self.parameters = ParameterServer(known, parameters or {}, self.vehicle)
         self.flight = Flight(self.vehicle, self.parameters.values, home, fly, wind)
-        self._firmware = behaviour.firmware(self.lists, behaviour, self._is_ready, self._is_flying)
+        self._server = behaviour.lists(self.lists, behaviour, self._is_ready, self._is_flying)
         self._speedup, self._beat, self._boot, self._place = speedup, beat, boot, place
         self._period = 1 / rate / speedup if rate > 0 else math.inf
         self._booted = self._now = self._next_beat = self._next_report = 0.0
@@ -144,8 +144,8 @@ class MockAutopilot(Machine[None]):
         due = [self._next_beat, event if self.armed else math.inf]
         if self._period < math.inf:
             due.append(self._next_report)
-        if self._firmware.deadline is not None:
-            due.append(self._firmware.deadline)
+        if self._server.deadline is not None:
+            due.append(self._server.deadline)
         return min(due)
 
     def start(self, now: float) -> Sequence[Message]:
@@ -156,7 +156,7 @@ class MockAutopilot(Machine[None]):
 
     def reboot(self, now: float) -> None:
         """Begin anew; what is stored stays, what is under way is lost."""
-        self._firmware.reset()
+        self._server.reset()
         self.flight.stop()
         self._current = 0
         self._booted, self._ready_at = now, now + self._boot
@@ -178,7 +178,7 @@ class MockAutopilot(Machine[None]):
         if self._speedup > 1 and self.flight.on_mission and late > _LATE:
             self._booted += late
         self._now = now
-        out: list[Message] = list(self._firmware.tick(now))
+        out: list[Message] = list(self._server.tick(now))
         if self.armed:
             out += self._follow(now)
         if now >= self._next_beat:
@@ -188,12 +188,16 @@ class MockAutopilot(Machine[None]):
                 out.append(CurrentMode(self.flight.mode, self.flight.asked_mode))
         if now >= self._next_report and self._period < math.inf:
             self._next_report = now + self._period
-            out += self._told_of_place(now)
+            out += self._place_reports(now)
         return out
 
-    def _told_of_place(self, now: float) -> list[Message]:
-        told = telemetry(self.posture(now), self.home, self._clock(now))
-        return told if self._knows_place() else self._firmware.without_place(told)
+    def _place_reports(self, now: float) -> list[Message]:
+        """Return where it is, on Earth first; what it tells of that while it does not know."""
+        posture, clock = self.posture(now), self._clock(now)
+        place = global_position(posture, self.home, clock)
+        if self._knows_place():
+            return [place, *local_reports(posture, clock)]
+        return [replace(place, lat=0, lon=0, alt=0)] if self.behaviour.tells_no_place else []
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self._now = now
@@ -225,9 +229,9 @@ class MockAutopilot(Machine[None]):
                 comes_back = self.flight.hear(message, self._clock(now))
                 modes = CurrentMode(self.flight.mode, self.flight.asked_mode)
                 return [self._heartbeat(), modes] if comes_back else ()
-        if self._firmware.silent_at_boot and not self._is_ready():
+        if self.behaviour.silent_at_boot and not self._is_ready():
             return ()
-        return self._firmware.on(envelope, now)
+        return self._server.on(envelope, now)
 
     def _is_ready(self) -> bool:
         return self._now >= self._ready_at
@@ -243,9 +247,9 @@ class MockAutopilot(Machine[None]):
         match command.command:
             case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
-                why = self._why_not_armed() if result == self._firmware.not_armed else None
+                why = self._why_not_armed() if result == self.behaviour.not_armed else None
                 if why is not None:
-                    text = self._firmware.not_armed_text.format(why)
+                    text = self.behaviour.not_armed_text.format(why)
                     answers.append(Statustext(MavSeverity.CRITICAL, text))
             case MavCommand.TAKEOFF:
                 climbs = self.flight.take_off(command.param7, self._clock(now))
@@ -256,7 +260,7 @@ class MockAutopilot(Machine[None]):
                 self.flight.enter(self.flight.modes.mission, self._clock(now))
                 result = self._begin(now)
             case MavCommand.SET_MODE:
-                result = self._set_mode(self._firmware.requested_mode(command), now)
+                result = self._set_mode(self.behaviour.requested_mode(command), now)
             case MavCommand.SET_CURRENT:
                 found = self._set_current(whole(command.param1), now)
                 result = ACCEPTED if found else DENIED
@@ -285,7 +289,7 @@ class MockAutopilot(Machine[None]):
         if kind == _AUTOPILOT_VERSION:
             return [AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
         if kind == POSITION:
-            return self._told_of_place(self._now)[:1]
+            return self._place_reports(self._now)[:1]
         spot = {HOME_POSITION: HomePosition, LOCAL_ORIGIN: GpsGlobalOrigin}.get(kind)
         return [] if spot is None else [spot(*place, round(home.altitude * 1000))]
 
@@ -294,7 +298,7 @@ class MockAutopilot(Machine[None]):
             self.flight.stop()
             return ACCEPTED
         if self._why_not_armed() is not None:
-            return self._firmware.not_armed
+            return self.behaviour.not_armed
         if not self.armed:
             self.flight.arm(self._clock(now))
         return self._begin(now) if self.mode == self.flight.modes.mission else ACCEPTED
@@ -309,33 +313,33 @@ class MockAutopilot(Machine[None]):
             fence = self.mission().fence
         except InputError:  # peers store what they like
             return None
-        outside = self._firmware.armed_inside_only and self.flight.home_outside(fence)
+        outside = self.behaviour.armed_inside_only and self.flight.home_outside(fence)
         return "Vehicle breaching Polygon fence" if outside else None
 
     def _set_mode(self, mode: int | None, now: float) -> int:
         modes, clock = self.flight.modes, self._clock(now)
         if mode is None:
-            return self._firmware.no_mode
-        if mode == modes.mission and self._problem() is not None:
-            return self._firmware.mode_denied
+            return self.behaviour.no_mode
+        if mode == modes.mission and self._problem():
+            return self.behaviour.mode_denied
         if mode == modes.guided and not self.flight.accepts_guided(clock):
-            return self._firmware.mode_denied
+            return self.behaviour.mode_denied
         self.flight.enter(mode, clock)
         return self._begin(now) if mode == modes.mission else ACCEPTED
 
-    def _problem(self) -> str | None:
-        """Return why what is stored cannot be flown, or None."""
+    def _problem(self) -> str:
+        """Return why what is stored cannot be flown, "" if it can."""
         try:
             mission = self.mission()
         except InputError as error:  # peers store what they like
             return str(error)
         if not mission.items:
             return "no mission"
-        return self._firmware.infeasible(mission)
+        return self.behaviour.infeasible(mission)
 
     def _begin(self, now: float) -> int:
         """Fly the mission, once armed and told to; not a second time."""
-        if self._problem() is not None:
+        if self._problem():
             return DENIED
         mission = replace(self.mission(), home=self.home)
         return ACCEPTED if self.flight.begin(mission, self._clock(now)) else DENIED
@@ -346,14 +350,14 @@ class MockAutopilot(Machine[None]):
         out: list[Message] = [MissionItemReached(n + first) for n in flight.reached(clock)]
         before = flight.mode
         if flight.at_fence(clock) is not None:
-            out += self._firmware.fence_texts
+            out += self.behaviour.fence_texts
         flight.lose_setpoints(clock)
         current = flight.aircraft.at(clock).item + first
         if flight.on_mission and current != self._current:
             self._current = current
             rows = self.lists.items(MissionType.MISSION)
             returns = rows[current : current + 1] and rows[current].command == _RETURN
-            if self.vehicle.kind in self._firmware.returns_by_mode and returns:
+            if self.vehicle.kind in self.behaviour.returns_by_mode and returns:
                 flight.mode = flight.modes.at_fence["return"]
             out.append(self._mission_current(now))
         if flight.aircraft.landed(clock):
@@ -378,7 +382,7 @@ class MockAutopilot(Machine[None]):
         state = 1 if total == 0 else 3 if self.flight.on_mission else 2
         if self.flight.on_mission and self._clock(now) >= self.flight.aircraft.arrives:
             state = MISSION_COMPLETE
-        number = self.lists.number(MissionType.MISSION) if self._firmware.numbers_missions else 0
+        number = self.lists.number(MissionType.MISSION) if self.behaviour.numbers_missions else 0
         return MissionCurrent(self._current, max(total, 0), state, number)
 
     def _system_status(self) -> list[Message]:

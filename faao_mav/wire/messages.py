@@ -88,13 +88,6 @@ class MissionClearAll(ListMessage):
     """MISSION_CLEAR_ALL."""
 
 
-class MissionWritePartialList(ListMessage):
-    """MISSION_WRITE_PARTIAL_LIST: items `start_index` to `end_index` are to be replaced."""
-
-    start_index: int
-    end_index: int
-
-
 class MissionSetCurrent(Addressed):
     """MISSION_SET_CURRENT."""
 

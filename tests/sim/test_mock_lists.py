@@ -15,7 +15,6 @@ from faao_mav.wire.messages import (
     MissionItemInt,
     MissionRequestInt,
     MissionRequestList,
-    MissionWritePartialList,
     Statustext,
     WireItem,
 )
@@ -259,18 +258,6 @@ def test_ardupilot_has_no_space_while_it_boots() -> None:
     assert results(desk.tell(count(3))) == [MavResult.NO_SPACE]
     desk.wait(5.1)
     assert asked(desk.tell(count(3))) == [0]
-
-
-def test_partial_lists() -> None:
-    desk, rows = desk_for("ardupilot"), rows_for("ardupilot", 4)
-    upload(desk, rows)
-    wrong = MissionWritePartialList(TO, 0, 2, 99)
-    assert results(desk.tell(wrong)) == [MavResult.ERROR]
-    assert asked(desk.tell(MissionWritePartialList(TO, 0, 2, 3))) == [2]
-    other = rows_for("ardupilot", 4, shift=0.1)
-    desk.tell(item(2, other[2]))
-    assert results(desk.tell(item(3, other[3]))) == [MavResult.ACCEPTED]
-    assert stored(desk) == places((*rows[:2], *other[2:4], *rows[4:]))
 
 
 def test_clearing_one_list_leaves_the_others() -> None:

@@ -116,10 +116,8 @@ def test_a_plane_has_its_own_number_modes_and_storage() -> None:
     assert result(desk.tell(SetMode(1, 1, 10))) == 0
     assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt > 0
     assert only(desk.wait(1.5), Heartbeat)[-1].type == 1
-    desk.machine.lists.put(
-        MissionType.MISSION, 3, wire_items(Mission(tuple(items), HOME), *MISSION)[3]
-    )
-    kept = desk.machine.lists.items(MissionType.MISSION)[3]
+    row = wire_items(Mission(tuple(items), HOME), *MISSION)[3]
+    kept = desk.machine.lists.kept(MissionType.MISSION, 3, row)
     assert kept.params[:2] == (0.0, 40.0)
 
 

@@ -50,13 +50,6 @@ def anything(target: st.SearchStrategy[Address]) -> st.SearchStrategy[messages.M
         st.builds(messages.MissionAck, target, types, st.one_of(st.integers(0, 15), bytes_)),
         st.builds(messages.MissionRequestList, target, types),
         st.builds(messages.MissionClearAll, target, types),
-        st.builds(
-            messages.MissionWritePartialList,
-            target,
-            types,
-            st.integers(-3, 9),
-            st.integers(-3, 9),
-        ),
         st.builds(messages.MissionSetCurrent, target, shorts),
         st.builds(messages.CommandLong, target, commands, bytes_, *[floats] * 7),
         st.builds(messages.SetMode, st.integers(0, 1), bytes_, st.integers(0, 2**32 - 1)),
