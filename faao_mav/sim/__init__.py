@@ -3,11 +3,10 @@
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from faao_mav.sim.ardupilot_firmware import MOCK_ARDUPILOT
-from faao_mav.sim.firmware import COUNT as COUNT
-from faao_mav.sim.firmware import Behaviour as Behaviour
+from faao_mav.sim.behaviour import COUNT as COUNT
+from faao_mav.sim.behaviour import MOCK_ARDUPILOT, MOCK_PX4
+from faao_mav.sim.behaviour import Behaviour as Behaviour
 from faao_mav.sim.mock_autopilot import MockAutopilot as MockAutopilot
-from faao_mav.sim.px4_firmware import MOCK_PX4
 
 MockKind: TypeAlias = Literal["ardupilot", "px4", "px4-legacy-first"]
 

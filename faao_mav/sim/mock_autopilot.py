@@ -8,9 +8,10 @@ from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
-from faao_mav.sim.firmware import Behaviour, StoredLists, whole
+from faao_mav.sim.behaviour import Behaviour, whole
 from faao_mav.sim.flight import Flight, Fly
 from faao_mav.sim.follower import Posture, global_position, local_reports
+from faao_mav.sim.lists import ListServer, StoredLists
 from faao_mav.sim.parameter_protocol import ParameterServer
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import (
@@ -120,7 +121,7 @@ class MockAutopilot(Machine[None]):
         known |= behaviour.parameters
         self.parameters = ParameterServer(known, parameters or {}, self.vehicle)
         self.flight = Flight(self.vehicle, self.parameters.values, home, fly, wind)
-        self._server = behaviour.lists(self.lists, behaviour, self._is_ready, self._is_flying)
+        self._server = ListServer(self.lists, behaviour, self._is_ready, self._is_flying)
         self._speedup, self._beat, self._boot, self._place = speedup, beat, boot, place
         self._period = 1 / rate / speedup if rate > 0 else math.inf
         self._booted = self._now = self._next_beat = self._next_report = 0.0
@@ -350,7 +351,7 @@ class MockAutopilot(Machine[None]):
         out: list[Message] = [MissionItemReached(n + first) for n in flight.reached(clock)]
         before = flight.mode
         if flight.at_fence(clock) is not None:
-            out += self.behaviour.fence_texts
+            out.append(Statustext(MavSeverity.CRITICAL, self.behaviour.fence_text))
         flight.lose_setpoints(clock)
         current = flight.aircraft.at(clock).item + first
         if flight.on_mission and current != self._current:
@@ -382,7 +383,7 @@ class MockAutopilot(Machine[None]):
         state = 1 if total == 0 else 3 if self.flight.on_mission else 2
         if self.flight.on_mission and self._clock(now) >= self.flight.aircraft.arrives:
             state = MISSION_COMPLETE
-        number = self.lists.number(MissionType.MISSION) if self.behaviour.numbers_missions else 0
+        number = self.lists.number(MissionType.MISSION) if self.behaviour.numbers_lists else 0
         return MissionCurrent(self._current, max(total, 0), state, number)
 
     def _system_status(self) -> list[Message]:
