@@ -16,7 +16,6 @@ from faao_mav.cli.main import app
 from faao_mav.mission.formats import read_mission
 from faao_mav.mission.item import Home
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.sim.serve import predicted
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 SPEEDUP = 20.0
@@ -43,7 +42,7 @@ def test_what_is_planned_is_what_the_vehicle_delivers(
     text = (MISSIONS / "copter_relay.yaml").read_text()
     plan.write_text(edited(text, SHORTER | {"vehicle.autopilot": kind}))
     tuned, port = parameter_path(out, kind), free_port()
-    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=predicted(), speedup=SPEEDUP, beat=0.1)
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, speedup=SPEEDUP, beat=0.1)
     with running(mock, f"udpin:127.0.0.1:{port}"):
         connection = f"udpout:127.0.0.1:{port}"
         arguments = (plan, "--out", out, "--save", save, "--upload", connection, "--json")

@@ -76,7 +76,7 @@ def autopilot(
     from faao_mav.autopilot import Vehicle
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.sim import MockAutopilot, behaviour_of
-    from faao_mav.sim.serve import predicted, serve
+    from faao_mav.sim.serve import serve
     from faao_mav.wire.faults import Faults
     from faao_mav.wire.protocol import Address
     from faao_mav.wire.signing import read_signing
@@ -86,15 +86,13 @@ def autopilot(
     check_known(None, aircraft)
     behaviour = behaviour_of(kind)
     vehicle = Vehicle(behaviour.family.key, aircraft, values, str(parameters or "parameters"))
-    air = read_wind(wind) or (0.0, 0.0)
     vehicle.flight_model()  # useless parameters are refused here, not in flight
     mock = MockAutopilot(
         behaviour,
         aircraft=aircraft,
         address=Address(system, 1),
         home=read_home(home),
-        fly=predicted(air),
-        wind=air,
+        wind=read_wind(wind) or (0.0, 0.0),
         parameters=values,
         speedup=speedup,
         boot=boot,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from faao_mav.autopilot import AutopilotFamily
 from faao_mav.autopilot.ardupilot import ARDUPILOT
 from faao_mav.autopilot.dialect import BESIDE
-from faao_mav.autopilot.px4 import PX4
+from faao_mav.autopilot.px4 import PX4, px4_mode
 from faao_mav.mission.command import (
     ABOVE_HOME,
     ABOVE_SEA,
@@ -17,7 +17,6 @@ from faao_mav.mission.command import (
 )
 from faao_mav.mission.item import Mission
 from faao_mav.wire.messages import CommandLong, WireItem
-from faao_mav.wire.modes import px4_mode
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.wire_items import GLOBAL_FRAMES
 

@@ -10,12 +10,14 @@ take up a mission in flight, without its take-off.
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot import Track, Vehicle, VehicleType
+from faao_mav.autopilot.predict import predict
 from faao_mav.autopilot.vehicle_type import FenceAction
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
@@ -23,10 +25,7 @@ from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.follower import Follower
-from faao_mav.wire.local_frame import frame_of
 from faao_mav.wire.messages import SetPositionTargetLocalNed
-from faao_mav.wire.modes import modes_of
-from faao_mav.wire.setpoints import setpoint_rules
 
 Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
 """How a vehicle with the parameters that it has flies a mission."""
@@ -44,9 +43,9 @@ _FARTHEST = 1e6
 class Flight:
     """What a mock autopilot's mode and motors are, and what it therefore does with its aircraft.
 
-    It flies missions along the track of `fly`, and follows setpoints in GUIDED and Offboard. In
-    another mode it returns, lands or holds its place. `values` are its parameters, `wind` is in
-    m/s east and north. Times are seconds on its own clock.
+    It flies missions along the track of `fly`, None: as predicted in the `wind`, m/s east and
+    north, and follows setpoints in GUIDED and Offboard. In another mode it returns, lands or holds
+    its place. `values` are its parameters. Times are seconds on its own clock.
     """
 
     def __init__(
@@ -57,8 +56,9 @@ class Flight:
         fly: Fly | None,
         wind: tuple[float, float],
     ) -> None:
-        self._type, self._values, self._home, self._fly = vehicle_type, values, home, fly
-        self.modes, self.rules = modes_of(vehicle_type), setpoint_rules(vehicle_type.family)
+        self._type, self._values, self._home = vehicle_type, values, home
+        self._fly = fly or partial(predict, wind=wind)
+        self.modes, self.rules = vehicle_type.modes, vehicle_type.family.setpoints
         self.mode = self.asked_mode = self.modes.rest
         self.aircraft = Follower(wind)
         self._first_heard = self._last_heard = -math.inf
@@ -68,13 +68,6 @@ class Flight:
     def vehicle(self) -> Vehicle:
         """The vehicle with its parameters; useless ones do not count."""
         return Vehicle(self._type.family.key, self._type.kind, self._values).usable()
-
-    def predict(self, mission: Mission) -> Track | None:
-        """Return its flight of `mission`; None if it flies none, or not this one."""
-        try:
-            return None if self._fly is None else self._fly(mission, self.vehicle)
-        except InputError:
-            return None
 
     def stop(self) -> None:
         """Stand at home with the motors off."""
@@ -131,11 +124,12 @@ class Flight:
         It flies straight to where that begins: in the air, where the first item is done.
         """
         if not self.armed or self.on_mission:
-            return self._fly is not None
+            return True
         vehicle, flies = self.vehicle, self.aircraft.flies(now)
         if self._track is None:
-            self._track = self.predict(mission)
-            if self._track is None:
+            try:
+                self._track = self._fly(mission, vehicle)
+            except InputError:
                 return False
             self._pending = _reached(self._track, mission)
             self._leaves = _leaves(self._track, mission.fence, vehicle)
@@ -212,7 +206,7 @@ class Flight:
     def aim(self, message: SetPositionTargetLocalNed) -> Real:
         """Return what `message` says, (3, 3), in metres east, north and up of home."""
         origin, aim = (self._home.latitude, self._home.longitude), _rows(message)
-        frame = frame_of(self._type.family, *origin)
+        frame = self._type.family.local_frame(*origin)
         aim[0, :2] = LocalFrame(*origin).to_local(*frame.to_geodetic(aim[0, :2]))
         return aim
 

@@ -11,7 +11,6 @@ from faao_mav.errors import InputError
 from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, MissionItem
 from faao_mav.sim.behaviour import COUNT, Behaviour
-from faao_mav.wire.manners import manners_of
 from faao_mav.wire.messages import (
     Envelope,
     ListMessage,
@@ -100,7 +99,7 @@ class ListServer:
         flying: Callable[[], bool],
     ) -> None:
         self._stored, self._behaviour = stored, behaviour
-        self._manners, self._dialect = manners_of(stored.vehicle), stored.vehicle.dialect
+        self._manners, self._dialect = stored.vehicle.family.manners, stored.vehicle.dialect
         self._ready, self._flying, self._alone = ready, flying, behaviour.one_at_a_time
         self._legacy, self._now = behaviour.legacy_first, 0.0
         self._busy = MavResult.ERROR if self._alone else MavResult.DENIED

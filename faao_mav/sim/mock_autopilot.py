@@ -13,56 +13,17 @@ from faao_mav.sim.flight import Flight, Fly
 from faao_mav.sim.follower import Posture, global_position, local_reports
 from faao_mav.sim.lists import ListServer, StoredLists
 from faao_mav.sim.parameter_protocol import ParameterServer
+from faao_mav.wire import messages, protocol
 from faao_mav.wire.machine import Machine
-from faao_mav.wire.messages import (
-    Addressed,
-    AutopilotVersion,
-    BatteryStatus,
-    CommandAck,
-    CommandLong,
-    CurrentMode,
-    Envelope,
-    GpsGlobalOrigin,
-    Heartbeat,
-    HomePosition,
-    Message,
-    MissionCurrent,
-    MissionItemReached,
-    MissionSetCurrent,
-    ParamRequestList,
-    ParamRequestRead,
-    ParamSet,
-    SetMode,
-    SetPositionTargetLocalNed,
-    Statustext,
-    SysStatus,
-    Timesync,
-)
-from faao_mav.wire.protocol import (
-    ARMED,
-    CURRENT_MODE,
-    GROUND_STATION,
-    HOME_POSITION,
-    LOCAL_ORIGIN,
-    MISSION_COMPLETE,
-    POSITION,
-    PREARM_CHECK,
-    Address,
-    MavCommand,
-    MavSeverity,
-    MavState,
-    MissionType,
-)
+from faao_mav.wire.messages import CommandLong, Envelope, Message, Statustext
+from faao_mav.wire.protocol import Address, MavCommand, MissionType
 from faao_mav.wire.wire_items import home_items, mission_of
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 """MAV_RESULT."""
 
-
-_AUTOPILOT_VERSION = 148
-"""The number of the message AUTOPILOT_VERSION."""
-
-_RETURN = Command.NAV_RETURN_TO_LAUNCH
+_SET_MODE, _AUTOPILOT_VERSION = 11, 148
+"""The numbers of these messages."""
 
 _CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
 """MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
@@ -75,7 +36,7 @@ _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
 
 
 class MockAutopilot(Machine[None]):
-    """It takes missions as ArduPilot or PX4 does, and flies them along `fly`'s track.
+    """It takes missions as ArduPilot or PX4 does, and flies them as predicted or as `fly` says.
 
     `aircraft` is what its heartbeats say that it is, and whose missions it stores.
     It boots for `boot` seconds, in which it refuses lists, and then knows after `place` seconds
@@ -86,8 +47,8 @@ class MockAutopilot(Machine[None]):
     world's, as those of simulators do; on a mission it then stands still while `tick` is late,
     rather than jump, as theirs do. Heartbeats are `beat` of the world's seconds apart.
     `parameters` are told beside its defaults, and may be set; of the names of one it has the oldest
-    that is given. It tells that its battery is at `battery` percent, -1: not known. It flies by
-    setpoints in a `wind`, m/s east and north: see `Flight`.
+    that is given. It tells that its battery is at `battery` percent, -1: not known. It flies in
+    a `wind`, m/s east and north.
     """
 
     progress = ("flying", 0, 0)
@@ -115,7 +76,7 @@ class MockAutopilot(Machine[None]):
         self.vehicle = vehicle_type(behaviour.family.key, aircraft)
         self.lists = StoredLists(self.vehicle, home)
         self._tells_asked_mode = False
-        known = self.vehicle.defaults() | dict(setpoint_rules(behaviour.family).defaults)
+        known = self.vehicle.defaults() | dict(behaviour.family.setpoints.defaults)
         for failsafe in self.vehicle.failsafes:
             known |= dict(failsafe.defaults)
         known |= behaviour.parameters
@@ -186,7 +147,7 @@ class MockAutopilot(Machine[None]):
             self._next_beat = now + self._beat
             out += [self._heartbeat(), self._mission_current(now), *self._system_status()]
             if self._tells_asked_mode:
-                out.append(CurrentMode(self.flight.mode, self.flight.asked_mode))
+                out.append(messages.CurrentMode(self.flight.mode, self.flight.asked_mode))
         if now >= self._next_report and self._period < math.inf:
             self._next_report = now + self._period
             out += self._place_reports(now)
@@ -203,32 +164,32 @@ class MockAutopilot(Machine[None]):
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self._now = now
         sender, message = envelope.sender, envelope.message
-        if isinstance(message, Timesync):
+        if isinstance(message, messages.Timesync):
             here = int(self._clock(now) * 1e9) + 1
-            return [Timesync(here, message.ts1)] if message.tc1 == 0 else ()
-        if isinstance(message, SetMode):
+            return [messages.Timesync(here, message.ts1)] if message.tc1 == 0 else ()
+        if isinstance(message, messages.SetMode):
             target = Address(message.target_system, 0)
-        elif isinstance(message, Addressed):
+        elif isinstance(message, messages.Addressed):
             target = message.target
         else:
             return ()
         own = self.address
-        as_planner = Address(own.system, GROUND_STATION.component)  # PX4 takes it for its own
+        # PX4 takes for its own what is sent to its mission planner.
+        as_planner = Address(own.system, protocol.GROUND_STATION.component)
         if sender == own or not (own.takes(target) or as_planner.takes(target)):
             return ()
         match message:
             case CommandLong():
                 return self._on_command(sender, message, now)
-            case SetMode(custom_mode=mode):
-                result = self._set_mode(mode, now)
-                return [CommandAck(sender, 11, result)]  # the number of the message SET_MODE
-            case ParamRequestList() | ParamRequestRead() | ParamSet():
+            case messages.SetMode(custom_mode=mode):
+                return [messages.CommandAck(sender, _SET_MODE, self._set_mode(mode, now))]
+            case messages.ParamRequestList() | messages.ParamRequestRead() | messages.ParamSet():
                 return self.parameters.on(message)
-            case MissionSetCurrent(seq=seq):
+            case messages.MissionSetCurrent(seq=seq):
                 return self._set_current(seq, now)
-            case SetPositionTargetLocalNed():
+            case messages.SetPositionTargetLocalNed():
                 comes_back = self.flight.hear(message, self._clock(now))
-                modes = CurrentMode(self.flight.mode, self.flight.asked_mode)
+                modes = messages.CurrentMode(self.flight.mode, self.flight.asked_mode)
                 return [self._heartbeat(), modes] if comes_back else ()
         if self.behaviour.silent_at_boot and not self._is_ready():
             return ()
@@ -251,7 +212,7 @@ class MockAutopilot(Machine[None]):
                 why = self._why_not_armed() if result == self.behaviour.not_armed else None
                 if why is not None:
                     text = self.behaviour.not_armed_text.format(why)
-                    answers.append(Statustext(MavSeverity.CRITICAL, text))
+                    answers.append(Statustext(protocol.MavSeverity.CRITICAL, text))
             case MavCommand.TAKEOFF:
                 climbs = self.flight.take_off(command.param7, self._clock(now))
                 result = ACCEPTED if climbs else DENIED
@@ -271,27 +232,30 @@ class MockAutopilot(Machine[None]):
                 kind = whole(command.param1) if by_number else _AUTOPILOT_VERSION
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
-            case MavCommand.SET_INTERVAL if command.param1 == CURRENT_MODE:
+            case MavCommand.SET_INTERVAL if command.param1 == protocol.CURRENT_MODE:
                 self._tells_asked_mode = bool(self.flight.rules.loss)
             case MavCommand.SET_INTERVAL:
                 period = whole(command.param2)  # microseconds; 0: the usual rate
-                if command.param1 == POSITION and period > 0 and self._period < math.inf:
+                if command.param1 == protocol.POSITION and period > 0 and self._period < math.inf:
                     self._period = period / 1e6 / self._speedup
             case MavCommand.REBOOT:
                 self.reboot(now)
             case _:
                 result = UNSUPPORTED
-        ack = CommandAck(sender, command.command, result)
+        ack = messages.CommandAck(sender, command.command, result)
         return [ack, *answers]
 
     def _asked_for(self, kind: int) -> list[Message]:
         home = self.home
         place = (round(home.latitude * 1e7), round(home.longitude * 1e7))
         if kind == _AUTOPILOT_VERSION:
-            return [AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
-        if kind == POSITION:
+            return [messages.AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
+        if kind == protocol.POSITION:
             return self._place_reports(self._now)[:1]
-        spot = {HOME_POSITION: HomePosition, LOCAL_ORIGIN: GpsGlobalOrigin}.get(kind)
+        spot = {
+            protocol.HOME_POSITION: messages.HomePosition,
+            protocol.LOCAL_ORIGIN: messages.GpsGlobalOrigin,
+        }.get(kind)
         return [] if spot is None else [spot(*place, round(home.altitude * 1000))]
 
     def _arm(self, wanted: bool, now: float) -> int:
@@ -348,22 +312,25 @@ class MockAutopilot(Machine[None]):
     def _follow(self, now: float) -> list[Message]:
         """Let the flight go on, and tell what becomes of it."""
         flight, clock, first = self.flight, self._clock(now), self._first_number()
-        out: list[Message] = [MissionItemReached(n + first) for n in flight.reached(clock)]
+        out: list[Message] = [messages.MissionItemReached(n + first) for n in flight.reached(clock)]
         before = flight.mode
         if flight.at_fence(clock) is not None:
-            out.append(Statustext(MavSeverity.CRITICAL, self.behaviour.fence_text))
+            out.append(Statustext(protocol.MavSeverity.CRITICAL, self.behaviour.fence_text))
         flight.lose_setpoints(clock)
         current = flight.aircraft.at(clock).item + first
         if flight.on_mission and current != self._current:
             self._current = current
             rows = self.lists.items(MissionType.MISSION)
-            returns = rows[current : current + 1] and rows[current].command == _RETURN
+            returns = (
+                rows[current : current + 1]
+                and rows[current].command == Command.NAV_RETURN_TO_LAUNCH
+            )
             if self.vehicle.kind in self.behaviour.returns_by_mode and returns:
                 flight.mode = flight.modes.at_fence["return"]
             out.append(self._mission_current(now))
         if flight.aircraft.landed(clock):
             flight.land()
-            out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
+            out.append(Statustext(protocol.MavSeverity.INFO, "Landed, disarming"))
         if (flight.mode, flight.armed) != (before, True):
             out.append(self._heartbeat())
         return out
@@ -382,23 +349,26 @@ class MockAutopilot(Machine[None]):
         # MISSION_STATE: none, not started, active
         state = 1 if total == 0 else 3 if self.flight.on_mission else 2
         if self.flight.on_mission and self._clock(now) >= self.flight.aircraft.arrives:
-            state = MISSION_COMPLETE
+            state = protocol.MISSION_COMPLETE
         number = self.lists.number(MissionType.MISSION) if self.behaviour.numbers_lists else 0
-        return MissionCurrent(self._current, max(total, 0), state, number)
+        return messages.MissionCurrent(self._current, max(total, 0), state, number)
 
     def _system_status(self) -> list[Message]:
         """Return that its checks pass, once it is ready, and how its battery is."""
-        passes = PREARM_CHECK * self._is_ready()
-        return [SysStatus(passes, 12_600, self._battery), BatteryStatus(0, 1, self._battery)]
+        passes = protocol.PREARM_CHECK * self._is_ready()
+        return [
+            messages.SysStatus(passes, 12_600, self._battery),
+            messages.BatteryStatus(0, 1, self._battery),
+        ]
 
     def _heartbeat(self) -> Message:
         if not self._is_ready():
-            state = MavState.CALIBRATING
+            state = protocol.MavState.CALIBRATING
         else:
-            state = MavState.ACTIVE if self.armed else MavState.STANDBY
+            state = protocol.MavState.ACTIVE if self.armed else protocol.MavState.STANDBY
         autopilot, is_mission = (
             self.vehicle.family.mav_autopilot,
             self.mode == self.flight.modes.mission,
         )
-        base_mode = _CUSTOM_MODE | _AUTO * is_mission | ARMED * self.armed
-        return Heartbeat(self.vehicle.mav_types[0], autopilot, base_mode, self.mode, state)
+        base_mode = _CUSTOM_MODE | _AUTO * is_mission | protocol.ARMED * self.armed
+        return messages.Heartbeat(self.vehicle.mav_types[0], autopilot, base_mode, self.mode, state)

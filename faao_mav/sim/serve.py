@@ -3,9 +3,6 @@
 import time
 from collections.abc import Callable
 
-from faao_mav.autopilot import Track, Vehicle
-from faao_mav.mission.item import Mission
-from faao_mav.sim.flight import Fly
 from faao_mav.sim.mock_autopilot import MockAutopilot
 from faao_mav.wire.faults import Faults, FaultyTransport
 from faao_mav.wire.link import WireLink
@@ -39,17 +36,3 @@ def serve(
             link.step(mock, time.monotonic() + _PATIENCE)
             if observe is not None:
                 observe(mock)
-
-
-def predicted(wind: tuple[float, float] = (0.0, 0.0)) -> Fly:
-    """Return how vehicles fly missions, by the flight prediction with their parameters.
-
-    `wind` is in m/s east and north.
-    """
-
-    def fly(mission: Mission, vehicle: Vehicle) -> Track:
-        from faao_mav.autopilot.predict import predict  # most uses of a mock never fly
-
-        return predict(mission, vehicle, wind=wind)
-
-    return fly

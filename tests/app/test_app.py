@@ -33,7 +33,6 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.sim.serve import predicted
 from faao_mav.wire.faults import Faults
 
 if TYPE_CHECKING:
@@ -309,9 +308,7 @@ def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
 @contextmanager
 def vehicle(**options: Any) -> Iterator[tuple[str, MockAutopilot]]:
     """A vehicle that flies twenty times as fast as real ones, and the connection to it."""
-    mock = MockAutopilot(
-        behaviour_of("ardupilot"), home=HOME, fly=predicted(), beat=0.1, speedup=20.0
-    )
+    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1, speedup=20.0)
     port = free_port()
     with running(mock, f"udpin:127.0.0.1:{port}", **options):
         yield f"udpout:127.0.0.1:{port}", mock

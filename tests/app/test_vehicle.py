@@ -23,7 +23,6 @@ from faao_mav.fly.seen import Flight
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.sim.serve import predicted
 from faao_mav.wire.faults import Faults
 from faao_mav.workflow import Result
 
@@ -43,7 +42,6 @@ def vehicle(result: Result, faults: Faults | None = None) -> Iterator[tuple[str,
     mock = MockAutopilot(
         behaviour_of("ardupilot"),
         home=HOME,
-        fly=predicted(),
         parameters=result.conversion.parameters,
         beat=0.1,
         speedup=8.0,

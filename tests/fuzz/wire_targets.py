@@ -15,7 +15,6 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.sim.serve import predicted
 from faao_mav.wire.client import UploadReport
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import Discovery, FoundVehicle, choose
@@ -107,7 +106,7 @@ def wire_targets() -> dict[str, Target]:
 
 
 def _mock(kind: MockKind) -> MockAutopilot:
-    return MockAutopilot(behaviour_of(kind), home=_HOME, fly=predicted(), speedup=50.0)
+    return MockAutopilot(behaviour_of(kind), home=_HOME, speedup=50.0)
 
 
 def _jobs(peer: Peer) -> Iterator[Machine[Any]]:

@@ -19,7 +19,6 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.sim.serve import predicted
 from faao_mav.wire import download, upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import Discovery, choose
@@ -71,7 +70,7 @@ def fill(mock: MockAutopilot, part: MissionType, rows: tuple[WireItem, ...]) -> 
 
 
 def flying(kind: MockKind) -> MockAutopilot:
-    mock = mock_of(kind, fly=predicted())
+    mock = mock_of(kind)
     mock.start(0.0)
     return mock
 
