@@ -17,8 +17,8 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot import Track, Vehicle, VehicleType
+from faao_mav.autopilot.manners import FenceAction
 from faao_mav.autopilot.predict import predict
-from faao_mav.autopilot.vehicle_type import FenceAction
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
