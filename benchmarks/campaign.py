@@ -17,6 +17,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "wire"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fly"))
 
 from trials import Trial, flown
 
