@@ -83,10 +83,10 @@ class Disturbance:
 
     def __call__(self, watch: Watch) -> None:
         """Break the link when that is due."""
-        samples, start = watch.seen.samples, watch.relay_start
-        if start is None or not samples.t:
+        fixes, start = watch.seen.fixes, watch.relay_start
+        if start is None or not fixes:
             return
-        t = samples.t[-1] - start
+        t = fixes[-1].t - start
         if self.case == "silence" and t > BEGIN and not self.silent_until:
             self.silent_until = time.monotonic() + 8 / SPEEDUP
 
@@ -129,7 +129,7 @@ def delivered(result: Result, report: FlightReport) -> str:
         ending += f" ({report.ending.text})"
     if report.relay_start is None:
         return f"{ending}, -"
-    t, w = report.samples.record().line(result.solution)
+    t, w = report.record.line(result.solution)
     real = price_flight(result.solution, t - report.relay_start, w)
     share = 100 * real.delivered_rate / result.solution.delivered_rate
     return f"{ending}, {share:.2f} %, {real.rms_position_error:.2f} m rms"

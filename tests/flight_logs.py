@@ -1,10 +1,10 @@
-"""Logs of a flight as ArduPilot, PX4 and ground stations write them, or once did.
+"""Logs of a flight as ArduPilot, PX4 and ground stations write them.
 
-Heights of the flight are above `HOME`. `home` is its altitude as the vehicle has it, m, for all of
-the flight or each position; `wind` (k, 2) is m/s towards east and north. Sources: ArduPilot, "Log
-messages"; MAVLink, "File formats"; PX4, "ULog file format".
+`wind` (k, 2) is m/s towards east and north. Sources: ArduPilot, "Log messages"; MAVLink, "File
+formats"; PX4, "ULog file format".
 """
 
+import math
 import struct
 from collections.abc import Iterator, Mapping
 from operator import itemgetter
@@ -16,25 +16,19 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from faao_mav.arrays import Real
 from faao_mav.fly.record import FlightRecord
 
-HOME = 584.0
-"""Altitude from which heights are, m."""
-
 _NONE: Mapping[str, float] = {}
 
 
 def kept(record: FlightRecord, which: Any) -> FlightRecord:
     """Return some of the positions of a flight."""
-    columns = (record.t, record.latitude, record.longitude, record.height)
-    return FlightRecord(*(column[which] for column in columns))
+    columns = (record.t, record.latitude, record.longitude, record.altitude, record.home)
+    return FlightRecord.of(np.column_stack([*columns, record.wind])[which])
 
 
 def ulog(
     record: FlightRecord,
     *,
-    home: Real | float = HOME,
-    valid: bool = True,
     wind: Real | None = None,
-    topic: str = "wind",
     parameters: Mapping[str, float] = _NONE,
 ) -> bytes:
     """Return a `.ulg`, which has a home where it is set or set again."""
@@ -45,7 +39,7 @@ def ulog(
     formats = {
         "vehicle_global_position": "uint64_t timestamp;double lat;double lon;float alt;",
         "home_position": "uint64_t timestamp;float alt;bool valid_alt;",
-        topic: "uint64_t timestamp;float windspeed_north;float windspeed_east;",
+        "wind": "uint64_t timestamp;float windspeed_north;float windspeed_east;",
     }
     out = [b"ULog\x01\x12\x35\x01" + bytes(8), message(b"B", bytes(40))]
     out += [message(b"F", f"{name}:{fields}".encode()) for name, fields in formats.items()]
@@ -54,12 +48,12 @@ def ulog(
         out.append(message(b"P", bytes([len(key)]) + key + struct.pack("<f", value)))
     for number, name in enumerate(formats):
         out.append(message(b"A", struct.pack("<BH", 0, number) + name.encode()))
-    last = None
-    for k, (t, *place, set_home) in enumerate(_places(record, home)):
+    last = math.nan
+    for k, (t, *place, set_home) in enumerate(_places(record)):
         time = round(t * 1e6)
         if set_home != last:
             last = set_home
-            out.append(message(b"D", struct.pack("<HQf?", 1, time, set_home, valid)))
+            out.append(message(b"D", struct.pack("<HQf?", 1, time, set_home, True)))
         out.append(message(b"D", struct.pack("<HQddf", 0, time, *place)))
         if wind is not None:
             out.append(message(b"D", struct.pack("<HQff", 2, time, *wind[k, ::-1])))
@@ -69,23 +63,20 @@ def ulog(
 def dataflash(
     record: FlightRecord,
     *,
-    home: Real | float = HOME,
-    above: tuple[str, ...] = ("RelHomeAlt",),
     wind: Real | None = None,
-    estimator: str = "XKF2",
     parameters: Mapping[str, float] = _NONE,
 ) -> bytes:
-    """Return a `.bin`, whose POS has the height above home in the columns `above`."""
+    """Return a `.bin`."""
     formats = (
-        ("POS", "QLLf" + "f" * len(above), "Qiif" + "f" * len(above), ("Lat,Lng,Alt", *above)),
-        (estimator, "QBff", "QBff", ("C,VWN,VWE",)),
-        ("PARM", "QNf", "Q16sf", ("Name,Value",)),
+        ("POS", "QLLff", "Qiiff", "Lat,Lng,Alt,RelHomeAlt"),
+        ("XKF2", "QBff", "QBff", "C,VWN,VWE"),
+        ("PARM", "QNf", "Q16sf", "Name,Value"),
     )
     out, layouts = [], {}
     for number, (name, letters, layout, columns) in enumerate(formats):
         layouts[name] = number, f"<3B{layout}"
         size = struct.calcsize(layouts[name][1])
-        texts = (name.encode(), letters.encode(), ",".join(("TimeUS", *columns)).encode())
+        texts = (name.encode(), letters.encode(), f"TimeUS,{columns}".encode())
         out.append(struct.pack("<5B4s16s64s", 0xA3, 0x95, 0x80, number, size, *texts))
 
     def add(name: str, *values: Any) -> None:
@@ -94,12 +85,12 @@ def dataflash(
 
     for name, value in parameters.items():
         add("PARM", 0, name.encode(), value)
-    for k, (t, latitude, longitude, altitude, its_home) in enumerate(_places(record, home)):
+    for k, (t, latitude, longitude, altitude, its_home) in enumerate(_places(record)):
         place = round(latitude * 1e7), round(longitude * 1e7), altitude
-        add("POS", round(t * 1e6), *place, *(altitude - its_home for _ in above))
+        add("POS", round(t * 1e6), *place, altitude - its_home)
         if wind is not None:
-            add(estimator, round(t * 1e6), 0, *wind[k, ::-1])
-            add(estimator, round(t * 1e6), 1, 9.0, 9.0)  # the second of the estimators
+            add("XKF2", round(t * 1e6), 0, *wind[k, ::-1])
+            add("XKF2", round(t * 1e6), 1, 9.0, 9.0)  # the second of the estimators
     return b"".join(out)
 
 
@@ -108,9 +99,7 @@ def heard(
     *,
     sender: tuple[int, int] = (1, 1),
     delay: float = 0.0,
-    home: Real | float = HOME,
     wind: Real | None = None,
-    message: str = "WIND_COV",
     parameters: Mapping[str, float] = _NONE,
 ) -> list[tuple[float, bytes]]:
     """Return what `sender` says of a flight, and when it is heard, s: `delay` after its clock."""
@@ -121,13 +110,11 @@ def heard(
 
     for name, value in parameters.items():
         add(record.t[0], dialect.MAVLink_param_value_message(name.encode(), value, 9, 1, 0))
-    for k, (t, latitude, longitude, altitude, its_home) in enumerate(_places(record, home)):
+    for k, (t, latitude, longitude, altitude, its_home) in enumerate(_places(record)):
         place = round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
         height, ms = round((altitude - its_home) * 1e3), round(t * 1e3)
         add(t, dialect.MAVLink_global_position_int_message(ms, *place, height, 0, 0, 0, 0))
-        if wind is not None and message == "WIND_COV":
-            add(t, dialect.MAVLink_wind_cov_message(ms * 1000, *wind[k, ::-1], *[0.0] * 6))
-        elif wind is not None:
+        if wind is not None:
             source = np.degrees(np.arctan2(*-wind[k]))
             add(t, dialect.MAVLink_wind_message(source, np.hypot(*wind[k]), 0.0))
     return out
@@ -139,8 +126,7 @@ def tlog(*said: list[tuple[float, bytes]]) -> bytes:
     return b"".join(struct.pack(">Q", round((1e9 + t) * 1e6)) + packet for t, packet in merged)
 
 
-def _places(record: FlightRecord, home: Real | float) -> Iterator[tuple[float, ...]]:
+def _places(record: FlightRecord) -> Iterator[tuple[float, ...]]:
     """Yield times, places, altitudes and the altitude of home."""
-    homes = np.broadcast_to(home, record.t.shape)
-    columns = (record.t, record.latitude, record.longitude, HOME + record.height, homes)
+    columns = (record.t, record.latitude, record.longitude, record.altitude, record.home)
     yield from zip(*(column.tolist() for column in columns), strict=True)

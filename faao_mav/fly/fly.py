@@ -6,8 +6,9 @@ from typing import Unpack
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.record import FlightRecord
 from faao_mav.fly.seen import Flight, read_held
-from faao_mav.fly.telemetry import POSITION_RATE, Ending, Samples
+from faao_mav.fly.telemetry import POSITION_RATE, Ending
 from faao_mav.fly.watch import Watch
 from faao_mav.validate.rule import Finding
 from faao_mav.wire.client import LinkOptions, Session
@@ -22,7 +23,7 @@ from faao_mav.wire.wire_items import wire_items
 class FlightReport:
     """How a flight was watched: `ending` is None where the vehicle does not hold the mission.
 
-    `differences` are what it holds instead; `samples` is where it was. `relay_start` is when the
+    `differences` are what it holds instead; `record` is where it was. `relay_start` is when the
     clock of a streamed plan read 0, s on the vehicle's. `findings` is what the gate before the
     flight found last.
     """
@@ -30,7 +31,7 @@ class FlightReport:
     vehicle: FoundVehicle
     differences: tuple[Difference, ...]
     ending: Ending | None
-    samples: Samples
+    record: FlightRecord
     relay_start: float | None = None
     findings: tuple[Finding, ...] = ()
 
@@ -77,7 +78,7 @@ def fly(
             if each.kind == "wrong"
         )
         if wrong:
-            return FlightReport(vehicle, wrong, None, Samples())
+            return FlightReport(vehicle, wrong, None, FlightRecord.of(()))
         ready = Readiness(
             flight, held, peer, elsewhere=elsewhere, untimed=untimed, timeouts=session.timeouts
         )
@@ -97,4 +98,4 @@ def fly(
         except LinkError as error:
             ending = Ending("lost", str(error))
     found = watch.findings or ()
-    return FlightReport(vehicle, (), ending, watch.seen.samples, watch.relay_start, found)
+    return FlightReport(vehicle, (), ending, watch.seen.record(), watch.relay_start, found)

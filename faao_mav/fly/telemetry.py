@@ -1,9 +1,10 @@
 """What a vehicle tells of its flight, and asking it for what it does not tell by itself."""
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from faao_mav.fly.record import Fix, FlightRecord
 from faao_mav.wire.messages import (
     BatteryStatus,
     CommandLong,
@@ -38,7 +39,6 @@ from faao_mav.wire.whereabouts import place_in
 from faao_mav.wire.wire_items import home_items
 
 if TYPE_CHECKING:
-    from faao_mav.fly.record import FlightRecord
     from faao_mav.mission.item import Home
 
 Kind: TypeAlias = Literal[
@@ -88,28 +88,6 @@ class Ending:
     text: str
 
 
-@dataclass(slots=True)
-class Samples:
-    """Where the vehicle was: its clock in s, degrees, metres above home."""
-
-    t: list[float] = field(default_factory=list)
-    latitude: list[float] = field(default_factory=list)
-    longitude: list[float] = field(default_factory=list)
-    height: list[float] = field(default_factory=list)
-
-    def record(self, first: int = 0) -> "FlightRecord":
-        """Return them as arrays, from number `first` on; -1: the last one alone."""
-        import numpy as np
-
-        from faao_mav.fly.record import FlightRecord
-
-        t, *place = (
-            np.array(column[first:])
-            for column in (self.t, self.latitude, self.longitude, self.height)
-        )
-        return FlightRecord(t, place[0], place[1], place[2])
-
-
 class Telemetry:
     """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
 
@@ -118,7 +96,7 @@ class Telemetry:
     Attributes:
         told: what has happened, in words, one after the other.
         said: what the vehicle said that is a warning or worse.
-        samples: where it was.
+        fixes: where it was.
         heartbeat, current, status, position: the last of these messages, None before the first.
         knows_place: LOCAL_POSITION_NED was heard, which ArduPilot sends once its estimator knows
             where it is.
@@ -139,7 +117,7 @@ class Telemetry:
         self._home = home_items(peer.vehicle, MissionType.MISSION)
         self.told: list[str] = []
         self.said: list[str] = []
-        self.samples = Samples()
+        self.fixes: list[Fix] = []
         self.heartbeat: Heartbeat | None = None
         self.current: MissionCurrent | None = None
         self.status: SysStatus | None = None
@@ -178,9 +156,18 @@ class Telemetry:
 
     def where(self, now: float) -> str:
         """Return in words its mode and height, and how old that is."""
-        height = f", {self.samples.height[-1]:.0f} m above home" if self.samples.t else ""
+        height = f", {self.height:.0f} m above home" if self.fixes else ""
         old = f", {now - self.last_heard:.0f} s ago" if self.is_silent else ""
         return f"in mode {self.mode}{height}{old}"
+
+    @property
+    def height(self) -> float:
+        """How high it was last above home as it was then, m."""
+        return self.fixes[-1].altitude - self.fixes[-1].home
+
+    def record(self) -> FlightRecord:
+        """Return where it was."""
+        return FlightRecord.of(self.fixes)
 
     @property
     def battery(self) -> int | None:
@@ -265,18 +252,17 @@ class Telemetry:
         return out
 
     def _on_position(self, message: GlobalPositionInt, now: float) -> None:
-        t, samples = message.time_boot_ms, self.samples
-        last = 1000 * samples.t[-1] if samples.t else -1.0
+        t = message.time_boot_ms
+        last = 1000 * self.fixes[-1].t if self.fixes else -1.0
         if t < last - _BACK:
             self._end("rebooted", "the vehicle has rebooted: what it flies now is not known")
         elif t > last and (place := place_in(message)) is not None:
             self.position, self.place, self._placed_at = message, place, now
             if t < last + 1000 * _SLOW * self._periods[POSITION]:
                 self._needed[POSITION] = now
-            samples.t.append(t / 1000)
-            samples.latitude.append(message.lat / 1e7)
-            samples.longitude.append(message.lon / 1e7)
-            samples.height.append(message.relative_alt / 1000)
+            home = (message.alt - message.relative_alt) / 1000
+            where = place.latitude, place.longitude, place.altitude
+            self.fixes.append(Fix(t / 1000, *where, home))
 
     def _on_current(self, message: MissionCurrent) -> None:
         known, self.current = self.current or message, message

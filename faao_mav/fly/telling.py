@@ -8,6 +8,7 @@ from typing import Any
 from faao_mav.autopilot import Track
 from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.radio import RadioFeed, UdpRadio
+from faao_mav.fly.record import FlightRecord
 from faao_mav.fly.watch import Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.comparison import on_the_plans_clock
@@ -60,7 +61,7 @@ class Telling:
         self._told = len(seen.told)
         if self._feed is not None:
             self._feed(watch, self._start if watch.relay_start is None else watch.relay_start)
-        now, t = time.monotonic(), seen.samples.t[-1] if seen.samples.t else float("-inf")
+        now, t = time.monotonic(), seen.fixes[-1].t if seen.fixes else float("-inf")
         if seen.heartbeat is None or now < self._next or t < self._last + _PERIOD:
             return
         self._next, self._last = now + _PERIOD, t
@@ -71,16 +72,15 @@ class Telling:
 
     def debriefing(self, report: FlightReport) -> Debriefing | None:
         """Return what became of the plan; None without one, or without its flight."""
-        if self._solution is None or self._line is None or not report.samples.t:
+        if self._solution is None or self._line is None or not len(report.record.t):
             return None
-        record = report.samples.record()
-        return record.debriefing(self._solution, self._line, report.relay_start)
+        return report.record.debriefing(self._solution, self._line, report.relay_start)
 
     def _standing(self, watch: Watch) -> Standing | None:
         """Return how the flight stands; None before it has left w_I, and when it is over."""
         if self._solution is None or self._line is None:
             return None
-        flight = watch.seen.samples.record().line(self._solution)
+        flight = watch.seen.record().line(self._solution)
         start = watch.relay_start
         if start is None and not watch.streams:
             self._start = start = plan_start(self._solution, self._line, flight)
@@ -101,29 +101,29 @@ class Feed:
 
     def __call__(self, watch: Watch, start: float | None) -> None:
         """Send what is new; the plan's clock read 0 at `start`, s on the vehicle's."""
-        samples = watch.seen.samples
-        if len(samples.t) == self._seen:
+        fixes = watch.seen.fixes
+        if len(fixes) == self._seen:
             return
-        self._seen = len(samples.t)
-        t = None if start is None else samples.t[-1] - start
-        place = samples.record(-1).line(self._solution).w[0]
+        self._seen = len(fixes)
+        t = None if start is None else fixes[-1].t - start
+        place = FlightRecord.of(fixes[-1]).line(self._solution).w[0]
         if (line := self._feed.line(t, place)) is not None:
             self._radio.send(line)
 
 
 def _as_dict(watch: Watch, stands: Standing | None, solution: Solution | None) -> dict[str, Any]:
     """Return a line of `--json`: s, degrees, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
-    samples, status = watch.seen.samples, watch.seen.status
+    last, status = watch.seen.fixes[-1], watch.seen.status
     volts = status.voltage_battery if status is not None else _NO_VOLTAGE
     percent = status.battery_remaining if status is not None else -1
     told: dict[str, Any] = {
-        "t": samples.t[-1],
+        "t": last.t,
         "phase": watch.phase,
         "mode": watch.seen.mode,
         "item": watch.seen.row,
-        "latitude": samples.latitude[-1],
-        "longitude": samples.longitude[-1],
-        "height": samples.height[-1],
+        "latitude": last.latitude,
+        "longitude": last.longitude,
+        "height": watch.seen.height,
         "volts": None if volts == _NO_VOLTAGE else volts / 1000,
         "battery": None if percent < 0 else percent,
         "plan": asdict(stands) if stands is not None else None,

@@ -9,6 +9,8 @@ debriefs the log of a real PX4.
 
 import json
 import struct
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -17,12 +19,14 @@ import numpy as np
 import pytest
 from conftest import edited
 from flight_logs import dataflash, heard, kept, tlog, ulog
+from hypothesis import given
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError
-from faao_mav.fly import log_messages, logs
-from faao_mav.fly.logs import read_log
+from faao_mav.fly import logs
+from faao_mav.fly.logs import Said, flights, read_log
 from faao_mav.fly.record import FlightRecord
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import save_solution
@@ -75,7 +79,7 @@ def test_both_logs_of_a_flight_tell_the_same(solutions: dict[str, Path]) -> None
         own["planned"]["delivered_rate"], rel=2e-3
     )
     assert "WPNAV_SPEED" not in own["parameters"]
-    assert own["wind"] is None
+    assert own["wind"] is None  # ArduCopter that is not told its drag logs zeros
     assert own["missing"] == 0
 
 
@@ -151,7 +155,7 @@ def test_every_kind_of_log_tells_the_flight(
     assert record.t == pytest.approx(flight.t, abs=1e-6)
     for name in ("latitude", "longitude"):
         assert getattr(record, name) == pytest.approx(getattr(flight, name), abs=1e-7)
-    assert record.height_above_home_at(record.t[0]) == pytest.approx(flight.height, abs=1e-3)
+    assert record.height == pytest.approx(flight.height, abs=2e-3)
     assert record.parameters == {"SPEED": 6.0}
     assert record.mean_wind(record.t[0], 1e3) == pytest.approx([2.0, 1.0])
 
@@ -159,7 +163,7 @@ def test_every_kind_of_log_tells_the_flight(
 def test_the_vehicle_whose_flight_is_the_plans(
     solutions: dict[str, Path], flight: FlightRecord, tmp_path: Path
 ) -> None:
-    idle = FlightRecord(flight.t, flight.latitude + 0.01, flight.longitude, 0 * flight.height)
+    idle = replace(flight, latitude=flight.latitude + 0.01, altitude=flight.home)
     wind = np.tile([5.0, 5.0], (len(flight.t), 1))
     log = tmp_path / "two.tlog"
     log.write_bytes(
@@ -201,8 +205,6 @@ def test_boots_in_one_log_stand_one_after_the_other(tmp_path: Path) -> None:
     ("name", "content", "told"),
     [
         ("flight.csv", b"1,2", "give a flight log: .bin, .tlog, .ulg"),
-        ("flight.log", b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name", "ArduPilot's log as text"),
-        ("flight.bin", b"Free RAM: 9\nFMT, 128, 89, FMT, BBnNZ", "ArduPilot's log as text"),
         ("flight.bin", b"", "empty"),
         ("flight.bin", b"no log at all" * 100, "0 positions"),
         ("flight.tlog", b"no log at all" * 100, "0 positions"),
@@ -232,9 +234,9 @@ def test_reading_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(logs, "_LARGEST", 99_999_999)
     with pytest.raises(InputError, match="larger than 99,999,999 bytes"):
         read_log(path)
-    monkeypatch.setattr(log_messages, "_MOST_MESSAGES", 800)
+    monkeypatch.setattr(logs, "_MOST_MESSAGES", 800)
     with pytest.raises(ValueError, match="more than 800 positions"):
-        log_messages.write(LOGS / "arducopter.tlog", StringIO())
+        logs.write(LOGS / "arducopter.tlog", StringIO())
 
 
 def test_no_code_of_the_current_directory_is_run(
@@ -246,3 +248,115 @@ def test_no_code_of_the_current_directory_is_run(
     monkeypatch.chdir(tmp_path)
     assert len(the_flight(Path("flight.tlog")).t) > 100
     assert not Path("run").exists()
+
+
+# ---- what logs say, message by message
+
+POSITIONS = 60
+"""Twelve seconds of a flight."""
+
+Position = Callable[[int, float, float], Said]
+
+
+def bin_position(k: int, height: float, home: float) -> Said:
+    place = {"Lat": -35.0 + 1e-6 * k, "Lng": 149.0, "Alt": home + height, "RelHomeAlt": height}
+    return 0, 0, "POS", {"TimeUS": 1e8 + 2e5 * k, **place}
+
+
+def tlog_position(k: int, height: float, home: float) -> Said:
+    place = {"lat": -350_000_000 + 10 * k, "lon": 1_490_000_000, "alt": 1e3 * (home + height)}
+    fields = {"time_boot_ms": 100_000 + 200 * k, **place, "relative_alt": 1e3 * height}
+    return 0, 0, "GLOBAL_POSITION_INT", dict(fields)
+
+
+def ulg_position(k: int, height: float, home: float) -> Said:
+    place = {"lat": -35.0 + 1e-6 * k, "lon": 149.0, "alt": home + height}
+    return 0, 0, "vehicle_global_position", {"timestamp": 1e8 + 2e5 * k, **place}
+
+
+def made_of(said: Sequence[Said]) -> FlightRecord:
+    (record,) = flights(Path("flight"), said)
+    return record
+
+
+@given(
+    kind=st.sampled_from((bin_position, tlog_position, ulg_position)),
+    damaged=st.sets(st.integers(0, POSITIONS // 4 - 1)),
+    field=st.integers(0, 3),
+    value=st.sampled_from([np.nan, np.inf, -np.inf, 1e300, -1e300, 1e15, -1e15, "text"]),
+)
+def test_a_damaged_position_is_left_out_and_no_other(
+    kind: Position, damaged: set[int], field: int, value: float | str
+) -> None:
+    said = [kind(k, 20.0, 500.0) for k in range(POSITIONS)]
+    for k in damaged:
+        fields = said[4 * k + 2][3]
+        fields[list(fields)[field]] = value
+    record = made_of([(0, 0, "home_position", {"alt": 500.0}), *said])
+    left = [k for k in range(POSITIONS) if k % 4 != 2 or k // 4 not in damaged]
+    assert record.t == pytest.approx(100.0 + 0.2 * np.array(left))
+    assert record.latitude == pytest.approx(-35.0 + 1e-6 * np.array(left), abs=1e-9)
+    assert record.height == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("kind", [bin_position, tlog_position, ulg_position])
+def test_heights_are_above_home_as_it_was_then(kind: Position) -> None:
+    """Home is set 6 m higher in the middle; the aircraft stays where it is."""
+    homes: tuple[dict[str, float | str], ...] = (
+        {"alt": 500.0, "valid_alt": 1},
+        {"alt": 999.0, "valid_alt": 0},
+        {"alt": 506.0},
+    )
+    first, none, second = ((0, 0, "home_position", home) for home in homes)
+    said: list[Said] = [first, *(kind(k, 20.0, 500.0) for k in range(30)), none, second]
+    record = made_of([*said, *(kind(k, 14.0, 506.0) for k in range(30, POSITIONS))])
+    for k, height in ((29, 20.0), (30, 14.0)):
+        heights = record.height_above_home_at(float(record.t[k]) + 0.1)
+        assert heights == pytest.approx(height)
+
+
+def test_a_home_that_comes_late_or_never() -> None:
+    said = [ulg_position(k, float(k), 500.0) for k in range(POSITIONS)]
+    assert made_of(said).height == pytest.approx(np.arange(POSITIONS))
+    later: list[Said] = [*said[:20], (0, 0, "home_position", {"alt": 490.0}), *said[20:]]
+    assert made_of(later).height == pytest.approx(10.0 + np.arange(POSITIONS))
+
+
+def test_wind_is_of_the_newest_that_estimates_it() -> None:
+    east = dict.fromkeys(("wind", "wind_estimate"), "windspeed_east") | {"WIND_COV": "wind_y"}
+    north = dict.fromkeys(("wind", "wind_estimate"), "windspeed_north") | {"WIND_COV": "wind_x"}
+    for winds, mean in (
+        ({"wind": 2.0, "wind_estimate": 9.0}, [2.0, 1.0]),
+        ({"wind": np.nan, "wind_estimate": 2.0}, [2.0, 1.0]),
+        ({"XKF2": 0.0, "NKF2": 2.0}, [2.0, 1.0]),
+        ({"NKF2": 9.0, "XKF2": 2.0}, [2.0, 1.0]),
+        ({"WIND_COV": 2.0}, [2.0, 1.0]),
+        ({"WIND_COV": np.nan}, None),
+        ({"XKF2": 1e30}, None),
+    ):
+        said: list[Said] = []
+        for k in range(POSITIONS):
+            said.append(bin_position(k, 20.0, 500.0))
+            for name, x in winds.items():
+                fields = {east.get(name, "VWE"): x, north.get(name, "VWN"): x / 2}
+                said.append((0, 0, name, dict(fields)))
+        found = made_of(said).mean_wind(101.0, 12.0)
+        assert found == (None if mean is None else pytest.approx(mean))
+
+
+def test_the_autopilot_of_a_system_counts() -> None:
+    def said(system: int, component: int, height: float, count: int = POSITIONS) -> list[Said]:
+        told = (tlog_position(k, height, 500.0) for k in range(count))
+        return [(system, component, *each[2:]) for each in told]
+
+    log = [*said(1, 191, 9.0), *said(1, 1, 1.0, 20), *said(2, 1, 2.0)]
+    log += [*said(3, 1, 9.0, 5), *said(3, 5, 3.0), *said(3, 191, 9.0, 30)]
+    found = {record.system: record.height.tolist() for record in flights(Path("flight"), log)}
+    assert found == {1: [1.0] * 20, 2: [2.0] * POSITIONS, 3: [3.0] * POSITIONS}
+    assert [record.system for record in flights(Path("flight"), log, 2)] == [2]
+
+
+def test_a_clock_that_runs_for_days_is_refused() -> None:
+    said = [bin_position(4500 * k, 20.0, 500.0) for k in range(POSITIONS + 50)]
+    with pytest.raises(InputError, match="27 hours"):
+        made_of(said)

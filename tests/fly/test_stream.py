@@ -67,7 +67,7 @@ def under(changes: dict[str, Any]) -> Solution:
 
 def flown(scene: Scene, solution: Solution) -> Prediction:
     """Return what became of the plan, on its own clock."""
-    line = scene.watch.seen.samples.record().line(solution)
+    line = scene.watch.seen.record().line(solution)
     return price_flight(solution, line.t - scene.watch.relay_start, line.w)
 
 
@@ -84,7 +84,7 @@ def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
     found = flown(scene, solution)
     assert found.rms_position_error < (0.3 if not loss else 0.6)
     assert found.delivered_rate > 0.997 * solution.delivered_rate
-    record = scene.watch.seen.samples.record()
+    record = scene.watch.seen.record()
     begin = scene.watch.relay_start
     during = (record.t > begin) & (record.t < begin + solution.plan.flight.duration)
     np.testing.assert_allclose(record.height[during], 6, atol=0.2)
@@ -177,7 +177,7 @@ def test_without_setpoints_or_sticks_px4_sinks_in_position() -> None:
     told = "setpoints lost: it changes to Position (and sinks, unless sticks fly it) after 1 s"
     assert any(each.message.startswith(told) for each in scene.watch.findings)
     assert modes == [px4_mode(3, 0)]
-    assert scene.watch.seen.samples.height[-1] == pytest.approx(0.0, abs=0.1)
+    assert scene.watch.seen.height == pytest.approx(0.0, abs=0.1)
 
 
 @KINDS
@@ -199,7 +199,7 @@ def test_it_is_not_started_where_it_must_not_be(kind: str) -> None:
 def test_a_pilot_may_have_the_mission_flown_instead(kind: str) -> None:
     scene = Scene(kind, solution=low())
     assert scene.run(events=[(18.0, scene.sets(scene.watch._modes.mission))]) == "taken over"
-    record = scene.watch.seen.samples.record()
+    record = scene.watch.seen.record()
     steps = np.linalg.norm(np.diff(record.line(low()).w, axis=0), axis=1)
     assert steps.max() < 1.5  # 10 m/s, ten times a second: it jumps nowhere
     last = scene.mock.mission().items[-2]
@@ -261,7 +261,7 @@ def test_it_ends_as_the_plan_says(finish: str) -> None:
     scene = Scene("ardupilot", solution=solution)
     assert scene.run() == "finished"
     assert scene.mock.armed == (finish == "hover")
-    record = scene.watch.seen.samples.record()
+    record = scene.watch.seen.record()
     last = solution.w[-1] if finish == "hover" else np.zeros(2)
     assert np.linalg.norm(record.line(solution).w[-1] - last) < 1
     assert record.height[-1] == pytest.approx(6 if finish == "hover" else 0, abs=1)
@@ -273,9 +273,9 @@ def test_the_ways_out_and_home_keep_the_fence() -> None:
     assert scene.run() == "finished"
     area = solution.plan.keep_in
     assert area is not None
-    record = scene.watch.seen.samples.record()
+    record = scene.watch.seen.record()
     high = record.height > 5.9
-    first = scene.watch.seen.samples.t.index(record.t[high][0])
+    first = int(np.argmax(high))
     path = record.line(solution).w[first:][record.height[first:] > 1]
     assert area.inside(1.0).covers(path).all()
     velocity = solution.v.copy()

@@ -113,7 +113,7 @@ def test_after_px4s_landing_failsafe_it_climbs_before_it_goes_on() -> None:
     climbs = (np.array(flown.times) > 57.4) & (places[:, 2] < 26.0)
     assert climbs.sum() > 50
     assert np.hypot(*off[climbs, :2].T).max() < 0.5
-    last = flown.scene.watch.seen.samples.record().line(swift()).w[-1]
+    last = flown.scene.watch.seen.record().line(swift()).w[-1]
     assert np.linalg.norm(last - swift().w[-1]) < 1.0
 
 
@@ -136,7 +136,7 @@ def test_after_a_silence_it_goes_on_inside_the_fence(
     assert flown.scene.run(Faults(outages=(outage,))) == "finished"
     flown.assert_gated()
     assert flown.after(outage[1]) > 50
-    last = flown.scene.watch.seen.samples.record().line(swift()).w[-1]
+    last = flown.scene.watch.seen.record().line(swift()).w[-1]
     assert np.linalg.norm(last - swift().w[-1]) < 1.0
 
 
@@ -461,7 +461,7 @@ def test_a_clock_that_leaps_ahead_leaves_the_aircraft_on_its_ways(kind: str, lea
     )
     assert flown.scene.run() == "finished"
     flown.assert_gated()
-    last = flown.scene.watch.seen.samples.record().line(swift()).w[-1]
+    last = flown.scene.watch.seen.record().line(swift()).w[-1]
     assert np.linalg.norm(last - swift().w[-1]) < 1.0
 
 
@@ -524,5 +524,5 @@ def test_the_finish_is_asked_for_until_its_failsafe_is_over() -> None:
         else answer(envelope, now)
     )
     assert flown.scene.run() == "finished"
-    assert flown.scene.watch.seen.samples.t[-1] > 60.0
+    assert flown.scene.watch.seen.fixes[-1].t > 60.0
     assert not flown.scene.mock.armed

@@ -42,12 +42,12 @@ def test_armed_started_and_watched_to_the_end(kind: str, loss: float) -> None:
     kinds = [order.command for order in scene.orders if isinstance(order, CommandLong)]
     assert kinds == sorted(kinds, reverse=True)  # 400 arms, then 300 starts
     assert {*kinds} == {MavCommand.ARM, MavCommand.START}
-    samples, track = scene.watch.seen.samples, fly(a_mission(12))
-    assert (np.diff(samples.t) > 0).all()
-    assert max(samples.height) == pytest.approx(track.position[:, 2].max(), abs=0.5)
-    assert samples.height[-1] < 5
+    record, track = scene.watch.seen.record(), fly(a_mission(12))
+    assert (np.diff(record.t) > 0).all()
+    assert record.height.max() == pytest.approx(track.position[:, 2].max(), abs=0.5)
+    assert record.height[-1] < 5
     if not loss:
-        assert np.diff(samples.t).max() == pytest.approx(0.2, abs=0.06)
+        assert np.diff(record.t).max() == pytest.approx(0.2, abs=0.06)
 
 
 @KINDS
@@ -76,7 +76,7 @@ def test_a_pilot_has_the_aircraft_for_good(kind: str, loss: float) -> None:
     assert scene.run(Faults(loss=loss, seed=1), events=events) == "taken over"
     assert len(scene.orders) == sent[0]
     assert scene.told("the pilot or a failsafe has the aircraft; nothing more is sent")
-    assert scene.watch.seen.samples.t[-1] > 35
+    assert scene.watch.seen.fixes[-1].t > 35
 
 
 def test_a_pilot_who_is_quicker_than_the_start() -> None:
@@ -387,7 +387,7 @@ def test_a_mission_outlives_the_terminal(kind: str) -> None:
         modes.append(mock.mode)
     assert not mock.armed
     assert {AUTO[kind]} <= set(modes) <= {AUTO[kind], 4 << 16 | 5 << 24}  # PX4's return
-    assert max(scene.watch.seen.samples.height) > 20
+    assert scene.watch.seen.record().height.max() > 20
 
 
 @KINDS

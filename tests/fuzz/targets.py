@@ -12,8 +12,7 @@ from harness import Target
 
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import InputError, MissionFileError
-from faao_mav.fly.log_flights import flights
-from faao_mav.fly.log_messages import messages
+from faao_mav.fly.logs import flights, messages
 from faao_mav.fly.record import FlightRecord
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import FreeArea, areas_of
