@@ -8,6 +8,7 @@ from faao_mav.errors import LinkError
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.record import FlightRecord
 from faao_mav.fly.seen import Flight, read_held
+from faao_mav.fly.start import Start
 from faao_mav.fly.telemetry import POSITION_RATE, Ending
 from faao_mav.fly.watch import Watch
 from faao_mav.validate.rule import Finding
@@ -15,7 +16,7 @@ from faao_mav.wire.client import LinkOptions, Session
 from faao_mav.wire.discover import FoundVehicle
 from faao_mav.wire.machine import Script
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.transfer.verify import Difference, compare
+from faao_mav.wire.transfer.verify import Difference
 from faao_mav.wire.wire_items import wire_items
 
 
@@ -74,8 +75,7 @@ def fly(
             each
             for part in MissionType
             if lists[part]
-            for each in compare(lists[part], held.lists.get(part, ()), part, peer.vehicle)
-            if each.kind == "wrong"
+            for each in held.other_than(lists[part], part, peer.vehicle)
         )
         if wrong:
             return FlightReport(vehicle, wrong, None, FlightRecord.of(()))
@@ -88,8 +88,11 @@ def fly(
             watch: Watch = Stream(peer, flight.solution, ready, rate=rate)
         else:
             rows = held.lists[MissionType.MISSION]
-            gate = ready if judged else None
-            watch = Watch(peer, rows, arm=arm, lands=lands, rate=rate, readiness=gate)
+            if arm:
+                watch = Start(peer, rows, ready, lands=lands, rate=rate)
+            else:
+                gate = ready if judged else None
+                watch = Watch(peer, rows, gate, lands=lands, rate=rate)
         watch.seen.strangers = session.link.strangers
         try:
             ending = session.link.watch(

@@ -1,7 +1,6 @@
-"""The gate of all setpoints: where an aircraft is may be sent to, by what it can have missed."""
+"""The gate of all setpoints: where an aircraft can be, and where it may be sent to from there."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,36 +15,34 @@ disturbs keeps its plan to 0.5 m rms in the simulators."""
 CLIMB, CLIMB_ACCELERATION = 2.0, 1.0
 """The speed, m/s, and acceleration, m/s², of a climb by setpoints; chosen: below all defaults."""
 
+_AROUND, _QUICKER = 2.0, 2.0
+"""A place may be so many metres farther from the last one than the aircraft flies meanwhile at so
+many times the plan's top speed. Chosen: a failsafe may fly faster than the plan, a wind carry it.
+"""
 
-@dataclass(frozen=True, slots=True)
-class Lag:
-    """How far behind a flight of at most `speed`, m/s, and `acceleration`, m/s², one may be.
+_MOVES, _STANDS = 0.5, 1.0
+"""An aircraft that tells at least so many m/s cannot be at the same place for so many seconds, to
+the last digit. Chosen."""
 
-    >>> lag = Lag(speed=8.0, acceleration=2.0)
-    >>> lag.after(0.5), lag.after(60.0)
-    (4.0, 16.0)
-    """
-
-    speed: float
-    acceleration: float
-
-    def after(self, seconds: float) -> float:
-        """Return the greatest lag, m, of an aircraft that was on course so many seconds ago.
-
-        One that stays where it is falls behind by at most the speed; one that follows from rest, by
-        the way that it takes to be as fast.
-        """
-        return min(self.speed * max(seconds, 0.0), self.speed**2 / (2 * self.acceleration))
+_BORNE = 3.0
+"""Seconds for which places are doubted until they are given up; chosen."""
 
 
 class Gate:
-    """The gate of the setpoints for a flight of `plan`: see `passes`; times are the vehicle's."""
+    """The gate of the setpoints for a flight of `plan`: see `believes` and `passes`.
+
+    Times are the vehicle's. `told` is what changes, in words.
+    """
 
     def __init__(self, plan: Plan) -> None:
-        self._fence = plan.keep_in
-        self._across = Lag(plan.max_ground_speed, plan.vehicle.max_acceleration)
-        self._up = Lag(CLIMB, CLIMB_ACCELERATION)
+        self._fence, self._speed = plan.keep_in, plan.max_ground_speed
+        self._acceleration = plan.vehicle.max_acceleration
         self._on_course: float | None = None
+        self._last: tuple[float, Real] | None = None
+        self._jumped_from: tuple[float, Real] | None = None
+        self._moved = 0.0
+        self._doubted_since = math.inf
+        self.told: list[str] = []
 
     def passes(self, t: float, place: Real, setpoint: Setpoint) -> bool:
         """Tell whether an aircraft at `place` (3,), m, at `t`, s, may be sent to `setpoint`.
@@ -58,7 +55,54 @@ class Gate:
         if self._on_course is None or (across <= NEAR and up <= LEVEL):
             self._on_course = t
         since = t - self._on_course
-        if across > NEAR + self._across.after(since) or up > LEVEL + self._up.after(since):
+        far = NEAR + _lag(since, self._speed, self._acceleration)
+        if across > far or up > LEVEL + _lag(since, CLIMB, CLIMB_ACCELERATION):
             return False
         straight = np.array([place[:2], setpoint.position[:2]])
         return across <= NEAR or self._fence is None or self._fence.covers_path(straight)
+
+    def believes(self, t: float, place: Real, velocity: Real) -> bool:
+        """Tell whether it can be at `place` (3,), m, with `velocity` (3,), m/s, at `t`, s.
+
+        After a jump it is doubted until it jumps back; so is one that moves and stays where it is.
+        """
+        last = self._last
+        if last is None or np.linalg.norm(velocity) < _MOVES or (place != last[1]).any():
+            self._moved = t
+        if self._jumped_from is None and self._jumps(last, t, place):
+            self._jumped_from = last
+        elif self._jumps(last, t, place) and not self._jumps(self._jumped_from, t, place):
+            self._jumped_from = None
+        self._last = t, place
+        stands = t - self._moved >= _STANDS
+        doubted = stands or self._jumped_from is not None
+        if doubted and self._doubted_since == math.inf:
+            self._doubted_since = t
+            why = "does not change, though it moves" if stands else "has jumped"
+            self.told.append(f"its place {why}: no setpoints are sent")
+        elif not doubted and self._doubted_since < math.inf:
+            self._doubted_since = math.inf
+            self.told.append("its place is believed again")
+        return not doubted
+
+    def has_lost_it(self, t: float) -> bool:
+        """Tell whether its places have been doubted for too long by `t`, s."""
+        return t >= self._doubted_since + _BORNE
+
+    def _jumps(self, before: tuple[float, Real] | None, t: float, place: Real) -> bool:
+        if before is None:
+            return False
+        within = _AROUND + _QUICKER * self._speed * (t - before[0])
+        return float(np.linalg.norm(place - before[1])) > within
+
+
+def _lag(seconds: float, speed: float, acceleration: float) -> float:
+    """Return the greatest lag, m, of an aircraft that was on course so many seconds ago.
+
+    One that stays where it is falls behind by at most the speed; one that follows from rest, by
+    the way that it takes to be as fast.
+
+    >>> _lag(0.5, 8.0, 2.0), _lag(60.0, 8.0, 2.0)
+    (4.0, 16.0)
+    """
+    return min(speed * max(seconds, 0.0), speed**2 / (2 * acceleration))

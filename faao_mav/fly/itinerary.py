@@ -32,15 +32,11 @@ _GROUNDED = 0.5
 """Metres above home below which an aircraft is not taken off again; chosen."""
 
 _STUCK = 60.0
-"""Seconds of waiting for an aircraft that does not follow, after which it is given up; chosen."""
+"""Seconds for which an aircraft may be on its way longer than twice what that takes, led to it anew
+or not, until it is given up; chosen."""
 
-_WAYS = 10
-"""How many ways it is led in a row, none of which it follows to its end, until it is given up;
-chosen."""
-
-_MEETINGS, _MISSED = 4, 2.0
-"""How many places to meet the plan at are tried before its end is; and seconds after which the plan
-has passed by one. Chosen."""
+_MISSED = 2.0
+"""Seconds after which the plan has passed by the place where it was to be met; chosen."""
 
 
 class Itinerary:
@@ -77,13 +73,13 @@ class Itinerary:
                 "the streamed flight leaves the plan's fence where it speeds up before flight.start"
                 " or slows down after flight.end: give hover for both, or move them"
             )
-        self.part: Part = "take-off"
+        self.part: Part
         self.relay_start: float | None = None
         self.told: list[str] = []
         self.trouble: str | None = None
         self._time: float | None = None
-        self._ways, self._meets = 0, 0.0
-        self._follow(None)
+        self._meets = 0.0
+        self._enter("take-off", None, 0.0)
 
     def setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
         """Return where an aircraft at `place` (3,), m, is to be at `t`, s; None: nowhere.
@@ -97,16 +93,14 @@ class Itinerary:
             case "take-off" if not self._takes_off or (
                 place[2] > height - _BELOW and abs(velocity[2]) < _LEVEL
             ):
-                self.part = "out"
-                self._follow(self._level_way(place, *self._corners, self._first))
+                self._enter("out", self._level_way(place, *self._corners, self._first), t)
             case "take-off":
                 return None
             case "out" if self._rests(t, place, velocity):
-                self.part, self.relay_start = "relay", t - self.relay.begin
-                self._follow(None)
+                self.relay_start = t - self.relay.begin
+                self._enter("relay", None, t)
             case "relay" if t - self._start >= max(self.relay.end, self._plan.flight.duration):
-                self.part = "back"
-                self._follow(self._back)
+                self._enter("back", self._back, t)
             case "back" if self._arrived is not None and (
                 np.linalg.norm(place - self._back.p[-1]) <= NEAR or self._is_late(t)
             ):
@@ -118,12 +112,18 @@ class Itinerary:
         assert self.relay_start is not None
         return self.relay_start
 
-    def _follow(self, way: Course | None) -> None:
+    def _enter(self, part: Part, way: Course | None, t: float) -> None:
+        self.part = part
+        self._off = False
+        self._follow(way, t)
+
+    def _follow(self, way: Course | None, t: float) -> None:
         """Follow `way` from its beginning; None: the plan."""
         self._course, self._gone = way, 0.0
         self._settled: float | None = None
         self._arrived: float | None = None
-        self._waits_since: float | None = None
+        if way is None or not self._off:
+            self._until = t + _STUCK + (0.0 if way is None else 2 * way.end)
 
     def _on_plan(self, t: float, place: Real) -> Setpoint | None:
         """Return where the plan has it at `t`; None where it may not be sent there."""
@@ -134,8 +134,8 @@ class Itinerary:
             return None
         if self._course is not None:
             self.told.append("it is on its plan again")
-            self._follow(None)
-        self._ways = 0
+            self._follow(None, t)
+        self._off = False
         return setpoint
 
     def _on_way(self, t: float, place: Real, passed: float) -> Setpoint | None:
@@ -144,31 +144,28 @@ class Itinerary:
         missed = self.part == "relay" and t - self._start > self._meets + _MISSED
         if way is not None and not missed:
             if self._gate.passes(t, place, way.at(ahead)):
-                self._gone, self._waits_since = ahead, None
-                if ahead >= way.end and self._arrived is None:
-                    self._arrived, self._ways = t, 0
+                self._gone = ahead
+                if ahead >= way.end:
+                    self._arrived, self._off = self._arrived or t, False
                 return way.at(ahead)
             waiting = Setpoint(way.at(self._gone).position, np.zeros(3), np.zeros(3))
-            if self._waits_since is None:
-                self._waits_since = t
-            if t < self._waits_since + _STUCK and self._gate.passes(t, place, waiting):
+            if t < self._until and self._gate.passes(t, place, waiting):
                 return waiting
         return self._led(t, place)
 
     def _led(self, t: float, place: Real) -> Setpoint | None:
         """Return the beginning of a new way to the present part; None, and why, without one."""
-        stuck = self._waits_since is not None and t >= self._waits_since + _STUCK
         if place[2] < _GROUNDED:
             self.trouble = "it has come down to the ground"
-        elif stuck or self._ways >= _WAYS:
+        elif self._course is not None and t >= self._until and self._arrived is None:
             self.trouble = "it does not follow"
         elif (way := self._leading(t, place)) is None:
             self.trouble = "no way inside the fence leads it back"
         else:
-            if not self._ways:
+            if not self._off:
                 self.told.append("it is off its flight, and led back to it")
-            self._ways += 1
-            self._follow(way)
+            self._follow(way, t)
+            self._off = True
             return way.at(0.0)
         return None
 
@@ -176,18 +173,16 @@ class Itinerary:
         """Return a way to the end of the part, or to the plan, that is there no sooner; or None."""
         if self.part != "relay":
             return self._way_to(place, self._first if self.part == "out" else self._back.p[-1])
-        now = t - self._start
-        times = np.arange(now, self.relay.end, 1.0)
-        east, north = (np.interp(times, self.relay.t, self.relay.p[:, axis]) for axis in (0, 1))
-        soonest = now + np.hypot(east - place[0], north - place[1]) / self._speed
-        for _ in range(_MEETINGS):
-            if not (soonest <= times).any():
-                break
-            self._meets = float(times[np.argmax(soonest <= times)])
-            way = self._way_to(place, self.relay.at(self._meets).position)
-            if way is None or now + way.end <= self._meets:
-                return way
-            soonest = np.maximum(soonest, now + way.end)
+        now = self._meets = t - self._start
+        while self._meets < self.relay.end:
+            meeting = self.relay.at(self._meets).position
+            soonest = now + float(np.linalg.norm((meeting - place)[:2])) / self._speed
+            if soonest <= self._meets:
+                way = self._way_to(place, meeting)
+                if way is None or now + way.end <= self._meets:
+                    return way
+                soonest = now + way.end
+            self._meets = max(self._meets + 1.0, soonest)
         self._meets = self.relay.end
         return self._way_to(place, self.relay.p[-1])
 

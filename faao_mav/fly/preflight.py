@@ -5,6 +5,7 @@ Nothing is armed while `preflight` finds an error. It is one gate for missions a
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import addressee_mistake
@@ -16,7 +17,6 @@ from faao_mav.validate.rule import Finding, Level
 from faao_mav.validate.words import counted
 from faao_mav.wire.parameters import close, number_in
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.transfer.verify import compare
 from faao_mav.wire.whereabouts import (
     FIRST_AWAY,
     FIRST_FARTHEST,
@@ -31,11 +31,6 @@ from faao_mav.wire.wire_items import wire_items
 LEAST_BATTERY = 30
 """Percent of the battery with which a flight begins at least, where nothing tells what it takes.
 Chosen: twice what PX4 takes for low by default."""
-
-_ORDER = {Level.ERROR: 0, Level.WARNING: 1, Level.NOTE: 2}
-
-_PLACE, _TIMING = "place-", "timing-"
-"""How the rules begin that --elsewhere and --untimed overrule."""
 
 _AT_FENCE: dict[FenceAction, str] = {
     "nothing": "flies on",
@@ -57,9 +52,8 @@ def preflight(
     """
     mistake = addressee_mistake(flight.made_for, seen.vehicle)
     if mistake is not None:
-        return (
-            _error("vehicle-other", mistake, "connect to its vehicle, or make another mission"),
-        )
+        action = "connect to its vehicle, or make another mission"
+        return (_error("vehicle-other", mistake, action),)
     judged = _judged(flight, seen, elsewhere=elsewhere)
     found = [
         *_state(flight, seen),
@@ -71,22 +65,17 @@ def preflight(
         *_failsafes(flight, seen, judged.vehicle),
     ]
     if elsewhere:
-        found = [_overruled(each, _PLACE, "--elsewhere") for each in found]
+        found = [_overruled(each, "place-", "--elsewhere") for each in found]
     if untimed:
-        found = [_overruled(each, _TIMING, "--untimed") for each in found]
-    return tuple(sorted(found, key=lambda each: _ORDER[each.level]))
+        found = [_overruled(each, "timing-", "--untimed") for each in found]
+    return tuple(sorted(found, key=lambda each: [*Level].index(each.level)))
 
 
-def _error(rule: str, message: str, action: str) -> Finding:
-    return Finding(Level.ERROR, rule, None, message, action)
+def _found(level: Level, rule: str, message: str, action: str = "") -> Finding:
+    return Finding(level, rule, None, message, action)
 
 
-def _warning(rule: str, message: str, action: str) -> Finding:
-    return Finding(Level.WARNING, rule, None, message, action)
-
-
-def _note(rule: str, message: str) -> Finding:
-    return Finding(Level.NOTE, rule, None, message, "")
+_error, _warning, _note = (partial(_found, level) for level in Level)
 
 
 def _overruled(found: Finding, rules: str, option: str) -> Finding:
@@ -98,21 +87,20 @@ def _overruled(found: Finding, rules: str, option: str) -> Finding:
 
 def _judged(flight: Flight, seen: Seen, *, elsewhere: bool) -> Check:
     """Return what validation says of the mission, from where it stands, with what it holds."""
-    mission, values = seen.held.beside(flight.placed, seen.vehicle), seen.held.reading.values
+    mission, solution = seen.held.beside(flight.placed, seen.vehicle), flight.solution
     if seen.place is not None and (elsewhere or Whereabouts.of(seen.place, mission).is_meant):
         mission = replace(mission, home=seen.place)
-    own, kind = seen.vehicle.family.key, seen.vehicle.kind
     vehicle = replace(
-        flight.vehicle, autopilot=own, kind=kind, parameters=values, source="the vehicle"
+        flight.vehicle,
+        autopilot=seen.vehicle.family.key,
+        kind=seen.vehicle.kind,
+        parameters=seen.held.reading.values,
+        source="the vehicle",
     ).usable()
-    if flight.solution is None:
-        return check(mission, vehicle)
-    limits = Limits(max_speed=flight.solution.plan.vehicle.max_speed)
-    found = check(mission, vehicle, limits=limits, solution=flight.solution)
-    if not flight.streamed:
-        return found
-    kept = tuple(each for each in found.findings if not _of_the_mission(each))
-    return replace(found, findings=kept)
+    limits = None if solution is None else Limits(max_speed=solution.plan.vehicle.max_speed)
+    found = check(mission, vehicle, limits=limits, solution=solution)
+    kept = [each for each in found.findings if not (flight.streamed and _of_the_mission(each))]
+    return replace(found, findings=tuple(kept))
 
 
 def _of_the_mission(found: Finding) -> bool:
@@ -127,10 +115,18 @@ def _state(flight: Flight, seen: Seen) -> Iterator[Finding]:
     if seen.stations:
         yield _error(
             "ground-station",
-            f"another ground station is on the link ({'; '.join(sorted(seen.stations))})",
+            f"another ground station is on the link ({'; '.join(seen.stations)})",
             "close it, or let it start the mission",
         )
-    if not flight.streamed and seen.mode in seen.vehicle.modes.not_to_arm_in:
+    if seen.strangers:
+        message = f"its number is used by another vehicle too, at {', '.join(seen.strangers)}"
+        yield _error("number-twice", message, "give each a number of its own")
+    if flight.streamed:
+        return
+    if seen.row is not None and seen.row > 1:
+        message = f"it would go on at item {seen.row}, not at the beginning"
+        yield _error("item-not-first", message, "set the first item (or reboot)")
+    if seen.mode in seen.vehicle.modes.not_to_arm_in:
         yield _error(
             "mode",
             f"it is in mode {seen.mode_name}, in which it is not armed, or flies as soon as it is",
@@ -141,20 +137,14 @@ def _state(flight: Flight, seen: Seen) -> Iterator[Finding]:
 def _place(flight: Flight, seen: Seen) -> Iterator[Finding]:
     place, mission = seen.place, flight.placed
     if place is None:
-        yield _error(
-            "position-unknown",
-            "it does not tell where it stands",
-            "wait until it has a position, under open sky",
-        )
+        message = "it does not tell where it stands"
+        yield _error("position-unknown", message, "wait until it has a position, under open sky")
         return
-    stands, carry = Whereabouts.of(place, mission), "carry it there, or make a mission for here"
+    stands = Whereabouts.of(place, mission)
+    action = "carry it there, or make a mission for here; --elsewhere flies it from here"
     if stands.from_home is not None and not stands.from_home <= HOME_AWAY:
-        yield _error(
-            "place-home",
-            f"it stands {shown(stands.from_home)} from the mission's home, not within "
-            f"{HOME_AWAY:g} m",
-            f"{carry}; --elsewhere flies it from here",
-        )
+        away = f"{shown(stands.from_home)} from the mission's home, not within {HOME_AWAY:g} m"
+        yield _error("place-home", f"it stands {away}", action)
     if stands.higher is not None and not abs(stands.higher) <= HOME_HIGHER:
         yield _error(
             "place-height",
@@ -165,49 +155,40 @@ def _place(flight: Flight, seen: Seen) -> Iterator[Finding]:
             "(site.origin.elevation); --elsewhere flies it all the same",
         )
     if stands.from_home is not None and stands.higher is None:
-        yield _warning(
-            "place-height-unknown",
-            "the mission does not tell how high its home is: it may be made for another height",
-            "give the home its height above sea level",
-        )
-    first, no_home = stands.from_first, stands.from_home is None
+        message = "the mission does not tell how high its home is: it may be for another height"
+        yield _warning("place-height-unknown", message, "give the home its height above sea level")
+    first = stands.from_first
     if first is not None and not first <= FIRST_AWAY:
+        far = stands.from_home is None or not first <= FIRST_FARTHEST
         message = f"the mission's first place is {shown(first)} from where it stands"
-        told = _error if no_home or not first <= FIRST_FARTHEST else _warning
-        yield told("place-first", message, f"{carry}; --elsewhere flies it from here")
+        yield (_error if far else _warning)("place-first", message, action)
     home = seen.held.home
-    if home is not None and not distance(place, (home.latitude, home.longitude)) <= HOME_AWAY:
-        away = distance(place, (home.latitude, home.longitude))
-        yield _warning(
-            "returns-elsewhere",
-            f"its own home, where it returns to, is {shown(away)} from where it stands",
-            "set its home here with the ground station, unless that is meant",
-        )
+    off = 0.0 if home is None else distance(place, (home.latitude, home.longitude))
+    if not off <= HOME_AWAY:
+        message = f"its own home, where it returns to, is {shown(off)} from where it stands"
+        action = "set its home here with the ground station, unless that is meant"
+        yield _warning("returns-elsewhere", message, action)
 
 
 def _lists(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
     """Yield where what it holds is not what the file has, no more and no less."""
     for part in MissionType:
-        rule = f"holds-{part.name.lower()}"
+        rule, rows = f"holds-{part.name.lower()}", seen.held.rows(part, seen.vehicle)
         wanted = wire_items(flight.mission, part, seen.vehicle)
-        held = seen.held.rows(part, seen.vehicle)
         if part in seen.held.missing:
             yield _error(rule, f"{part.title}: what it holds cannot be read", "try again")
         elif wanted:
-            found = compare(wanted, seen.held.lists.get(part, ()), part, seen.vehicle)
-            wrong = [each for each in found if each.kind == "wrong"]
-            if wrong:
-                yield _error(rule, f"it holds another one: {wrong[0]}", "upload it again")
-        elif held:
+            for wrong in seen.held.other_than(wanted, part, seen.vehicle)[:1]:
+                yield _error(rule, f"it holds another one: {wrong}", "upload it again")
+        elif rows:
             idle = part is MissionType.FENCE and own.type.at_fence(own).action == "nothing"
-            told = _warning if idle else _error
             what = "a fence" if part is MissionType.FENCE else part.title
-            message = f"it holds {what} ({counted(len(held), 'item')}) that the file has not"
-            yield told(
-                rule,
-                f"{message}, and does nothing about it" if idle else message,
-                "take that into the file (download), or remove it (upload --clear-rest)",
-            )
+            message = f"it holds {what} ({counted(len(rows), 'item')}) that the file has not"
+            action = "take that into the file (download), or remove it (upload --clear-rest)"
+            if idle:
+                yield _warning(rule, f"{message}, and does nothing about it", action)
+            else:
+                yield _error(rule, message, action)
 
 
 def _timing(flight: Flight, seen: Seen, judged: Check) -> Iterator[Finding]:
@@ -219,16 +200,15 @@ def _timing(flight: Flight, seen: Seen, judged: Check) -> Iterator[Finding]:
         name = next((each for each in parameter.names if each in values), None)
         if name is None:
             (unread if timed else assumed).append(" or ".join(parameter.names))
-        if name is None or not timed:
-            continue
-        wanted = number_in(parameter, name, given)
-        if wanted is not None and not close(values[name], wanted):
-            other.append(f"{name} is {values[name]:g}, not {wanted:g}")
+        elif timed:
+            wanted = number_in(parameter, name, given)
+            if wanted is not None and not close(values[name], wanted):
+                other.append(f"{name} is {values[name]:g}, not {wanted:g}")
     # Setpoints come when they are due, whatever the mission's time is.
     told = _warning if flight.streamed else _error
-    action = "set them (upload --parameters FILE), or --untimed flies it late or early"
     if other:
         message = f"other parameters than the mission is timed for: {', '.join(other)}"
+        action = "set them (upload --parameters FILE), or --untimed flies it late or early"
         yield told("timing-other", f"{message}{_lateness(flight, judged)}", action)
     if unread:
         message = f"not read, though the mission is timed for them: {', '.join(unread)}"
@@ -242,11 +222,9 @@ def _timing(flight: Flight, seen: Seen, judged: Check) -> Iterator[Finding]:
 
 def _lateness(flight: Flight, judged: Check) -> str:
     """Return how long the flight takes with the parameters of both, as the end of a sentence."""
-    if judged.track is None:
-        return ""
     own = replace(judged.vehicle, parameters=flight.vehicle.parameters).usable()
     meant = check(judged.mission, own, wind=judged.wind).track
-    if meant is None:
+    if judged.track is None or meant is None:
         return ""
     return f"; predicted to take {judged.track.t[-1]:.1f} s, not {meant.t[-1]:.1f} s"
 
@@ -254,16 +232,14 @@ def _lateness(flight: Flight, judged: Check) -> str:
 def _battery(seen: Seen, judged: Check) -> Iterator[Finding]:
     energy, percent = judged.energy, seen.battery
     if percent is None:
-        yield _warning(
-            "battery-unknown", "it does not tell its battery", "see to it that the battery is full"
-        )
+        action = "see to it that the battery is full"
+        yield _warning("battery-unknown", "it does not tell its battery", action)
         return
     least, why = float(LEAST_BATTERY), "where no plan tells what the flight takes"
     if energy is not None and energy.battery is not None:
-        battery = energy.battery
-        takes = 100 * energy.total / battery.capacity_wh
-        least = takes + battery.reserve
-        why = f"the flight takes {takes:.0f} %, and is to leave {battery.reserve:g} %"
+        takes = 100 * energy.total / energy.battery.capacity_wh
+        least = takes + energy.battery.reserve
+        why = f"the flight takes {takes:.0f} %, and is to leave {energy.battery.reserve:g} %"
     if percent < least:
         message = f"its battery is at {percent} %, which is below {least:.0f} %: {why}"
         yield _error("battery-low", message, "change the battery")
@@ -293,11 +269,11 @@ def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
     if seen.held.rows(MissionType.FENCE, seen.vehicle):
         response = own.type.at_fence(own)
         name = own.name_of(response.parameter)
-        message = f"fence left: it {_AT_FENCE[response.action]} ({name})"
+        level, action = Level.WARNING, f"set {name} {response.set_to}"
         if response.keeps:
-            yield _note("on-fence-left", message)
-        else:
-            yield _warning("on-fence-left", message, f"set {name} {response.set_to}")
+            level, action = Level.NOTE, ""
+        message = f"fence left: it {_AT_FENCE[response.action]} ({name})"
+        yield _found(level, "on-fence-left", message, action)
     height = own.vertical.return_height
     if height > 0 and "return_height" in own.type.parameters:
         name = own.name_of("return_height")

@@ -6,6 +6,7 @@ from dataclasses import replace
 from faao_mav.fly.preflight import preflight
 from faao_mav.fly.seen import Flight, Held, Seen, read_held
 from faao_mav.fly.telemetry import Telemetry
+from faao_mav.mission.item import Home
 from faao_mav.validate.rule import Finding, Level
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import Envelope, Message, ParamValue
@@ -14,7 +15,7 @@ from faao_mav.wire.transfer.exchange import Peer
 from faao_mav.wire.transfer.pace import Timeouts
 
 _STEADY = 5
-"""Digits of a degree within which a vehicle counts as standing still: a metre. Chosen."""
+"""Digits of a degree to which a place is looked at: a metre. Chosen."""
 
 _LOOK = 5.0
 """Seconds after which it is told what stands against a flight, though its place is not known.
@@ -29,7 +30,7 @@ class Readiness:
     """The gate of `flight` by the vehicle of `peer`, of which `held` was read just before.
 
     For `elsewhere` and `untimed` see `preflight`. `findings` is what it found last, None before.
-    Setup, once: `start`; then `on` with what arrives, `look` now and then, and before the vehicle
+    Setup, once: `start`; then `on` with what arrives, `judge` now and then, and before the vehicle
     is armed `settle`, until it is up to date.
     """
 
@@ -46,7 +47,7 @@ class Readiness:
         self._flight, self._held, self._peer, self._timeouts = flight, held, peer, timeouts
         self._options = {"elsewhere": elsewhere, "untimed": untimed}
         self.findings: tuple[Finding, ...] | None = None
-        self._known: tuple[object, ...] = ()
+        self._judged: Seen | None = None
         self._reading: Script[Held] | None = None
         self._read_at = self._begun = 0.0
 
@@ -60,19 +61,14 @@ class Readiness:
         """The vehicle's parameters that a flight depends on, by name."""
         return self._held.reading.values
 
-    @property
-    def deadline(self) -> float | None:
-        """When `settle` is due, None: not by itself."""
-        return None if self._reading is None else self._reading.deadline
-
     def start(self, now: float) -> None:
         """Begin: what is held was read just now."""
         self._read_at = self._begun = now
 
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of what arrived, also of a parameter that somebody sets, and answer it."""
+        """Take note of what the vehicle says, also of a parameter that somebody sets; answer it."""
         message = envelope.message
-        if isinstance(message, ParamValue) and envelope.sender == self._peer.address:
+        if isinstance(message, ParamValue):
             reading, name = self._held.reading, message.param_id
             found = setting_in(message, self._peer.vehicle)
             if name in reading.settings and reading.settings[name] != found:
@@ -80,13 +76,21 @@ class Readiness:
                 self._held = replace(self._held, reading=replace(reading, settings=settings))
         return () if self._reading is None else self._take(self._reading.on(envelope, now), now)
 
-    def look(self, seen: Telemetry, now: float) -> None:
-        """Judge what is heard, once enough is, and again when its place is known."""
-        beat, placed = seen.heartbeat, seen.place is not None
-        if beat is None or beat.armed or (self.findings is not None and not self._misses(placed)):
+    def judge(self, seen: Telemetry, now: float) -> None:
+        """Judge what is heard, once enough is, and again when that is something else."""
+        beat, place, vehicle = seen.heartbeat, seen.place, self._peer.vehicle
+        known = place is not None and seen.status is not None
+        if beat is None or vehicle is None or not (known or now >= self._begun + _LOOK):
             return
-        if (placed and seen.status is not None) or now >= self._begun + _LOOK:
-            self._judge(seen)
+        if place is not None:
+            level = round(place.latitude, _STEADY), round(place.longitude, _STEADY)
+            place = Home(*level, round(place.altitude))
+        others = tuple(sorted(seen.stations)), tuple(sorted(seen.strangers))
+        state = beat.armed, beat.custom_mode, seen.mode, seen.row
+        found = Seen(vehicle, self._held, place, seen.battery, *state, *others)
+        if found != self._judged:
+            self._judged = found
+            self.findings = preflight(self._flight, found, **self._options)
 
     def settle(self, seen: Telemetry, now: float) -> Sequence[Message] | None:
         """Return what is to be sent until the gate is up to date; None: `findings` is.
@@ -100,33 +104,15 @@ class Readiness:
         if now > self._read_at + _READ_BEFORE:
             self._reading = Script(read_held(self._peer, self._timeouts))
             return self._take(self._reading.start(now), now)
-        self._judge(seen)
+        self.judge(seen, now)
         return None
 
     def cancel(self, now: float) -> Sequence[Message]:
         """Read no more."""
         return () if self._reading is None else self._reading.cancel(now)
 
-    def _misses(self, placed: bool) -> bool:
-        """Tell whether a place was missing that is known now."""
-        return placed and any(each.rule == "position-unknown" for each in self.errors)
-
     def _take(self, out: Sequence[Message], now: float) -> Sequence[Message]:
         """Return `out`, and take what the vehicle holds once it is read."""
         if self._reading is not None and self._reading.outcome is not None:
             self._held, self._reading, self._read_at = self._reading.outcome, None, now
         return out
-
-    def _judge(self, seen: Telemetry) -> None:
-        beat, place, vehicle = seen.heartbeat, seen.place, self._peer.vehicle
-        assert beat is not None
-        assert vehicle is not None
-        stands = None
-        if place is not None:
-            spot = (round(place.latitude, _STEADY), round(place.longitude, _STEADY))
-            stands = (*spot, round(place.altitude))
-        state = (seen.battery, beat.armed, beat.custom_mode, seen.mode, tuple(seen.stations))
-        if (known := (self._held, stands, *state)) != self._known:
-            self._known = known
-            now = Seen(vehicle, self._held, place, *state)
-            self.findings = preflight(self._flight, now, **self._options)

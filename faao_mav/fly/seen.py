@@ -16,6 +16,7 @@ from faao_mav.wire.questions import AskFor
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import download_lists
+from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.whereabouts import home_in
 from faao_mav.wire.wire_items import home_items, mission_of
 
@@ -43,6 +44,13 @@ class Held:
     def rows(self, part: MissionType, vehicle: VehicleType) -> tuple[WireItem, ...]:
         """Return the items of one list, without the home row; none where it was not read."""
         return tuple(self.lists.get(part, ()))[home_items(vehicle, part) :]
+
+    def other_than(
+        self, sent: Sequence[WireItem], part: MissionType, vehicle: VehicleType
+    ) -> tuple[Difference, ...]:
+        """Return where one list is not `sent`, home included, but for what storage loses."""
+        found = compare(sent, self.lists.get(part, ()), part, vehicle)
+        return tuple(each for each in found if each.kind == "wrong")
 
     def beside(self, mission: Mission, vehicle: VehicleType) -> Mission:
         """Return `mission` with the fence and the rally points that are held."""
@@ -125,12 +133,13 @@ class Flight:
         return replace(self.mission, home=home)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Seen:
     """What was seen of a vehicle before its flight.
 
-    `place` is where it stands, metres above mean sea level; `battery` is in percent. None: not
-    known. `stations` are other ground stations on the link.
+    `place` is where it stands, metres above mean sea level; `battery` is in percent; `row` is that
+    of the mission file that is under way. None: not known. `stations` are other ground stations on
+    the link, `strangers` addresses of others that use its number.
     """
 
     vehicle: VehicleType
@@ -140,4 +149,6 @@ class Seen:
     armed: bool = False
     mode: int = -1
     mode_name: str = "unknown"
+    row: int | None = None
     stations: tuple[str, ...] = ()
+    strangers: tuple[str, ...] = ()

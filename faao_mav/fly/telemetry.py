@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from faao_mav.fly.record import Fix, FlightRecord
+from faao_mav.mission.item import Home
 from faao_mav.wire.messages import (
     BatteryStatus,
     CommandLong,
@@ -38,9 +39,6 @@ from faao_mav.wire.transfer.verify import compare
 from faao_mav.wire.whereabouts import place_in
 from faao_mav.wire.wire_items import home_items
 
-if TYPE_CHECKING:
-    from faao_mav.mission.item import Home
-
 Kind: TypeAlias = Literal[
     "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
 ]
@@ -51,14 +49,9 @@ _SILENT = 5.0
 POSITION_RATE = 5.0
 """Positions a second that are asked for. Chosen: at 8 m/s they are 1.6 m apart."""
 
-_PERIODS = {SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
-"""Other messages that are needed, and the seconds between two of them that are asked for."""
-
-_SLOW = 1.5
-"""Positions that come with so many times the period between them are asked for again; chosen."""
-
-_MISSED = 3.0
-"""Seconds without one of these after which it is asked for again; chosen."""
+_SLOW, _MISSED = 1.5, 3.0
+"""A message is asked for again after so many seconds without one; positions also when they come
+with so many times the period between them. Chosen."""
 
 _FRESH = 3.0
 """Seconds for which what was heard of the vehicle's state counts: three heartbeats. Chosen."""
@@ -91,7 +84,8 @@ class Ending:
 class Telemetry:
     """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
 
-    Without `rows` its mission is not looked at. It is asked for `rate` positions a second.
+    Without `rows` its mission is not looked at. It is asked for `rate` positions a second. After
+    `patience` seconds without any message nothing more can be known.
 
     Attributes:
         told: what has happened, in words, one after the other.
@@ -105,9 +99,6 @@ class Telemetry:
         stations: other ground stations that were heard.
         strangers: network addresses from which something else speaks in the vehicle's name.
         ending: why nothing more can be known, None as long as something can.
-        patience: seconds without any message after which nothing more can be known.
-        last_heard: when the last message came, s.
-        is_silent: nothing was heard for so long that it was told.
     """
 
     def __init__(
@@ -121,22 +112,22 @@ class Telemetry:
         self.heartbeat: Heartbeat | None = None
         self.current: MissionCurrent | None = None
         self.status: SysStatus | None = None
-        self.knows_place = False
         self.position: GlobalPositionInt | None = None
+        self.knows_place = False
         self.wanted: CurrentMode | None = None
         self.place: Home | None = None
-        self._batteries: dict[int, int] = {}
-        self._beat_at = self._placed_at = float("-inf")
-        self._periods = {POSITION: 1 / rate} | _PERIODS
         self.stations: set[str] = set()
         self.strangers: Set[str] = set()
         self.ending: Ending | None = None
+        self._batteries: dict[int, int] = {}
+        self._beat_at = self._placed_at = float("-inf")
+        self._periods = {POSITION: 1 / rate, SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
         self._next_item = self._home
         self.start(0.0)
 
     def start(self, now: float) -> None:
         """Begin to listen."""
-        self.last_heard, self.is_silent = now, False
+        self._last_heard, self._is_silent = now, False
         self._needed = dict.fromkeys(self._periods, now - _MISSED)
         self._next_reading = now
 
@@ -150,15 +141,14 @@ class Telemetry:
         return len(self._rows) - self._home
 
     @property
+    def row(self) -> int | None:
+        """The row of the mission file that is under way: row 0 is home, also for PX4."""
+        return None if self.current is None else self.current.seq + 1 - self._home
+
+    @property
     def mode(self) -> str:
         """The vehicle's mode by its name."""
         return "unknown" if self.heartbeat is None else mode_name(self.heartbeat)
-
-    def where(self, now: float) -> str:
-        """Return in words its mode and height, and how old that is."""
-        height = f", {self.height:.0f} m above home" if self.fixes else ""
-        old = f", {now - self.last_heard:.0f} s ago" if self.is_silent else ""
-        return f"in mode {self.mode}{height}{old}"
 
     @property
     def height(self) -> float:
@@ -168,6 +158,12 @@ class Telemetry:
     def record(self) -> FlightRecord:
         """Return where it was."""
         return FlightRecord.of(self.fixes)
+
+    def where(self, now: float) -> str:
+        """Return in words its mode and height, and how old that is."""
+        height = f", {self.height:.0f} m above home" if self.fixes else ""
+        old = f", {now - self._last_heard:.0f} s ago" if self._is_silent else ""
+        return f"in mode {self.mode}{height}{old}"
 
     @property
     def battery(self) -> int | None:
@@ -180,27 +176,18 @@ class Telemetry:
         """Tell whether mode, armed state and place were heard of in the last seconds."""
         return now - min(self._beat_at, self._placed_at) <= _FRESH
 
-    @property
-    def row(self) -> int | None:
-        """The row of the mission file that is under way: row 0 is home, also for PX4."""
-        return None if self.current is None else self._row(self.current.seq)
-
-    def _row(self, seq: int) -> int:
-        return seq + 1 - self._home
-
     def hear(self, envelope: Envelope, now: float) -> None:
         """Take note of a message."""
         sender, message = envelope.sender, envelope.message
-        if isinstance(message, Heartbeat) and message.type == GROUND_STATION_TYPE:
-            name = str(sender)
-            if name not in self.stations:
-                self.stations.add(name)
-                self.told.append(f"another ground station is on this link: {name}")
+        of_station = isinstance(message, Heartbeat) and message.type == GROUND_STATION_TYPE
+        if of_station and str(sender) not in self.stations:
+            self.stations.add(str(sender))
+            self.told.append(f"another ground station is on this link: {sender}")
         if sender != self._peer.address:
             return
-        if self.is_silent:
-            self.told.append(f"heard again after {now - self.last_heard:.0f} s")
-        self.last_heard, self.is_silent = now, False
+        if self._is_silent:
+            self.told.append(f"heard again after {now - self._last_heard:.0f} s")
+        self._last_heard, self._is_silent = now, False
         match message:
             case BatteryStatus(battery_function=function) if function in _PROPULSION:
                 self._batteries[message.id] = message.battery_remaining
@@ -222,18 +209,19 @@ class Telemetry:
                 self._needed[CURRENT_ITEM] = now
                 self._on_current(message)
             case MissionItemInt(mission_type=MissionType.MISSION, seq=seq, item=item):
-                self._on_item(seq, item)
+                if self._home <= seq < len(self._rows):
+                    self._hold((*self._rows[:seq], item, *self._rows[seq + 1 :]))
             case Statustext(severity=severity, text=text) if severity <= MavSeverity.WARNING:
                 self.said.append(text.strip())
                 self.told.append(f"the vehicle says: {text.strip()}")
 
-    def tick(self, now: float) -> Sequence[Message]:
+    def tick(self, now: float) -> list[Message]:
         """Take note of the time, and return what to ask the vehicle."""
-        quiet = now - self.last_heard
+        quiet = now - self._last_heard
         if quiet >= self.patience:
             self._end("lost", f"nothing was heard for {quiet:.0f} s; the vehicle is on its own")
-        elif quiet >= _SILENT and not self.is_silent:
-            self.is_silent = True
+        elif quiet >= _SILENT and not self._is_silent:
+            self._is_silent = True
             self.told.append(f"nothing heard for {quiet:.0f} s")
         out: list[Message] = []
         for kind, period in self._periods.items():
@@ -261,8 +249,7 @@ class Telemetry:
             if t < last + 1000 * _SLOW * self._periods[POSITION]:
                 self._needed[POSITION] = now
             home = (message.alt - message.relative_alt) / 1000
-            where = place.latitude, place.longitude, place.altitude
-            self.fixes.append(Fix(t / 1000, *where, home))
+            self.fixes.append(Fix(t / 1000, place.latitude, place.longitude, place.altitude, home))
 
     def _on_current(self, message: MissionCurrent) -> None:
         known, self.current = self.current or message, message
@@ -270,18 +257,11 @@ class Telemetry:
         if self._rows and not (same and message.total in (0, self.items)):
             self._end("changed", "the vehicle's mission is another one now than the file's")
 
-    def _on_item(self, seq: int, item: WireItem) -> None:
-        if not self._home <= seq < len(self._rows):
-            return
-        rows = (*self._rows[: self._home], self._rows[seq])
-        part = MissionType.MISSION
-        found = compare(rows, (*rows[:-1], item), part, self._peer.vehicle)
-        wrong = next((each for each in found if each.kind == "wrong"), None)
-        if wrong is not None:
-            row = f"item {self._row(seq)} of the vehicle's mission"
-            text = f"{wrong.field} is {wrong.found}, in the file {wrong.sent}"
-            self._end("changed", f"{row} is another one now: {text}")
+    def _hold(self, rows: Sequence[WireItem]) -> None:
+        """Compare the mission that it holds now with the one that it held before."""
+        found = compare(self._rows, rows, MissionType.MISSION, self._peer.vehicle)
+        for wrong in (each for each in found if each.kind == "wrong"):
+            self._end("changed", f"the vehicle's mission is another one now: {wrong}")
 
     def _end(self, kind: Kind, text: str) -> None:
-        if self.ending is None:
-            self.ending = Ending(kind, text)
+        self.ending = self.ending or Ending(kind, text)

@@ -9,6 +9,7 @@ from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicl
 
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.seen import Flight, Held
+from faao_mav.fly.start import Start
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.watch import Watch
 from faao_mav.mission import Mission
@@ -76,7 +77,7 @@ class Scene:
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
         held = held_by(self.mock, untold)
         ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
-        self.watch: Any = Watch(peer, rows, arm=self.arm, lands=lands, readiness=ready)
+        self.watch: Any = (Start if self.arm else Watch)(peer, rows, ready, lands=lands)
         if solution is not None:
             self.watch = Stream(peer, solution, ready)
         self.client = Counted(self.watch)

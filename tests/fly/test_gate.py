@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
-from faao_mav.fly.belief import Belief
 from faao_mav.fly.course import Setpoint
 from faao_mav.fly.gate import LEVEL, NEAR, Gate
 from faao_mav.fly.itinerary import Itinerary
@@ -94,16 +93,16 @@ def test_the_straight_to_a_setpoint_keeps_the_fence() -> None:
 
 
 def test_a_place_is_believed_where_the_aircraft_can_have_flown() -> None:
-    belief, v = Belief(8.0), np.array([8.0, 0.0, 0.0])
+    gate, v = Gate(plan_with({})), np.array([8.0, 0.0, 0.0])
     for k in range(20):
-        assert belief.holds(k / 10, np.array([0.8 * k, 0.0, 30.0]), v)
-    assert belief.holds(30.0, np.array([300.0, 0.0, 30.0]), v)  # after a silence
+        assert gate.believes(k / 10, np.array([0.8 * k, 0.0, 30.0]), v)
+    assert gate.believes(30.0, np.array([300.0, 0.0, 30.0]), v)  # after a silence
     jumped = np.array([400.0, 0.0, 30.0])
     for k in range(1, 40):
-        assert not belief.holds(30 + k / 10, jumped + 0.8 * k, v)
-        assert belief.is_lost(30 + k / 10) == (k > 30)
-    assert belief.holds(34.0, np.array([316.0, 0.0, 30.0]), v)
-    assert belief.told == [
+        assert not gate.believes(30 + k / 10, jumped + 0.8 * k, v)
+        assert gate.has_lost_it(30 + k / 10) == (k > 30)
+    assert gate.believes(34.0, np.array([316.0, 0.0, 30.0]), v)
+    assert gate.told == [
         "its place has jumped: no setpoints are sent",
         "its place is believed again",
     ]
@@ -111,11 +110,11 @@ def test_a_place_is_believed_where_the_aircraft_can_have_flown() -> None:
 
 @pytest.mark.parametrize(("speed", "believed"), [(4.0, False), (0.2, True)])
 def test_an_aircraft_that_moves_is_elsewhere_a_second_later(speed: float, believed: bool) -> None:
-    belief, place, v = Belief(8.0), np.array([1.0, 2.0, 30.0]), np.array([0.0, speed, 0.0])
-    held = [belief.holds(k / 10, place, v) for k in range(20)]
+    gate, place, v = Gate(plan_with({})), np.array([1.0, 2.0, 30.0]), np.array([0.0, speed, 0.0])
+    held = [gate.believes(k / 10, place, v) for k in range(20)]
     assert all(held[:9])
     assert held[-1] == believed
-    assert belief.holds(2.1, place + np.array([0.0, 0.3, 0.0]), v)
+    assert gate.believes(2.1, place + np.array([0.0, 0.3, 0.0]), v)
 
 
 @given(

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from conftest import FLYABLE, edited
 from scenes import Scene, held_by
-from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, vehicle_of
+from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, vehicle_of
 
 from faao_mav import parse_plan, plan_mission
 from faao_mav.autopilot import Vehicle
@@ -16,7 +16,6 @@ from faao_mav.autopilot.files import MadeFor
 from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.fly.preflight import LEAST_BATTERY, preflight
 from faao_mav.fly.seen import Flight, Held, Seen
-from faao_mav.fly.watch import Watch
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission
 from faao_mav.mission.fence import Circle, Fence
@@ -431,11 +430,6 @@ def test_an_empty_battery_or_a_return_that_is_not_over_is_not_armed() -> None:
     assert scene.run(events=[(0.1, scene.sets(6))]) == "refused"
     assert "mode RTL" in scene.watch.outcome.text
     assert not armed(scene)
-
-
-def test_nothing_is_armed_without_the_gate() -> None:
-    with pytest.raises(ValueError, match="nothing is armed without the gate"):
-        Watch(peer_of("px4"), (), arm=True)
 
 
 def test_what_was_never_read_does_not_stand_for_nothing() -> None:

@@ -18,6 +18,7 @@ from faao_mav.autopilot import vehicle_type
 from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.fly.course import Course
+from faao_mav.fly.own import OwnClock
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.seen import Flight, Held
 from faao_mav.fly.stream import Stream
@@ -26,7 +27,7 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.wire.faults import Faults
-from faao_mav.wire.messages import CommandLong, Envelope, SetPositionTargetLocalNed
+from faao_mav.wire.messages import CommandLong, Envelope, SetPositionTargetLocalNed, Timesync
 from faao_mav.wire.parameters import Reading
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand
 from faao_mav.wire.transfer.exchange import Peer
@@ -326,3 +327,13 @@ def test_a_course_is_what_its_pieces_add_up_to() -> None:
     v = np.array([course.at(each).velocity for each in t])
     np.testing.assert_allclose(np.gradient(p, t, axis=0)[1:-1], v[1:-1], atol=0.02)
     assert np.linalg.norm(v[-1]) == 0
+
+
+def test_what_others_asked_tells_nothing_of_the_link() -> None:
+    clock = OwnClock()
+    for now in (1.0, 2.0, 3.0):
+        own = clock.ask(now).ts1
+        clock.hear(Timesync(int(2e9 * now), own), now + 0.1)
+        clock.hear(Timesync(int(2e9 * now), own - 500_000_000), now + 0.2)  # another station's
+    assert clock.speed == pytest.approx(2.0)
+    assert clock.lead == pytest.approx(0.2)

@@ -147,8 +147,8 @@ class Judge(Counted):
     def tick(self, now: float) -> Sequence[Message]:
         sent = self._judged(super().tick(now), now)
         watch = self.machine
-        asks = watch.phase == "holding" and watch._command is not None and watch.outcome is None
-        unsure = self.trial.streams and watch._who_flies.unsure
+        asks = watch.phase == "holding" and watch._order is not None and watch.outcome is None
+        unsure = self.trial.streams and watch._unsure_since is not None
         if asks and not unsure and now > self._ordered_at + 2.1:
             self.wrong.append(f"{now:.1f} s: the hold is not asked for any more")
         return sent

@@ -21,7 +21,6 @@ from stations import HOME, VEHICLE, a_mission
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.fly import fly
-from faao_mav.fly.round_trips import RoundTrips
 from faao_mav.fly.seen import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import Timeouts, download, upload
@@ -198,16 +197,6 @@ def test_nothing_is_started_that_has_a_namesake() -> None:
     assert scene.run() == "refused"
     assert ELSEWHERE in scene.watch.outcome.text
     assert scene.orders == []
-
-
-def test_what_others_asked_tells_nothing_of_the_link() -> None:
-    trips = RoundTrips()
-    for now in (1.0, 2.0, 3.0):
-        own = trips.ask(now).ts1
-        trips.hear(Timesync(int(2e9 * now), own), now + 0.1)
-        trips.hear(Timesync(int(2e9 * now), own - 500_000_000), now + 0.2)  # another station's
-    assert trips.clock_speed == pytest.approx(2.0)
-    assert trips.lasting == pytest.approx(0.2)
 
 
 @dataclass

@@ -1,0 +1,122 @@
+"""A vehicle's own clock and its own local frame, in which setpoints reach it."""
+
+from collections import deque
+from statistics import median
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.autopilot import AutopilotFamily
+from faao_mav.fly.course import Setpoint
+from faao_mav.geodesy import LocalFrame
+from faao_mav.plan.sections import Origin
+from faao_mav.wire.messages import (
+    GlobalPositionInt,
+    GpsGlobalOrigin,
+    SetPositionTargetLocalNed,
+    Timesync,
+)
+from faao_mav.wire.protocol import Address
+
+_LOCAL_NED = 1
+"""MAV_FRAME_LOCAL_NED."""
+
+_NO_YAW = 1 << 10 | 1 << 11
+"""POSITION_TARGET_TYPEMASK: yaw and yaw rate are ignored, all else counts."""
+
+_KEPT, _LONGEST = 9, 1.0
+"""How many round trips on the link are kept, one each half second, whose median counts; and the
+most that counts, s. Chosen."""
+
+_ANOTHER_CLOCK = 60.0
+"""From so many seconds of the world on a time is one of another clock than the answers'; chosen."""
+
+
+class OwnClock:
+    """What the answers to TIMESYNC tell; before the second one a round trip takes no time.
+
+    Only those to own questions count: vehicles tell everybody what they answer to anybody.
+    """
+
+    def __init__(self) -> None:
+        self._asked = deque[int](maxlen=_KEPT)
+        self._trips = deque[float](maxlen=_KEPT)
+        self._read = deque[tuple[float, float]](maxlen=_KEPT)
+        """When we were in the middle of a short trip, and what the vehicle's clock read, s."""
+
+    def ask(self, now: float) -> Timesync:
+        """Return the question, with the time `now` in it, which the answer repeats."""
+        self._asked.append(int(now * 1e9))
+        return Timesync(0, self._asked[-1])
+
+    def hear(self, answer: Timesync, now: float) -> None:
+        """Take note of an answer."""
+        asked = answer.ts1 / 1e9
+        if answer.tc1 and answer.ts1 in self._asked:
+            self._trips.append(now - asked)
+            if now - asked <= _LONGEST:
+                self._read.append(((asked + now) / 2, answer.tc1 / 1e9))
+
+    @property
+    def speed(self) -> float:
+        """How many seconds of the vehicle's clock a second of the world's has."""
+        if len(self._read) < 2:
+            return 1.0
+        (begin, first), (end, last) = self._read[0], self._read[-1]
+        return max((last - first) / max(end - begin, 1e-9), 1e-3)
+
+    @property
+    def lead(self) -> float:
+        """How long a round trip takes, s of the vehicle's clock."""
+        if len(self._trips) < 2:
+            return 0.0
+        return min(self.speed * median(self._trips), _LONGEST)
+
+    def age(self, t: float, now: float) -> float:
+        """Return how long ago, s of the world, the vehicle's clock read `t`, s; 0: not known."""
+        if len(self._read) < 2:
+            return 0.0
+        middle, there = self._read[-1]
+        age = now - middle + (there - t) / self.speed
+        return age if 0 < age < _ANOTHER_CLOCK else 0.0
+
+
+class OwnFrame:
+    """The frame of an autopilot of `family`; `plan_origin` is the plan's, and the vehicle's home.
+
+    `origin` is where its own frame has its origin, None until it tells. Heights are above home as
+    the vehicle tells it, and once `home`, mm, is set above that: home may be set anew in flight,
+    and the ground stays where it is.
+    """
+
+    def __init__(self, family: AutopilotFamily, plan_origin: Origin) -> None:
+        self._family = family
+        self._plans = LocalFrame(plan_origin.latitude, plan_origin.longitude)
+        self.origin: GpsGlobalOrigin | None = None
+        self.home: int | None = None
+
+    def risen(self, position: GlobalPositionInt) -> float:
+        """Return by how many metres home is higher now than at the departure."""
+        return (position.alt - position.relative_alt - self._home(position)) / 1000
+
+    def _home(self, position: GlobalPositionInt) -> int:
+        return position.alt - position.relative_alt if self.home is None else self.home
+
+    def place(self, position: GlobalPositionInt) -> Real:
+        """Return where it is: (3,) m east, north, up of the plan's origin, which is its home."""
+        level = self._plans.to_local(position.lat / 1e7, position.lon / 1e7)
+        return np.append(level, (position.alt - self._home(position)) / 1000)
+
+    def message(
+        self, setpoint: Setpoint, position: GlobalPositionInt, target: Address
+    ) -> SetPositionTargetLocalNed:
+        """Return `setpoint` for the vehicle `target` that has told its `position`."""
+        assert self.origin is not None
+        own = self._family.local_frame(self.origin.latitude / 1e7, self.origin.longitude / 1e7)
+        p, v, a = setpoint
+        east, north = own.to_local(*self._plans.to_geodetic(p[:2]))
+        home = (self._home(position) - self.origin.altitude) / 1000
+        values = (north, east, -(p[2] + home), v[1], v[0], -v[2], a[1], a[0], -a[2])
+        return SetPositionTargetLocalNed(
+            target, position.time_boot_ms, _LOCAL_NED, _NO_YAW, *map(float, values)
+        )
