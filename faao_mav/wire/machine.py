@@ -65,22 +65,19 @@ class Machine(ABC, Generic[T]):
         """Do what is due now."""
 
 
-_EARLY = 3
-"""How often a question is put again early, where that is asked for. Chosen: 200 uploads of 200
-items to a mock PX4, with 20 % loss each way, took at most 11.6 s with one, 10.2 s with three."""
+_FIRST, _LONGEST = 0.25, 1.5
+"""Seconds after which a question is put again the first time, and at the latest: the guide's."""
 
 
 class AskingMachine(Machine[T]):
-    """A machine that begins with a question, and repeats it until there is an answer.
+    """A machine that puts one question until there is an answer, for `patience` seconds.
 
-    The question is put again every `wait` seconds, `retries` times; then `_give_up` is called.
-    With `soon` it is put `_EARLY` times more before that, each time after so many seconds.
+    It is put again after a quarter of a second, and each time after twice as long, up to 1.5 s.
     """
 
-    def __init__(self, wait: float, retries: int, soon: float | None = None) -> None:
+    def __init__(self, patience: float) -> None:
         super().__init__()
-        self._wait, self._retries, self._soon = wait, retries, soon
-        self._retries_done = 0
+        self._patience, self._wait, self._until = patience, _FIRST, 0.0
 
     @abstractmethod
     def _question(self) -> Message:
@@ -88,22 +85,19 @@ class AskingMachine(Machine[T]):
 
     @abstractmethod
     def _give_up(self, now: float) -> Sequence[Message]:
-        """End, or begin anew, for want of an answer."""
+        """End for want of an answer."""
 
     def start(self, now: float) -> Sequence[Message]:
         """Ask."""
-        self._retries_done = 0 if self._soon is None else -_EARLY
+        self._until = now + self._patience
         return self._ask(now)
 
     def _time_out(self, now: float) -> Sequence[Message]:
-        if self._retries_done == self._retries:
-            return self._give_up(now)
-        self._retries_done += 1
-        return self._ask(now)
+        return self._give_up(now) if now >= self._until else self._ask(now)
 
     def _ask(self, now: float) -> Sequence[Message]:
-        early = self._soon if self._retries_done < 0 else None
-        self._due = now + (self._wait if early is None else early)
+        self._due = min(now + self._wait, self._until)
+        self._wait = min(2 * self._wait, _LONGEST)
         return [self._question()]
 
 

@@ -16,7 +16,7 @@ from faao_mav.errors import InputError
 from faao_mav.wire.machine import AskingMachine, Machine, Progress
 from faao_mav.wire.messages import Envelope, Message, ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.transfer.exchange import Peer
-from faao_mav.wire.transfer.pace import Pace, Question, Timeouts
+from faao_mav.wire.transfer.pace import Pace, Questions, Timeouts
 
 Names: TypeAlias = tuple[str, ...]
 """The names that one parameter has in the generations of an autopilot: a vehicle has one."""
@@ -33,7 +33,7 @@ _SHOWN = 5
 _LEAST_WAIT, _TRIES = 0.25, 8
 """Seconds after which a name is asked for again at the earliest, and how often it is asked for.
 Chosen: of 50 parameters, over a link that loses a fifth each way, one stays unread in 1.4 % of all
-readings; a name that the vehicle does not know costs 2 s."""
+readings; a name that the vehicle does not know costs 4 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,18 +91,19 @@ def close(one: float, other: float) -> bool:
 class ReadParameters(Machine[Reading]):
     """A machine that reads `parameters` of the vehicle of `peer`, each by all of its names.
 
-    A name is asked for again until it is answered, `_TRIES` times, in the pace of the link; who
-    answers none of the first ones has no parameters.
+    A name is asked for `_TRIES` times in the pace of the link; who answers none of the first ones
+    has no parameters.
     """
 
     def __init__(
         self, peer: Peer, parameters: Sequence[Names], timeouts: Timeouts | None = None
     ) -> None:
         super().__init__()
-        self._peer, self._pace = peer, Pace(timeouts or Timeouts())
+        self._peer = peer
         self._all = tuple(dict.fromkeys(parameters))
         self._left = list(self._all)
-        self._asked: dict[Names, Question] = {}
+        self._asked = Questions[Names](Pace(timeouts or Timeouts()))
+        self._asked.least = _LEAST_WAIT
         self._settings: dict[str, Setting] = {}
         self._missing: list[Names] = []
 
@@ -124,19 +125,16 @@ class ReadParameters(Machine[Reading]):
         if names is None:
             return ()
         self._settings[message.param_id] = setting_in(message, self._peer.vehicle)
-        self._pace.answer(self._asked.pop(names), now)
+        self._asked.answer(names, now)
         return self._proceed(now)
 
     def _time_out(self, now: float) -> Sequence[Message]:
         out: list[Message] = []
-        for names, question in list(self._asked.items()):
-            if now < question.last_sent + self._wait:
-                continue
-            if question.sent == _TRIES:
+        for names in self._asked.late(now):
+            if self._asked.times(names) > _TRIES:
                 self._missing.append(names)
-                del self._asked[names]
+                self._asked.answer(names, now)
             else:
-                self._pace.repeat(question, now)
                 out += self._questions(names)
         if not self._settings and self._missing:
             return self.cancel(now)
@@ -144,24 +142,18 @@ class ReadParameters(Machine[Reading]):
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Do without those that are not read yet."""
-        missing = (*self._missing, *self._asked, *self._left)
-        self.outcome = Reading(self._settings, missing)
+        self.outcome = Reading(self._settings, (*self._missing, *self._asked, *self._left))
         return ()
-
-    @property
-    def _wait(self) -> float:
-        return max(self._pace.wait, _LEAST_WAIT)
 
     def _proceed(self, now: float) -> Sequence[Message]:
         out: list[Message] = []
         while self._left and sum(map(len, self._asked)) < _AT_ONCE:
             names = self._left.pop(0)
-            self._asked[names] = self._pace.ask(now)
+            self._asked.put(names, now)
             out += self._questions(names)
         if not self._asked:
-            self.outcome = Reading(self._settings, tuple(self._missing))
-            return ()
-        self._due = min(each.last_sent for each in self._asked.values()) + self._wait
+            return self.cancel(now)
+        self._due = self._asked.due
         return out
 
     def _questions(self, names: Names) -> list[Message]:
@@ -178,8 +170,7 @@ class SetParameter(AskingMachine[bool]):
     def __init__(
         self, peer: Peer, name: str, setting: Setting, timeouts: Timeouts | None = None
     ) -> None:
-        chosen = timeouts or Timeouts()
-        super().__init__(chosen.response, chosen.retries, _LEAST_WAIT)
+        super().__init__((timeouts or Timeouts()).silence)
         self._peer, self._name, self._setting = peer, name, setting
 
     @property

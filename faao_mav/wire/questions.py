@@ -1,6 +1,5 @@
 """What a vehicle is asked: for one of its messages, and whether it is there now."""
 
-import math
 from collections.abc import Sequence
 from typing import Generic, TypeVar
 
@@ -17,10 +16,8 @@ class AskFor(AskingMachine[list[M]], Generic[M]):
     Its outcome is a list with the first that comes, asked for or not, or empty.
     """
 
-    def __init__(
-        self, vehicle: Address, number: int, kind: type[M], wait: float = 1.0, retries: int = 2
-    ) -> None:
-        super().__init__(wait, retries)
+    def __init__(self, vehicle: Address, number: int, kind: type[M], patience: float = 3.0) -> None:
+        super().__init__(patience)
         self._vehicle, self._number, self._kind = vehicle, number, kind
 
     @property
@@ -49,7 +46,7 @@ class AskFor(AskingMachine[list[M]], Generic[M]):
 class AskAlive(AskingMachine[bool]):
     """A machine that asks for the answer to a `number` that nobody could know before.
 
-    It asks twice a second for `patience` seconds. Its outcome is whether `vehicle` answered, which
+    It asks for `patience` seconds. Its outcome is whether `vehicle` answered, which
     one that reads MAVLink 1 alone does not: on a link that is signed a recording cannot, and what
     was recorded before the answer is older than it, so that it is passed over from then on.
 
@@ -66,7 +63,7 @@ class AskAlive(AskingMachine[bool]):
     progress = ("asking for a sign of life", 0, 0)
 
     def __init__(self, vehicle: Address, number: int, patience: float = 9.0) -> None:
-        super().__init__(0.5, math.ceil(patience / 0.5) - 1)
+        super().__init__(patience)
         self._vehicle, self._number = vehicle, number
 
     def _question(self) -> Message:

@@ -14,7 +14,7 @@ REQUEST_INT = 51
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    ("loss", "seconds", "messages"), [(0.0, 5, 1), (0.05, 10, 1.3), (0.2, 30, 2)]
+    ("loss", "seconds", "messages"), [(0.0, 5, 1), (0.05, 10, 1.3), (0.2, 60, 2)]
 )
 def test_600_items_over_a_quick_link(
     kind: MockKind, loss: float, seconds: float, messages: float
@@ -41,9 +41,11 @@ SLOW = {
 @pytest.mark.parametrize("name", SLOW)
 def test_a_slow_link_is_not_flooded(kind: MockKind, name: str) -> None:
     up, back = there_and_back(kind, 100, SLOW[name])
-    assert back.ours <= 1.2 * 100
-    # PX4 asks again after 0.25 s, and is answered each time.
-    assert up.ours <= 1.1 * up.theirs
+    # A late request ends a download of PX4, which begins anew.
+    late = kind == "px4" and SLOW[name].delay > 0
+    assert back.ours <= (1.7 if late else 1.2) * 100
+    # PX4 asks again after 0.25 s, ArduPilot after 1 s, and is answered each time.
+    assert up.ours <= (2.1 if SLOW[name].latency >= 0.5 else 1.2) * up.theirs
     assert up.theirs <= (1.1 if kind == "ardupilot" else 4.1) * 100
 
 

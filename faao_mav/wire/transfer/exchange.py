@@ -1,6 +1,5 @@
 """What the transfers of one list have in common, and the simplest of them: clearing it."""
 
-import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +7,7 @@ from typing import Literal, TypeAlias
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.autopilot.manners import Manners
-from faao_mav.wire.machine import AskingMachine, Progress
+from faao_mav.wire.machine import Machine, Progress
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
@@ -20,15 +19,16 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import Address, MavResult, MissionType
-from faao_mav.wire.transfer.pace import Budget, Timeouts
+from faao_mav.wire.transfer.pace import Pace, Questions, Timeouts
 
-Status: TypeAlias = Literal[
-    "accepted", "unknown", "refused", "silent", "stalled", "armed", "cancelled"
-]
+Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "armed", "cancelled"]
 
 TENTATIVE = frozenset({MavResult.ERROR, MavResult.DENIED})
 """Results that PX4 and ArduPilot also give to late packets of an earlier transfer: they count when
 nothing else is said."""
+
+OPENING = -1
+"""The question that opens a transfer, where the others are the numbers of items."""
 
 _TEXTS = 5
 """The number of status texts that are kept, the last ones; chosen."""
@@ -61,11 +61,11 @@ class Outcome:
     """How a transfer ended.
 
     `status`: "accepted"; "unknown": everything was sent, but the last answer is missing or
-    ambiguous; "refused" with the `result`; "silent": nothing came any more; "stalled": it got no
-    further in the time there is; "armed": stopped because the vehicle is armed; "cancelled" by us,
-    or by the vehicle with the `result`. `last_requested` is the number of the item last asked for,
-    `items` what was downloaded, `said` the vehicle's status texts, `opaque_id` its number for the
-    list, 0 for none. `armed` tells whether a heartbeat said so meanwhile.
+    ambiguous; "refused" with the `result`; "silent": it got no further; "armed": stopped because
+    the vehicle is armed; "cancelled" by us, or by the vehicle with the `result`. `last_requested`
+    is the number of the item last asked for, `items` what was downloaded, `said` the vehicle's
+    status texts, `opaque_id` its number for the list, 0 for none. `armed` tells whether a heartbeat
+    said so meanwhile.
     """
 
     status: Status
@@ -76,13 +76,18 @@ class Outcome:
     opaque_id: int = 0
     armed: bool = False
 
+    @property
+    def by_us(self) -> bool:
+        """Whether this end cancelled it."""
+        return self.status == "cancelled" and self.result is None
 
-class Exchange(AskingMachine[Outcome]):
+
+class Exchange(Machine[Outcome]):
     """The transfer of one list: it opens with a question and ends with an `Outcome`.
 
-    It takes its time from `budget`, its own if none is given. What derives from it gives
-    `_question`, which opens the transfer, and `_take`, which answers the vehicle's messages about
-    the list, and says whether it writes.
+    Its questions are put again at a pace, until the transfer has got no further for
+    `Timeouts.silence`. What derives from it gives `_message`, the question under a key, and
+    `_take`, which answers the vehicle's messages about the list, and says whether it writes.
     """
 
     writes = True
@@ -92,22 +97,31 @@ class Exchange(AskingMachine[Outcome]):
         peer: Peer,
         mission_type: MissionType = MissionType.MISSION,
         timeouts: Timeouts | None = None,
-        budget: Budget | None = None,
-        soon: float = math.inf,
+        pace: Pace | None = None,
     ) -> None:
+        super().__init__()
         self._timeouts = timeouts or Timeouts()
-        wait = self._timeouts.response
-        super().__init__(wait, self._timeouts.retries, soon if soon < wait else None)
         self._peer, self._type = peer, mission_type
-        self._budget = budget or Budget(self._timeouts)
-        self._armed = False
-        self._texts: list[str] = []
+        self._questions = Questions[int](pace or Pace(self._timeouts))
+        self._until = 0.0
+        """When it is given up, s."""
         self._result: int | None = None
         """What the vehicle said last, if it was no."""
+        self._armed = False
+        self._texts: list[str] = []
+
+    @abstractmethod
+    def _message(self, key: int) -> Message:
+        """Return the question under `key`."""
 
     @abstractmethod
     def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         """Answer what the vehicle says to us about the list."""
+
+    @property
+    def deadline(self) -> float | None:
+        """When `tick` is due."""
+        return None if self.outcome is not None else min(self._questions.due, self._until)
 
     @property
     def _reached(self) -> int | None:
@@ -115,17 +129,24 @@ class Exchange(AskingMachine[Outcome]):
         return None
 
     def start(self, now: float) -> Sequence[Message]:
-        """Ask, and begin to spend the budget."""
-        self._budget.open(now)
-        return super().start(now)
+        """Ask."""
+        self._result = None
+        self._questions.clear()
+        self._get_further(now)
+        return self._ask(OPENING, now)
 
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of what arrived, and of the time."""
-        return [*super().on(envelope, now), *self._stop_if_stalled(now)]
+    def _get_further(self, now: float) -> None:
+        """Note that the transfer has got further."""
+        self._until, self._result = now + self._timeouts.silence, None
 
-    def tick(self, now: float) -> Sequence[Message]:
-        """Take note of the time."""
-        return [*super().tick(now), *self._stop_if_stalled(now)]
+    def _ask(self, key: int, now: float) -> list[Message]:
+        self._questions.put(key, now)
+        return [self._message(key)]
+
+    def _time_out(self, now: float) -> Sequence[Message]:
+        if now >= self._until:
+            return self._give_up(now)
+        return [self._message(key) for key in self._questions.late(now)]
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message = envelope.message
@@ -146,17 +167,18 @@ class Exchange(AskingMachine[Outcome]):
         """Answer the vehicle's heartbeat."""
         return ()
 
+    def _doubt(self, result: int, now: float) -> None:
+        """Note a refusal that counts only when nothing else is said."""
+        self._result = result
+        if OPENING not in self._questions:  # which a busy vehicle is asked until it is free
+            self._until = min(self._until, now + self._timeouts.response)
+
     def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        self._end("silent" if self._result is None else "refused", self._result)
-        return ()
+        return self._stop("silent" if self._result is None else "refused", self._result)
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Give up and tell the vehicle."""
         return () if self.outcome is not None else self._stop("cancelled")
-
-    def _stop_if_stalled(self, now: float) -> Sequence[Message]:
-        stalled = self.outcome is None and self._budget.is_spent(now)
-        return self._stop("stalled", self._result) if stalled else ()
 
     def _stop(self, status: Status, result: int | None = None) -> Sequence[Message]:
         self._end(status, result)
@@ -176,7 +198,7 @@ class Exchange(AskingMachine[Outcome]):
 class Clear(Exchange):
     """A machine that clears a list; asking twice does no harm, so it asks until answered.
 
-    An ERROR is the end only if it is repeated: PX4 says nothing while busy, ArduPilot ERROR.
+    PX4 says nothing while busy, ArduPilot ERROR.
 
     >>> vehicle = Address(1, 1)
     >>> own = Address(246, 190)
@@ -184,10 +206,10 @@ class Clear(Exchange):
     >>> clearing.start(now=0.0)
     [MissionClearAll(target=Address(system=1, component=1), mission_type=<MissionType.RALLY: 2>)]
     >>> clearing.deadline  # when the question is put again, s
-    1.5
+    0.25
     >>> accepted = MissionAck(own, MissionType.RALLY, MavResult.ACCEPTED)
     >>> clearing.on(Envelope(vehicle, accepted), now=0.1)
-    []
+    ()
     >>> clearing.outcome.status
     'accepted'
     """
@@ -197,16 +219,14 @@ class Clear(Exchange):
         """Not counted."""
         return f"clearing {self._type.title}", 0, 0
 
-    def _question(self) -> Message:
+    def _message(self, key: int) -> Message:  # noqa: ARG002
         return MissionClearAll(self._peer.address, self._type)
 
-    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:  # noqa: ARG002
+    def _take(self, message: ListMessage, now: float) -> Sequence[Message]:
         if not isinstance(message, MissionAck):
             return ()
-        if message.type == MavResult.ACCEPTED:
-            self._end("accepted", message.type)
-        elif message.type == MavResult.ERROR and self._result is None:
-            self._result = message.type
+        if message.type == MavResult.ERROR:
+            self._doubt(message.type, now)
         else:
-            self._end("refused", message.type)
+            self._end("accepted" if message.type == MavResult.ACCEPTED else "refused", message.type)
         return ()

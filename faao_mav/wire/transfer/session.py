@@ -13,7 +13,7 @@ from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType, meaning
 from faao_mav.wire.transfer.download import Download
 from faao_mav.wire.transfer.exchange import TENTATIVE, Clear, Outcome, Peer
-from faao_mav.wire.transfer.pace import Budget, Timeouts
+from faao_mav.wire.transfer.pace import Pace, Timeouts
 from faao_mav.wire.transfer.upload import Upload
 from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.wire_items import autopilot_name, home_items
@@ -23,7 +23,7 @@ Job: TypeAlias = Generator[Machine[Any], Outcome, T]
 """What `Script` runs: yields exchanges, is sent their outcomes, returns its own."""
 
 Verdict: TypeAlias = Literal[
-    "verified", "different", "unread", "refused", "silent", "stalled", "armed", "cancelled"
+    "verified", "different", "unread", "refused", "silent", "armed", "cancelled"
 ]
 
 
@@ -101,7 +101,7 @@ def download_lists(
             items[part] = outcome.items
             continue
         missing[part] = outcome
-        if _by_us(outcome) or (outcome.status != "refused" and not items):
+        if outcome.by_us or (outcome.status != "refused" and not items):
             break
     return Lists(items, missing)
 
@@ -123,7 +123,7 @@ def clear_lists(
                 verdict: Verdict = "different" if differences else "verified"
                 report = replace(report, verdict=verdict, differences=differences)
         reports.append(report)
-        if report.verdict in ("silent", "stalled", "armed", "cancelled"):
+        if report.verdict in ("silent", "armed", "cancelled"):
             break
     return tuple(reports)
 
@@ -137,28 +137,26 @@ def _upload_part(
     part: MissionType, items: tuple[WireItem, ...], peer: Peer, timeouts: Timeouts
 ) -> Job[tuple[PartReport, bool]]:
     """Return what became of a list, and whether the vehicle was armed when it was read back."""
-    number, budget = _own_items(part, items, peer), Budget(timeouts)
+    number, pace = _own_items(part, items, peer), Pace(timeouts)
     for attempt in range(1, timeouts.attempts + 1):
-        uploading = Upload(items, peer, part, timeouts, budget)
-        sent = yield uploading
-        report, armed, stop = _failed(part, number, sent, attempt), sent.armed, _is_final(sent)
+        sent: Outcome = yield Upload(items, peer, part, timeouts, pace)
+        report, armed, stop = _failed(part, number, sent, attempt), sent.armed, sent.by_us
         if sent.status in ("accepted", "unknown"):
-            read = yield Download(peer, part, timeouts, budget, uploading.pace)
-            armed, stop = armed or read.armed, _is_final(read)
+            read: Outcome = yield Download(peer, part, timeouts, pace)
+            armed, stop = armed or read.armed, read.by_us
             if read.status == "accepted":
                 differences = compare(items, read.items, part, peer.vehicle)
-                wrong = any(difference.kind == "wrong" for difference in differences)
+                right = all(difference.kind != "wrong" for difference in differences)
+                # A doubtful refusal is about a duplicate if the list is right, else about an item.
+                refused = not right and sent.result in TENTATIVE
                 report = replace(
                     report,
-                    verdict="different" if wrong else "verified",
+                    verdict="verified" if right else "refused" if refused else "different",
                     differences=differences,
+                    result=None if right and sent.result in TENTATIVE else sent.result,
                     opaque_id=sent.opaque_id or read.opaque_id,
                 )
-                if sent.result in TENTATIVE:
-                    # Of a reminder or a duplicate if the list is right, else of an item.
-                    told = replace(report, verdict="refused")
-                    report = told if wrong else replace(report, result=None)
-            elif _by_us(read):
+            elif read.by_us:
                 report = replace(report, verdict="cancelled")
             elif sent.status == "accepted":
                 report = replace(report, verdict="unread", said=read.said)
@@ -166,34 +164,23 @@ def _upload_part(
         # DENIED, but not if it is said of every announcement of a whole attempt.
         unheard = report.result == MavResult.DENIED and report.item is None
         refused = report.verdict == "refused" and (unheard or report.result not in TENTATIVE)
-        if report.verified or refused or stop:
+        if report.verdict in ("verified", "armed") or refused or stop:
             break
     return report, armed
 
 
 def _failed(part: MissionType, items: int, outcome: Outcome, attempts: int) -> PartReport:
     """Return the report for `outcome` as long as nothing was read back."""
-    verdicts: dict[str, Verdict] = {
-        "accepted": "unread",
-        "unknown": "silent",
-        "refused": "refused",
-        "silent": "silent",
-        "stalled": "stalled",
-        "armed": "armed",
-        "cancelled": "cancelled",
-    }
-    verdict = verdicts[outcome.status]
+    verdict: Verdict
+    match outcome.status:
+        case "accepted":
+            verdict = "unread"
+        case "unknown":
+            verdict = "silent"
+        case verdict:
+            pass
     result, said = outcome.result, outcome.said
     return PartReport(part, items, verdict, (), result, outcome.last_requested, attempts, said)
-
-
-def _by_us(outcome: Outcome) -> bool:
-    return outcome.status == "cancelled" and outcome.result is None
-
-
-def _is_final(outcome: Outcome) -> bool:
-    """Tell whether nothing is to be tried again after `outcome`."""
-    return _by_us(outcome) or outcome.status in ("armed", "stalled")
 
 
 def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int], str]) -> str:
@@ -214,10 +201,6 @@ def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int]
             text += "accepted, but it could not be read back; download it to see what is there"
         case "armed":
             text += "the vehicle is armed: nothing more is written (--allow-armed allows it)"
-        case "stalled":
-            text += "the transfer got no further in time"
-            if report.item is not None:
-                text += f" than item {report.item} of {report.items + home}"
         case "silent":
             text += "the vehicle stopped answering"
             if report.item is not None:
