@@ -39,8 +39,7 @@ class Manners:
 
     In uploads: `request_period` is how long after its last request it asks again, s. An item that
     it did not ask for it passes over without a word (`ignores_other_items`), or answers
-    INVALID_SEQUENCE and goes on waiting. `reminder` is the item, counted from the end (-1: the
-    last one), to send again when the last acknowledgement is missing, None if none is safe.
+    INVALID_SEQUENCE and goes on waiting.
 
     In downloads: `any_request_order` tells that it answers each request by itself, so that several
     can be under way, and `final_acks` how many acknowledgements it is sent at the end.
@@ -51,7 +50,6 @@ class Manners:
     request_period: float = math.inf
     patience: float = math.inf
     ignores_other_items: bool = False
-    reminder: int | None = None
     any_request_order: bool = False
     final_acks: int = 1
     meanings: Mapping[str, str] = field(default_factory=dict)

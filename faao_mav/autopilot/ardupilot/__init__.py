@@ -58,7 +58,6 @@ ARDUPILOT = AutopilotFamily(
     manners=Manners(
         request_period=1.0,
         patience=8.0,
-        reminder=-2,
         any_request_order=True,
         meanings={
             "ERROR": (

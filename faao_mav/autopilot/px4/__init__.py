@@ -71,7 +71,6 @@ PX4 = AutopilotFamily(
         request_period=0.25,
         patience=5.0,
         ignores_other_items=True,
-        reminder=-1,
         final_acks=2,  # until it hears one, nobody else can begin a transfer for 5 s
         meanings={
             "ERROR": (
