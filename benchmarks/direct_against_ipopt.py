@@ -38,7 +38,6 @@ from faao_mav.optimizer.search.bound import Bound, upper_bound
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
-from faao_mav.radio.best_precoder import best_precoders
 
 MISSIONS = Path(__file__).parents[1] / "missions"
 PATIENCE = 30.0
@@ -84,8 +83,7 @@ def best_rate(problem: Problem, w: Real) -> float:
     means = []
     for link in problem.links:
         H = link.channel(w, link.small_scale(w))
-        rate = best_precoders(H, link.power, link.modulation, link.noise).rate
-        means.append(rate.mean())
+        means.append(link.draw_rates(H, link.best(H[:, None])).mean())
     return float(min(means))
 
 
@@ -100,7 +98,7 @@ def by_ipopt(problem: Problem, random: int) -> float:
         found = []
         for link in problem.links:
             H = link.channel(w, link.small_scale(w))
-            P = best_precoders(H, link.power, link.modulation, link.noise).P
+            P = link.best(H[:, None])
             found.append(at_precoders(link, w, P))
         return found
 
@@ -197,13 +195,14 @@ def fixed_precoders(quick: bool) -> None:
         precoders = []
         for link in problem.links:
             H = link.channel(flight.w, link.small_scale(flight.w))
-            precoders.append(best_precoders(H, link.power, link.modulation, link.noise).P)
+            precoders.append(link.best(H[:, None]))
         pairs = list(zip(problem.links, precoders, strict=True))
 
         def own(
             pairs: Any = pairs, kin: Any = kin, flight: Any = flight, problem: Any = problem
         ) -> Any:
-            field = RateField(problem.links, tuple(FixedRate(k, P) for k, P in pairs))
+            held = tuple(FixedRate(k, P) for k, P in pairs)  # these samples have no steering
+            field = RateField(problem.links, held)
             return maximize(kin, field, flight, tolerance=1e-6).trajectory
 
         def other(pairs: Any = pairs, kin: Any = kin, flight: Any = flight) -> Any:

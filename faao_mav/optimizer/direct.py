@@ -38,7 +38,7 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.mode_rate import ModeRate
 from faao_mav.optimizer.rates.rate_model import CurveRate
-from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate
+from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate, unturned
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
@@ -215,7 +215,10 @@ def _at_exact_rates(
         _precoders(link, rate, scheme, w, link.channel(w, link.small_scale(w)))
         for link, rate in zip(field.links, field.rates, strict=True)
     ]
-    exact = tuple(FixedRate(link, P) for link, P in zip(field.links, held, strict=True))
+    exact = tuple(
+        FixedRate(link, unturned(link, link_coordinates(link, w.T).cosine, P))
+        for link, P in zip(field.links, held, strict=True)
+    )
     further = maximize(
         kin,
         RateField(field.links, exact),

@@ -13,6 +13,7 @@ from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.optimizer.size import check_size
 from faao_mav.plan import Plan, Vector
+from faao_mav.radio.best_precoder import best_precoders
 from faao_mav.radio.channel import (
     balanced_rayleigh,
     line_of_sight_all_ones,
@@ -25,7 +26,7 @@ from faao_mav.radio.constellation import (
     DifferenceClasses,
     difference_classes,
 )
-from faao_mav.radio.measure import Measure, best_precoders_for, draw_rates
+from faao_mav.radio.rate import Measure, draw_rates
 from faao_mav.radio.relay import RelayQueue
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ class Link:
         """Return the rates of the channels H ((S,) ..., N_r, N_t), bits ((S,) ...).
 
         P is (..., N_t, N_t), or has the axis of the draws too. Of the mutual information the mean
-        over the draws is accurate: see `radio.measure`.
+        over the draws is accurate: see `radio.rate`.
         """
         if not self.averaged:
             H, P = H[..., None, :, :], P[..., None, :, :]
@@ -143,8 +144,8 @@ class Link:
 
         The search begins at `start` (..., N_t, N_t) where given.
         """
-        return best_precoders_for(
-            self.measure, draws, self.power, self.modulation, self.noise, start=start
+        return best_precoders(
+            draws, self.power, self.modulation, self.noise, measure=self.measure, start=start
         )
 
 

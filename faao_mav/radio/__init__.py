@@ -2,12 +2,12 @@
 
 - ``constellation``: the alphabets, and the differences between their vectors merged into classes;
 - ``channel``: path gain, line of sight, fading, (1) and (2);
-- ``rate``: the cutoff rate, (7) and (8), from the sums of ``class_sum``, which
-  ``lattice_sum`` forms for square alphabets;
+- ``rate``: the rate that counts by its name, and the cutoff rate, (7) and (8), from the sums of
+  ``class_sum``, which ``lattice_sum`` forms for square alphabets;
 - ``mutual_information``: the mutual information, (5) and (6), at fixed noises;
 - ``precoder``: the classical linear precoders and the optimum for BPSK on two antennas;
-- ``best_precoder``: the precoders of highest cutoff rate, one per channel or one for many draws;
-  ``precoder_search`` finds them, ``precoder_objective`` has the derivatives.
+- ``best_precoder``: the precoders of highest rate, one per channel or one for many draws, found by
+  the BFGS method of ``precoder_search``.
 
 Everything is in linear SI units and vectorised over time slots, which lead every array's axes.
 Another alphabet is an entry of ``constellation._GRIDS``, another linear precoder a function in

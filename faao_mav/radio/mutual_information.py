@@ -188,11 +188,13 @@ def mutual_information(
     return _averages(flat, used, noise, real=modulation == "bpsk").reshape(A.shape[:-2])
 
 
-def information_and_errors(H: Complex, P: Complex, modulation: str, noise: float) -> Information:
+def information_and_errors(
+    H: Complex, P: Complex, modulation: str, noise: float, nodes: int = NODES
+) -> Information:
     """Return the information and the errors at H (b, S, N_r, N_t) and P (b, S or 1, N_t, N_t)."""
     A = H @ P
     errors = np.empty((*A.shape[:2], A.shape[-1], A.shape[-1]), dtype=np.complex128)
-    used = noise_set(modulation, A.shape[-1], A.shape[1])
+    used = noise_set(modulation, A.shape[-1], A.shape[1], nodes)
     return Information(_averages(A, used, noise, errors, real=modulation == "bpsk"), errors)
 
 

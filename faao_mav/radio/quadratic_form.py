@@ -1,7 +1,6 @@
-"""Real coordinates of the Hermitian Z in u^H Z u, and what multiplies them.
+"""Real coordinates z of the Hermitian Z in u^H Z u = Σ_a φ_a z_a, and the features φ of u.
 
-With the N² Hermitian B_a, Z has the real coordinates z_a and u u^H = Σ_a φ_a B_a, so that
-u^H Z u = Σ_a φ_a z_a is linear in z.
+The coordinates are the diagonal of Z, then the real and imaginary parts of the entries above it.
 """
 
 from itertools import combinations
@@ -11,27 +10,14 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 
 
-def basis(antennas: int) -> Complex:
-    """Return the N² Hermitian B_a with z_a = tr(B_a Z), (N², N, N).
-
-    The coordinates z are the diagonal of Z, then Re and Im of the entries above it.
-    """
-    B = np.zeros((antennas**2, antennas, antennas), dtype=np.complex128)
-    B[np.arange(antennas), np.arange(antennas), np.arange(antennas)] = 1.0
-    for a, (i, j) in enumerate(combinations(range(antennas), 2)):
-        B[antennas + 2 * a, i, j] = B[antennas + 2 * a, j, i] = 0.5
-        B[antennas + 2 * a + 1, i, j] = 0.5j
-        B[antennas + 2 * a + 1, j, i] = -0.5j
-    return B
-
-
 def features(u: Complex) -> Real:
-    """Return φ (k, N²) with Σ_a φ_a B_a = u u^H for u (k, N)."""
-    columns = [np.abs(u[:, i]) ** 2 for i in range(u.shape[1])]
-    for i, j in combinations(range(u.shape[1]), 2):
-        product = 2.0 * u[:, i] * u[:, j].conj()
+    """Return φ (..., N²) of u (..., N): |u_i|², then Re and Im of 2 u_i u_j* for i < j."""
+    antennas = u.shape[-1]
+    columns = [np.abs(u[..., i]) ** 2 for i in range(antennas)]
+    for i, j in combinations(range(antennas), 2):
+        product = 2.0 * u[..., i] * u[..., j].conj()
         columns += [product.real, product.imag]
-    return np.column_stack(columns)
+    return np.stack(columns, axis=-1)
 
 
 def coordinates(Z: Complex) -> Real:
@@ -41,3 +27,16 @@ def coordinates(Z: Complex) -> Real:
     for i, j in combinations(range(antennas), 2):
         columns += [Z[..., i, j].real, Z[..., i, j].imag]
     return np.stack(columns, axis=-1)
+
+
+def outer(phi: Real) -> Complex:
+    """Return the Hermitian u u^H (..., N, N), or a mean of it, of the features φ (..., N²)."""
+    antennas = round(phi.shape[-1] ** 0.5)
+    M = np.empty((*phi.shape[:-1], antennas, antennas), dtype=np.complex128)
+    for i in range(antennas):
+        M[..., i, i] = phi[..., i]
+    for k, (i, j) in enumerate(combinations(range(antennas), 2)):
+        at = antennas + 2 * k
+        M[..., i, j] = (phi[..., at] + 1j * phi[..., at + 1]) / 2
+        M[..., j, i] = M[..., i, j].conj()
+    return M

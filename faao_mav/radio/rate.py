@@ -1,26 +1,53 @@
-"""The cutoff rate, (7) and (8): a lower bound on the mutual information, in closed form."""
+"""The rate that counts: the cutoff rate (7), (8) in closed form, or the mutual information.
+
+The cutoff rate is what is known of every code, a lower bound on the mutual information (5), (6);
+that is what the best codes come near to.
+"""
 
 import math
-from collections.abc import Sequence
+from typing import Literal, TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real, RealOrComplex
+from faao_mav.arrays import Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.class_sum import class_sum
-from faao_mav.radio.constellation import DifferenceClasses
+from faao_mav.radio.constellation import DifferenceClasses, difference_classes
+from faao_mav.radio.mutual_information import mutual_information
 from faao_mav.radio.quadratic_form import coordinates, features
 
-_CHUNK = 1 << 16  # exponents held at once: 512 kB stay in the cache, 15 % quicker than 16 MB
-_PAIRS = 1 << 17  # channels with their precoders taken together: bounds the memory; chosen
-_CLASSES = 2048  # classes taken together: those of the largest alphabets would not stay there
+Measure: TypeAlias = Literal["cutoff", "mutual_information"]
+"""The name of the rate that counts."""
+
+_PAIRS = 1 << 17
+"""Channels with their precoders taken together, which bounds the memory. Chosen."""
 
 
-def _received(H: RealOrComplex, P: RealOrComplex, noise: float) -> Complex:
-    """Return H P / (2 σ), (..., N_r, N_t): the exponents are squared norms of it times u."""
+def draw_rates(
+    measure: Measure, H: RealOrComplex, P: RealOrComplex, modulation: str, noise: float
+) -> Real:
+    """Return the rate of every draw of a channel, (..., S) bit/s/Hz.
+
+    Of the mutual information the mean over the S draws is accurate. Arguments and errors are those
+    of ``mutual_information``.
+
+    >>> one = np.ones((1, 1, 1))
+    >>> for measure in ("cutoff", "mutual_information"):
+    ...     print(draw_rates(measure, one, one, "bpsk", 1.0).round(3))
+    [0.548]
+    [0.721]
+    """
+    if measure == "mutual_information":
+        return mutual_information(H, P, modulation, noise)
+    return cutoff_rate(H, P, difference_classes(modulation, np.shape(P)[-1]), noise)
+
+
+def _coordinates(H: RealOrComplex, P: RealOrComplex, noise: float) -> Real:
+    """Return z of Z = P^H H^H H P / (4 σ²), (..., N_t²)."""
     if not noise > 0.0:
         raise InputError(f"the noise power must be above 0, got {noise}")
-    return np.asarray(np.asarray(H) @ np.asarray(P) / (2.0 * np.sqrt(noise)), dtype=np.complex128)
+    A = np.asarray(H) @ np.asarray(P) / (2.0 * np.sqrt(noise))
+    return coordinates(np.asarray(A.conj().mT @ A, dtype=np.complex128))
 
 
 def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float) -> Real:
@@ -33,8 +60,7 @@ def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float
     >>> exponents(np.eye(1), np.eye(1), np.array([[2.0 + 0j]]), 0.5)
     array([2.])
     """
-    A = _received(H, P, noise)
-    D: Real = coordinates(A.conj().mT @ A) @ features(np.asarray(u, dtype=np.complex128)).T
+    D: Real = _coordinates(H, P, noise) @ features(np.asarray(u, dtype=np.complex128)).T
     return np.maximum(D, 0.0, out=D)
 
 
@@ -44,9 +70,7 @@ def cutoff_rate(
     """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz, (...) from 0 to ``classes.bits``.
 
     R_0 = 2 N log2(rho) - log2 Σ_m Σ_k exp(-||H P u_mk||² / (4 σ²)), the double sum taken over the
-    classes. In terms of the class probabilities it is -log2(1 + Σ weight (e^-D - 1)), exact where
-    the rate is small, and N log2(rho) - log2(1 + Σ multiplicity e^-D / rho^N), exact where it is
-    nearly N log2(rho); each is used on its side.
+    classes: N log2(rho) - log2(1 + Σ multiplicity e^-D / rho^N).
 
     `H` (..., N_r, N_t) are channels and `P` (..., N_t, N_t) precoders, whose leading axes
     broadcast; `classes` are the differences of the alphabet on N_t antennas; `noise` is σ², W.
@@ -56,45 +80,15 @@ def cutoff_rate(
     >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))
     0.548059
     """
-    H, P = np.asarray(H, dtype=np.complex128), np.asarray(P, dtype=np.complex128)
-    shape = np.broadcast_shapes(H.shape[:-2], P.shape[:-2])
-    if math.prod(shape) > _PAIRS:
-        axis = int(np.argmax(shape)) - len(shape) - 2
-        parts = -(-math.prod(shape) // _PAIRS)
-        return np.concatenate(
-            [
-                cutoff_rate(*part, classes, noise)
-                for part in zip(_split(H, axis, parts), _split(P, axis, parts), strict=True)
-            ],
-            axis=axis + 2,
-        )
-    A = _received(H, P, noise)
-    z = coordinates(A.conj().mT @ A)
-    flat = z.reshape(-1, z.shape[-1])
-    rate = classes.bits - np.logaddexp(0.0, class_sum(classes).value(flat)) / np.log(2.0)
-    low = rate < 1.0
-    rate[low] = -np.log1p(_mean_fall(flat[low], classes)) / np.log(2.0)
-    bounded: Real = np.clip(rate, 0.0, classes.bits).reshape(z.shape[:-1])[()]
-    return bounded
-
-
-def _split(M: Complex, axis: int, parts: int) -> Sequence[Complex]:
-    """Return M (..., N, N) in parts along an axis, or M itself for each if it has none there."""
-    if M.ndim < -axis or M.shape[axis] == 1:
-        return [M] * parts
-    return [*np.array_split(M, parts, axis)]
-
-
-def _mean_fall(z: Real, classes: DifferenceClasses) -> Real:
-    """Return Σ weight (e^-D - 1) over the classes, (n,), at the coordinates z (n, N²)."""
-    total = np.zeros(len(z))
-    step = max(1, _CHUNK // min(_CLASSES, len(classes.vectors)))
-    for first in range(0, len(classes.vectors), _CLASSES):
-        phi = -features(classes.vectors[first : first + _CLASSES]).T
-        weight = classes.weight[first : first + _CLASSES]
-        for start in range(0, len(z), step):
-            part = slice(start, start + step)
-            D = z[part] @ phi
-            np.minimum(D, 0.0, out=D)
-            total[part] += np.expm1(D, out=D) @ weight
-    return total
+    shape = np.broadcast_shapes(np.shape(H)[:-2], np.shape(P)[:-2])
+    channels, precoders = (
+        np.broadcast_to(np.asarray(M, dtype=np.complex128), (*(shape or (1,)), *np.shape(M)[-2:]))
+        for M in (H, P)
+    )
+    s = np.empty(math.prod(shape))
+    for first in range(0, len(s), _PAIRS):
+        part = np.arange(first, min(first + _PAIRS, len(s)))
+        at = np.unravel_index(part, shape or (1,))
+        s[part] = class_sum(classes).value(_coordinates(channels[at], precoders[at], noise))
+    rate: Real = classes.bits - np.logaddexp(0.0, s) / np.log(2.0)
+    return np.maximum(rate, 0.0).reshape(shape)

@@ -15,7 +15,6 @@ from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.search.best_rates import best_rates
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.plan import read_plan
-from faao_mav.radio.best_precoder import best_precoders
 
 FAINT = {
     "radio.fading": "realization",
@@ -28,8 +27,7 @@ def best_rate(problem: Problem, w: Real) -> float:
     means = []
     for link in problem.links:
         H = link.channel(w, link.small_scale(w))
-        found = best_precoders(H, link.power, link.modulation, link.noise)
-        means.append(found.rate.mean())
+        means.append(link.draw_rates(H, link.best(H[:, None])).mean())
     return float(min(means))
 
 
@@ -99,7 +97,7 @@ def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> N
         r = np.linalg.norm(w - link.station, axis=1)
         values, exact = best_rates(problem, link, r[:, None])
         H = link.channel(w, link.small_scale(w))
-        true = best_precoders(H, link.power, link.modulation, link.noise).rate
+        true = link.draw_rates(H, link.best(H[:, None]))
         assert exact
         assert (values[:, 0] >= true - 1e-12).all()
         if kind == "all_ones":

@@ -17,8 +17,8 @@ from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import DirectionPartials, RatePartials
 from faao_mav.optimizer.rates.spline import BicubicSpline, GridPosition
-from faao_mav.radio.best_precoder import has_closed_form
-from faao_mav.radio.measure import Measure, best_precoders_for, draw_rates
+from faao_mav.radio.best_precoder import best_precoders, has_closed_form
+from faao_mav.radio.rate import Measure, draw_rates
 
 # Chosen; what a change costs is not measured.
 _SPACING = 0.125  # spacing of the grid of a, 0.54 dB: of the cutoff rate
@@ -177,7 +177,7 @@ def _search(measure: Measure, modulation: str, H: Complex) -> tuple[Real, Comple
 
     def searched(H: Complex, start: Complex | None = None) -> tuple[Real, Complex]:
         draws = H[..., None, :, :]
-        P = best_precoders_for(measure, draws, 1.0, modulation, 1.0, start=start)
+        P = best_precoders(draws, 1.0, modulation, 1.0, measure=measure, start=start)
         return draw_rates(measure, draws, P[..., None, :, :], modulation, 1.0)[..., 0], P
 
     if has_closed_form(modulation, H.shape[-1]):

@@ -9,7 +9,7 @@ from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rates
 from faao_mav.optimizer.rates.rate_model import best_curves
-from faao_mav.radio.best_precoder import best_precoders, has_closed_form
+from faao_mav.radio.best_precoder import has_closed_form
 from faao_mav.radio.rate import cutoff_rate
 
 _SEARCHED = 25
@@ -38,9 +38,9 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     H_r[:, k, k] = singular
     if exact:
         # a path gain scales H and leaves the singular vectors, and with them P, as they are
-        best = best_precoders(H_r, link.power, link.modulation, link.noise)
+        best = link.best(H_r[:, None])
         H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
-        return cutoff_rate(H, best.P[:, None], link.classes, link.noise), True
+        return cutoff_rate(H, best[:, None], link.classes, link.noise), True
     diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
     if has_few_modes(link):
         (rate,) = mode_rates([diagonal], [np.array([gain_log.min(), gain_log.max()])])
