@@ -3,7 +3,6 @@
 import math
 from itertools import pairwise
 
-from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, at_zero
 from faao_mav.validate.rule import Checks, Hits, at
@@ -79,7 +78,7 @@ def _(context: ValidationContext) -> Hits:
 def _without_takeoff(context: ValidationContext) -> Hits:
     kind = context.vehicle.kind
     if context.items and not any(context.each(*_TAKEOFFS[kind])):
-        yield at(kind=kind, does=_ON_GROUND[kind])
+        yield at(does=_ON_GROUND[kind])
 
 
 @checks("ardupilot-takeoff-first")
@@ -113,9 +112,8 @@ def _(context: ValidationContext) -> Hits:
 
 @checks("ardupilot-land-approach")
 def _(context: ValidationContext) -> Hits:
-    for (_, first), (index, second) in pairwise(context.flying):
-        if (first, second) == (Command.NAV_TAKEOFF, Command.NAV_LAND):
-            yield at(index)
+    landing = (Command.NAV_TAKEOFF, Command.NAV_LAND)
+    return (at(k) for (_, one), (k, two) in pairwise(context.flying) if (one, two) == landing)
 
 
 @checks("ardupilot-set-home")
@@ -145,9 +143,7 @@ def _(context: ValidationContext) -> Hits:
 
 @checks("ardupilot-command-skipped")
 def _(context: ValidationContext) -> Hits:
-    kind = context.vehicle.kind
-    for k, item in context.each(*_SKIPPED[kind]):
-        yield at(k, name=name_of(item.command), kind=kind)
+    return (at(k) for k, _ in context.each(*_SKIPPED[context.vehicle.kind]))
 
 
 @checks("ardupilot-terrain")
@@ -161,7 +157,6 @@ def _(context: ValidationContext) -> Hits:
 @checks("altitude-rounded")
 def _(context: ValidationContext) -> Hits:
     pairs = [(k, item.z, kept.z) for k, item, kept in context.stored if item.command in FLOWN_TO]
-    changed = [each for each in pairs if abs(each[2] - each[1]) > 1e-4 * max(1.0, abs(each[1]))]
-    for index, up, kept in changed[:1]:
-        more = f", and so in {len(changed)} items" if changed[1:] else ""
-        yield at(index, up=up, kept=kept, more=more)
+    changed = [(k, kept) for k, up, kept in pairs if abs(kept - up) > 1e-4 * max(1.0, abs(up))]
+    for index, kept in changed[:1]:
+        yield at(index, kept=kept, more=f", and so in {len(changed)} items" if changed[1:] else "")

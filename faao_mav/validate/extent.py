@@ -53,7 +53,7 @@ def _(context: ValidationContext) -> Hits:
         command = context.items[place.index].command
         meant = command in LANDINGS or (place.up < 0 and command not in TAKEOFFS)
         if place.up < LEAST_HEIGHT and not meant:
-            yield at(place.index, up=place.up, **_raised(context, place))
+            yield at(place.index, place=place, **_raised(context, place))
 
 
 def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
@@ -92,15 +92,13 @@ def _(context: ValidationContext) -> Hits:
 
 
 def _above(context: ValidationContext, limit: float | None) -> Hits:
-    for place in context.places if limit is not None else ():
-        if limit is not None and place.up > limit:
-            yield at(place.index, up=place.up, limit=limit)
+    most = math.inf if limit is None else limit
+    return (at(p.index, place=p, limit=limit) for p in context.places if p.up > most)
 
 
 def _beyond(context: ValidationContext, limit: float | None) -> Hits:
-    for place in context.places if context.home is not None else ():
-        if limit is not None and place.from_origin > limit:
-            yield at(place.index, away=place.from_origin, limit=limit)
+    most = math.inf if limit is None or context.home is None else limit
+    return (at(p.index, place=p, limit=limit) for p in context.places if p.from_origin > most)
 
 
 def _fenced(context: ValidationContext, key: str, bit: int) -> float | None:
@@ -120,8 +118,8 @@ def _(context: ValidationContext) -> Hits:
     limit = _fenced(context, "fence_floor", bit=8)
     for place in context.places if limit is not None else ():
         lands = context.items[place.index].command == Command.NAV_LAND
-        if limit is not None and place.up < limit and not lands:
-            yield at(place.index, up=place.up, limit=limit)
+        if not lands and place.up < (limit or 0.0):
+            yield at(place.index, place=place, limit=limit)
 
 
 @checks("ardupilot-fence-circle")
@@ -160,7 +158,7 @@ def _(context: ValidationContext) -> Hits:
     high = [place for place in context.places if place.up > COMMON_CEILING]
     if high and context.limits.max_altitude is None:
         top = max(high, key=lambda place: place.up)
-        yield at(top.index, up=top.up)
+        yield at(top.index, place=top)
 
 
 @checks("return-above-ceiling")
@@ -175,9 +173,8 @@ def _(context: ValidationContext) -> Hits:
 def _(context: ValidationContext) -> Hits:
     if context.home is not None and context.limits.max_distance is None:
         for place in context.places:
-            away = place.from_origin / 1000
-            if FAR < away <= _FARTHEST[context.vehicle.type.hovers]:
-                yield at(place.index, away=away)
+            if FAR < place.from_origin / 1000 <= _FARTHEST[context.vehicle.type.hovers]:
+                yield at(place.index, away=place.from_origin / 1000)
 
 
 @checks("long-leg")
@@ -185,9 +182,8 @@ def _(context: ValidationContext) -> Hits:
     farthest = 1000 * _FARTHEST[context.vehicle.type.hovers]
     for leg in context.legs:
         near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
-        start, end = leg.start.index, leg.end.index
-        if leg.length > 1000 * FAR and near and HOME not in (start, end):
-            yield at(leg.index, length=leg.length / 1000, start=start + 1, end=end + 1)
+        if leg.length > 1000 * FAR and near and HOME not in (leg.start.index, leg.end.index):
+            yield at(leg.index, leg=leg, length=leg.length / 1000)
 
 
 @checks("too-long")
@@ -213,8 +209,7 @@ def _(context: ValidationContext) -> Hits:
 def _short(battery: Battery | None, takes: float) -> Hits:
     """Tell of a flight that `takes` so many Wh and leaves less than the reserve."""
     if battery is not None and takes > battery.usable:
-        capacity, usable, reserve = battery.capacity_wh, battery.usable, battery.reserve
-        yield at(takes=takes, capacity=capacity, usable=usable, reserve=reserve)
+        yield at(takes=takes, battery=battery)
 
 
 def least_duration(context: ValidationContext) -> float:

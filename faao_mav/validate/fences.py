@@ -10,7 +10,6 @@ from faao_mav.mission.fence import RallyPoint
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.fence_map import FenceMap
 from faao_mav.validate.rule import Checks, Hits, at
-from faao_mav.validate.straight import HOME
 from faao_mav.vector import lengths
 
 checks = Checks()
@@ -74,11 +73,10 @@ def _(context: ValidationContext) -> Hits:
     for fence in context.fences:
         for k in np.flatnonzero(fence.legs.leave).tolist():
             leg = context.legs[k]
-            start = "home" if leg.start.index == HOME else f"item {leg.start.index + 1}"
             broken = fence.broken_by(fence.legs.shapes[k])
             parts = " and ".join(f"{length:.1f} m of it {what}" for what, length in broken)
             jump = " by a jump" if leg.jump else ""
-            yield at(leg.index, start=start, jump=jump, length=leg.length, parts=parts)
+            yield at(leg.index, leg=leg, jump=jump, parts=parts)
 
 
 @checks("fence-circle")

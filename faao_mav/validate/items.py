@@ -2,7 +2,6 @@
 
 import math
 
-from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import (
     ABOVE_HOME,
     ABOVE_SEA,
@@ -101,17 +100,14 @@ def _(context: ValidationContext) -> Hits:
 
 @checks("jump-target")
 def _(context: ValidationContext) -> Hits:
-    for index, item, target in context.jumps:
-        if target is None:
-            yield at(index, name=name_of(item.command), target=item.params[0])
+    return (at(index) for index, _, target in context.jumps if target is None)
 
 
 @checks("jump-forever")
 def _(context: ValidationContext) -> Hits:
     for index, item, target in context.jumps:
-        count = item.params[1]
-        if target is not None and target <= index and count < 0:
-            yield at(index, name=name_of(item.command), target=target + 1, count=count)
+        if target is not None and target <= index and item.params[1] < 0:
+            yield at(index, target=target + 1)
 
 
 @checks("same-place")
@@ -122,7 +118,7 @@ def _(context: ValidationContext) -> Hits:
             continue
         both = {context.items[start].command, context.items[end].command}
         if both == {Command.NAV_WAYPOINT} and abs(leg.rise) < 0.05:
-            yield at(end, before=start + 1, length=leg.length)
+            yield at(end, leg=leg)
 
 
 @checks("refused-on-upload")
@@ -175,19 +171,19 @@ def _(context: ValidationContext) -> Hits:
 
 def _too_many(context: ValidationContext, sure: int, most: float) -> Hits:
     """Tell of more than `sure` rows, and no more than `most`."""
-    own, dialect = context.vehicle.type, context.vehicle.type.dialect
+    dialect = context.vehicle.type.dialect
     rows = len(context.items) + dialect.home_row
     if sure < rows <= most and not dialect.unlimited(context.vehicle):
         room = f", or {dialect.make_room}" if dialect.make_room else ""
         home = " with home" if dialect.home_row else ""
-        yield at(rows=rows, home=home, name=own.name, sure=sure, room=room)
+        yield at(rows=rows, home=home, sure=sure, room=room)
 
 
 @checks("many-jumps")
 def _(context: ValidationContext) -> Hits:
     limit, jumps = context.vehicle.type.dialect.jumps, [index for index, _, _ in context.jumps]
     if limit is not None and len(jumps) > limit.sure:
-        yield at(jumps[limit.sure], count=len(jumps), sure=limit.sure, most=limit.most)
+        yield at(jumps[limit.sure], count=len(jumps), limit=limit)
 
 
 _HELD = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
@@ -209,7 +205,7 @@ def _(context: ValidationContext) -> Hits:
         instead = "use whole seconds from 0 to 65535, or a NAV_DELAY after a plain waypoint"
         if not context.vehicle.type.hovers and item.command == Command.NAV_WAYPOINT:
             instead = "use NAV_LOITER_TIME: a plane waits in a circle"
-        yield at(index, hold=item.params[0], kept=stored.params[0], instead=instead)
+        yield at(index, kept=stored.params[0], instead=instead)
 
 
 @checks("value-dropped")
@@ -224,13 +220,13 @@ def _(context: ValidationContext) -> Hits:
                 found.setdefault((item.command, n), []).append((index, value, kept))
     for (command, n), places in found.items():
         index, value, kept = places[0]
-        told = {"name": name_of(command), "n": n + 1, "value": value, "kept": kept}
         waypoint = command == Command.NAV_WAYPOINT
         meaning = _MEANING.get(n, "") if waypoint else ""
         more = f", and so in {len(places)} items" if places[1:] else ""
         instead = _INSTEAD.get(n) if waypoint and context.vehicle.type.hovers else None
         instead = instead or "write what can be stored"
-        yield at(index, **told, meaning=meaning, more=more, instead=instead)
+        told = {"value": value, "kept": kept, "more": more, "instead": instead}
+        yield at(index, n=n + 1, meaning=meaning, **told)
 
 
 def _same(value: float, kept: float) -> bool:

@@ -37,15 +37,14 @@ _STRAIGHT = math.radians(5)
 
 @checks("px4-command-rejected")
 def _(context: ValidationContext) -> Hits:
-    for k, item in context.each(Command.CONDITION_DELAY, Command.CONDITION_DISTANCE):
-        if item.frame == Frame.MISSION:
-            yield at(k, name=name_of(item.command))
+    conditions = context.each(Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
+    return (at(k) for k, item in conditions if item.frame == Frame.MISSION)
 
 
 @checks("px4-vtol-items")
 def _(context: ValidationContext) -> Hits:
-    for k, item in context.each(Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000):
-        yield at(k, name=name_of(item.command), kind=context.vehicle.kind)
+    vtol = (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000)
+    return (at(k) for k, _ in context.each(*vtol))
 
 
 @checks("px4-starts-with-land")
@@ -66,7 +65,7 @@ def _(context: ValidationContext) -> Hits:
 
 @checks("px4-takeoff-altitude")
 def _(context: ValidationContext) -> Hits:
-    return (at(p.index, up=p.up) for p in context.places_of(TAKEOFFS) if p.up < _SINGLE)
+    return (at(p.index, place=p) for p in context.places_of(TAKEOFFS) if p.up < _SINGLE)
 
 
 @checks("px4-takeoff-low")
@@ -76,7 +75,7 @@ def _(context: ValidationContext) -> Hits:
     names, least = {"radius": radius_name, "height": height_name}, max(radius + 1, first)
     for place in context.places_of(TAKEOFFS):
         if 0 < place.up < least:
-            yield at(place.index, up=place.up, old=radius + 1, first=first, least=least, **names)
+            yield at(place.index, place=place, old=radius + 1, first=first, least=least, **names)
 
 
 @checks("px4-takeoff-or-landing-missing")
@@ -99,9 +98,8 @@ def _(context: ValidationContext) -> Hits:
 @checks("px4-first-waypoint-far")
 def _(context: ValidationContext) -> Hits:
     limit = context.vehicle.value("first_waypoint_distance")
-    for first in context.places[:1] if context.home is not None else ():
-        if 0 < limit <= first.from_origin:
-            yield at(first.index, away=first.from_origin, limit=limit)
+    first = context.places[:1] if context.home is not None else ()
+    return (at(p.index, place=p, limit=limit) for p in first if 0 < limit <= p.from_origin)
 
 
 @checks("px4-approach-entrance")
@@ -131,9 +129,8 @@ def _(context: ValidationContext) -> Hits:
 
 @checks("px4-approach-orbit")
 def _(context: ValidationContext) -> Hits:
-    for index, _, away, radius in _approaches(context):
-        if 0 < radius >= away:
-            yield at(index, away=away, radius=radius)
+    found = ((k, away, radius) for k, _, away, radius in _approaches(context))
+    return (at(k, away=away, radius=radius) for k, away, radius in found if 0 < radius >= away)
 
 
 @checks("px4-approach-steep")
@@ -203,9 +200,8 @@ def _(context: ValidationContext) -> Hits:
 @checks("px4-takeoff-elsewhere")
 def _(context: ValidationContext) -> Hits:
     radius = context.vehicle.value("acceptance_radius")
-    for place in context.places_of({Command.NAV_TAKEOFF}) if context.home is not None else ():
-        if place.from_origin > radius:
-            yield at(place.index, away=place.from_origin)
+    takeoffs = context.places_of({Command.NAV_TAKEOFF}) if context.home is not None else ()
+    return (at(place.index, place=place) for place in takeoffs if place.from_origin > radius)
 
 
 @checks("px4-roi")
@@ -213,8 +209,7 @@ def _(context: ValidationContext) -> Hits:
     for index, item in context.each(80, Command.DO_SET_ROI):
         allowed, mode = (0, 1, 2) if item.frame == Frame.MISSION else (0, 3), item.params[0]
         if math.isnan(mode) or math.trunc(mode) not in allowed:
-            taken = ", ".join(map(str, allowed))
-            yield at(index, mode=mode, frame=item.frame, allowed=taken)
+            yield at(index, allowed=", ".join(map(str, allowed)))
 
 
 @checks("px4-fence-size")
@@ -243,7 +238,7 @@ def _(context: ValidationContext) -> Hits:
     for leg, radius in _radii(context):
         held = context.items[leg.index].params[0] > 0  # it is held at all the same
         if leg.start.index != HOME and 0.05 <= leg.length <= radius and not held:
-            yield at(leg.index, length=leg.length, radius=radius)
+            yield at(leg.index, leg=leg, radius=radius)
 
 
 @checks("px4-radius-small")
@@ -256,4 +251,4 @@ def _(context: ValidationContext) -> Hits:
     for (leg, radius), (onward, smaller) in pairwise(_radii(context)):
         passed = leg.end is onward.start and not context.items[leg.index].params[0] > 0
         if passed and radius > smaller + _NARROWER and leg.turn(onward) > _STRAIGHT:
-            yield at(leg.index, radius=radius, smaller=smaller, onward=onward.index + 1)
+            yield at(leg.index, radius=radius, smaller=smaller, onward=onward.end)

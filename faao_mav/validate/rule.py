@@ -7,6 +7,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.dialect import name_of
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
@@ -41,7 +42,7 @@ class Finding:
     action: str
 
 
-Hit: TypeAlias = tuple[int | None, Mapping[str, object]]
+Hit: TypeAlias = tuple[int | None, dict[str, object]]
 """Where a rule holds: the index of an item in `Mission.items`, None for none, and the values that
 go into the rule's texts, by their names."""
 
@@ -62,9 +63,10 @@ class Rule:
     `id` is short and stays the same from version to version. `autopilot` and `kind` are the
     autopilot and the type of vehicle that it is about, None: all. `summary` says in a line what is
     wrong when the rule speaks. `says` is that with the values of a hit, "" where there are none,
-    and `do` what to do about it; a name in braces stands for a value of the hit, or for a constant
-    of the check's module. `source` names where the rule comes from: a function or document of the
-    autopilot with its version, a measurement, or the limits that were set.
+    and `do` what to do about it; a name in braces stands for a value of the hit, the `item` there
+    or its `command`, the `vehicle`, or a constant of the check's module. `source` names where the
+    rule comes from: a function or document of the autopilot with its version, a measurement, or
+    the limits that were set.
     """
 
     level: Level
@@ -84,7 +86,11 @@ class Rule:
     def findings(self, context: "ValidationContext") -> Iterator[Finding]:
         """Yield what the rule finds in `context`."""
         for index, values in self.check(context):
-            told = {**self.check.__globals__, **values}
+            about: dict[str, object] = {"vehicle": context.vehicle}
+            if index is not None:
+                item = context.items[index]
+                about |= {"item": item, "command": name_of(item.command)}
+            told = self.check.__globals__ | about | values
             says, do = (text.format_map(told) for text in (self.says or self.summary, self.do))
             yield Finding(self.level, self.id, None if index is None else index + 1, says, do)
 

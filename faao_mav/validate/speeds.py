@@ -57,14 +57,13 @@ def _asked(context: ValidationContext) -> Iterator[tuple[int, float, float]]:
 
 @checks("speed-lean")
 def _(context: ValidationContext) -> Hits:
-    vehicle, top = context.vehicle, context.vehicle.top_airspeed
+    top = context.vehicle.top_airspeed
     changes = ((change, -k) for k, change in enumerate(context.changes) if change is not None)
     level = ((change.speed or 0.0, k) for change, k in changes if change.axis == "horizontal")
     fastest, k = max(level, default=(0.0, 0))
     if fastest > top:
         angle, name = context.parameter("lean_angle")
-        told = {"angle": math.degrees(angle), "name": name, "assumption": vehicle.assumption}
-        yield at(-k, speed=fastest, top=top, **told)
+        yield at(-k, speed=fastest, top=top, angle=math.degrees(angle), name=name)
 
 
 @checks("ardupilot-speed-ignored")
@@ -73,7 +72,7 @@ def _(context: ValidationContext) -> Hits:
     for index, item in context.each(Command.DO_CHANGE_SPEED):
         throttle = 0.0 if own.hovers else item.params[2]
         if own.dialect.speed_change(item) is None and not throttle > 0:
-            yield at(index, type=item.params[0], speed=item.params[1])
+            yield at(index)
 
 
 @checks("ardupilot-plane-speed")
@@ -91,30 +90,26 @@ def _airspeeds(context: ValidationContext, kinds: tuple[float, ...]) -> Hits:
     least, top = context.vehicle.value("min_speed"), context.vehicle.value("max_speed")
     for index, kind, speed in _asked(context):
         if (kind in kinds or not kinds) and speed > 0 and not least <= speed <= top:
-            yield at(index, speed=speed, least=least, top=top)
+            yield at(index, least=least, top=top)
 
 
 @checks("px4-speed-default")
 def _(context: ValidationContext) -> Hits:
     default, name = context.parameter("cruise_speed")
-    for index, _, speed in _asked(context):
-        if not speed > 0:
-            yield at(index, speed=speed, default=default, name=name)
+    asked = (k for k, _, speed in _asked(context) if not speed > 0)
+    return (at(k, default=default, name=name) for k in asked)
 
 
 @checks("px4-speed-type")
 def _(context: ValidationContext) -> Hits:
-    for index, kind, speed in _asked(context):
-        if kind in (2, 3) and speed > 0:
-            yield at(index, type=kind, speed=speed)
+    return (at(k) for k, kind, speed in _asked(context) if kind in (2, 3) and speed > 0)
 
 
 @checks("px4-speed-capped")
 def _(context: ValidationContext) -> Hits:
     limit, name = context.parameter("max_speed")
-    for index, _, speed in _asked(context):
-        if speed > limit:
-            yield at(index, speed=speed, limit=limit, name=name)
+    asked = (k for k, _, speed in _asked(context) if speed > limit)
+    return (at(k, limit=limit, name=name) for k in asked)
 
 
 @checks("speed-not-reached")
@@ -247,8 +242,8 @@ def _(context: ValidationContext) -> Hits:
         needed = radius * math.tan(min(turn, math.radians(179)) / 2)
         room = min(before.length, after.length)
         if needed > room:
-            told = {"turn": math.degrees(turn), "speed": before.speed, "bank": math.degrees(bank)}
-            yield at(before.index, **told, needed=needed, room=room)
+            told = {"turn": math.degrees(turn), "bank": math.degrees(bank)}
+            yield at(before.index, leg=before, **told, needed=needed, room=room)
 
 
 @checks("steep-leg")
@@ -260,8 +255,5 @@ def _(context: ValidationContext) -> Hits:
         level, vertical = leg.length / leg.speed, abs(leg.rise) / limit
         steep = math.isfinite(vertical) and level < _CLIMB_SHARE * vertical
         if steep and leg.index in waypoints and leg.start.index != HOME:
-            told = {"way": way, "rise": abs(leg.rise), "length": leg.length, "limit": limit}
-            slower = leg.length / vertical
-            yield at(
-                leg.index, **told, vertical=vertical, level=level, speed=leg.speed, slower=slower
-            )
+            told = {"rise": abs(leg.rise), "limit": limit, "vertical": vertical, "level": level}
+            yield at(leg.index, leg=leg, way=way, slower=leg.length / vertical, **told)

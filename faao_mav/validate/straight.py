@@ -25,6 +25,11 @@ class PlacedItem:
     up: float
 
     @property
+    def name(self) -> str:
+        """What people call it."""
+        return "home" if self.index == HOME else f"item {self.index + 1}"
+
+    @property
     def ground(self) -> Real:
         """East and north, (2,) m."""
         return np.array([self.east, self.north])
