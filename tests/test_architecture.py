@@ -103,7 +103,7 @@ WAITING = (
     ("cli.study", {"numpy", "joblib", "matplotlib"}),
     ("cli.app", {"numpy", "nicegui", "ruamel", "pydantic"}),
     ("mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
-    ("validate", {"scipy", "cvxpy", "pyproj", "pymavlink", "shapely"}),
+    ("validate", {"scipy", "cvxpy", "pyproj", "pymavlink"}),
     ("radio.mutual_information", {"scipy", "cvxpy"}),
     ("radio.precoder", {"scipy", "cvxpy"}),
     ("plan", {"scipy", "cvxpy", "pyproj", "pymavlink"}),

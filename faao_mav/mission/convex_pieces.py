@@ -7,18 +7,17 @@ pieces as need be).
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING
+
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from faao_mav.arrays import Real
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 _FLAT = 1e-9
 """Share of its hull's area that a piece may lack and still count as convex: rounding."""
 
 
-def convex_pieces(shape: "BaseGeometry") -> list[Real]:
+def convex_pieces(shape: BaseGeometry) -> list[Real]:
     """Return the corners (k, 2), counterclockwise, of convex polygons that together are `shape`.
 
     >>> import shapely
@@ -26,8 +25,6 @@ def convex_pieces(shape: "BaseGeometry") -> list[Real]:
     >>> [len(piece) for piece in convex_pieces(corner)]
     [4, 4]
     """
-    import shapely
-
     pieces: dict[int, BaseGeometry] = {}
     sides: dict[tuple[tuple[float, ...], ...], list[int]] = {}
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))

@@ -5,19 +5,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import quote
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.mission.shortest_way import shortest_way
-
-if TYPE_CHECKING:
-    import shapely
-    from shapely.geometry.base import BaseGeometry
 
 _SEGMENTS = 64
 """Straights to a quarter of a circle: 0.075 mm of error a metre of radius."""
@@ -49,15 +46,13 @@ class Area:
 
     name: str
     inclusion: bool
-    shape: "BaseGeometry"
+    shape: BaseGeometry
     crosses_itself: bool = False
     disc: tuple[float, float, float] | None = None
 
 
 def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
     """Return the parts of `fence` in `frame`: polygons, then circles."""
-    import shapely
-
     areas = []
     for name, polygon in zip(_names(fence.polygons, "polygon"), fence.polygons, strict=True):
         outline = shapely.Polygon(frame.to_local(*np.transpose(polygon.vertices)))
@@ -87,13 +82,11 @@ def _names(zones: Sequence[Polygon | Circle], shape: str) -> Iterator[str]:
         yield f"{kind} {shape}" if alone else f"{kind} {shape} {seen[zone.inclusion]}"
 
 
-def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | None":
+def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> BaseGeometry | None:
     """Return where the aircraft may be by the inclusions of `areas`, None if there are none.
 
     Inside one of them with `any_inclusion`, else inside all.
     """
-    import shapely
-
     shapes = [area.shape for area in areas if area.inclusion]
     if not shapes:
         return None
@@ -101,14 +94,12 @@ def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> "BaseGeometry | 
     return _polygonal(joined)
 
 
-def _enclosed(outline: "shapely.Polygon") -> "BaseGeometry":
+def _enclosed(outline: shapely.Polygon) -> BaseGeometry:
     """Return what an odd number of turns of `outline` encloses.
 
     Its edges cut the plane into faces, each enclosed or not as one of its points is. For 100
     corners that cross everywhere `shapely.make_valid` takes 50 times as long.
     """
-    import shapely
-
     edges = shapely.union_all(outline.exterior)
     faces = shapely.get_parts(shapely.polygonize([edges]))
     x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T
@@ -119,10 +110,8 @@ def _enclosed(outline: "shapely.Polygon") -> "BaseGeometry":
     return shapely.coverage_union_all(faces[odd])
 
 
-def _polygonal(shape: "BaseGeometry") -> "BaseGeometry":
+def _polygonal(shape: BaseGeometry) -> BaseGeometry:
     """Return the part of `shape` that has an area."""
-    import shapely
-
     parts = shapely.get_parts(shapely.get_parts(shape))
     flat = [part for part in parts if part.geom_type == "Polygon"]
     return shapely.union_all(flat) if flat else shapely.Polygon()
@@ -143,13 +132,11 @@ class FreeArea:
     [[20.0, 10.0], [40.0, 80.0], [60.0, 80.0], [80.0, 10.0]]
     """
 
-    shape: "BaseGeometry"
+    shape: BaseGeometry
 
     @classmethod
     def of(cls, areas: Sequence[Area], *, any_inclusion: bool) -> "FreeArea":
         """Return what `areas` leave; `any_inclusion` as in `free_area`."""
-        import shapely
-
         free = free_area(areas, any_inclusion=any_inclusion)
         if free is None:
             free = shapely.box(-FARTHEST, -FARTHEST, FARTHEST, FARTHEST)
@@ -157,9 +144,7 @@ class FreeArea:
         return cls(_polygonal(free - out))
 
     @cached_property
-    def _prepared(self) -> "BaseGeometry":
-        import shapely
-
+    def _prepared(self) -> BaseGeometry:
         shapely.prepare(self.shape)
         return self.shape
 
@@ -174,16 +159,12 @@ class FreeArea:
 
     def edges(self) -> list[Real]:
         """Return the closed rings (k, 2), m, that bound the area; of the plane's square none."""
-        import shapely
-
         rings = shapely.get_rings(shapely.get_parts(self.shape))
         corners = map(shapely.get_coordinates, rings)
         return [ring for ring in corners if np.abs(ring).max() < FARTHEST / 2]
 
     def covers(self, points: Real) -> Flags:
         """Return which of `points` (n, 2) lie inside or on the edge, (n,)."""
-        import shapely
-
         return np.asarray(shapely.covers(self._prepared, shapely.points(points)), dtype=np.bool_)
 
     def clearance(self, path: Real) -> float:
@@ -191,36 +172,22 @@ class FreeArea:
 
         Below 0 where it leaves the area: by how far it does.
         """
-        import shapely
-
         line = shapely.LineString(path) if len(path) > 1 else shapely.Point(path[0])
         if shapely.covers(self._prepared, line):
             return float(shapely.distance(self.shape.boundary, line))
         outside = shapely.get_coordinates((line - self.shape).segmentize(1.0))
         return -float(shapely.distance(self.shape, shapely.points(outside)).max(initial=0.0))
 
-    def part_of(self, point: Real) -> int | None:
-        """Return which of the separate parts of the area `point` (2,) is in, None if in none."""
-        import shapely
-
-        parts = shapely.get_parts(self.shape)
-        found = np.flatnonzero(shapely.covers(parts, shapely.Point(point)))
-        return int(found[0]) if found.size else None
-
     def nearest(self, point: Real, start: Real) -> Real:
         """Return the place nearest to `point` in the part of the area that `start` is in."""
-        import shapely
-
-        part = self.part_of(start)
-        shape = self.shape if part is None else shapely.get_parts(self.shape)[part]
-        line = shapely.shortest_line(shape, shapely.Point(point))
+        parts = shapely.get_parts(self.shape)
+        own = parts[shapely.covers(parts, shapely.Point(start))]
+        line = shapely.shortest_line(own[0] if own.size else self.shape, shapely.Point(point))
         return np.asarray(shapely.get_coordinates(line)[0])
 
     @cached_property
-    def holes(self) -> "list[BaseGeometry]":
+    def holes(self) -> list[BaseGeometry]:
         """The obstacles that can be passed on two sides, as polygons."""
-        import shapely
-
         rings = (ring for part in shapely.get_parts(self.shape) for ring in part.interiors)
         return [shapely.Polygon(ring) for ring in rings]
 
@@ -230,8 +197,6 @@ class FreeArea:
         Ways in it pass that obstacle on its other side. `outward` is a direction (2,); None where
         the bar would have no length.
         """
-        import shapely
-
         far = corner + 2 * FARTHEST * outward
         lines = shapely.get_parts(shapely.LineString([corner, far]) & self.shape)
         first = [line for line in lines if line.distance(shapely.Point(corner)) < _BAR]
@@ -247,8 +212,6 @@ class FreeArea:
         None where no way keeps inside. Round arcs have few corners: the way keeps up to twice
         `_SIMPLER` from them where both ends and every gap allow that.
         """
-        import shapely
-
         for simpler in _SIMPLER:
             shape = _polygonal(self.shape.buffer(-simpler, quad_segs=1)).simplify(simpler)
             shapely.prepare(shape)
@@ -259,6 +222,4 @@ class FreeArea:
 
     def covers_path(self, path: Real) -> bool:
         """Return whether the polyline `path` (n, 2) keeps inside."""
-        import shapely
-
         return bool(shapely.covers(self._prepared, shapely.LineString(path)))

@@ -7,23 +7,19 @@ obstacles", Communications of the ACM 22 (1979).
 """
 
 import heapq
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from faao_mav.arrays import Flags, Real
 
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
-
-def shortest_way(area: "BaseGeometry", start: Real, end: Real) -> Real | None:
+def shortest_way(area: BaseGeometry, start: Real, end: Real) -> Real | None:
     """Return the corners (k, 2) of the shortest way in `area`, a prepared (multi)polygon, or None.
 
     `start` and `end` are (2,); both are corners of the way.
     """
-    import shapely
-
     if not shapely.covers(area, shapely.points([start, end])).all():
         return None
     before, corners, after = _inward_corners(area)
@@ -67,10 +63,8 @@ def shortest_way(area: "BaseGeometry", start: Real, end: Real) -> Real | None:
     return np.asarray(corners_of_way[turns])
 
 
-def _inward_corners(area: "BaseGeometry") -> tuple[Real, Real, Real]:
+def _inward_corners(area: BaseGeometry) -> tuple[Real, Real, Real]:
     """Return the corners before, the inward corners, and the corners after them, each (m, 2)."""
-    import shapely
-
     triples = []
     for part in shapely.get_parts(area):
         for ring in shapely.get_rings(shapely.orient_polygons(part)):

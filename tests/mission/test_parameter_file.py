@@ -71,7 +71,6 @@ def test_the_form_that_qgroundcontrol_reads() -> None:
         "1\t1\tMIS_TKO_LAND_REQ\t2\t6\n"
         "1\t1\tNAV_ACC_RAD\t0.00002\t9\n"
     )
-    assert render_parameters({"A": 1}, "qgroundcontrol", system=7).endswith("7\t1\tA\t1\t6\n")
 
 
 def test_the_form_that_mission_planner_reads() -> None:

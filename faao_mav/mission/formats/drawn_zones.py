@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import shapely
+
 from faao_mav.errors import InputError, MissionFileError, quote
 from faao_mav.mission.fence import Fence, LatLon, Polygon, check_outlines
 
@@ -149,8 +151,6 @@ def _joined(parts: list[list[Ring]]) -> list[list[Ring]]:
     """Return the union of `parts`, each an outline and its holes, also across the date line."""
     if len(parts) == 1:
         return parts
-    import shapely
-
     check_outlines([Polygon(tuple(ring), True) for part in parts for ring in part])
     first = parts[0][0][0][1]
     shapes = []

@@ -10,6 +10,8 @@ from datetime import UTC, datetime
 from typing import TypeAlias
 from xml.etree import ElementTree as Xml
 
+import shapely
+
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import (
     ABOVE_HOME,
@@ -130,8 +132,6 @@ def _description(item: MissionItem) -> str:
 
 def _areas(fence: Fence) -> Iterator[Xml.Element]:
     """Yield the areas of `fence`, on the ground, each with its kind in its name; circles too."""
-    import shapely
-
     frame = LocalFrame(*fence.place)
     for area in areas_of(fence, frame):
         for part in shapely.get_parts(area.shape):

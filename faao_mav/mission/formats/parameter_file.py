@@ -8,7 +8,7 @@ QGroundControl.
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -22,25 +22,19 @@ ParameterStyle: TypeAlias = Literal["list", "qgroundcontrol"]
 MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: ten times what the largest autopilot has."""
 
-_AUTOPILOT_COMPONENT = 1
-"""MAV_COMP_ID_AUTOPILOT1: the component whose parameters are read."""
+_AUTOPILOT = "1"
+"""MAV_COMP_ID_AUTOPILOT1: the component whose parameters are read and written."""
 
 _INT32, _REAL32 = 6, 9
-"""MAV_PARAM_TYPE of what is written; those of 8, 16, 32 and 64 bits are read."""
-
-_INTEGERS, _TYPES = range(1, 9), range(1, 11)
-"""MAV_PARAM_TYPE of integers, and all of them."""
-
-_INT32_LIMITS = range(-(2**31), 2**31)
+"""MAV_PARAM_TYPE of what is written; those of 8, 16, 32 and 64 bits are read, integers up to 8."""
 
 _READ_ONLY = "@READONLY"
 """What MAVProxy writes behind a parameter that cannot be set."""
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
+_NAMED = "expected at most 16 capitals, digits and _"
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"0x[0-9a-f]{1,8}", re.ASCII | re.IGNORECASE)
-_COMMA = re.compile(r"\d,\d")
-_WHOLE = re.compile(r"\d{1,3}", re.ASCII)
 
 
 def read_parameters(path: str | Path) -> dict[str, float]:
@@ -57,108 +51,79 @@ def read_parameters(path: str | Path) -> dict[str, float]:
     result: dict[str, float] = {}
     lines: dict[str, int] = {}
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
-        for name, value in _parameter(line, f"{path}: line {number}"):
-            if result.setdefault(name, value) != value:
-                raise ParameterFileError(
-                    f"{path}: line {number}: {name} {value:g}; line {lines[name]} says "
-                    f"{result[name]:g}: remove one"
-                )
-            lines.setdefault(name, number)
+        content, where = line.partition("#")[0].strip(), f"{path}: line {number}"
+        name, value = _parameter(content, where) if content else ("", 0.0)
+        if name and result.setdefault(name, value) != value:
+            raise ParameterFileError(
+                f"{where}: {name} {value:g}; line {lines[name]} says {result[name]:g}: remove one"
+            )
+        lines.setdefault(name, number)
     if not result:
         raise ParameterFileError(f"{path}: no parameters in it; expected lines of NAME,VALUE")
     return result
 
 
+def _parameter(content: str, where: str) -> tuple[str, float]:
+    """Return the parameter of a line, no name for one of another component."""
+    fields = re.split(r"[ \t]*,[ \t]*|[ \t]+", content)
+    if fields[-1] == _READ_ONLY:
+        fields.pop()
+    component, kind = _AUTOPILOT, str(_REAL32)
+    if len(fields) == 5:
+        _, component, *fields, kind = fields
+    if len(fields) != 2:
+        comma = "; numbers have a decimal point, no comma" if re.search(r"\d,\d", content) else ""
+        raise ParameterFileError(
+            f"{where}: {quote(content)}; expected NAME,VALUE or NAME VALUE, or five fields: "
+            f"system, component, name, value, type{comma}"
+        )
+    name, text = fields
+    if kind not in map(str, range(1, 11)):
+        raise ParameterFileError(f"{where}: type {quote(kind)}; expected a number 1 to 10")
+    if component != _AUTOPILOT and component.isdecimal():
+        return "", 0.0
+    if component != _AUTOPILOT:
+        raise ParameterFileError(f"{where}: component {quote(component)}; expected a number")
+    if not _NAME.fullmatch(name):
+        raise ParameterFileError(f"{where}: name {quote(name)}; {_NAMED}")
+    whole = int(kind) < _REAL32
+    if _HEXADECIMAL.fullmatch(text):
+        value = float(int(text, 16))
+    else:
+        value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(value) or (whole and value % 1):
+        expected = "a whole number, as its type says" if whole else "a finite number"
+        raise ParameterFileError(f"{where}: value {quote(text)}; expected {expected}")
+    return name, int(value) if whole else value
+
+
 def render_parameters(
-    parameters: Mapping[str, float],
-    style: ParameterStyle = "list",
-    *,
-    header: str = "",
-    system: int = 1,
+    parameters: Mapping[str, float], style: ParameterStyle = "list", *, header: str = ""
 ) -> str:
     """Return the text of a parameter file, with the lines of `header` as comments before them.
 
     In the style "qgroundcontrol" an `int` is an INT32 and a `float` a REAL32, so 5 and 5.0
-    differ: QGroundControl refuses the wrong one, and, if it is connected, a `system` that is not
-    the vehicle's. Values have as many digits as they need. Raises `ParameterFileError` for names
-    and values that no autopilot has.
+    differ: QGroundControl refuses the wrong one. Values have as many digits as they need. Raises
+    `ParameterFileError` for names and values that no autopilot has.
 
     >>> print(render_parameters({"WPNAV_SPEED": 800.0, "WPNAV_JERK": 1.5}), end="")
     WPNAV_SPEED,800
     WPNAV_JERK,1.5
     """
+    lines = [f"# {line}".rstrip() for line in header.splitlines()]
+    if style == "qgroundcontrol":
+        lines += [*(["#"] if header else []), "# Vehicle-Id Component-Id Name Value Type"]
     for name, value in parameters.items():
+        whole = isinstance(value, int)
         if not _NAME.fullmatch(name):
-            raise ParameterFileError(
-                f"parameter {quote(name)}; expected at most 16 capitals, digits and _"
-            )
-        if not math.isfinite(value) or (isinstance(value, int) and value not in _INT32_LIMITS):
+            raise ParameterFileError(f"parameter {quote(name)}; {_NAMED}")
+        if not math.isfinite(value) or (whole and not -(2**31) <= value < 2**31):
             raise ParameterFileError(
                 f"parameter {name}: {value}; expected a finite number, an integer within 32 bits"
             )
-    comments = [f"# {line}".rstrip() for line in header.splitlines()]
-    if style == "qgroundcontrol":
-        comments += [*(["#"] if header else []), "# Vehicle-Id Component-Id Name Value Type"]
-        rows = [
-            "\t".join((str(system), str(_AUTOPILOT_COMPONENT), name, _digits(value), _type(value)))
-            for name, value in parameters.items()
-        ]
-    else:
-        rows = [f"{name},{_digits(value)}" for name, value in parameters.items()]
-    return "\n".join([*comments, *rows, ""])
-
-
-def _digits(value: float) -> str:
-    """Return the shortest decimal, without exponent, that is read back as `value`."""
-    number = int(value) if isinstance(value, int) else float(value)
-    return format(Decimal(repr(number)), "f").removesuffix(".0")
-
-
-def _type(value: float) -> str:
-    return str(_INT32 if isinstance(value, int) else _REAL32)
-
-
-def _parameter(line: str, where: str) -> Iterator[tuple[str, float]]:
-    """Yield the parameter of a line, nothing for a line without one."""
-    content = line.partition("#")[0].strip()
-    if not content:
-        return
-    fields = re.split(r"[ \t]*,[ \t]*|[ \t]+", content)
-    if len(fields) == 5:
-        _, component, name, text, kind = fields
-        if not _WHOLE.fullmatch(component):
-            raise ParameterFileError(f"{where}: component {quote(component)}; expected a number")
-        if not _WHOLE.fullmatch(kind) or int(kind) not in _TYPES:
-            raise ParameterFileError(f"{where}: type {quote(kind)}; expected a number 1 to 10")
-        if int(component) == _AUTOPILOT_COMPONENT:
-            _check_name(name, where)
-            yield name, _number(text, where, whole=int(kind) in _INTEGERS)
-        return
-    if fields[-1] == _READ_ONLY:
-        fields.pop()
-    if len(fields) != 2:
-        comma = "; numbers have a decimal point, no comma" if _COMMA.search(content) else ""
-        raise ParameterFileError(
-            f"{where}: {quote(content)}; expected NAME,VALUE or NAME VALUE, or five fields: "
-            f"system, component, name, value, type{comma}"
-        )
-    _check_name(fields[0], where)
-    yield fields[0], _number(fields[1], where, whole=False)
-
-
-def _check_name(name: str, where: str) -> None:
-    if not _NAME.fullmatch(name):
-        raise ParameterFileError(
-            f"{where}: name {quote(name)}; expected at most 16 capitals, digits and _"
-        )
-
-
-def _number(text: str, where: str, *, whole: bool) -> float:
-    if _HEXADECIMAL.fullmatch(text):
-        value = float(int(text, 16))
-    else:
-        value = float(text) if _NUMBER.fullmatch(text) else math.nan
-    if not math.isfinite(value) or (whole and value != int(value)):
-        kind = "a whole number, as its type says" if whole else "a finite number"
-        raise ParameterFileError(f"{where}: value {quote(text)}; expected {kind}")
-    return int(value) if whole else value
+        # the shortest decimal, without exponent, that is read back as the value
+        digits = format(Decimal(repr(value)), "f").removesuffix(".0")
+        kind = _INT32 if whole else _REAL32
+        row = f"1\t{_AUTOPILOT}\t{name}\t{digits}\t{kind}"
+        lines.append(row if style == "qgroundcontrol" else f"{name},{digits}")
+    return "\n".join([*lines, ""])
