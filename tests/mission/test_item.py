@@ -10,14 +10,10 @@ from faao_mav.errors import InputError
 from faao_mav.mission import Command, Frame, Home, MissionItem
 
 
-@pytest.mark.parametrize("command", Command)
-def test_commands_have_mavlinks_numbers(command: Command) -> None:
-    assert mavlink.enums["MAV_CMD"][int(command)].name == f"MAV_CMD_{command.name}"
-
-
-@pytest.mark.parametrize("frame", Frame)
-def test_frames_have_mavlinks_numbers(frame: Frame) -> None:
-    assert mavlink.enums["MAV_FRAME"][int(frame)].name == f"MAV_FRAME_{frame.name}"
+def test_commands_and_frames_have_mavlinks_numbers() -> None:
+    for kind, prefix in ((Command, "MAV_CMD"), (Frame, "MAV_FRAME")):
+        for each in kind:
+            assert mavlink.enums[prefix][int(each)].name == f"{prefix}_{each.name}"
 
 
 @pytest.mark.parametrize(

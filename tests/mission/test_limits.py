@@ -99,26 +99,6 @@ FORMATS: dict[Callable[[Zones, Path], Path], Callable[[Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("write", FORMATS)
-def test_a_fence_has_one_limit_in_all_formats(
-    write: Callable[[Zones, Path], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(fence, "MAX_CORNERS", 1_000)  # as many as are quick to read
-    read = FORMATS[write]
-    many = tuple(ring(3, k) for k in range(255))
-    long = (ring(600), ring(400, 1))
-    for kept in (many, long):
-        read(write(kept, tmp_path))
-    for zones, told in (
-        ((*many, ring(3, 255)), "256 exclusion polygons; at most 255 are accepted"),
-        ((*long, ring(3, 2)), "1,003 corners and circles; at most 1,000 are accepted"),
-    ):
-        path = write(zones, tmp_path)
-        with pytest.raises(InputError, match=rf"x\.(fence\.)?[a-z]+: fence: {told}") as caught:
-            read(path)
-        assert "\n" not in str(caught.value)
-
-
 def comb(teeth: int, *, across: bool) -> tuple[LatLon, ...]:
     """Return the corners of a comb of 200 m; its teeth cross each of one `across` four times."""
     corners = [(-35.361, 149.17)]
@@ -130,17 +110,40 @@ def comb(teeth: int, *, across: bool) -> tuple[LatLon, ...]:
 
 
 @pytest.mark.parametrize("write", FORMATS)
-def test_areas_that_cross_everywhere_are_refused_in_all_formats(
-    write: Callable[[Zones, Path], Path], tmp_path: Path
+def test_a_fence_has_the_same_limits_in_all_formats(
+    write: Callable[[Zones, Path], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    read, tangled = FORMATS[write], (comb(249, across=False), comb(249, across=True))
-    with pytest.raises(InputError, match=r"its outlines cross at more than 50,000 places"):
-        read(write(tangled, tmp_path))
-    if write is not as_yaml:  # such a plan leaves no way
-        read(write((comb(100, across=False), comb(100, across=True)), tmp_path))
+    monkeypatch.setattr(fence, "MAX_CORNERS", 1_000)  # as many as are quick to read
+    read = FORMATS[write]
+    many = tuple(ring(3, k) for k in range(255))
+    long = (ring(600), ring(400, 1))
+    for kept in (many, long):
+        read(write(kept, tmp_path))
+    for zones, told in (
+        ((*many, ring(3, 255)), "256 exclusion polygons; at most 255 are accepted"),
+        ((*long, ring(3, 2)), "1,003 corners and circles; at most 1,000 are accepted"),
+        ((comb(112, across=False), comb(120, across=True)), "its outlines cross at more than 50,0"),
+    ):
+        path = write(zones, tmp_path)
+        with pytest.raises(InputError, match=rf"x\.(fence\.)?[a-z]+: fence: {told}") as caught:
+            read(path)
+        assert "\n" not in str(caught.value)
 
 
-def test_the_parts_of_a_drawing_that_cross_everywhere_are_not_joined(tmp_path: Path) -> None:
+def test_all_outlines_count_by_kind_and_where_they_cross(tmp_path: Path) -> None:
+    for inclusion in (True, False):
+        circles = (Circle((1.0, 2.0), 3.0, inclusion),) * 255
+        assert Fence((), circles)
+        with pytest.raises(InputError, match=r"256 (in|ex)clusion circles"):
+            Fence((), (*circles, circles[0]))
+    star = [(math.cos(2.4 * k) / 1e3, math.sin(2.4 * k) / 1e3) for k in range(100)]
+    teeth = Polygon(comb(1_000, across=False), False)
+    rings = tuple(Circle((-35.36, 149.172), 50.0 + k / 10, False) for k in range(100))
+    assert Fence((Polygon(tuple(star), False),) * 3)
+    assert Fence((teeth,), rings[:5])
+    for polygons, circles in (((Polygon(tuple(star), False),) * 81, ()), ((teeth,), rings)):
+        with pytest.raises(InputError, match="cross at more than 50,000 places"):
+            Fence(polygons, circles)
     parts = [
         [[list(place[::-1]) for place in comb(249, across=across)]] for across in (True, False)
     ]
@@ -149,27 +152,6 @@ def test_the_parts_of_a_drawing_that_cross_everywhere_are_not_joined(tmp_path: P
     (tmp_path / "x.geojson").write_text(json.dumps(feature))
     with pytest.raises(InputError, match=r"x\.geojson: geometry: fence: its outlines cross at"):
         read_fence(tmp_path / "x.geojson")
-
-
-def test_circles_and_outlines_that_cross_themselves_count_too() -> None:
-    star = [(math.cos(2.4 * k) / 1e3, math.sin(2.4 * k) / 1e3) for k in range(100)]
-    assert Fence((Polygon(tuple(star), False),) * 3)
-    with pytest.raises(InputError, match="cross at more than 50,000 places"):
-        Fence((Polygon(tuple(star), False),) * 81)
-    teeth = Polygon(comb(1_000, across=False), False)
-    circles = tuple(Circle((-35.36, 149.172), 50.0 + k / 10, False) for k in range(100))
-    assert Fence((teeth,), circles[:5])
-    with pytest.raises(InputError, match="cross at more than 50,000 places"):
-        Fence((teeth,), circles)
-
-
-def test_each_kind_of_area_is_counted_by_itself() -> None:
-    circles = tuple(
-        Circle((1.0, 2.0), 3.0, inclusion) for inclusion in (True, False) for _ in range(255)
-    )
-    assert Fence((), circles)
-    with pytest.raises(InputError, match="256 inclusion circles"):
-        Fence((), (*circles, circles[0]))
 
 
 def test_the_fence_of_a_plan_and_that_of_its_file_have_the_limit_together(
@@ -207,28 +189,18 @@ def test_more_items_than_a_count_can_tell_are_refused(tmp_path: Path) -> None:
         Mission((), rally=(RallyPoint(1.0, 2.0, 3.0),) * 256)
 
 
-@pytest.mark.parametrize(
-    ("key", "inside", "most"),
-    [
-        ("mission.items", '"items": [', MAX_ITEMS),
-        ("geoFence.polygons", '"polygons": [', MAX_CORNERS),
-        ("rallyPoints.points", '"points": [', MAX_CORNERS),
-    ],
-)
-def test_endless_lists_of_a_plan_file_are_not_read_to_their_end(
-    key: str, inside: str, most: int, tmp_path: Path
-) -> None:
-    one = {
-        "mission.items": '{"type": "SimpleItem", "command": 16, "frame": 3, "autoContinue": true,'
-        '"params": [0, 0, 0, 0, 1, 1, 1]}',
-        "geoFence.polygons": '{"version": 1, "polygon": [[1, 1], [1, 2], [2, 2]],'
-        '"inclusion": true}',
-        "rallyPoints.points": "[1, 1, 1]",
-    }[key]
+def test_endless_lists_of_a_plan_file_are_not_read_to_their_end(tmp_path: Path) -> None:
     text = as_plan((), tmp_path).read_text()
     text = text[:-1] + ', "rallyPoints": {"version": 2, "points": []}}'
-    with pytest.raises(InputError, match=rf"{key}: more than {most:,} values"):
-        read_qgc_plan(text.replace(inside, inside + ", ".join([one] * (most + 1))))
+    item = '{"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, 0, 1, 1, 1]}'
+    for key, one, most in (
+        ("mission.items", item, MAX_ITEMS),
+        ("geoFence.polygons", '{"version": 1, "polygon": [], "inclusion": true}', MAX_CORNERS),
+        ("rallyPoints.points", "[1, 1, 1]", MAX_CORNERS),
+    ):
+        inside = f'"{key.rpartition(".")[2]}": ['
+        with pytest.raises(InputError, match=rf"{key}: more than {most:,} values"):
+            read_qgc_plan(text.replace(inside, inside + ", ".join([one] * (most + 1))))
 
 
 def test_a_plan_of_too_many_values_is_not_read_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
