@@ -1,8 +1,8 @@
 """Flights from the logs of autopilots and ground stations.
 
 Logs are read by the libraries of those who made the formats, which take minutes and gigabytes for
-files that are no logs: so in a process of its own. That is this module, run as a program, which
-writes what a log says as lines of JSON, and where it fails the reason to standard error.
+files that are no logs: so by a process of its own. That is this module, run as a program, which
+writes flights as JSON, or the reason why there is none.
 
 Sources: ArduPilot, "Log messages"; MAVLink, "File formats"; PX4, "ULog file format".
 """
@@ -12,53 +12,37 @@ import math
 import os
 import subprocess
 import sys
-from array import array
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, suppress
 from operator import itemgetter
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import TextIO, TypeAlias
-
-import numpy as np
+from typing import Any, TypeAlias
 
 from faao_mav.errors import InputError, check_extra, shortened
 from faao_mav.fly.record import Fix, FlightRecord
 
-Said: TypeAlias = tuple[int, int, str, dict[str, float | str]]
+Said: TypeAlias = tuple[int, int, str, Mapping[str, Any]]
 """System and component of MAVLink that said it, 0 in a vehicle's own log; name; values by field."""
 
-_ENDINGS = (".bin", ".tlog", ".ulg")
-
+_PLACES = ("POS", "GLOBAL_POSITION_INT", "vehicle_global_position", "home_position")
+_PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
 _WINDS = {
-    **dict.fromkeys(("XKF2", "NKF2"), ("VWE", "VWN", "C")),
+    **dict.fromkeys(("XKF2", "NKF2"), ("VWE", "VWN")),
     "WIND_COV": ("wind_y", "wind_x"),
     "WIND": ("direction", "speed"),
-    **dict.fromkeys(("wind", "wind_estimate"), ("windspeed_east", "windspeed_north", "timestamp")),
+    **dict.fromkeys(("wind", "wind_estimate"), ("windspeed_east", "windspeed_north")),
 }
-"""Messages about wind, newer ones first: the fields of what blows east and north, and others."""
+"""Messages about parameters and wind, newer ones first, and their fields: towards east and north,
+but of WIND whence, degrees, and how fast."""
 
-_FIELDS = {
-    "POS": ("TimeUS", "Lat", "Lng", "Alt", "RelHomeAlt"),
-    "GLOBAL_POSITION_INT": ("time_boot_ms", "lat", "lon", "alt", "relative_alt"),
-    "vehicle_global_position": ("timestamp", "lat", "lon", "alt"),
-    "home_position": ("timestamp", "alt", "valid_alt"),
-    "PARM": ("Name", "Value"),
-    "PARAM_VALUE": ("param_id", "param_value"),
-    **_WINDS,
-}
-"""The messages that are read, and their fields, of which older firmware lacks some."""
-
-_LARGEST = 2**30
-"""Bytes of a log that is read; chosen: hours of a `.bin`."""
+_LARGEST, _MOST_MESSAGES = 2**30, 1_000_000
+"""Bytes of a log that is read, and messages about the flight that it has at most; chosen: hours of
+a `.bin`, and nine hours, thrice at 10 Hz."""
 
 _PATIENCE, _BYTES = 60, 2_000_000_000
 """Seconds after which reading a log is given up, processor time too, and the memory that it may
 take; chosen: four times and twice what a `.bin` of 10^9 bytes takes."""
-
-_MOST_MESSAGES = 1_000_000
-"""Messages about the flight, of which a log has no more; chosen: nine hours, thrice at 10 Hz."""
 
 _LEAST, _LONGEST = 10, 86_400.0
 """Positions that a flight has at least, and seconds that it lasts at most; chosen."""
@@ -67,14 +51,11 @@ _REBOOT, _BETWEEN = 2.0, 1000.0
 """Seconds by which a vehicle's clock goes back when it has booted again, less is a late packet; and
 the seconds that are put there, and for any longer pause. Chosen: no flight goes on across them."""
 
-_BOUNDS = (1e8, 90.0, 180.0, 1e5)
-"""What no position is beyond: s, degrees, degrees and m; chosen."""
+_BOUNDS, _FASTEST_WIND = (1e8, 90.0, 180.0, 1e5), 100.0
+"""What no position is beyond, s, degrees, degrees and m, and no wind, m/s; chosen."""
 
-_FASTEST_WIND = 100.0
-"""m/s, in which nothing flies; chosen."""
-
-_READERS = {"MAVLINK20": "1", "MAVLINK_DIALECT": "ardupilotmega", "OPENBLAS_NUM_THREADS": "1"}
-"""The environment of the process that reads: the MAVLink that pymavlink is to read, no threads."""
+_ENVIRONMENT = {"MAVLINK20": "1", "MAVLINK_DIALECT": "ardupilotmega", "OPENBLAS_NUM_THREADS": "1"}
+"""Of the process that reads: the MAVLink that pymavlink is to read, no threads."""
 
 
 def read_log(path: Path, system: int | None = None) -> list[FlightRecord]:
@@ -84,50 +65,37 @@ def read_log(path: Path, system: int | None = None) -> list[FlightRecord]:
     names one. A log that ends in the middle is read as far as it goes. It is read in a process of
     its own, which runs no code of the current directory. Raises `InputError` for anything else.
     """
-    _check(path)
-    if system is not None and path.suffix.lower() != ".tlog":
-        raise InputError(f"--system {system}: {path} is the log of one vehicle; that is for .tlog")
-    return flights(path, _told(path), system)
-
-
-def _check(path: Path) -> None:
-    """Raise `InputError` for what is no log, as its name and size tell."""
     ending = path.suffix.lower()
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
-    if ending not in _ENDINGS:
-        raise InputError(f"{path}: give a flight log: {', '.join(_ENDINGS)}")
+    if ending not in (".bin", ".tlog", ".ulg"):
+        raise InputError(f"{path}: give a flight log: .bin, .tlog, .ulg")
     if not 0 < path.stat().st_size <= _LARGEST:
         raise InputError(f"{path}: empty, or larger than {_LARGEST:,} bytes; expected a flight log")
     if ending == ".ulg":
         check_extra("debrief", "pyulog", f"{path}: a log of PX4")
+    if system is not None and ending != ".tlog":
+        raise InputError(f"--system {system}: {path} is the log of one vehicle; that is for .tlog")
+    command = [sys.executable, "-P", "-m", __name__, str(path), str(system or 0)]
+    environment = os.environ | _ENVIRONMENT
+    try:
+        read = subprocess.run(
+            command, capture_output=True, env=environment, timeout=_PATIENCE, check=False
+        )
+    except subprocess.TimeoutExpired:
+        text = f"{path}: not read within {_PATIENCE:g} s; expected the log of a flight"
+        raise InputError(text) from None
+    if read.returncode:
+        reason = read.stderr.decode(errors="replace").strip()
+        raise InputError(reason or f"{path}: not a {ending} log: its reader was ended")
+    return [FlightRecord.of(*each) for each in json.loads(read.stdout)]
 
 
-def _told(path: Path) -> Iterator[Said]:
-    """Yield what the process that reads a log says of it, in the time that it has."""
-    command = [sys.executable, "-P", "-m", __name__, str(path)]
-    with TemporaryFile() as out:
-        try:
-            ended = subprocess.run(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=subprocess.PIPE,
-                env=os.environ | _READERS,
-                timeout=_PATIENCE,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            text = f"{path}: not read within {_PATIENCE:g} s; expected the log of a flight"
-            raise InputError(text) from None
-        if ended.returncode:
-            reason = ended.stderr.decode(errors="replace").strip() or "its reader was ended"
-            raise InputError(f"{path}: not a {path.suffix} log: {shortened(reason)}")
-        out.seek(0)
-        yield from map(json.loads, out)
+Flown: TypeAlias = tuple[list[Fix], dict[str, float], int]
+"""What `FlightRecord.of` takes."""
 
 
-def flights(path: Path, said: Iterable[Said], system: int | None = None) -> list[FlightRecord]:
+def flights(path: Path, said: Iterable[Said], system: int = 0) -> list[Flown]:
     """Return the flights of the vehicles that tell their positions in the log `path`.
 
     `system` chooses one. Of a system the component with the lowest number counts, which is the
@@ -135,59 +103,61 @@ def flights(path: Path, said: Iterable[Said], system: int | None = None) -> list
     where there is no flight.
     """
     heard = defaultdict[tuple[int, int], _Heard](_Heard)
-    for number, component, name, fields in said:
+    for count, (number, component, name, fields) in enumerate(said):
+        if count == _MOST_MESSAGES:
+            text = f"more than {_MOST_MESSAGES:,} positions, winds and parameters"
+            raise InputError(f"{path}: {text}; expected the log of a flight")
         heard[number, component].hear(name, fields)
-    flown = dict[int, FlightRecord]()
+    flown = dict[int, _Heard]()
     for (number, _), each in sorted(heard.items(), key=itemgetter(0)):
-        if each.count >= _LEAST:
-            flown.setdefault(number, each.record(number))
+        if len(each.fixes) >= _LEAST:
+            flown.setdefault(number, each)
     if not flown:
-        most = max((each.count for each in heard.values()), default=0)
+        most = max((len(each.fixes) for each in heard.values()), default=0)
         raise InputError(f"{path}: {most} positions; expected the log of a flight")
-    if system is not None and system not in flown:
+    if system and system not in flown:
         numbers = ", ".join(map(str, filter(None, flown)))
         raise InputError(f"--system {system}: not in {path}, where positions are of: {numbers}")
-    chosen = [each for number, each in flown.items() if system in (None, number)]
-    longest = max(each.t[-1] - each.t[0] for each in chosen)
+    chosen = {number: each for number, each in flown.items() if system in (0, number)}
+    longest = max(each.fixes[-1].t - each.fixes[0].t for each in chosen.values())
     if longest > _LONGEST:
         raise InputError(f"{path}: {longest / 3600:.0f} hours; expected the log of a flight")
-    return chosen
+    return [(each.found(), each.parameters, number) for number, each in chosen.items()]
 
 
 class _Heard:
-    """What one sender has said of its flight."""
+    """What one sender has said of its flight: `fixes`, and `parameters` by name."""
 
     def __init__(self) -> None:
-        self._rows = array("d")
-        self._last = self._later = math.nan
-        self._home = math.nan
+        self.fixes: list[Fix] = []
+        self.parameters: dict[str, float] = {}
+        self._last, self._later, self._home = math.nan, 0.0, math.nan
         self._estimator, self._wind = len(_WINDS), (math.nan, math.nan)
-        self._parameters: dict[str, float] = {}
 
-    @property
-    def count(self) -> int:
-        """How many positions it has told."""
-        return len(self._rows) // len(Fix._fields)
-
-    def hear(self, name: str, said: Mapping[str, float | str]) -> None:
+    def hear(self, name: str, said: Mapping[str, Any]) -> None:
         """Take note of a message."""
-        told = [said.get(field, math.nan) for field in _FIELDS[name]]
-        match name, [math.nan if isinstance(each, str) else each for each in told]:
-            case "GLOBAL_POSITION_INT", [t, latitude, longitude, altitude, height]:
-                place = latitude / 1e7, longitude / 1e7, altitude / 1e3, height / 1e3
-                self._be(t / 1e3, *place)
-            case "POS" | "vehicle_global_position", [t, *rest]:
-                self._be(t / 1e6, *rest)
-            case "home_position", [_, altitude, valid]:
-                self._home = altitude if valid else self._home
-            case "PARM" | "PARAM_VALUE", [_, value]:
-                if math.isfinite(value):
-                    self._parameters[str(told[0])] = value
-            case "WIND", [source, speed]:  # from where it blows, degrees
-                angle = math.radians(source)
-                self._blow(name, -speed * math.sin(angle), -speed * math.cos(angle))
-            case _, [east, north, *_] if said.get("C", 0) == 0:  # the first of the estimators
-                self._blow(name, east, north)
+
+        def value(field: str) -> float:
+            found = said.get(field, math.nan)
+            return float(found) if isinstance(found, int | float) else math.nan
+
+        match name:
+            case "GLOBAL_POSITION_INT":
+                t, *heights = (value(x) / 1e3 for x in ("time_boot_ms", "alt", "relative_alt"))
+                self._be(t, value("lat") / 1e7, value("lon") / 1e7, *heights)
+            case "POS":
+                place = value("Lat"), value("Lng"), value("Alt"), value("RelHomeAlt")
+                self._be(value("TimeUS") / 1e6, *place)
+            case "vehicle_global_position":
+                self._be(value("timestamp") / 1e6, value("lat"), value("lon"), value("alt"))
+            case "home_position" if said.get("valid_alt", True):
+                self._home = value("alt")
+            case "PARM" | "PARAM_VALUE":
+                key, field = _PARAMETERS[name]
+                if math.isfinite(value(field)):
+                    self.parameters[str(said.get(key))] = value(field)
+            case _ if name in _WINDS and not said.get("C", 0):  # the first of the estimators
+                self._blow(name, *map(value, _WINDS[name]))
 
     def _be(
         self, t: float, latitude: float, longitude: float, altitude: float, height: float = math.nan
@@ -198,40 +168,31 @@ class _Heard:
         """
         place = latitude, longitude, altitude
         sound = all(abs(x) <= most for x, most in zip((t, *place), _BOUNDS, strict=True))
-        if not sound or not (latitude or longitude):
-            return
         step = t - self._last
-        if math.isnan(step):
-            self._later = 0.0
-        elif step < -_REBOOT or step > _BETWEEN:
-            self._later += _BETWEEN - step
-        elif step <= 0:
+        late = -_REBOOT <= step <= 0
+        if late or not sound or not (latitude or longitude):
             return
+        if step < -_REBOOT or step > _BETWEEN:
+            self._later += _BETWEEN - step
         self._last = t
         if abs(height) <= _BOUNDS[-1]:
             self._home = altitude - height
-        self._rows.extend((t + self._later, *place, self._home, *self._wind))
+        self.fixes.append(Fix(t + self._later, *place, self._home, *self._wind))
 
     def _blow(self, name: str, east: float, north: float) -> None:
         """Take note of a wind, if no better estimator tells one; one that does not run tells 0."""
-        rank = [*_WINDS].index(name)
-        told = (east or north) and math.hypot(east, north) <= _FASTEST_WIND
+        if name == "WIND":
+            angle, speed = math.radians(east), north
+            east, north = -speed * math.sin(angle), -speed * math.cos(angle)
+        rank, told = [*_WINDS].index(name), 0 < math.hypot(east, north) <= _FASTEST_WIND
         if rank <= self._estimator and told:
             self._estimator, self._wind = rank, (east, north)
 
-    def record(self, system: int) -> FlightRecord:
-        """Return the flight; `system` is 0 without one.
-
-        Until home is told it is where it was first told, or else where the first position is.
-        """
-        found = FlightRecord.of(self._rows, self._parameters, system)
-        home, known = found.home, np.isfinite(found.home)
-        home[: np.argmax(known)] = home[np.argmax(known)]
-        home[np.isnan(home)] = found.altitude[0]
-        return found
-
-
-# ---- the process that reads
+    def found(self) -> list[Fix]:
+        """Return the flight; until home is told it is where it is first told, or where it began."""
+        known = (each.home for each in self.fixes if math.isfinite(each.home))
+        home = next(known, self.fixes[0].altitude)
+        return [x if math.isfinite(x.home) else x._replace(home=home) for x in self.fixes]
 
 
 def messages(path: Path) -> Iterator[Said]:
@@ -252,41 +213,29 @@ def _mavlog(path: Path, *, own: bool) -> Iterator[Said]:
     except AttributeError:  # a log that ends in the first message of its kind
         log = mavutil.mavlogfile(str(path))  # which takes ten times as long
     with closing(log):
-        while (message := log.recv_match(type=[*_FIELDS])) is not None:
-            name = message.get_type()
-            values = {field: getattr(message, field, None) for field in _FIELDS[name]}
-            known = {key: x for key, x in values.items() if isinstance(x, (int, float, str))}
+        while (message := log.recv_match(type=[*_PLACES, *_PARAMETERS, *_WINDS])) is not None:
             sender = (0, 0) if own else (message.get_srcSystem(), message.get_srcComponent())
-            yield *sender, name, known
+            yield *sender, message.get_type(), message.to_dict()
 
 
 def _ulog(path: Path) -> Iterator[Said]:
     from pyulog import ULog
 
     with path.open("rb") as file:
-        log = ULog(file, [*_FIELDS])
+        log = ULog(file, [*_PLACES, *_WINDS])
     for name, value in log.initial_parameters.items():
         yield 0, 0, "PARM", {"Name": name, "Value": value}
-    rows: list[tuple[float, str, dict[str, float | str]]] = []
+    rows: list[tuple[float, str, dict[str, float]]] = []
     for topic in log.data_list:
         if topic.multi_id == 0:
-            fields = [field for field in _FIELDS[topic.name] if field in topic.data]
-            for values in zip(*(topic.data[field].tolist() for field in fields), strict=True):
-                row = dict(zip(fields, values, strict=True))
-                rows.append((row["timestamp"], topic.name, row))
+            columns = [values.tolist() for values in topic.data.values()]
+            told = (dict(zip(topic.data, row, strict=True)) for row in zip(*columns, strict=True))
+            rows += [(row["timestamp"], topic.name, row) for row in told]
     for _, name, row in sorted(rows, key=itemgetter(0)):
         yield 0, 0, name, row
 
 
-def write(path: Path, out: TextIO) -> None:
-    """Write the messages of a log to `out`, one in a line of JSON."""
-    for count, said in enumerate(messages(path)):
-        if count == _MOST_MESSAGES:
-            raise ValueError(f"more than {_MOST_MESSAGES:,} positions, winds and parameters")
-        print(json.dumps(said), file=out)
-
-
-def _main(path: Path) -> int:
+def _main(path: Path, system: int) -> int:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     with os.fdopen(os.dup(1), "w") as out, os.fdopen(os.dup(2), "w") as failed:
         for number in (1, 2):  # for the libraries' own remarks, a line for each byte of zeros
@@ -297,12 +246,16 @@ def _main(path: Path) -> int:
 
                 resource.setrlimit(getattr(resource, limit), (most, most))
         try:
-            write(path, out)
+            json.dump(flights(path, messages(path), system), out)
+        except InputError as error:
+            print(error, file=failed)
+            return 1
         except Exception as error:  # what libraries make of files that are something else
-            print(f"{type(error).__name__}: {error}", file=failed)
+            reason = shortened(f"{type(error).__name__}: {error}")
+            print(f"{path}: not a {path.suffix} log: {reason}", file=failed)
             return 1
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(_main(Path(sys.argv[1])))
+    sys.exit(_main(Path(sys.argv[1]), int(sys.argv[2])))

@@ -144,7 +144,7 @@ def _log(path: Path) -> list[FlightRecord]:
             said = list(messages(path))
         except Exception as error:
             raise InputError(f"{path}: not a log: {type(error).__name__}") from None
-    return flights(path, said)
+    return [FlightRecord.of(*each) for each in flights(path, said)]
 
 
 def _vary(content: bytes) -> object:
