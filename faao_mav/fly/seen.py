@@ -8,11 +8,10 @@ from faao_mav.autopilot import Vehicle, VehicleType
 from faao_mav.autopilot.files import MadeFor
 from faao_mav.errors import InputError
 from faao_mav.mission.item import Home, Mission
-from faao_mav.wire.machine import Machine
+from faao_mav.wire.machine import Machine, ask_for
 from faao_mav.wire.messages import HomePosition, WireItem
 from faao_mav.wire.parameters import Names, Reading, ReadParameters
 from faao_mav.wire.protocol import HOME_POSITION, MavResult, MissionType
-from faao_mav.wire.questions import AskFor
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import download_lists
@@ -86,7 +85,7 @@ def read_held(
     if MissionType.MISSION in lists.missing or not parameters:
         return Held(lists.items, Reading({}), lists.missing)
     reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle), timeouts)
-    told: list[HomePosition] = yield AskFor(peer.address, HOME_POSITION, HomePosition)
+    told: list[HomePosition] = yield ask_for(peer.address, HOME_POSITION, HomePosition)
     try:
         home = home_in(told[0]) if told else None
     except InputError:

@@ -14,9 +14,9 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import SETTLE, Discovery, FoundVehicle, choose
 from faao_mav.wire.link import Observe, WireLink
-from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.machine import Machine, Script, ask_alive, ask_for
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition
-from faao_mav.wire.parameters import Change, Names, check_settable, set_parameters
+from faao_mav.wire.parameters import Change, check_settable, set_parameters
 from faao_mav.wire.protocol import (
     GROUND_STATION,
     HOME_POSITION,
@@ -26,7 +26,6 @@ from faao_mav.wire.protocol import (
     MissionType,
     meaning,
 )
-from faao_mav.wire.questions import AskAlive, AskFor
 from faao_mav.wire.signing import Verdict, read_signing, remember
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.pace import Timeouts
@@ -85,18 +84,6 @@ class LinkOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True, slots=True)
-class Holdings:
-    """What a vehicle holds, as far as it could be read; `problems` say why a list is missing.
-
-    A missing fence or missing rally points are among `Mission.unread`.
-    """
-
-    vehicle: FoundVehicle
-    mission: Mission
-    problems: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class UploadReport:
     """What became of an upload: one report for each list, `seconds` in all.
 
@@ -115,6 +102,10 @@ class UploadReport:
     def verified(self) -> bool:
         """Whether everything is on the vehicle, whole and equal."""
         return not self.problems
+
+
+Work: TypeAlias = Generator[Machine[Any], Any, UploadReport]
+"""What changes a vehicle, for a `Script`; its report has no seconds and problems of lists yet."""
 
 
 def upload(
@@ -142,15 +133,88 @@ def upload(
         raise InputError("upload: the mission has no items; clear the vehicle's instead")
     check_settable(parameters or (), "parameters")
 
-    def job(session: "Session") -> "Work":
-        vehicle = session.peer.vehicle
-        if made_for is not None and vehicle is not None:
-            mistake = addressee_mistake(made_for, vehicle)
+    def job(session: Session) -> Work:
+        peer, timeouts = session.peer, session.timeouts
+        if made_for is not None and peer.vehicle is not None:
+            mistake = addressee_mistake(made_for, peer.vehicle)
             if mistake is not None:
                 raise LinkError(f"{connection}: {mistake}: nothing is uploaded")
-        return _upload(mission, session.peer, session.timeouts, parameters or {}, clear_rest)
+        lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
+        told: list[GlobalPositionInt] = yield ask_for(peer.address, POSITION, GlobalPositionInt)
+        place = place_in(told[0]) if told else None
+        stands = None if place is None else Whereabouts.of(place, mission)
+        changes, problem = yield from set_parameters(parameters or {}, peer, timeouts)
+        if problem:
+            return UploadReport(session.found, (), 0.0, (problem,), stands, changes)
+        given = [(part, items) for part, items in lists.items() if items]
+        reports = yield from upload_parts(given, peer, timeouts)
+        if clear_rest and all(each.verified for each in reports):
+            rest = [part for part, items in lists.items() if not items]
+            cleared = yield from clear_lists(rest, peer, timeouts)
+            reports += tuple(each for each in cleared if each.result not in _ABSENT)
+        return UploadReport(session.found, reports, 0.0, (), stands, changes)
 
     return _change(connection, mission, allow_armed, job, options)
+
+
+def clear(
+    connection: str,
+    *,
+    types: Sequence[MissionType] = tuple(MissionType),
+    allow_armed: bool = False,
+    **options: Unpack[LinkOptions],
+) -> UploadReport:
+    """Clear lists of the vehicle at `connection` and read back that they are empty.
+
+    Arguments and errors as in `upload`.
+    """
+
+    def job(session: Session) -> Work:
+        reports = yield from clear_lists(types, session.peer, session.timeouts)
+        return UploadReport(session.found, reports, 0.0, ())
+
+    return _change(connection, Mission(()), allow_armed, job, options)
+
+
+def _change(
+    connection: str,
+    mission: Mission,
+    allow_armed: bool,
+    job: "Callable[[Session], Work]",
+    options: LinkOptions,
+) -> UploadReport:
+    """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
+    with Session(connection, options, knocks=True) as session:
+        if session.found.armed and not allow_armed:
+            raise LinkError(
+                f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
+                "disarm it, or allow it (--allow-armed)"
+            )
+        session.peer = replace(session.peer, may_be_armed=allow_armed)
+        try:
+            report = session.run(Script(job(session)))
+        except LinkError as error:
+            raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
+        problems = [*report.problems]
+        for part in report.parts:
+            if not part.verified:
+                unheard = part.verdict == "silent" and part.item is None
+                why = session.why_silent() if unheard else ""
+                problems.append(explain(part, session.peer, mission) + why)
+        seconds = time.monotonic() - session.started
+    return replace(report, seconds=seconds, problems=tuple(problems))
+
+
+@dataclass(frozen=True, slots=True)
+class Holdings:
+    """What a vehicle holds, as far as it could be read; `problems` say why a list is missing.
+
+    A missing fence or missing rally points are among `Mission.unread`.
+    """
+
+    vehicle: FoundVehicle
+    mission: Mission
+    problems: tuple[str, ...]
 
 
 def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
@@ -184,7 +248,7 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
         try:
             mission = mission_of(lists.items, peer.vehicle)
             if mission.home is None:
-                told = session.run(AskFor(peer.address, HOME_POSITION, HomePosition))
+                told = session.run(ask_for(peer.address, HOME_POSITION, HomePosition))
                 mission = replace(mission, home=home_in(told[0]) if told else None)
         except InputError as error:
             raise LinkError(
@@ -192,38 +256,6 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
             ) from None
     mission = replace(mission, unread=tuple(part.title for part in missing))
     return Holdings(session.found, mission, tuple(missing.values()))
-
-
-def clear(
-    connection: str,
-    *,
-    types: Sequence[MissionType] = tuple(MissionType),
-    allow_armed: bool = False,
-    **options: Unpack[LinkOptions],
-) -> UploadReport:
-    """Clear lists of the vehicle at `connection` and read back that they are empty.
-
-    Arguments and errors as in `upload`.
-    """
-
-    def job(session: "Session") -> "Work":
-        return _Done((yield from clear_lists(types, session.peer, session.timeouts)))
-
-    return _change(connection, Mission(()), allow_armed, job, options)
-
-
-@dataclass(frozen=True, slots=True)
-class _Done:
-    """What a change of a vehicle's lists and parameters led to."""
-
-    reports: tuple[PartReport, ...]
-    stands: Whereabouts | None = None
-    changes: tuple[Change, ...] = ()
-    problems: tuple[str, ...] = ()
-
-
-Work: TypeAlias = Generator[Machine[Any], Any, _Done]
-"""What changes a vehicle, for a `Script`."""
 
 
 class Session:
@@ -250,23 +282,7 @@ class Session:
             note=self._note,
         )
         try:
-            names = options.get("system"), options.get("component")
-            wait = options.get("wait", 10.0)
-            discovery = Discovery(
-                *names,
-                patience=wait,
-                settle=SETTLE if self.link.listens else None,
-                boot=self.timeouts.boot,
-                knocks=knocks and parse_connection(connection).kind == "serial",
-            )
-            found = self.run(discovery)
-            if self._signing is not None and not found:
-                self._check_heard(connection)
-            others = discovery.others.values()
-            self.found = choose(found, connection, *names, wait, others)
-            self.link.bind(self.found.address, *self.found.origins)
-            if self._signing is not None or self.link.speaks_old(self.found.address):
-                self._check_alive(connection)
+            self.found = self._find(connection, options, knocks)
         except BaseException:
             self.close()
             raise
@@ -286,29 +302,42 @@ class Session:
         if self.link.log is not None and self.link.log.failure is not None:
             self._note(self.link.log.failure)
 
-    def _check_alive(self, connection: str) -> None:
-        """Raise `LinkError` where nobody answers what no recording can, nor who cannot read it."""
-        number, patience = secrets.randbits(62), self.timeouts.silence
-        if self.run(AskAlive(self.found.address, number, patience)):
-            return
+    def _find(self, connection: str, options: LinkOptions, knocks: bool) -> FoundVehicle:
+        """Return the vehicle that there is, bound to the link and alive."""
+        names = options.get("system"), options.get("component")
+        wait = options.get("wait", 10.0)
+        discovery = Discovery(
+            *names,
+            patience=wait,
+            settle=SETTLE if self.link.listens else None,
+            boot=self.timeouts.boot,
+            knocks=knocks and parse_connection(connection).kind == "serial",
+        )
+        found = self.run(discovery)
+        if self._signing is not None and not found:
+            for verdict, text in _PASSED_OVER.items():
+                if verdict in self.link.heard:
+                    raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
+        one = choose(found, connection, *names, wait, discovery.others.values())
+        self.link.bind(one.address, *one.origins)
+        old = self.link.speaks_old(one.address)
+        if self._signing is None and not old:
+            return one
+        if self.run(ask_alive(one.address, secrets.randbits(62), self.timeouts.silence)):
+            return one
         why = (
             "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "
             "or a recording of it?"
         )
-        if self.link.speaks_old(self.found.address):
-            known = [each for each in families() if each.mavlink_2]
-            ports = "; ".join(f"{each.name}: {each.mavlink_2}" for each in known)
+        if old:
+            ports = "; ".join(
+                f"{each.name}: {each.mavlink_2}" for each in families() if each.mavlink_2
+            )
             why = (
                 "it speaks MAVLink 1 only, and does not answer MAVLink 2: set its port to MAVLink "
                 f"2 ({ports})"
             )
-        raise LinkError(f"{connection}: {self.found}: {why}")
-
-    def _check_heard(self, connection: str) -> None:
-        """Raise `LinkError` where packets come that this key does not vouch for."""
-        for verdict, text in _PASSED_OVER.items():
-            if verdict in self.link.heard:
-                raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
+        raise LinkError(f"{connection}: {one}: {why}")
 
     def not_read(self, part: MissionType, outcome: Outcome) -> str:
         """Return in words why a list was not read."""
@@ -329,84 +358,3 @@ class Session:
     def run(self, machine: Machine[T]) -> T:
         """Run `machine` to its end and return the outcome."""
         return self.link.run(machine, self._observe)
-
-
-def _upload(
-    mission: Mission,
-    peer: Peer,
-    timeouts: Timeouts,
-    parameters: Mapping[str, float],
-    clear_rest: bool,
-) -> Work:
-    """Find out where the vehicle stands, set `parameters`, and upload what `mission` has."""
-    lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
-    told = yield AskFor(peer.address, POSITION, GlobalPositionInt)
-    place = place_in(told[0]) if told else None
-    stands = None if place is None else Whereabouts.of(place, mission)
-    changes, unknown = yield from set_parameters(parameters, peer, timeouts)
-    if problems := _parameter_problems(changes, unknown):
-        return _Done((), stands, changes, problems)
-    given = [(part, items) for part, items in lists.items() if items]
-    reports = yield from upload_parts(given, peer, timeouts)
-    if clear_rest and all(each.verified for each in reports):
-        rest = [part for part, items in lists.items() if not items]
-        cleared = yield from clear_lists(rest, peer, timeouts)
-        reports += tuple(each for each in cleared if each.result not in _ABSENT)
-    return _Done(reports, stands, changes)
-
-
-def _change(
-    connection: str,
-    mission: Mission,
-    allow_armed: bool,
-    job: Callable[[Session], Work],
-    options: LinkOptions,
-) -> UploadReport:
-    """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
-    with Session(connection, options, knocks=True) as session:
-        if session.found.armed and not allow_armed:
-            raise LinkError(
-                f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
-                "disarm it, or allow it (--allow-armed)"
-            )
-        session.peer = replace(session.peer, may_be_armed=allow_armed)
-        work = Script(job(session))
-        try:
-            done = session.run(work)
-        except LinkError as error:
-            raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
-        seconds = time.monotonic() - session.started
-        told = _problems(done.reports, session.peer, mission, session.why_silent())
-        problems = done.problems + told
-    return UploadReport(session.found, done.reports, seconds, problems, done.stands, done.changes)
-
-
-def _parameter_problems(changes: Sequence[Change], unknown: Sequence[Names]) -> tuple[str, ...]:
-    """Return in words which parameters were not set, for which nothing else is changed either."""
-    if unknown:
-        names = ", ".join(" or ".join(each) for each in unknown)
-        return (f"parameters: the vehicle has no {names}: nothing was set or uploaded",)
-    failed = [str(each) for each in changes if not each.made]
-    if failed:
-        return (f"parameters: not set: {', '.join(failed)}: the mission was not uploaded",)
-    return ()
-
-
-def _problems(
-    reports: Sequence[PartReport], peer: Peer, mission: Mission, why_silent: str
-) -> tuple[str, ...]:
-    limit = 0 if peer.vehicle is None else peer.vehicle.dialect.items.sure
-
-    def describe(item: int) -> str:
-        if item < 0:
-            return "the home row"
-        if item >= len(mission.items):
-            return f"item {item}"
-        return f"item {item} (command {mission.items[item].command})"
-
-    failed = [report for report in reports if not report.verified]
-    return tuple(
-        explain(report, peer, limit, describe if report.part is MissionType.MISSION else str)
-        + (why_silent if report.verdict == "silent" and report.item is None else "")
-        for report in failed
-    )

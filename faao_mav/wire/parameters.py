@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from faao_mav.autopilot import VehicleType, vehicle_types
 from faao_mav.autopilot.parameter import Parameter
 from faao_mav.errors import InputError
-from faao_mav.wire.machine import AskingMachine, Machine, Progress
+from faao_mav.wire.machine import Ask, Machine, Progress
 from faao_mav.wire.messages import Envelope, Message, ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.transfer.exchange import Peer
 from faao_mav.wire.transfer.pace import Pace, Questions, Timeouts
@@ -160,44 +160,24 @@ class ReadParameters(Machine[Reading]):
         return [ParamRequestRead(self._peer.address, name, -1) for name in names]
 
 
-class SetParameter(AskingMachine[bool]):
-    """A machine that sets the parameter `name` of the vehicle of `peer`.
+def set_parameter(
+    peer: Peer, name: str, setting: Setting, timeouts: Timeouts | None = None
+) -> Ask[bool]:
+    """Return a machine that sets the parameter `name` of the vehicle of `peer` to `setting`.
 
-    Its outcome is whether the vehicle answered that it has the value of `setting`. It is told the
-    value again until then: setting it twice does no harm.
+    It tells the value until the vehicle answers with it: setting it twice does no harm.
     """
 
-    def __init__(
-        self, peer: Peer, name: str, setting: Setting, timeouts: Timeouts | None = None
-    ) -> None:
-        super().__init__((timeouts or Timeouts()).silence)
-        self._peer, self._name, self._setting = peer, name, setting
-
-    @property
-    def progress(self) -> Progress:
-        """Not counted."""
-        return f"setting {self._name}", 0, 0
-
-    def _question(self) -> Message:
-        number = on_the_wire(self._setting, self._peer.vehicle)
-        return ParamSet(self._peer.address, self._name, number, self._setting.kind)
-
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
+    def answer(envelope: Envelope) -> bool | None:
         message = envelope.message
-        if envelope.sender != self._peer.address or not isinstance(message, ParamValue):
-            return ()
-        if message.param_id == self._name:
-            found = setting_in(message, self._peer.vehicle)
-            self.outcome = same_value(found.value, self._setting.value) or None
-        return ()
+        if envelope.sender != peer.address or not isinstance(message, ParamValue):
+            return None
+        found = setting_in(message, peer.vehicle)
+        return (message.param_id == name and same_value(found.value, setting.value)) or None
 
-    def _give_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        self.outcome = False
-        return ()
-
-    def cancel(self, now: float) -> Sequence[Message]:
-        """Leave it as it is."""
-        return self._give_up(now)
+    number = on_the_wire(setting, peer.vehicle)
+    question = ParamSet(peer.address, name, number, setting.kind)
+    return Ask(f"setting {name}", question, answer, (timeouts or Timeouts()).silence)
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,55 +221,56 @@ def check_settable(parameters: Iterable[str], source: object) -> None:
     Those are what shapes how some vehicle flies a mission; what decides about failsafes, fence,
     return and checks is for its pilot to set.
     """
-    tables = [each.parameters.values() for each in vehicle_types()]
+    tables = (each.parameters.values() for each in vehicle_types())
     own = {name for table in tables for each in table if each.motion for name in each.names}
-    rules = {name for table in tables for each in table if not each.motion for name in each.names}
-    rules |= {name for each in vehicle_types() for f in each.failsafes for name in f.defaults}
     other = [name for name in parameters if name not in own]
-    decide = [name for name in other if name in rules]
-    for names, what in (
-        (decide, "what decides about failsafes, fence, return and checks"),
-        (other, "what no mission is timed for"),
-    ):
-        if names:
-            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-            raise InputError(
-                f"{source}: {', '.join(names[:_SHOWN])}{more}: {what} is not set with a mission; "
-                "set it with the ground station, and give the mission's own file"
-            )
+    if other:
+        raise InputError(
+            f"{source}: {named(other)}: not among what a mission is timed for, which alone is set "
+            "with it; set it with the ground station, and give the mission's own file"
+        )
+
+
+def named(names: Sequence[str]) -> str:
+    """Return the first of some names in a line, and how many more there are."""
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
 
 
 def set_parameters(
     wanted: Mapping[str, float], peer: Peer, timeouts: Timeouts | None = None
-) -> Generator[Machine[Any], Any, tuple[tuple[Change, ...], tuple[Names, ...]]]:
+) -> Generator[Machine[Any], Any, tuple[tuple[Change, ...], str]]:
     """Give the vehicle of `peer` the parameters of its table that `wanted` names, and read them.
 
-    Of the names of one parameter it sets the one that the vehicle has. What the vehicle does not
-    know is returned as the second part, and then nothing is set; the first are the changes. It
-    stops at the first that the vehicle does not take.
+    Of the names of one parameter it sets the one that the vehicle has. Nothing is set if the
+    vehicle does not know one; it stops at the first that the vehicle does not take. Return the
+    changes, and in words what went wrong, "" for nothing.
     """
     table = () if peer.vehicle is None else peer.vehicle.parameters.values()
     groups = {tuple(each.names): each for each in table if each.name_in(wanted) is not None}
-    foreign = tuple((name,) for name in wanted if not any(name in names for names in groups))
-    if foreign:
-        return (), foreign
-    before: Reading = yield ReadParameters(peer, tuple(groups), timeouts)
-    if before.missing:
-        return (), before.missing
+    unknown = [(name,) for name in wanted if not any(name in names for names in groups)]
+    before = Reading({})
+    if not unknown:
+        before = yield ReadParameters(peer, tuple(groups), timeouts)
+        unknown = [*before.missing]
+    if unknown:
+        names = named([" or ".join(each) for each in unknown])
+        return (), f"parameters: the vehicle has no {names}: nothing was set or uploaded"
     asked: dict[str, float] = {}
-    for names, parameter in groups.items():
-        name = next(each for each in names if each in before.settings)
+    for names_of_one, parameter in groups.items():
+        name = next(each for each in names_of_one if each in before.settings)
         number = number_in(parameter, name, wanted)
         if number is not None and not same_value(number, before.settings[name].value):
             asked[name] = number
     for name, number in asked.items():
         kind = before.settings[name].kind
-        taken: bool = yield SetParameter(peer, name, Setting(number, kind), timeouts)
-        if not taken:
+        if not (yield set_parameter(peer, name, Setting(number, kind), timeouts)):
             break
     after: Reading = yield ReadParameters(peer, [(name,) for name in asked], timeouts)
-    found = after.values
-    return tuple(
-        Change(name, before.settings[name].value, number, found.get(name))
+    changes = tuple(
+        Change(name, before.settings[name].value, number, after.values.get(name))
         for name, number in asked.items()
-    ), ()
+    )
+    failed = ", ".join(str(each) for each in changes if not each.made)
+    problem = f"parameters: not set: {failed}: the mission was not uploaded" if failed else ""
+    return changes, problem

@@ -92,10 +92,14 @@ def test_the_missions_own_parameters_are_set_and_no_others(tmp_path: Path, to: s
     with vehicle(to) as mock:
         before = dict(mock.parameters.values)
         for lines, status, told in (
-            ("WPNAV_ACCEL,400\nFENCE_ENABLE,1", 2, "FENCE_ENABLE: what decides about failsafes"),
-            ("WPNAV_ACCEL,400\nFS_THR_ENABLE,0", 2, "FS_THR_ENABLE: what decides"),
-            ("WPNAV_ACCEL,400\nRTL_ALT,3000", 2, "RTL_ALT: what decides"),
-            ("WPNAV_ACCEL,400\nARMING_CHECK,0", 2, "ARMING_CHECK: what no mission is timed for"),
+            (
+                "WPNAV_ACCEL,400\nFENCE_ENABLE,1",
+                2,
+                "FENCE_ENABLE: not among what a mission is timed for",
+            ),
+            ("WPNAV_ACCEL,400\nFS_THR_ENABLE,0", 2, "FS_THR_ENABLE: not among"),
+            ("WPNAV_ACCEL,400\nRTL_ALT,3000", 2, "RTL_ALT: not among"),
+            ("WPNAV_ACCEL,400\nARMING_CHECK,0", 2, "ARMING_CHECK: not among what a mission"),
             ("MPC_ACC_HOR,4", 1, "the vehicle has no MPC_ACC_HOR: nothing was set or uploaded"),
         ):
             file.write_text(lines)

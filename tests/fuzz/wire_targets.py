@@ -19,7 +19,7 @@ from faao_mav.wire.client import UploadReport
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import Discovery, FoundVehicle, choose
 from faao_mav.wire.framing import Framer
-from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.machine import Machine, Script, ask_alive, ask_for
 from faao_mav.wire.messages import (
     CommandLong,
     Heartbeat,
@@ -40,7 +40,6 @@ from faao_mav.wire.protocol import (
     MavCommand,
     MissionType,
 )
-from faao_mav.wire.questions import AskAlive, AskFor
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer.exchange import Peer
 from faao_mav.wire.transfer.session import (
@@ -112,10 +111,10 @@ def _mock(kind: MockKind) -> MockAutopilot:
 def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
     """Return all that a client does once it has found a vehicle."""
     lists = [(part, wire_items(_MISSION, part, peer.vehicle)) for part in MissionType]
-    yield AskAlive(peer.address, 1)
+    yield ask_alive(peer.address, 1)
     yield Script(upload_parts(lists, peer))
     yield Script(download_lists(tuple(MissionType), peer))
-    yield AskFor(peer.address, HOME_POSITION, HomePosition)
+    yield ask_for(peer.address, HOME_POSITION, HomePosition)
     yield Script(clear_lists(tuple(MissionType), peer))
 
 
@@ -157,7 +156,7 @@ def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
         for ending in (".waypoints", ".plan", ".kml"):
             render_files(mission, f"m{ending}")
     elif isinstance(outcome, tuple):
-        problems = tuple(explain(each, peer, 650, str) for each in outcome if not each.verified)
+        problems = tuple(explain(each, peer, _MISSION) for each in outcome if not each.verified)
         report = UploadReport(found, outcome, 1.0, problems)
         lines = upload_text(report).split("\n")
         assert all(line.isprintable() for line in lines), lines

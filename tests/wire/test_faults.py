@@ -344,7 +344,7 @@ def test_a_vehicle_that_another_station_uploads_to_is_given_up_after_one_attempt
     mock = mock_of(behaviour_of("ardupilot", refusals={(0, COUNT): MavResult.DENIED}))
     report, took = upload_to(mock, rows_for("ardupilot", 5))
     assert took < 10
-    told = explain(report, peer_of("ardupilot"), 650, str)
+    told = explain(report, peer_of("ardupilot"))
     assert told == "mission: refused: DENIED (another ground station is uploading)"
 
 

@@ -117,8 +117,8 @@ def test_those_of_a_mission_are_set_and_read_back(kind: str, loss: float) -> Non
     job = Script(set_parameters(wanted, peer_of(kind)))
     ran(job, mock, Faults(loss=loss, seed=5))
     assert job.outcome is not None
-    changes, missing = job.outcome
-    assert missing == ()
+    changes, problem = job.outcome
+    assert problem == ""
     assert all(change.made for change in changes)
     assert [str(change) for change in changes] == {
         "ardupilot": ["WPNAV_SPEED 1000 -> 600", "WPNAV_ACCEL 250 -> 400"],
@@ -135,7 +135,9 @@ def test_nothing_is_set_where_one_is_not_known() -> None:
     before = dict(mock.parameters.values)
     job = Script(set_parameters({"MPC_XY_CRUISE": 6.0, "MPC_JERK_AUTO": 9.0}, peer_of("px4")))
     ran(job, mock)
-    assert job.outcome == ((), (("MPC_JERK_AUTO",),))
+    assert job.outcome is not None
+    assert job.outcome[0] == ()
+    assert "the vehicle has no MPC_JERK_AUTO: nothing was set" in job.outcome[1]
     assert mock.parameters.values == before
 
 
@@ -150,8 +152,11 @@ def test_a_value_that_the_vehicle_does_not_keep_is_told() -> None:
     mock.on = stubborn  # type: ignore[method-assign]
     job = Script(set_parameters({"WPNAV_SPEED": 600.0}, peer_of("ardupilot")))
     ran(job, mock)
-    assert job.outcome == ((Change("WPNAV_SPEED", 1000.0, 600.0, 1000.0),), ())
-    assert str(job.outcome[0][0]) == "WPNAV_SPEED 1000 -> 1000 (asked for 600)"
+    assert job.outcome == (
+        (Change("WPNAV_SPEED", 1000.0, 600.0, 1000.0),),
+        "parameters: not set: WPNAV_SPEED 1000 -> 1000 (asked for 600): "
+        "the mission was not uploaded",
+    )
 
 
 def test_px4_takes_no_other_type_than_it_has() -> None:

@@ -4,10 +4,11 @@ Each is a generator of machines for `Script`, so that it runs on a real link and
 one alike.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, TypeVar
 
+from faao_mav.mission.item import Mission
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType, meaning
@@ -183,46 +184,50 @@ def _failed(part: MissionType, items: int, outcome: Outcome, attempts: int) -> P
     return PartReport(part, items, verdict, (), result, outcome.last_requested, attempts, said)
 
 
-def explain(report: PartReport, peer: Peer, limit: int, describe: Callable[[int], str]) -> str:
-    """Return in words why `report` is not verified.
-
-    `limit` is how many items the vehicle is thought to hold, `describe(item)` names an item.
-    """
-    part = report.part.title
+def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> str:
+    """Return in words why the `report` of a list of `mission` is not verified."""
     home = home_items(peer.vehicle, report.part)
-    text = f"{part}: "
+    rows = report.items + home
     match report.verdict:
         case "different":
-            wrong = [d for d in report.differences if d.kind == "wrong"]
-            shown = "; ".join(str(difference) for difference in wrong[:5])
+            wrong = [str(each) for each in report.differences if each.kind == "wrong"]
             more = f"; and {len(wrong) - 5} more" if len(wrong) > 5 else ""
-            text = f"not what was sent: {shown}{more}"
+            text = f"not what was sent: {'; '.join(wrong[:5])}{more}"
         case "unread":
-            text += "accepted, but it could not be read back; download it to see what is there"
+            text = "accepted, but it could not be read back; download it to see what is there"
         case "armed":
-            text += "the vehicle is armed: nothing more is written (--allow-armed allows it)"
+            text = "the vehicle is armed: nothing more is written (--allow-armed allows it)"
         case "silent":
-            text += "the vehicle stopped answering"
+            text = "the vehicle stopped answering"
             if report.item is not None:
-                text += f" after it asked for item {report.item} of {report.items + home}"
+                text += f" after it asked for item {report.item} of {rows}"
         case "cancelled":
-            text += "the transfer was cancelled"
-            text += "" if report.result is None else " by the vehicle"
+            text = "the transfer was cancelled" + (" by the vehicle" if report.result else "")
         case _:
-            assert report.result is not None
-            text += f"refused: {meaning(report.result, peer.manners.meanings)}"
-            if report.result == MavResult.NO_SPACE:
-                text += f": {report.items + home} rows"
-                text += " with home" if home else ""
-                text += f", and a vehicle like this holds about {limit}"
+            text = f"refused: {meaning(report.result or 0, peer.manners.meanings)}"
+            if report.result == MavResult.NO_SPACE and peer.vehicle is not None:
+                sure = peer.vehicle.dialect.items.sure
+                with_home = " with home" if home else ""
+                text += f": {rows} rows{with_home}, and a vehicle like this holds about {sure}"
             elif report.item is not None:
-                text += f", at {describe(report.item - home)}"
+                text += f", at {_named(report.item - home, report.part, mission)}"
+    if report.verdict != "different":
+        text = f"{report.part.title}: {text}"
     if report.said:
         text += f". The vehicle says: {'; '.join(report.said)}"
     begun = report.item is not None and report.verdict not in ("different", "unread")
     if begun and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
         text += f". {what_is_left(peer)}"
     return text
+
+
+def _named(item: int, part: MissionType, mission: Mission | None) -> str:
+    """Return what people call item `item` of a list, counted from behind the home row."""
+    if item < 0:
+        return "the home row"
+    if part is not MissionType.MISSION or mission is None or item >= len(mission.items):
+        return f"item {item}"
+    return f"item {item} (command {mission.items[item].command})"
 
 
 def what_is_left(peer: Peer) -> str:
