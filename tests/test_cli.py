@@ -110,15 +110,6 @@ def test_algorithm_1_by_option(plan: Path) -> None:
     assert "less than 0.0001" in data["ending"]
 
 
-def test_same_plan_same_bytes(plan: Path, tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        assert run(plan, "--out", tmp_path / f"{name}.txt", "--save", tmp_path / f"{name}.npz",
-                   "--quiet").output == ""  # fmt: skip
-    for suffix in ("txt", "npz"):
-        first, second = (tmp_path / f"{name}.{suffix}" for name in "ab")
-        assert first.read_bytes() == second.read_bytes()
-
-
 def test_saturation_is_said_with_the_power_to_save(plan: Path) -> None:
     plan.write_text(
         edited(FLYABLE, {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40})
@@ -128,31 +119,6 @@ def test_saturation_is_said_with_the_power_to_save(plan: Path) -> None:
     assert "saturated" in result.stdout
     assert "dB less power at both stations would do" in result.stdout
     assert "files        none: give --out" in result.stdout
-
-
-@pytest.mark.parametrize(
-    ("options", "part"),
-    [
-        (["--out", "x.gpx"], "x.gpx: '.gpx'; expected a name that ends in .waypoints or .txt"),
-        (["--out", "x"], "no ending"),
-        (["--out", "absent/x.txt"], "there is no directory absent"),
-        (["--save", "x.yaml"], "--save x.yaml: give a name that ends in .npz"),
-        (["--method", "magic"], "optimizer.method: 'magic' is not accepted; give direct or"),
-        (["--method", "algorithm1"], "radio.fading: ergodic is not for algorithm1"),
-        (["--nonsense"], "No such option"),
-        (["second.yaml"], "unexpected extra argument"),
-    ],
-)
-def test_bad_arguments(
-    plan: Path, options: list[str], part: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    plan.write_text(edited(FLYABLE, {"radio.fading": "ergodic"}))
-    result = run(plan, *options)
-    assert result.exit_code == 2
-    assert part in result.stderr
-    assert result.stdout == ""
-    assert [p.name for p in tmp_path.iterdir()] == ["plan.yaml"]
 
 
 def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
@@ -168,26 +134,13 @@ def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
     assert result.exit_code == 2
     assert "vehicle.parameters: WPNAV_JERK: 0" in result.stderr
     assert not save.exists()
+    out.write_text("precious")
     plan.write_text(edited(FLYABLE, {"mission.max_items": 4}))
     result = run(plan, "--out", out, "--save", save)
     assert result.exit_code == 1
     assert "mission.max_items" in result.stderr
     assert save.exists()
-    assert not out.exists()
-
-
-def test_a_failed_run_keeps_the_old_mission(plan: Path, tmp_path: Path) -> None:
-    out = tmp_path / "m.txt"
-    out.write_text("precious")
-    plan.write_text(edited(FLYABLE, {"mission.max_items": 4}))
-    assert run(plan, "--out", out).exit_code == 1
     assert out.read_text() == "precious"
-
-
-def test_help_and_no_arguments() -> None:
-    assert "--out" in run("--help").stdout
-    assert run("--version").stdout.startswith("faao-mission ")
-    assert run().exit_code == 2
 
 
 def test_as_a_program(plan: Path, tmp_path: Path) -> None:
@@ -223,17 +176,6 @@ def test_output_that_cannot_be_written_or_shown(tmp_path: Path) -> None:
     )
     assert (done.returncode, done.stderr) == (1, "")
     assert "\\xfc.waypoints: 0 items" in done.stdout
-
-
-def test_parameters_that_no_run_has_written_are_kept(plan: Path, tmp_path: Path) -> None:
-    out, beside = tmp_path / "m.waypoints", tmp_path / "m.param"
-    beside.write_text("WPNAV_SPEED,700\n")
-    result = run(plan, "--out", out)
-    assert result.exit_code == 2
-    assert f"{beside}: the mission's parameters are to go there" in result.stderr
-    assert beside.read_text() == "WPNAV_SPEED,700\n"
-    beside.unlink()
-    assert run(plan, "--out", out).exit_code == run(plan, "--out", out).exit_code == 0
 
 
 def test_names_that_are_no_unicode(plan: Path, tmp_path: Path) -> None:
@@ -294,26 +236,6 @@ def test_no_mutation_gives_a_traceback_or_a_partial_file(
         assert result.stdout == ""
         assert result.stderr
         assert [p.name for p in folder.iterdir()] == ["plan.yaml"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--out", "plan.txt"), "--out plan.txt: is the file of PLAN.yaml too"),
-        (("--out", "m.txt", "--precoders", "m.txt"), "--precoders m.txt: is the file of --out too"),
-        (("--out", "m.txt", "--precoders", "m.param"), "is the file of the parameters of --out"),
-    ],
-)
-def test_no_output_replaces_the_plan_or_another_output(
-    arguments: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("plan.txt").write_text(FLYABLE)
-    result = run("plan.txt", *arguments)
-    assert result.exit_code == 2
-    assert said in result.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["plan.txt"]
-    assert Path("plan.txt").read_text() == FLYABLE
 
 
 def test_a_plan_is_piped_in(tmp_path: Path) -> None:

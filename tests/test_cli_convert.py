@@ -70,36 +70,3 @@ def test_what_is_odd_about_a_file_is_told_once(command: str, tmp_path: Path) -> 
         f"faao-mission: {source}: line 4, field index: '3': indexes do not count up; rows are "
         "taken in the file's order, in which targets of DO_JUMP count too"
     ]
-
-
-@pytest.mark.parametrize(
-    ("source", "target", "part"),
-    [
-        ("two_current.waypoints", "m.plan", "field current: '1'; expected 0"),
-        ("plain.waypoints", "m.gpx", "'.gpx'; expected a name that ends in .waypoints"),
-        ("plain.waypoints", "absent/m.plan", "there is no directory"),
-        ("absent.waypoints", "m.plan", "cannot be read: No such file"),
-        ("plain.kml", "m.plan", "KML is written for drawing"),
-    ],
-)
-def test_a_refused_conversion_writes_nothing(
-    source: str, target: str, part: str, tmp_path: Path
-) -> None:
-    result = run(MISSIONS / source, "--out", tmp_path / target)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("faao-mission: ")
-    assert part in result.stderr
-    assert result.stdout == ""
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_the_input_is_not_overwritten(tmp_path: Path) -> None:
-    mission = tmp_path / "m.waypoints"
-    mission.write_text((MISSIONS / "plain.waypoints").read_text())
-    (tmp_path / "link.waypoints").symlink_to(mission)
-    before = mission.read_bytes()
-    for out in (mission, tmp_path / "." / "m.waypoints", tmp_path / "link.waypoints"):
-        result = run(mission, "--out", out)
-        assert result.exit_code == 2
-        assert "is the file of MISSION too; give another name" in result.stderr
-    assert mission.read_bytes() == before

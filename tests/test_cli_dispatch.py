@@ -10,6 +10,7 @@ from conftest import FLYABLE
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
+from faao_mav.plan.autopilots import autopilots, types
 
 HOME = "0\t1\t0\t16\t0\t0\t0\t0\t47.4\t8.5\t400\t1"
 MISSION = f"QGC WPL 110\n{HOME}\n1\t0\t3\t16\t0\t0\t0\t0\t47.5\t8.6\t50\t1\n"
@@ -52,35 +53,11 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     assert run("-h").stdout == shown
     assert "--method" in run("plan.yaml", "--help").stdout
     assert "--method" in run("plan", "-h").stdout
-
-
-@pytest.mark.parametrize(
-    ("word", "part"),
-    [
-        ("convertt", "convertt: no command and no file of this name; did you mean convert?"),
-        ("z" * 300, "zzz: no command and no file of this name; commands: plan, "),
-        ("zzz", "zzz: no command and no file of this name; commands: plan, validate, "),
-    ],
-)
-def test_a_mistyped_command_is_told_from_a_plan(word: str, part: str) -> None:
-    for arguments in ([word], [word, "m.waypoints"], [word, "m.waypoints", "--out", "x.plan"]):
-        result = run(*arguments)
-        assert result.exit_code == 2
-        assert part in result.stderr
-        assert result.stdout == ""
-
-
-@pytest.mark.parametrize("name", ["absent.yaml", "folder/absent"])
-def test_a_missing_plan_is_still_a_missing_plan(name: str) -> None:
-    result = run(name)
-    assert result.exit_code == 2
-    assert result.stderr == f"faao-mission: {name}: cannot be read: No such file or directory\n"
-
-
-def test_no_arguments_show_the_help() -> None:
-    result = run()
-    assert result.exit_code == 2
-    assert "Commands:" in result.stderr
+    assert run("--version").stdout.startswith("faao-mission ")
+    validates = run("validate", "--help").stdout
+    assert all(name in validates for name in (*autopilots(), *types()))
+    bare = run()
+    assert (bare.exit_code, "Commands:" in bare.stderr) == (2, True)
 
 
 def test_help_loads_nothing_that_costs() -> None:

@@ -33,33 +33,6 @@ def mission(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (("fly", "missing.waypoints", "--to", "udpout:127.0.0.1:1"), "missing.waypoints"),
-        (("fly", "{mission}", "--to", "nowhere"), "nowhere"),
-        (
-            ("fly", "{mission}", "--to", "udpout:127.0.0.1:1", "--plan", "a", "--solution", "b"),
-            "--plan and --solution: give one",
-        ),
-        (
-            ("fly", "{mission}", "--to", "a", "--stream", "--plan", "p.yaml"),
-            "--stream: needs --arm",
-        ),
-        (("fly", "{mission}", "--to", "a", "--stream", "--arm"), "--stream: needs --plan"),
-        (("fly", "{mission}", "--to", "a", "--radio", "udp:h:1"), "--radio: needs --plan"),
-        (("debrief", LOG), "--plan or --solution: give the plan that was flown"),
-        (("debrief", "{mission}", "--plan", "a.yaml"), "give a flight log: .bin, .tlog, .ulg"),
-        (("debrief", LOG, "--plan", "a.yaml", "--report", "page.txt"), "--report"),
-    ],
-)
-def test_unusable_arguments(mission: Path, arguments: tuple[object, ...], told: str) -> None:
-    result = run(*(str(each).format(mission=mission) for each in arguments))
-    assert result.exit_code == 2
-    assert told in result.output
-    assert "Traceback" not in result.output
-
-
 def test_a_flight_of_another_plan_is_not_in_the_log(tmp_path: Path) -> None:
     plan = tmp_path / "plan.yaml"
     plan.write_text(FLYABLE)

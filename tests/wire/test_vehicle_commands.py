@@ -13,11 +13,11 @@ from served import running
 from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
 from typer.testing import CliRunner, Result
 
-from faao_mav.cli.autopilot import autopilot, read_home
+from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.download import download
 from faao_mav.cli.progress import transfer_progress
 from faao_mav.cli.upload import upload
-from faao_mav.errors import InputError, LinkError
+from faao_mav.errors import LinkError
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.formats import read_mission, read_mission_file, write_wpl
@@ -139,29 +139,6 @@ def test_no_vehicle_is_status_1(mission_file: Path, port: int) -> None:
     assert result.exit_code == 1
     assert result.stdout == ""
     assert "no heartbeat of an autopilot within 0.3 s" in result.stderr
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["upload", "missing.waypoints", "--to", "udpout:127.0.0.1:9"], "missing.waypoints"),
-        (["upload", "FILE", "--to", "nonsense"], "expected udpin:HOST:PORT"),
-        (["upload", "FILE", "--to", "/dev/ttyNONE,57600"], "there is no such device"),
-        (["upload", "FILE", "--to", "udpout:127.0.0.1:9", "--log", "no/x.tlog"], "no directory"),
-        (["upload", "FILE", "--to", "udpout:127.0.0.1:9", "--signing-key", "no"], "cannot be read"),
-        (["download", "--from", "nonsense", "--out", "FILE"], "expected udpin:HOST:PORT"),
-        (["download", "--from", "udpout:127.0.0.1:9", "--out", "x.doc"], "expected a name"),
-        (["autopilot", "--listen", "nonsense"], "expected udpin:HOST:PORT"),
-        (["autopilot", "--home", "1,2"], "expected LAT,LON,ALT"),
-        (["autopilot", "--home", "91,2,3"], "latitude"),
-        (["autopilot", "--home", "0,0,1e30"], "an altitude of at most 100000 m"),
-    ],
-)
-def test_unusable_input_is_status_2(arguments: list[str], told: str, mission_file: Path) -> None:
-    result = run(*(mission_file if each == "FILE" else each for each in arguments))
-    assert result.exit_code == 2
-    assert told in result.stderr
-    assert "Traceback" not in result.output
 
 
 def test_a_port_in_use_is_an_unusable_argument(mission_file: Path, port: int) -> None:
@@ -293,12 +270,3 @@ def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]
         observe("uploading mission", 3, 9)
         observe("asking for home", 0, 0)
     assert capsys.readouterr().out == ""
-
-
-def test_homes_are_read() -> None:
-    home = read_home("47.397742, 8.545594, 488")
-    assert (home.latitude, home.longitude, home.altitude) == (47.397742, 8.545594, 488.0)
-    for altitude in ("nan", "inf", "-1e30", "100001"):
-        with pytest.raises(InputError, match="expected an altitude of at most 100000 m"):
-            read_home(f"1,2,{altitude}")
-    assert MissionType.RALLY.title == "rally points"
