@@ -9,8 +9,8 @@ import pytest
 from conftest import FLYABLE
 from typer.testing import CliRunner
 
+from faao_mav.autopilot import autopilots, kinds
 from faao_mav.cli.main import app
-from faao_mav.plan.autopilots import autopilots, types
 
 HOME = "0\t1\t0\t16\t0\t0\t0\t0\t47.4\t8.5\t400\t1"
 MISSION = f"QGC WPL 110\n{HOME}\n1\t0\t3\t16\t0\t0\t0\t0\t47.5\t8.6\t50\t1\n"
@@ -55,7 +55,7 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     assert "--method" in run("plan", "-h").stdout
     assert run("--version").stdout.startswith("faao-mission ")
     validates = run("validate", "--help").stdout
-    assert all(name in validates for name in (*autopilots(), *types()))
+    assert all(name in validates for name in (*autopilots(), *kinds()))
     bare = run()
     assert (bare.exit_code, "Commands:" in bare.stderr) == (2, True)
 

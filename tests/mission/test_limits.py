@@ -141,9 +141,9 @@ def test_all_outlines_count_by_kind_and_where_they_cross(tmp_path: Path) -> None
     rings = tuple(Circle((-35.36, 149.172), 50.0 + k / 10, False) for k in range(100))
     assert Fence((Polygon(tuple(star), False),) * 3)
     assert Fence((teeth,), rings[:5])
-    for polygons, circles in (((Polygon(tuple(star), False),) * 81, ()), ((teeth,), rings)):
+    for polygons, around in (((Polygon(tuple(star), False),) * 81, ()), ((teeth,), rings)):
         with pytest.raises(InputError, match="cross at more than 50,000 places"):
-            Fence(polygons, circles)
+            Fence(polygons, around)
     parts = [
         [[list(place[::-1]) for place in comb(249, across=across)]] for across in (True, False)
     ]
