@@ -405,7 +405,7 @@ def test_a_flight_that_circles_for_too_long_is_refused(monkeypatch: pytest.Monke
     ends = [waypoint(10 * (k % 2), 10 * (k % 3)) for k in range(9)]
     assert flown(*ends, vehicle=PX4).t[-1] < 120
     ways = [replace(end, params=(0.0, 0.05, 0.0, 0.0)) for end in ends]
-    with pytest.raises(InputError, match=r"waypoints would take more than 0\.033 h"):
+    with pytest.raises(InputError, match="more than 120 s"):
         flown(*ways, vehicle=PX4)
 
 

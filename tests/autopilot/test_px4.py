@@ -12,7 +12,7 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.flight_path import FlightPath
 from faao_mav.autopilot.px4 import Px4
-from faao_mav.autopilot.px4.simulation import SWITCH_DELAY
+from faao_mav.autopilot.px4.flight_model import SWITCH_DELAY
 from faao_mav.errors import InputError
 
 SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)

@@ -20,7 +20,7 @@ def test_every_flight_is_predicted_in_time_and_place(rows: list[Row]) -> None:
         assert flight.path_error <= 1.5, flight
         if flight.use != "slow":
             assert flight.arrival_rms <= 1.3, flight
-            assert flight.position_rms <= 5.5, flight
+            assert flight.position_rms <= 7, flight
 
 
 def test_flights_of_missions_that_were_made_for_plans(rows: list[Row]) -> None:
@@ -37,8 +37,8 @@ def errors(flight: Row) -> tuple[float, float]:
 @pytest.mark.parametrize("use", ["fitted", "held out"])
 def test_flights_together(rows: list[Row], use: str) -> None:
     arrival, position = together(rows, use)
-    assert arrival <= 0.55
-    assert position <= 2.4
+    assert arrival <= 0.5
+    assert position <= 2.5
 
 
 def test_wind_changes_nothing_within_the_lean_limit(rows: list[Row]) -> None:

@@ -1,14 +1,43 @@
 """A PX4 multicopter as a flight model."""
 
-import math
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.autopilot.flight_path import FlightPath, Flown
+from faao_mav.autopilot.px4.guidance import (
+    GuidedLeg,
+    climb_setpoint,
+    fastest_climb,
+    headed,
+    legs,
+    level_setpoint,
+)
 from faao_mav.autopilot.px4.parameters import Px4Limits
-from faao_mav.autopilot.px4.simulation import SWITCH_DELAY, FlightLog, simulate
+from faao_mav.autopilot.px4.smoothing import Axis, follow
+from faao_mav.autopilot.stepper import STEP, Copter, Samples
+
+POSITION_GAIN = 0.95
+"""MPC_XY_P, 1/s."""
+
+VELOCITY_GAINS = (1.8, 0.4, 0.2)
+"""MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC."""
+
+SWITCH_DELAY = 0.065
+"""How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
+next, s. Fitted to recorded flights."""
+
+_WANDER = 0.17
+"""How far the position estimate wanders along the way, m: an aircraft on its trajectory is taken to
+be half of that behind it. Fitted to recorded flights."""
+
+_NEAREST = 0.05
+"""Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at
+such a waypoint by chance (0.05 m took 53 s), which no prediction foretells."""
+
+_SHORTEST = 2e-3
+"""The shortest step towards an arrival, s. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,9 +46,8 @@ class Px4(Px4Limits):
 
     A simulation of PX4's own chain: guidance with a look at the next waypoint only, smoothing
     within jerk and acceleration, a clock that runs slower while the aircraft lags behind, a
-    cascaded controller and an aircraft with lag and drag; see the modules of this package for the
-    equations. Fitted to recorded flights are the `body`, how its position estimate strays in
-    `step`, `simulation.START_LAG` and `simulation.SWITCH_DELAY`; the rest is PX4's. Limits are SI:
+    cascaded controller and an aircraft with lag and drag. Fitted to recorded flights are the
+    `body`, how the position estimate wanders, and `SWITCH_DELAY`; the rest is PX4's. Limits are SI:
     m, m/s, m/s², m/s³; the defaults are those of PX4 1.16. Wind and the lean limit are left out:
     with the simulator's drag the controller's integral holds against a steady wind from the
     take-off on, and drag takes all of the lean limit at 49 m/s only.
@@ -31,58 +59,120 @@ class Px4(Px4Limits):
         Holds keep their fractions and count from entering the acceptance radius; speeds of 0 or
         less mean `cruise_speed`, radii of 0 `acceptance_radius`. Spline waypoints, which PX4
         refuses, are flown as plain ones. The end is when the last waypoint is done: the aircraft
-        is then within its radius and may still be braking.
+        is then within its radius and may still be braking. Raises `InputError` for a flight of more
+        than `path.longest` s: only flying tells how long it circles round a small radius.
         """
         speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
-        holds = path.holds + path.delays
-        if len(path.points) == 1:
-            return _standing(path.points[0], float(holds[0]), step)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
-        speeds = np.minimum(speeds, self.max_speed)
-        log = simulate(self, path.points, radii, speeds, holds, step, path.longest)
-        return sampled(log, path.points[0, 2], step)
+        holds = (path.holds + path.delays).tolist()
+        route = legs(
+            self,
+            path.points,
+            np.maximum(radii, _NEAREST).tolist(),
+            np.minimum(speeds, self.max_speed).tolist(),
+            holds,
+        )
+        flight = _Flight(self, path)
+        arrivals, departures = [0.0], [holds[0] + SWITCH_DELAY if holds[0] > 0 else 0.0]
+        flight.time = departures[0]
+        flight.keep()
+        for leg in route:
+            flight.arrive(leg)
+            arrivals.append(flight.time)
+            departures.append(flight.time + SWITCH_DELAY + leg.hold)
+            flight.stay(leg, departures[-1])
+        if route:
+            flight.stay(route[-1], departures[-1] + max(step, STEP))
+        return flight.samples.flown(np.array(arrivals), np.array(departures), step)
 
 
-def _standing(point: Real, hold: float, step: float) -> Flown:
-    """Return what becomes of a path of one point (3,): `hold` s there."""
-    end = hold + SWITCH_DELAY if hold > 0 else 0.0
-    t = grid(end, step)
-    position = np.tile(point, (len(t), 1))
-    return Flown(np.zeros(1), np.array([end]), t, position, np.zeros_like(position))
+class _Flight:
+    """A flight along legs, its samples kept.
 
-
-def grid(end: float, step: float) -> Real:
-    """Return the multiples of `step` from 0 to the first that is at least `end`."""
-    return np.arange(math.ceil(end / step - 1e-9) + 1, dtype=float) * step
-
-
-def sampled(log: FlightLog, height: float, step: float) -> Flown:
-    """Return the flight of `log` every `step` seconds up to its end.
-
-    `height` m is that of a path that does not climb.
+    A trajectory, `axes` east, north and up, is followed by the aircraft across the ground; its
+    height is the trajectory's.
     """
-    t = grid(float(log.departures[-1]), step)
-    place, velocity = _between(t, log.time, log.motion)
-    if place.shape[1] == 2:
-        place = np.column_stack([place, np.full(len(t), height)])
-        velocity = np.column_stack([velocity, np.zeros(len(t))])
-    return Flown(log.arrivals, log.departures, t, place, velocity)
 
+    def __init__(self, limits: Px4Limits, path: FlightPath) -> None:
+        self._limits = limits
+        self._axes = [Axis(each) for each in path.points[0].tolist()]
+        self._climbs = float(np.ptp(path.points[:, 2])) > 0
+        self._body = Copter(limits.body, complex(*path.points[0, :2]))
+        self._integral, self._remembered, self._pace = 0j, 0.0, 1.0
+        self.time, self.samples = 0.0, Samples(path.longest)
+        self.keep()
 
-def _between(t: Real, time: Real, motion: Real) -> tuple[Real, Real]:
-    """Return places and velocities (len(t), n): cubic and linear between samples (k, 2, n)."""
-    left = np.clip(np.searchsorted(time, t, side="right") - 1, 0, len(time) - 2)
-    right = left + 1
-    width = (time[right] - time[left])[:, None]
-    s = np.clip((t - time[left])[:, None] / np.maximum(width, 1e-9), 0.0, 1.0)
-    rest = 1 - s
-    (place_left, velocity_left), (place_right, velocity_right) = (
-        motion[side].swapaxes(0, 1) for side in (left, right)
-    )
-    bends = rest * velocity_left - s * velocity_right
-    places = (
-        rest * rest * (1 + 2 * s) * place_left
-        + s * s * (3 - 2 * s) * place_right
-        + s * rest * width * bends
-    )
-    return places, rest * velocity_left + s * velocity_right
+    def keep(self) -> None:
+        """Keep where the aircraft is now."""
+        up, body = self._axes[2], self._body
+        climb = self._pace * up.velocity
+        self.samples.add(self.time, body.place, up.position, body.velocity, climb)
+
+    def arrive(self, leg: GuidedLeg) -> None:
+        """Fly along `leg` until its end is reached."""
+        away, closing = self._away(leg), 0.0
+        while away > 0:
+            step = min(STEP, max(away / closing, _SHORTEST)) if closing > 0 else STEP
+            self._move(leg, step)
+            before, away = away, self._away(leg)
+            closing = (before - away) / step
+
+    def stay(self, leg: GuidedLeg, until: float) -> None:
+        """Go on towards the end of `leg`, where the aircraft is, `until` s."""
+        while (left := until - self.time) > 1e-9:
+            self._move(leg, min(STEP, left))
+
+    def _away(self, leg: GuidedLeg) -> float:
+        """Return how far the aircraft is from being accepted at the end, m; 0 and less is in."""
+        up = abs(self._axes[2].position - leg.height)
+        nearest = max(self._limits.height_radius, _NEAREST)
+        return max(abs(self._body.place - leg.target) - leg.radius, up - nearest)
+
+    def _move(self, leg: GuidedLeg, step: float) -> None:
+        """Fly on for `step` s: what is asked for halfway is pursued all along it."""
+        limits, body, (east, north, up) = self._limits, self._body, self._axes
+        place = complex(east.position, north.position)
+        velocity = complex(east.velocity, north.velocity)
+        midway = place + velocity * (step / 2)
+        aim = headed(limits, leg, body.place)
+        direction, speed, self._remembered = level_setpoint(
+            limits, aim, midway, velocity, self._remembered
+        )
+        climb, most = 0.0, limits.acceleration
+        if self._climbs:
+            height = up.position + up.velocity * (step / 2)
+            speed, climb = climb_setpoint(limits, aim, abs(aim.target - midway), height, speed)
+        wanted = direction * speed
+        lag = place - body.place
+        self._pace = self._paced(lag, velocity)
+        count = 3 if self._climbs else 2
+        self._axes[:count] = follow(
+            self._axes[:count],
+            (wanted.real, wanted.imag, climb)[:count],
+            (most, most, fastest_climb(limits, climb)[1])[:count],
+            limits.jerk,
+            self._pace * step,
+        )
+        later = self._axes
+        push = complex(
+            east.acceleration + later[0].acceleration, north.acceleration + later[1].acceleration
+        )
+        proportional, integral, derivative = VELOCITY_GAINS
+        lack = velocity + POSITION_GAIN * lag - body.velocity
+        asked = push / 2 + proportional * lack + self._integral - derivative * body.acceleration
+        self._integral += integral * lack * step
+        body.move(asked, step)
+        self.time += step
+        self.keep()
+
+    def _paced(self, lag: complex, velocity: complex) -> float:
+        """Return the rate of the trajectory's clock: 1 less the `lag`'s share of MPC_XY_ERR_MAX.
+
+        An aircraft ahead of its trajectory does not hold it up. How far it is behind wavers with
+        the position estimate: what waits is the mean over that.
+        """
+        if not velocity:
+            return 1.0
+        along = (lag * velocity.conjugate()).real / abs(velocity)
+        behind = (along + hypot(along, _WANDER)) / 2
+        return 1 - min(behind / self._limits.error_limit, 1.0)

@@ -63,7 +63,7 @@ class Px4Legs(Px4Limits):
 
     def reachable_speed(self, length: Real) -> Real:
         """Return the speed from which it can stop within legs of `length`, m, in m/s."""
-        speeds = [stopping_speed(self.jerk, self.acceleration, way, 0.0) for way in length.flat]
+        speeds = [stopping_speed(self.jerk, self.acceleration, way) for way in length.flat]
         return np.reshape(np.array(speeds), np.shape(length))
 
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:
@@ -71,7 +71,7 @@ class Px4Legs(Px4Limits):
 
         A wider one costs less speed in a corner, of sqrt(a r tan(alpha / 2)) at the inner angle
         alpha, but cuts it: by r tan(turn / 4) about, `turn` (n,) in radians. Where it turns none is
-        wider than the next: PX4 would first fly back to the waypoint (see `detour`). `stops` (n,)
+        wider than the next: PX4 would first fly back to the waypoint. `stops` (n,)
         marks waypoints at which it waits: those are left from within.
         """
         most_cut = _CUT if self.jerk < _HIGH_JERK else _CUT_WITH_HIGH_JERK
