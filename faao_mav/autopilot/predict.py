@@ -36,6 +36,9 @@ _REPEATS = 20
 _SAME_PLACE = 0.01
 """The distance, m, below which two places are one."""
 
+_CIRCLING = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT)
+"""How a vehicle that does not land on its return goes on."""
+
 _SHORTEST = 1e-3
 """The shortest motion, s, that is worth a sample."""
 
@@ -323,14 +326,13 @@ class _Walk:
             up = np.array([self.place[0], self.place[1], level])
             self._go(index, up, self.vertical.climb(level - float(self.place[2])))
         self.speed = self.model.cruise_speed
-        rise, circling = level - float(self.place[2]), 0.0
-        if not self.vertical.lands_on_return:  # until it is at its height, on the way or over home
-            speed = self.flying.value("climb_speed" if rise > 0 else "descent_speed")
-            circling = abs(rise) / speed
-        self._towards(index, np.array([goal[0], goal[1], level]), circling)
-        if self.vertical.lands_on_return:
-            self._descend(index)
-        self.over = True
+        place = np.array([goal[0], goal[1], level])
+        orbit = self.vehicle.type.orbits(self.vehicle, _CIRCLING)
+        if orbit is not None and not self.vertical.lands_on_return:
+            self._circle(index, place, orbit)
+            return
+        self._towards(index, place, 0.0)
+        self._descend(index)
 
     def _descend(self, index: int) -> None:
         self.fly()

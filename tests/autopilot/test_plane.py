@@ -32,7 +32,7 @@ def test_motion_is_an_aeroplanes(path: FlightPath) -> None:
     heading = np.unwrap(np.arctan2(flown.velocity[:, 1], flown.velocity[:, 0]))
     turning = abs(np.diff(heading)) / 0.1
     assert turning.max(initial=0) <= 2 * 9.81 * math.tan(PLANE.roll_limit) / speed.min()
-    assert (flown.departures >= flown.arrivals + path.holds - 1e-9).all()
+    assert (flown.departures >= flown.arrivals - 1e-9).all()
     assert (flown.arrivals[1:] >= flown.departures[:-1] - 1e-9).all()
     assert flown.t[-1] >= flown.departures[-1] - 1e-9
 
@@ -109,32 +109,6 @@ def test_a_small_radius_is_passed_at_the_perpendicular() -> None:
     assert np.hypot(*(flown.position[-1, :2] - [200, 15])) < 40
 
 
-def test_a_hold_is_a_loiter() -> None:
-    flown = PLANE.fly(path_of([0, 500, 1000 + 300j], 15.0, holds={1: 60.0}))
-    settled = (flown.t > flown.arrivals[1] + 15) & (flown.t < flown.arrivals[1] + 60)
-    radius = np.hypot(flown.position[settled, 0] - 500, flown.position[settled, 1])
-    assert radius.min() > 57
-    assert radius.max() < 75  # sideslip carries it outwards
-    assert 60 <= flown.departures[1] - flown.arrivals[1] < 60 + 2 * math.pi * 60 / 15
-    leaving = int(flown.departures[1] / 0.1) + 1
-    course = flown.velocity[leaving, 0] + 1j * flown.velocity[leaving, 1]
-    onward = 1000 + 300j - complex(*flown.position[leaving, :2])
-    assert abs(np.angle(onward / course)) < math.radians(15)
-
-
-@pytest.mark.parametrize(("radius", "turns"), [(60.0, -1), (-60.0, 1)])
-def test_the_sign_of_the_loiter_radius_is_its_direction(radius: float, turns: int) -> None:
-    flown = ArduPlane(loiter_radius=radius).fly(path_of([0, 300], 15.0, holds={1: 60.0}))
-    heading = np.unwrap(np.arctan2(flown.velocity[:, 1], flown.velocity[:, 0]))
-    assert turns * (heading[-1] - heading[-300]) > 2 * math.pi
-
-
-def test_a_loiter_tighter_than_the_bank_allows_still_ends() -> None:
-    plane = ArduPlane(loiter_radius=15, roll_limit=math.radians(20))
-    flown = plane.fly(path_of([0, 100, 120, 120], 18.0, holds={0: 20.0, 1: 20.0, 2: 5.0}))
-    assert np.isfinite(flown.departures).all()
-
-
 def test_climbs_along_the_leg_as_fast_as_it_may() -> None:
     flown = PLANE.fly(path_of([0, 1000, 1500], 15.0, heights=[50, 100, 100]))
     middle = int(flown.arrivals[1] / 0.1 / 2)
@@ -144,28 +118,27 @@ def test_climbs_along_the_leg_as_fast_as_it_may() -> None:
     assert np.median(climb[climb > 1]) == pytest.approx(5, abs=0.5)
 
 
-def test_one_point() -> None:
-    flown = PLANE.fly(path_of([3 + 4j], holds={0: 20.0}))
-    assert flown.departures[0] == 20
-    assert np.hypot(flown.position[:, 0] - 3, flown.position[:, 1] - 4).max() < 150
+def test_one_point_is_where_it_is() -> None:
+    flown = PLANE.fly(path_of([3 + 4j]))
+    assert flown.departures[0] == 0
+    np.testing.assert_allclose(flown.position, [[3, 4, 30]])
 
 
 def test_limits_come_from_parameters_of_either_generation() -> None:
-    old = {"TRIM_ARSPD_CM": 1800, "LIM_ROLL_CD": 3000, "ARSPD_FBW_MAX": 25, "WP_LOITER_RAD": -80}
-    new = {"AIRSPEED_CRUISE": 18, "ROLL_LIMIT_DEG": 30, "AIRSPEED_MAX": 25, "WP_LOITER_RAD": -80}
+    old = {"TRIM_ARSPD_CM": 1800, "LIM_ROLL_CD": 3000, "ARSPD_FBW_MAX": 25}
+    new = {"AIRSPEED_CRUISE": 18, "ROLL_LIMIT_DEG": 30, "AIRSPEED_MAX": 25}
     for parameters in (old, new):
         plane = ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", parameters))
         assert plane.cruise_speed == 18
         assert plane.roll_limit == pytest.approx(math.radians(30))
         assert plane.max_speed == 25
-        assert plane.loiter_radius == -80
 
 
 @pytest.mark.parametrize(
     ("name", "value", "least"),
     [
         ("TRIM_ARSPD_CM", 50, "100"),
-        ("WP_LOITER_RAD", 0, "1 of either sign"),
+        ("WP_RADIUS", 0, "1"),
         ("LIM_ROLL_CD", 9, "500"),
     ],
 )

@@ -3,17 +3,35 @@
 import cmath
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot.plane.motion import STEP, Motion, Track
 from faao_mav.autopilot.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.autopilot.atmosphere import density_ratio
 from faao_mav.autopilot.flight_path import FlightPath, Flown
-from faao_mav.errors import InputError
+from faao_mav.autopilot.stepper import STEP, Samples
+from faao_mav.power import GRAVITY
+
+_INTERCEPT = math.sin(math.radians(45))
+"""The sine of the steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
+
+_NOTICED = 0.05
+"""How long after it is passed a waypoint counts as reached, s. Fitted to the flights that the
+airframe is, and to eleven of missions that circle: with 0.12 these were flown up to 2 m inside."""
+
+_HEIGHT_TIME = 2.0
+"""The time constant with which a height is approached, s. Chosen."""
+
+_CLIMB_LAG = 1.0
+"""The time constant with which a climb follows what the height asks for, s. Chosen."""
+
+_SLOWEST = 1.0
+"""The least airspeed with which a flight begins, m/s. Chosen: nothing is divided by 0."""
+
+_SHORTEST = 2e-3
+"""The shortest step towards a waypoint, s. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +55,6 @@ class ArduPlaneLegs(ArduPlaneLimits):
         return np.zeros_like(turn)
 
 
-_HEADED = math.radians(10)
-"""A loiter is left when the course is this close to the next waypoint."""
-
-_NOTICED = 0.05
-"""How long after it is passed a waypoint counts as reached, s. Fitted to the flights that the
-airframe is, and to eleven of missions that circle: with 0.12 these were flown up to 2 m inside."""
-
-
 @dataclass(frozen=True, slots=True)
 class ArduPlane(ArduPlaneLimits):
     """How ArduPlane flies plain waypoints in AUTO, in a steady wind.
@@ -54,8 +64,8 @@ class ArduPlane(ArduPlaneLimits):
     total energy control. A waypoint is reached within its acceptance radius or on passing the
     perpendicular through it. Where the waypoint gives no radius it is the least of WP_RADIUS, over
     the density's ratio, and the guidance's look-ahead, for turns below 90 degrees in proportion to
-    the turn. Commanded speeds are equivalent airspeeds. Holds are loiters: ArduPlane has no hold at
-    a plain waypoint. Limits are SI, angles radians; a negative `loiter_radius` turns left.
+    the turn. Commanded speeds are equivalent airspeeds. ArduPlane has no hold at a plain waypoint,
+    so `FlightPath.holds` do not count. Limits are SI, angles radians.
     """
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
@@ -63,156 +73,131 @@ class ArduPlane(ArduPlaneLimits):
 
         An aeroplane is never at rest: it starts over the first point at the path's `entry`
         velocity, as after a take-off, and then flies straight to the second point; without one, at
-        the first leg's speed and course. A hold counts from when the circle is reached, and ends
-        when the course is within 10 degrees of the next waypoint. Speeds of 0 or less mean
-        `cruise_speed`.
+        the first leg's speed and course. Speeds of 0 or less mean `cruise_speed`.
 
         Raises `InputError` for a flight that takes more than `path.longest`, as in a wind that
         carries it away.
         """
-        return _Flight(self, path).flown(step)
+        flight, arrivals = _Flight(self, path), [0.0]
+        for k in range(1, len(path.points)):
+            flight.arrive(k)
+            arrivals.append(flight.time)
+        if len(arrivals) > 1:
+            flight.move(len(arrivals) - 1, step)  # the last sample is up to a step later
+        return flight.samples.flown(np.array(arrivals), np.array(arrivals), step)
 
 
 class _Flight:
-    """One flight under way, its track kept step by step."""
+    """A flight, its samples kept.
+
+    Guidance is Park, Deyst and How's (AIAA 2004-4900) in ArduPilot's form: with damping ζ and
+    period T the aircraft aims at a point L = ζ T V / π ahead on its track, by the lateral
+    acceleration 4 ζ² V² / L sin η, η the angle from its course to that point. It banks for that
+    as in a coordinated turn.
+
+    The airspeed follows with the lag of the `body` a demand, which goes to what is commanded within
+    `speed_rates`. The height is approached within the greatest climb and descent.
+
+    Banks and throttle turn and speed up the flight through the air, which moves steadily at the
+    wind; guidance sees the flight over ground, the sum of both. Angles are positive to the left.
+    """
 
     def __init__(self, plane: ArduPlane, path: FlightPath) -> None:
-        self._plane, self._path = plane, path
+        self._plane, self._path, self._wind = plane, path, complex(*path.wind)
         self._places = [complex(east, north) for east, north in path.points[:, :2].tolist()]
-        self._heights, self._holds = path.points[:, 2].tolist(), path.holds.tolist()
-        ends = zip(pairwise(self._places), pairwise(self._heights), strict=True)
-        self._tracks = [Track(*places, *heights) for places, heights in ends]
+        self._heights: list[float] = path.points[:, 2].tolist()
         altitude = path.elevation + max(self._heights)
         commands = path.speeds.tolist() or [0.0]
         self._speeds = [plane.true_airspeed(command, altitude) for command in commands]
         self._full_radius = plane.waypoint_radius / density_ratio(altitude)
-        height = self._heights[0]
-        wind, climb, demanded = complex(*path.wind), 0.0, None
+        self._sideslip = plane.body.sideslip * density_ratio(altitude)
+        self._place, self._height, self._climb = self._places[0], self._heights[0], 0.0
+        self._bank, self._demand, self._rates = 0.0, self._speeds[0], plane.speed_rates
         if path.entry is None:
-            moves = [b - a for a, b in pairwise(self._places) if b != a]
-            airspeed = _headed(moves[0] if moves else 1j, self._speeds[0], wind)
+            moves = np.diff(np.array(self._places))
+            way = _unit(complex(moves[moves != 0][0])) if moves.any() else 1j
+            across = (self._wind * way.conjugate()).imag / self._demand
+            against = math.asin(min(max(across, -1.0), 1.0))  # as far as it can
+            airspeed = way * cmath.rect(self._demand, -against)
         else:
-            east, north, climb = path.entry.tolist()
-            airspeed, demanded = complex(east, north) - wind, plane.true_airspeed(0.0, altitude)
-        self._motion = Motion(
-            plane, altitude, self._places[0], height, airspeed, climb, speed=demanded, wind=wind
-        )
-        self._track = [self._motion.sample()]
-
-    def flown(self, step: float) -> Flown:
-        count = len(self._places)
-        arrivals, departures = np.zeros(count), np.zeros(count)
-        for k in range(count):
-            if k > 0:
-                arrivals[k] = self._fly_leg(k)
-            departures[k] = arrivals[k]
-            if self._holds[k] > 0:
-                began = self._circle(k)
-                arrivals[k] = began if k > 0 else 0.0
-                departures[k] = self._loiter(k, arrivals[k] + self._holds[k])
-        t = np.arange(math.ceil(departures[-1] / step - 1e-9) + 1, dtype=float) * step
-        while self._motion.time < t[-1]:
-            self._step_on(count - 1, STEP)
-        return self._sampled(arrivals, departures, t)
-
-    def _fly_leg(self, k: int) -> float:
-        """Fly to point `k` and return when it is reached; a loiter's point is only approached."""
-        motion = self._motion
-        if self._holds[k] > 0:
-            return motion.time
-        turn, given = self._turn(k), float(self._path.radii[k])
-        before = self._beyond(k, turn, given)
-        due = motion.time + _NOTICED if before >= 0 else math.inf
-        while motion.time < due - 1e-9:
-            step = min(STEP, due - motion.time)
-            self._step_on(k, step)
-            if due == math.inf and (after := self._beyond(k, turn, given)) >= 0:
-                due = motion.time - step * after / (after - before) + _NOTICED
-            elif due == math.inf:
-                before = after
-        return due
-
-    def _beyond(self, k: int, turn: float, given: float) -> float:
-        """Return how far beyond where point `k` is reached the aircraft is, m, below 0 before it.
-
-        `turn` is the angle there over 90 degrees, at most 1; `given` is the acceptance radius, m,
-        or 0.
-        """
-        motion = self._motion
-        radius = given if given > 0 else min(self._full_radius, motion.look_ahead) * turn
-        passed = self._tracks[k - 1].passed(motion.place)
-        return max(passed, radius - abs(motion.place - self._places[k]))
-
-    def _turn(self, k: int) -> float:
-        if k + 1 == len(self._places):
-            return 1.0
-        here, onward = self._places[k] - self._places[k - 1], self._places[k + 1] - self._places[k]
-        return min(abs(cmath.phase(here.conjugate() * onward)) / (math.pi / 2), 1.0)
-
-    def _circle(self, k: int) -> float:
-        """Fly to the circle about point `k` and return when it is reached."""
-        while not self._step_round(k):
-            pass
-        return self._motion.time
-
-    def _loiter(self, k: int, until: float) -> float:
-        """Circle point `k` until the time is over and the course fits; return when that is.
-
-        No course fits a next waypoint within the circle: the aircraft leaves when the time is over.
-        """
-        while self._motion.time < until - 1e-9:
-            self._step_round(k)
-        if k + 1 == len(self._places):
-            return until
-        onward = self._places[k + 1]
-        if abs(onward - self._places[k]) > abs(self._motion.place - self._places[k]):
-            full_turn = self._motion.heading - math.copysign(2 * math.pi, self._plane.loiter_radius)
-            while abs(self._motion.bearing_to(onward)) > _HEADED and (
-                (self._motion.heading - full_turn) * self._plane.loiter_radius > 0
-            ):
-                self._step_round(k)
-        return max(until, self._motion.time)
-
-    def _step_on(self, k: int, step: float) -> None:
-        """Go on by `step` seconds along the leg that ends at point `k`."""
-        if k == 0 or self._holds[k] > 0:
-            self._step_round(k)
-            return
-        if k == 1 and self._path.entry is not None:
-            self._motion.towards(self._places[1], self._heights[1], self._speeds[0], step)
-        else:
-            self._motion.along(self._tracks[k - 1], self._speeds[k - 1], step)
+            east, north, self._climb = path.entry.tolist()
+            airspeed = complex(east, north) - self._wind
+            self._demand = plane.true_airspeed(0.0, altitude)
+        self._airspeed, self._heading = max(abs(airspeed), _SLOWEST), cmath.phase(airspeed)
+        self.time, self.samples = 0.0, Samples(path.longest)
         self._keep()
 
-    def _step_round(self, k: int) -> bool:
-        """Go on by one step round point `k` and return whether the circle is being flown."""
-        speed = self._speeds[max(k - 1, 0)]
-        circling = self._motion.round(self._places[k], self._heights[k], speed, STEP)
-        self._keep()
-        return circling
+    def arrive(self, k: int) -> None:
+        """Fly along the leg to point `k` until that is reached."""
+        before = self._places[k] - self._places[k - 1]
+        turn = 1.0  # over 90 degrees
+        if k + 1 < len(self._places):
+            onward = self._places[k + 1] - self._places[k]
+            turn = min(abs(cmath.phase(before.conjugate() * onward)) / (math.pi / 2), 1.0)
+        while (away := self._away(k, _unit(before), turn)) > 0:
+            self.move(k, min(STEP, max(away / abs(self._velocity), _SHORTEST)))
+        self.move(k, _NOTICED)
+
+    def _away(self, k: int, way: complex, turn: float) -> float:
+        """Return how far the aircraft is from where point `k` counts as reached, m."""
+        radius, offset = float(self._path.radii[k]), self._places[k] - self._place
+        if radius <= 0:
+            look_ahead = self._plane.look_ahead * abs(self._velocity)
+            radius = min(self._full_radius, look_ahead) * turn
+        return min((offset * way.conjugate()).real, abs(offset) - radius)
+
+    @property
+    def _velocity(self) -> complex:
+        """The velocity over ground, m/s."""
+        return cmath.rect(self._airspeed, self._heading) + self._wind
 
     def _keep(self) -> None:
-        """Keep where the aircraft is now."""
-        if self._motion.time > self._path.longest:
-            raise InputError(
-                f"the flight would take more than {self._motion.time:.0f} s, perhaps for the wind"
-            )
-        self._track.append(self._motion.sample())
+        self.samples.add(self.time, self._place, self._height, self._velocity, self._climb)
 
-    def _sampled(self, arrivals: Real, departures: Real, t: Real) -> Flown:
-        track = np.array(self._track)
-        columns = [np.interp(t, track[:, 0], column) for column in track[:, 1:].T]
-        return Flown(
-            arrivals, departures, t, np.stack(columns[:3], axis=-1), np.stack(columns[3:], axis=-1)
-        )
+    def _aim(self, k: int) -> tuple[complex, float]:
+        """Return the direction to aim in on the leg to point `k`, and the height to be at, m."""
+        start, end = self._places[k - 1], self._places[k]
+        if start == end or (k == 1 and self._path.entry is not None):
+            return end - self._place, self._heights[k]
+        way = _unit(end - start)
+        offset = (self._place - start) * way.conjugate()
+        sine = offset.imag / (self._plane.look_ahead * abs(self._velocity))
+        sine = min(max(sine, -_INTERCEPT), _INTERCEPT)
+        done = min(max(offset.real / abs(end - start), 0.0), 1.0)
+        height = self._heights[k - 1] + done * (self._heights[k] - self._heights[k - 1])
+        return way * cmath.rect(1.0, -math.asin(sine)), height
+
+    def move(self, k: int, step: float) -> None:
+        """Go on by `step` seconds on the leg to point `k`."""
+        plane, body, velocity = self._plane, self._plane.body, self._velocity
+        aim, height = self._aim(k)
+        self._speed_up(self._speeds[k - 1], step)
+        climb = (height - self._height) / _HEIGHT_TIME
+        climb = min(max(climb, -plane.descent_speed), plane.climb_speed)
+        self._climb += (climb - self._climb) * -math.expm1(-step / _CLIMB_LAG)
+        self._height += self._climb * step
+        turn = cmath.phase(aim * velocity.conjugate())
+        turn = min(max(turn, -math.pi / 2), math.pi / 2)
+        gain = 4 * plane.damping**2 / plane.look_ahead
+        bank = math.atan2(gain * abs(velocity) * math.sin(turn), GRAVITY)
+        bank = min(max(bank, -plane.roll_limit), plane.roll_limit)
+        self._bank += (bank - self._bank) * -math.expm1(-step / plane.roll_time)
+        slipping = self._sideslip * min(self._airspeed / body.sideslip_airspeed, 1.0)
+        turned = (1 - slipping) * GRAVITY * math.tan(self._bank) / self._airspeed * step
+        through_air = cmath.rect(self._airspeed, self._heading + turned / 2)
+        self._place += (through_air + self._wind) * step
+        self._heading += turned
+        self.time += step
+        self._keep()
+
+    def _speed_up(self, speed: float, step: float) -> None:
+        """Let the airspeed go towards a commanded `speed`, m/s, for `step` seconds."""
+        rise, fall = self._rates.power / self._airspeed * step, self._rates.fall * step
+        self._demand += min(max(speed - self._demand, -fall), rise)
+        heeded = -math.expm1(-step / self._plane.body.airspeed_lag)
+        self._airspeed += (self._demand - self._airspeed) * heeded
 
 
-def _headed(course: complex, speed: float, wind: complex) -> complex:
-    """Return the velocity through the air that leads along `course` at an airspeed of `speed`, m/s.
-
-    In a `wind` across that is stronger, the aircraft heads against it.
-    """
-    along = course / abs(course)
-    across = (wind * along.conjugate()).imag
-    against = math.asin(min(max(across / speed, -1.0), 1.0))
-    return along * cmath.rect(speed, -against)
+def _unit(way: complex) -> complex:
+    """Return the direction of `way`, 0 for none."""
+    return way / abs(way) if way else 0j

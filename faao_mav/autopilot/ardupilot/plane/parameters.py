@@ -81,7 +81,6 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
     roll_limit: float = TABLE["roll_limit"].default
     roll_time: float = TABLE["roll_time"].default
     waypoint_radius: float = TABLE["waypoint_radius"].default
-    loiter_radius: float = TABLE["loiter_radius"].default
     climb_speed: float = TABLE["climb_speed"].default
     descent_speed: float = TABLE["descent_speed"].default
     period: float = TABLE["period"].default
