@@ -77,7 +77,8 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
     Only what flies counts, by its MAV_TYPE: not what else is on board or on the link. Of a system
     that is component 1, for which it waits as long as it has `patience`, and any other only
-    without it. `system` and `component` leave out all others.
+    without it. `system` and `component` leave out all others. `others` has what else was heard, in
+    words.
 
     It ends `settle` seconds after the first, in which others are heard, once all are ready (at once
     where a `system` is given, unless told otherwise); after `patience` seconds without any; and
@@ -85,8 +86,7 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
 
     Until there is one it asks whoever is there for the time (TIMESYNC): a vehicle that answers
     where it was spoken to has to be spoken to. With `knocks` it sends a heartbeat too where nothing
-    at all is heard: PX4 1.13 and 1.14 say nothing on USB before they hear one. `others` has what
-    else was heard, in words.
+    at all is heard: PX4 1.13 and 1.14 say nothing on USB before they hear one.
     """
 
     progress = ("listening for a vehicle", 0, 0)
@@ -116,6 +116,11 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         self._begun = now
         return self._greet(now)
 
+    def _greet(self, now: float) -> Sequence[Message]:
+        self._due = min(now + _GREET, self._begun + self._patience)
+        knocks = self._knocks and now >= self._begun + _KNOCK
+        return [Timesync(0, int(now * 1e9)), *([_KNOCKING] if knocks else [])]
+
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         message, sender = envelope.message, envelope.sender
         self._knocks = False
@@ -135,33 +140,22 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         return self.tick(now)
 
     def _time_out(self, now: float) -> Sequence[Message]:
-        waits = not self._found and now < self._begun + self._patience
-        return self._greet(now) if waits else self._look(now)
-
-    def _greet(self, now: float) -> Sequence[Message]:
-        self._due = min(now + _GREET, self._begun + self._patience)
-        knocks = self._knocks and now >= self._begun + _KNOCK
-        return [Timesync(0, int(now * 1e9)), *([_KNOCKING] if knocks else [])]
-
-    def _look(self, now: float) -> Sequence[Message]:
-        """End, if all that is waited for is there; else look again soon."""
-        found = self._main()
-        waited = now >= self._begun + self._patience or self._component is not None
-        complete = waited or all(map(_is_main, found))
+        """End, if all that is waited for is there; else ask, or look again soon."""
+        waited = now >= self._begun + self._patience
+        if not (self._found or waited):
+            return self._greet(now)
+        mains = {address.system for address in self._found if _is_main(address)}
+        found = tuple(
+            replace(self._found[address], origins=tuple(self._origins[address]))
+            for address in sorted(self._found)
+            if _is_main(address) or address.system not in mains
+        )
+        complete = waited or self._component or all(_is_main(each.address) for each in found)
         ready = all(each.ready for each in found) or now >= self._begun + self._boot
         if now >= self._settled and complete and ready:
             self.outcome = found
         self._due = now + _LOOK_AGAIN
         return ()
-
-    def _main(self) -> tuple[FoundVehicle, ...]:
-        """Return those that were found, of each system component 1 alone where it has one."""
-        found = [
-            replace(self._found[address], origins=tuple(self._origins[address]))
-            for address in sorted(self._found)
-        ]
-        systems = {each.address.system for each in found if _is_main(each)}
-        return tuple(each for each in found if _is_main(each) or each.address.system not in systems)
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Stop listening."""
@@ -169,8 +163,8 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
         return ()
 
 
-def _is_main(found: FoundVehicle) -> bool:
-    return found.address.component == AUTOPILOT_COMPONENT
+def _is_main(address: Address) -> bool:
+    return address.component == AUTOPILOT_COMPONENT
 
 
 def choose(
@@ -188,36 +182,29 @@ def choose(
     if not found:
         who = "an autopilot" if system is None else f"the autopilot of system {system}"
         who += "" if component is None else f" with component number {component}"
-        heard = tuple(others)
-        raise LinkError(
-            f"{connection}: no heartbeat of {who} within {patience:g} s; "
-            + (
-                f"there is only {_listed(heard)}"
-                if heard
-                else "is it switched on and connected there, and no other program in between?"
-            )
+        heard = _listed(tuple(others))
+        hint = "is it switched on and connected there, and no other program in between?"
+        problem = f"no heartbeat of {who} within {patience:g} s; " + (
+            f"there is only {heard}" if heard else hint
         )
-    for each in found:
-        if len(each.origins) > 1:
-            raise LinkError(
-                f"{connection}: {each.address} is heard from "
-                f"{' and '.join(each.origins[:_SHOWN])}: more than one vehicle has this number, "
-                "and which is meant is not known. Give each its own, or connect to one alone"
-            )
-    if len(found) > 1:
-        one_system = len({each.address.system for each in found}) == 1
-        raise LinkError(
-            f"{connection}: several autopilots: {_listed(tuple(map(str, found)))}. Choose one with "
-            f"--{'component' if one_system else 'system'}"
+    elif twins := [each for each in found if len(each.origins) > 1]:
+        problem = (
+            f"{twins[0].address} is heard from {' and '.join(twins[0].origins[:_SHOWN])}: more than "
+            "one vehicle has this number, and which is meant is not known. Give each its own, or "
+            "connect to one alone"
         )
-    if not found[0].ready:
-        raise LinkError(f"{connection}: {found[0]} does not finish booting")
-    if found[0].family is not None and found[0].vehicle is None:
-        raise LinkError(
-            f"{connection}: {found[0]}: this type of vehicle is not supported; "
-            f"{' and '.join(kinds())} are (VTOLs are neither)"
-        )
-    return found[0]
+    elif len(found) > 1:
+        option = "component" if len({each.address.system for each in found}) == 1 else "system"
+        names = _listed(tuple(map(str, found)))
+        problem = f"several autopilots: {names}. Choose one with --{option}"
+    elif not found[0].ready:
+        problem = f"{found[0]} does not finish booting"
+    elif found[0].family is not None and found[0].vehicle is None:
+        supported = " and ".join(kinds())
+        problem = f"{found[0]}: this type of vehicle is not supported; {supported} are (VTOLs are neither)"
+    else:
+        return found[0]
+    raise LinkError(f"{connection}: {problem}")
 
 
 def _listed(names: Sequence[str]) -> str:
