@@ -29,9 +29,9 @@ from faao_mav.fly.seen import Flight
 from faao_mav.fly.watch import Watch
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.prediction import price_flight
+from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.wire import link
 from faao_mav.wire.client import upload
-from faao_mav.wire.faults import Faults, FaultyTransport
 from faao_mav.wire.transport import Transport, open_transport
 
 SPEEDUP = 2

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "wire"))
 from stations import mock_of, rows_for, there_and_back, upload_to
 
 from faao_mav.sim import MockKind
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 
 KINDS: tuple[MockKind, ...] = ("px4", "ardupilot")
 

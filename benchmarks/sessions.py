@@ -41,8 +41,8 @@ from faao_mav.autopilot import VehicleType
 from faao_mav.errors import LinkError
 from faao_mav.mission import Mission
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.wire import link, upload
-from faao_mav.wire.faults import Faults, FaultyTransport
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType

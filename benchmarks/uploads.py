@@ -27,8 +27,8 @@ from stations import HOME, a_mission, places
 
 from faao_mav.errors import LinkError
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim.faults import Faults
 from faao_mav.wire import upload
-from faao_mav.wire.faults import Faults
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.wire_items import wire_items
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from faao_mav.sim import MockAutopilot
+from faao_mav.sim.faults import Faults
 from faao_mav.sim.serve import serve
-from faao_mav.wire.faults import Faults
 from faao_mav.wire.transport import Transport, open_transport
 
 

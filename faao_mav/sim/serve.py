@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable
 
+from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.sim.mock_autopilot import MockAutopilot
-from faao_mav.wire.faults import Faults, FaultyTransport
 from faao_mav.wire.link import WireLink
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transport import Transport, open_transport

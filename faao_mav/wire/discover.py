@@ -188,10 +188,10 @@ def choose(
             f"there is only {heard}" if heard else hint
         )
     elif twins := [each for each in found if len(each.origins) > 1]:
+        origins = " and ".join(twins[0].origins[:_SHOWN])
         problem = (
-            f"{twins[0].address} is heard from {' and '.join(twins[0].origins[:_SHOWN])}: more than "
-            "one vehicle has this number, and which is meant is not known. Give each its own, or "
-            "connect to one alone"
+            f"{twins[0].address} is heard from {origins}: more than one vehicle has this number, "
+            "and which is meant is not known. Give each its own, or connect to one alone"
         )
     elif len(found) > 1:
         option = "component" if len({each.address.system for each in found}) == 1 else "system"
@@ -200,8 +200,8 @@ def choose(
     elif not found[0].ready:
         problem = f"{found[0]} does not finish booting"
     elif found[0].family is not None and found[0].vehicle is None:
-        supported = " and ".join(kinds())
-        problem = f"{found[0]}: this type of vehicle is not supported; {supported} are (VTOLs are neither)"
+        known = f"{' and '.join(kinds())} are (VTOLs are neither)"
+        problem = f"{found[0]}: this type of vehicle is not supported; {known}"
     else:
         return found[0]
     raise LinkError(f"{connection}: {problem}")

@@ -33,7 +33,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 
 if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page

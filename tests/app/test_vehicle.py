@@ -23,7 +23,7 @@ from faao_mav.fly.seen import Flight
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.workflow import Result
 
 HOME = Home(-35.363262, 149.165237, 584.0)

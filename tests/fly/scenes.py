@@ -15,7 +15,7 @@ from faao_mav.fly.watch import Watch
 from faao_mav.mission import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import (
     CommandLong,

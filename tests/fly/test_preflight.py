@@ -20,8 +20,8 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.sim import MockAutopilot
+from faao_mav.sim.faults import Faults
 from faao_mav.validate import Finding, Level
-from faao_mav.wire.faults import Faults
 from faao_mav.wire.messages import CommandLong, Envelope, ParamSet
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
 from faao_mav.wire.transfer.exchange import Outcome

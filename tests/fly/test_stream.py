@@ -26,7 +26,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.messages import CommandLong, Envelope, SetPositionTargetLocalNed, Timesync
 from faao_mav.wire.parameters import Reading
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand

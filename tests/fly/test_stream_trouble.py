@@ -19,7 +19,7 @@ from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.fly.gate import LEVEL, NEAR
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.optimizer.solution import Solution
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.messages import (
     CurrentMode,
     Envelope,

@@ -12,7 +12,7 @@ from stations import FOREIGN, HOME, VEHICLE, a_mission, rows_for
 
 from faao_mav.mission import Mission
 from faao_mav.sim import MockAutopilot
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.messages import (
     CommandAck,
     CommandLong,

@@ -20,7 +20,7 @@ from faao_mav.fly.telemetry import Kind
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home
 from faao_mav.optimizer.solution import Solution
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import (
     CommandLong,

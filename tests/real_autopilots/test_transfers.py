@@ -16,8 +16,8 @@ from stations import FENCE, RALLY, a_mission, signing_key
 
 from faao_mav.errors import LinkError
 from faao_mav.mission import MissionItem
+from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.wire import clear, download, link, upload
-from faao_mav.wire.faults import Faults, FaultyTransport
 from faao_mav.wire.transport import open_transport
 
 MISSION = a_mission(6, fence=FENCE, rally=RALLY)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
+from faao_mav.sim.faults import Channel, Faults
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.faults import Channel, Faults
 from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.protocol import Address
 

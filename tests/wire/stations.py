@@ -11,7 +11,7 @@ from faao_mav.autopilot import VehicleType, vehicle_type
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.machine import Machine, Script
 from faao_mav.wire.messages import (
     Envelope,

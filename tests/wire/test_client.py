@@ -19,8 +19,8 @@ from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim.faults import Faults
 from faao_mav.wire import Timeouts, clear, download, upload
-from faao_mav.wire.faults import Faults
 from faao_mav.wire.link import WireLink
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import Address, MavResult, MissionType

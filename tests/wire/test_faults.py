@@ -27,9 +27,9 @@ from stations import (
 from faao_mav.autopilot import PX4_COPTER, register, unregister
 from faao_mav.errors import LinkError
 from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim.faults import Channel, Faults, Lost
 from faao_mav.sim.lists import StoredLists
 from faao_mav.wire.discover import Discovery, choose
-from faao_mav.wire.faults import Channel, Faults, Lost
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,

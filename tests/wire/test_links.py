@@ -4,7 +4,7 @@ import pytest
 from stations import mock_of, rows_for, there_and_back, upload_to
 
 from faao_mav.sim import MockKind, behaviour_of
-from faao_mav.wire.faults import Faults, Lost
+from faao_mav.sim.faults import Faults, Lost
 from faao_mav.wire.protocol import MavResult, MissionType
 
 MISSION = MissionType.MISSION

@@ -12,7 +12,7 @@ from stations import VEHICLE, Desk, mock_of, peer_of
 
 from faao_mav.autopilot import ARDUCOPTER, PX4_COPTER
 from faao_mav.sim import MockAutopilot
-from faao_mav.wire.faults import Faults
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.machine import Machine, Script
 from faao_mav.wire.messages import Envelope, ParamSet, ParamValue
 from faao_mav.wire.parameters import (

@@ -5,13 +5,13 @@ import time
 from dataclasses import dataclass, field
 from itertools import count
 from random import Random
+from typing import NamedTuple
 
 from faao_mav.wire.framing import message_id
 from faao_mav.wire.transport import Origin, Transport
 
 
-@dataclass(frozen=True, slots=True)
-class Lost:
+class Lost(NamedTuple):
     """One particular packet that does not arrive: the `number`-th (from 1) with `message_id`."""
 
     message_id: int
@@ -47,37 +47,30 @@ class Channel:
     faults: Faults
     name: str
     _random: Random = field(init=False)
-    _seen: dict[int, int] = field(init=False)
-    _free: float = field(init=False)
+    _seen: dict[int, int] = field(init=False, default_factory=dict)
+    _free: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         self._random = Random(f"{self.faults.seed} {self.name}")
-        self._seen = {}
-        self._free = 0.0
 
     def carry(self, packet: bytes, now: float) -> list[tuple[float, bytes]]:
         """Return when `packet`, sent at `now`, arrives, and as what; not at all, once or twice."""
         faults, random = self.faults, self._random
         if self._is_lost(packet) or any(begin <= now < end for begin, end in faults.outages):
             return []
-        sent = self._sent(packet, now)
-        copies = 1 + (random.random() < faults.duplication)
+        if faults.rate:
+            now = self._free = max(self._free, now) + len(packet) / faults.rate
         arrivals = []
-        for _ in range(copies):
+        for _ in range(1 + (random.random() < faults.duplication)):
             if random.random() < faults.loss:
                 continue
             late = random.random() < faults.reordering
-            arrival = sent + faults.latency + (random.uniform(0.0, faults.delay) if late else 0.0)
-            damaged = random.random() < faults.corruption
-            arrivals.append((arrival, self._damaged(packet) if damaged else packet))
+            arrival = now + faults.latency + (random.uniform(0.0, faults.delay) if late else 0.0)
+            content = bytearray(packet)
+            if random.random() < faults.corruption:
+                content[random.randrange(len(content))] ^= 1 << random.randrange(8)
+            arrivals.append((arrival, bytes(content)))
         return arrivals
-
-    def _sent(self, packet: bytes, now: float) -> float:
-        """Return when the last byte of `packet` has gone into the line."""
-        if not self.faults.rate:
-            return now
-        self._free = max(self._free, now) + len(packet) / self.faults.rate
-        return self._free
 
     def _is_lost(self, packet: bytes) -> bool:
         if not self.faults.lost:
@@ -86,63 +79,55 @@ class Channel:
         self._seen[number] = self._seen.get(number, 0) + 1
         return Lost(number, self._seen[number]) in self.faults.lost
 
-    def _damaged(self, packet: bytes) -> bytes:
-        content = bytearray(packet)
-        place = self._random.randrange(len(content))
-        content[place] ^= 1 << self._random.randrange(8)
-        return bytes(content)
-
 
 class FaultyTransport:
     """A transport that loses, repeats, delays and damages what passes it, both ways."""
 
     def __init__(self, inner: Transport, faults: Faults) -> None:
-        self._inner = inner
-        self.listens = inner.listens
-        self._channels = {way: Channel(faults, way) for way in ("in", "out")}
-        self._queues: dict[str, list[tuple[float, int, bytes, Origin | None]]] = {
-            "in": [],
-            "out": [],
-        }
-        self._order = count()
-        self._started = time.monotonic()
+        self._inner, self.listens = inner, inner.listens
+        self._in, self._out = Channel(faults, "in"), Channel(faults, "out")
+        self._order, self._started = count(), time.monotonic()
+        self._under_way: list[tuple[float, int, bool, bytes, Origin | None]] = []
+        """When it arrives, its number, whether it goes out, the packet, and where from or to."""
+        self._arrived: list[tuple[bytes, Origin]] = []
 
     def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         """Return what has arrived by now, or within `timeout` seconds."""
-        self._flush()
-        end = self._now() + timeout
-        waiting = [queue[0][0] for queue in self._queues.values() if queue]
-        for data, origin in self._inner.read(min([end, *waiting]) - self._now()):
-            self._push("in", data, origin)
-        self._flush()
-        return [(data, origin or "") for data, origin in self._due("in")]
+        end = self._pass() + timeout
+        end = min([end, *(each[0] for each in self._under_way[:1])])
+        for data, origin in self._inner.read(0.0 if self._arrived else end - self._now()):
+            self._push(self._in, data, origin)
+        self._pass()
+        arrived, self._arrived = self._arrived, []
+        return arrived
 
     def write(self, data: bytes, to: Origin | None = None) -> None:
         """Send `data` as the faults allow: late, damaged, twice or not at all."""
-        self._push("out", data, to)
-        self._flush()
+        self._push(self._out, data, to)
+        self._pass()
 
     def close(self) -> None:
         """Close the transport beneath; what was sent is under way, and arrives early."""
         try:
-            for _, _, data, to in sorted(self._queues["out"]):
-                self._inner.write(data, to)
+            self._pass(float("inf"))
         finally:
             self._inner.close()
 
     def _now(self) -> float:
         return time.monotonic() - self._started
 
-    def _push(self, way: str, data: bytes, where: Origin | None) -> None:
-        for when, arriving in self._channels[way].carry(data, self._now()):
-            heapq.heappush(self._queues[way], (when, next(self._order), arriving, where))
+    def _push(self, channel: Channel, data: bytes, where: Origin | None) -> None:
+        for when, arriving in channel.carry(data, self._now()):
+            item = (when, next(self._order), channel is self._out, arriving, where)
+            heapq.heappush(self._under_way, item)
 
-    def _due(self, way: str) -> list[tuple[bytes, Origin | None]]:
-        queue, now, due = self._queues[way], self._now(), []
-        while queue and queue[0][0] <= now:
-            due.append(heapq.heappop(queue)[2:])
-        return due
-
-    def _flush(self) -> None:
-        for data, to in self._due("out"):
-            self._inner.write(data, to)
+    def _pass(self, now: float | None = None) -> float:
+        """Hand over what arrives by `now`, and return when that is."""
+        now = self._now() if now is None else now
+        while self._under_way and self._under_way[0][0] <= now:
+            _, _, goes_out, data, where = heapq.heappop(self._under_way)
+            if goes_out:
+                self._inner.write(data, where)
+            else:
+                self._arrived.append((data, where or ""))
+        return now
