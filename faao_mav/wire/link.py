@@ -158,7 +158,12 @@ class WireLink:
         what was under way.
         """
         try:
-            return self._run(machine, observe)
+            self.begin(machine)
+            while (outcome := machine.outcome) is None:
+                self.step(machine, time.monotonic() + _BEAT)
+                if observe is not None:
+                    observe(*machine.progress)
+            return outcome
         except (KeyboardInterrupt, LinkError) as end:
             what, done, total = machine.progress
             text = f"while {what}" + (f" at item {done} of {total}" if total else "")
@@ -167,14 +172,6 @@ class WireLink:
             self._send(machine.cancel(time.monotonic()))
             raise LinkError(f"interrupted {text}: cancelled") from None
 
-    def _run(self, machine: Machine[T], observe: Observe | None) -> T:
-        self.begin(machine)
-        while (outcome := machine.outcome) is None:
-            self.step(machine, time.monotonic() + _BEAT)
-            if observe is not None:
-                observe(*machine.progress)
-        return outcome
-
     def watch(self, machine: Machine[T], observe: Callable[[], object], *, beats: bool) -> T:
         """Run `machine` to its end and return the outcome; `observe` is called after every step.
 
@@ -182,20 +179,21 @@ class WireLink:
         keyboard the machine is told to cancel, and is run on until it ends; likewise `hang_up`
         when the terminal has gone, or `observe` cannot tell anybody anything any more.
         """
-        next_beat = time.monotonic()
+        heard, next_beat = True, time.monotonic()
         self.begin(machine)
         while (outcome := machine.outcome) is None:
             try:
-                if beats and time.monotonic() >= next_beat:
+                if time.monotonic() >= next_beat:
                     next_beat = time.monotonic() + _BEAT
-                    self._send([self._being_there])
-                self.step(machine, time.monotonic() + _BEAT if not beats else next_beat)
+                    self._send([self._being_there] if beats else [])
+                self.step(machine, next_beat)
                 try:
-                    observe()
+                    if heard:
+                        observe()
                 except OSError:
                     raise HangUp from None
             except HangUp:
-                observe = _tell_nobody
+                heard = False
                 self._send(machine.hang_up(time.monotonic()))
             except KeyboardInterrupt:
                 self._send(machine.cancel(time.monotonic()))
@@ -228,15 +226,15 @@ class WireLink:
         if self._vehicle is None or sender_of(packet.raw) != self._vehicle[0]:
             return True
         vehicle, own = self._vehicle
-        if origin != own:
-            if origin not in self.strangers and len(self.strangers) < _SHOWN:
-                self.strangers.add(origin)
-                self._note(
-                    f"packets of {vehicle} come from {origin} too, not only from {own}: they do "
-                    "not count. If the vehicle's address has changed, begin again"
-                )
-            return False
-        return not isinstance(message, Heartbeat) or message.of_autopilot
+        if origin == own:
+            return not isinstance(message, Heartbeat) or message.of_autopilot
+        if origin not in self.strangers and len(self.strangers) < _SHOWN:
+            self.strangers.add(origin)
+            self._note(
+                f"packets of {vehicle} come from {origin} too, not only from {own}: they do not "
+                "count. If the vehicle's address has changed, begin again"
+            )
+        return False
 
     def _send(self, messages: Sequence[Message], to: Origin | None = None) -> None:
         for message in messages:
@@ -244,7 +242,3 @@ class WireLink:
             if self.log is not None:
                 self.log.write(packet, received=False)
             self._transport.write(packet, to if self._vehicle is None else self._vehicle[1])
-
-
-def _tell_nobody() -> None:
-    """Do without those who were told."""

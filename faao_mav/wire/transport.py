@@ -9,9 +9,8 @@ import errno
 import select
 import socket
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.wire.framing import Framer
@@ -20,7 +19,9 @@ FORMS = (
     "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
     "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
 )
-_KINDS = ("udpin", "udpout", "udp", "tcp", "tcpin")
+_KINDS = {"udpin": "udpin", "udp": "udpin", "udpout": "udpout", "tcp": "tcp", "tcpin": "tcpin"}
+"""Kinds of connections, by what they are called."""
+
 _CONNECT_TIMEOUT = 5.0
 """Seconds to wait for a TCP connection: chosen."""
 
@@ -37,7 +38,11 @@ _WRITE_TIMEOUT = 5.0
 """Seconds in which a serial port has to take a packet: chosen, above the 4.3 s in which a line of
 9600 baud empties the 4096 bytes that Linux keeps for it."""
 
-_UNUSABLE = frozenset({errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES})
+_REASONS = {
+    errno.EADDRINUSE: "the port is in use; stop who listens there, or take another port",
+    errno.EADDRNOTAVAIL: "this machine does not have that address; to listen on all, use 0.0.0.0",
+    errno.EACCES: "not permitted; ports below 1024 are reserved",
+}
 """Errors of a connection that this machine can not make: the argument is to be another one."""
 
 _MAX_DATAGRAM = 65_535
@@ -64,8 +69,7 @@ class Transport(Protocol):
         """Let go of the connection."""
 
 
-@dataclass(frozen=True, slots=True)
-class Endpoint:
+class Endpoint(NamedTuple):
     """A connection string, taken apart; `kind` "serial" has a device and a baud rate."""
 
     kind: str
@@ -81,12 +85,12 @@ def parse_connection(text: str) -> Endpoint:
     """
     kind, colon, rest = text.partition(":")
     if colon and kind in _KINDS:
-        host, colon, port = rest.rpartition(":")
-        if not colon or not host or not port.isascii() or not port.isdigit():
+        host, _, port = rest.rpartition(":")
+        if not host or not port.isascii() or not port.isdigit():
             raise InputError(f"connection {text!r}: expected {kind}:HOST:PORT")
         if not 0 < int(port) < 65_536:
             raise InputError(f"connection {text!r}: port {port}; expected 1 to 65535")
-        return Endpoint("udpin" if kind == "udp" else kind, host, int(port))
+        return Endpoint(_KINDS[kind], host, int(port))
     device, comma, baud = text.partition(",")
     if not device or (colon and "/" not in kind) or not (comma or "/" in device):
         raise InputError(f"connection {text!r}: expected {FORMS}")
@@ -101,66 +105,47 @@ def open_transport(text: str) -> Transport:
     Raises `InputError` for a string or device that is none, or where this machine cannot listen,
     `LinkError` if the other end cannot be reached.
     """
-    endpoint = parse_connection(text)
-    if endpoint.kind == "serial":
-        return _Serial(endpoint)
+    kind, host, port = parse_connection(text)
+    if kind == "serial":
+        return _Serial(host, port)
     try:
-        address = socket.getaddrinfo(endpoint.host, endpoint.port, socket.AF_INET)[0][4]
+        address = str(socket.getaddrinfo(host, port, socket.AF_INET)[0][4][0]), port
     except (OSError, UnicodeError):  # UnicodeError: empty or overlong labels between dots
-        raise LinkError(f"connection {text!r}: there is no host {endpoint.host}") from None
-    host_port = (str(address[0]), endpoint.port)
+        raise LinkError(f"connection {text!r}: there is no host {host}") from None
     try:
-        match endpoint.kind:
-            case "udpin":
-                return _Udp(host_port, None)
-            case "udpout":
-                return _Udp(None, host_port)
-            case _:
-                return _Tcp(host_port, listens=endpoint.kind == "tcpin")
+        of_kind = _Udp if kind.startswith("udp") else _Tcp
+        return of_kind(address, listens=kind.endswith("in"))
     except OSError as error:
-        kind = InputError if error.errno in _UNUSABLE else LinkError
-        raise kind(f"connection {text!r}: {_reason(error)}") from None
+        reason = error.strerror or str(error)
+        if isinstance(error, ConnectionRefusedError):
+            reason = "nothing listens there"
+        elif isinstance(error, TimeoutError):
+            reason = f"no answer within {_CONNECT_TIMEOUT:g} s"
+        wrong = LinkError if error.errno not in _REASONS else InputError
+        told = _REASONS.get(error.errno or 0, reason)
+        raise wrong(f"connection {text!r}: {told}") from None
 
 
-def _reason(error: OSError) -> str:
-    match error.errno:
-        case errno.EADDRINUSE:
-            return "the port is in use; stop the program that listens there, or take another port"
-        case errno.EADDRNOTAVAIL:
-            return "this machine does not have that address; to listen on all, use 0.0.0.0"
-        case errno.ECONNREFUSED:
-            return "nothing listens there"
-        case errno.EACCES:
-            return "not permitted; ports below 1024 are reserved"
-    if isinstance(error, TimeoutError):
-        return f"no answer within {_CONNECT_TIMEOUT:g} s"
-    return error.strerror or str(error)
+Peer: TypeAlias = tuple[str, int]
 
 
-@dataclass(slots=True)
-class _Sender:
-    """Who sends from one address; `heard` is when, s."""
-
-    heard: float = 0.0
-    framer: Framer = field(default_factory=Framer)
-
-
-def _origin(address: tuple[str, int]) -> Origin:
+def _origin(address: Peer) -> Origin:
     return f"{address[0]}:{address[1]}"
 
 
 class _Udp:
     """A UDP socket that sends to one place, or to whoever was heard."""
 
-    def __init__(self, listen: tuple[str, int] | None, target: tuple[str, int] | None) -> None:
+    def __init__(self, address: Peer, *, listens: bool) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._target = target
-        self.listens = target is None
-        self._senders: dict[tuple[str, int], _Sender] = {}
+        self._target, self.listens = None if listens else address, listens
+        self._framers: dict[Peer, Framer] = {}
+        self._heard: dict[Peer, float] = {}
+        """When each sender was heard last, s; who is silent longest comes first."""
         try:
             self._socket.setblocking(False)
-            if listen is not None:
-                self._socket.bind(listen)
+            if listens:
+                self._socket.bind(address)
         except OSError:
             self._socket.close()
             raise
@@ -173,7 +158,7 @@ class _Udp:
         with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
             for _ in range(_BURST):
                 data, address = self._socket.recvfrom(_MAX_DATAGRAM)
-                packets = self._sender(address).framer.feed_datagram(data)
+                packets = self._framer(address).feed_datagram(data)
                 found += [(packet, _origin(address)) for packet in packets]
         return found
 
@@ -186,31 +171,30 @@ class _Udp:
     def close(self) -> None:
         self._socket.close()
 
-    def _targets(self, to: Origin | None) -> list[tuple[str, int]]:
+    def _targets(self, to: Origin | None) -> list[Peer]:
         if self._target is not None:
             return [self._target]
         if to is not None:
             host, _, port = to.rpartition(":")
             return [(host, int(port))]
         recent = time.monotonic() - _FORGET
-        return [who for who, sender in self._senders.items() if sender.heard > recent]
+        return [address for address, heard in self._heard.items() if heard > recent]
 
-    def _sender(self, address: tuple[str, int]) -> _Sender:
-        """Return who is at `address` and was heard now; too many forget who is silent longest."""
-        sender = self._senders.pop(address, None) or _Sender()
-        sender.heard = time.monotonic()
-        if len(self._senders) == _MOST_PEERS:
-            del self._senders[next(iter(self._senders))]
-        self._senders[address] = sender
-        return sender
+    def _framer(self, address: Peer) -> Framer:
+        """Return what cuts up what comes from `address`; too many forget who is silent longest."""
+        self._heard.pop(address, None)
+        if len(self._heard) == _MOST_PEERS:
+            silent = next(iter(self._heard))
+            del self._heard[silent], self._framers[silent]
+        self._heard[address] = time.monotonic()
+        return self._framers.setdefault(address, Framer())
 
 
 class _Tcp:
     """TCP: the connection that this end made, or all that others make to a listening socket."""
 
-    def __init__(self, address: tuple[str, int], *, listens: bool) -> None:
-        self._name = f"tcp:{address[0]}:{address[1]}"
-        self.listens = listens
+    def __init__(self, address: Peer, *, listens: bool) -> None:
+        self._name, self.listens = f"tcp:{_origin(address)}", listens
         self._listener = socket.create_server(address) if listens else None
         self._peers: dict[socket.socket, tuple[Origin, Framer]] = {}
         if self._listener is not None:
@@ -240,10 +224,9 @@ class _Tcp:
 
     def write(self, data: bytes, to: Origin | None = None) -> None:
         for peer, (origin, _) in list(self._peers.items()):
-            if to not in (None, origin):
-                continue
             try:
-                peer.sendall(data)
+                if to in (None, origin):
+                    peer.sendall(data)
             except OSError as error:
                 self._drop(peer, error)
 
@@ -254,7 +237,7 @@ class _Tcp:
     def _sockets(self) -> list[socket.socket]:
         return [*self._peers] if self._listener is None else [self._listener, *self._peers]
 
-    def _welcome(self, peer: socket.socket, address: tuple[str, int]) -> None:
+    def _welcome(self, peer: socket.socket, address: Peer) -> None:
         """Take one more peer, if there is room; it is dropped when it does not read."""
         if len(self._peers) == _MOST_PEERS:
             peer.close()
@@ -267,10 +250,11 @@ class _Tcp:
         if self._listener is not None:
             del self._peers[peer]
             peer.close()
-        elif error is None or isinstance(error, ConnectionError):
-            raise LinkError(f"{self._name}: the other side closed the connection") from None
-        else:
-            raise LinkError(f"{self._name}: {error.strerror or error}") from None
+            return
+        why = "the other side closed the connection"
+        if error is not None and not isinstance(error, ConnectionError):
+            why = error.strerror or str(error)
+        raise LinkError(f"{self._name}: {why}") from None
 
 
 class _Serial:
@@ -278,30 +262,26 @@ class _Serial:
 
     listens = False
 
-    def __init__(self, endpoint: Endpoint) -> None:
+    def __init__(self, device: str, baud: int) -> None:
         import serial
 
-        self._name = endpoint.host
-        self._framer = Framer()
-        self._error: type[Exception] = serial.SerialException
+        self._name, self._framer = device, Framer()
         self._late: type[Exception] = serial.SerialTimeoutException
-        if "/" in endpoint.host and not Path(endpoint.host).exists():
+        if "/" in device and not Path(device).exists():
             raise InputError(
-                f"connection {endpoint.host!r}: there is no such device; is the vehicle plugged in?"
+                f"connection {device!r}: there is no such device; is the vehicle plugged in?"
             )
         try:
-            self._port: Any = serial.Serial(
-                endpoint.host, endpoint.port, timeout=0, write_timeout=_WRITE_TIMEOUT
-            )
-        except (serial.SerialException, ValueError, OSError) as error:
-            raise LinkError(f"connection {endpoint.host!r}: {error}") from None
+            self._port: Any = serial.Serial(device, baud, timeout=0, write_timeout=_WRITE_TIMEOUT)
+        except (ValueError, OSError) as error:
+            raise LinkError(f"connection {device!r}: {error}") from None
 
     def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         try:
             self._port.timeout = max(timeout, 0.0)
             data = bytes(self._port.read(1))
             data += bytes(self._port.read(self._port.in_waiting))
-        except (self._error, OSError) as error:
+        except OSError as error:
             raise LinkError(f"{self._name}: {error}") from None
         return [(packet, "") for packet in self._framer.feed(data)]
 
@@ -314,7 +294,7 @@ class _Serial:
                 f"{self._name}: it has taken no bytes for {_WRITE_TIMEOUT:g} s; is the vehicle "
                 "switched on, and the cable or radio in order?"
             ) from None
-        except (self._error, OSError) as error:
+        except OSError as error:
             raise LinkError(f"{self._name}: {error}") from None
 
     def close(self) -> None:
