@@ -41,17 +41,17 @@ def debrief(
     read = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     check_apart({"--report": report}, read)
     from faao_mav.fly.logs import read_log
-    from faao_mav.fly.radio import UdpRadio, replay, replayed
+    from faao_mav.fly.radio import Radios
     from faao_mav.report.debrief import debriefed, other_parameters, remarks_on
     from faao_mav.report.flights import debriefing_lines
     from faao_mav.report.lines import joined
     from faao_mav.validate.flown import Line
     from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 
-    to = None if radio is None else UdpRadio(radio)
     records = read_log(log, system)
     solution = planned(plan_file, solution_file)
     assert solution is not None
+    radios = None if radio is None else Radios(solution, radio)
     result = with_mission(Result(solution))
     record, found = debriefed(records, result, str(log))
     remarks = list(remarks_on(records, record, found, result))
@@ -70,7 +70,7 @@ def debrief(
         typer.echo(json.dumps(told, allow_nan=False))
     else:
         typer.echo(joined([*debriefing_lines(found), *remarks]))
-    if to is not None:
+    if radios is not None:
         flight = record.line(solution)
-        lines = replayed(solution, Line(flight.t - found.start, flight.w))
-        note(f"{replay(lines, to.send)} slots were told to {radio}")
+        count = radios.replay(Line(flight.t - found.start, flight.w))
+        note(f"{count} slots were told to {radio}")

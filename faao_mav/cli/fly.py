@@ -75,8 +75,9 @@ def fly(
     arguments or input.
     """
     from faao_mav.fly.fly import fly as run
+    from faao_mav.fly.radio import Radios
     from faao_mav.fly.telemetry import POSITION_RATE
-    from faao_mav.fly.telling import HEADER, Feed, Telling, as_text
+    from faao_mav.fly.telling import HEADER, Telling, as_text
     from faao_mav.mission.formats import read_mission_file
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.lines import joined
@@ -100,13 +101,13 @@ def fly(
     for line in file.warnings:
         note(line)
     solution = planned(plan_file, solution_file)
-    feed = Feed(solution, radio) if solution is not None and radio is not None else None
+    radios = Radios(solution, radio) if solution is not None and radio is not None else None
     flight = _flight(mission_file, file, solution, streamed=stream)
     track = None if stream else _predicted(flight)
-    telling = Telling(solution, track, feed, say)
+    telling = Telling(solution, track, radios, say)
     rate = rate if stream else POSITION_RATE
-    if feed is not None:
-        rate = max(rate, feed.slots_per_second * 2)  # two positions for each slot at least
+    if radios is not None and solution is not None:  # two positions for each slot at least
+        rate = max(rate, 2 / solution.plan.flight.time_step)
     report = run(
         flight,
         to,

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
-from faao_mav.validate.flown import Debriefing, Line, debriefing, plan_start
+from faao_mav.validate.comparison import on_the_plans_clock
+from faao_mav.validate.flown import Debriefing, Line, debriefing, plan_start, planned_line
 
 
 class Fix(NamedTuple):
@@ -24,6 +26,11 @@ class Fix(NamedTuple):
     home: float
     east: float = math.nan
     north: float = math.nan
+
+
+def predicted_line(solution: Solution, track: Track | None) -> Line:
+    """Return the predicted flight `track` on the plan's clock; the plan itself without one."""
+    return planned_line(solution) if track is None else Line(*on_the_plans_clock(solution, track))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

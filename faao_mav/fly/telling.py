@@ -7,12 +7,11 @@ from typing import Any
 
 from faao_mav.autopilot import Track
 from faao_mav.fly.fly import FlightReport
-from faao_mav.fly.radio import RadioFeed, UdpRadio
-from faao_mav.fly.record import FlightRecord
+from faao_mav.fly.radio import Radios
+from faao_mav.fly.record import FlightRecord, predicted_line
 from faao_mav.fly.watch import Watch
 from faao_mav.optimizer.solution import Solution
-from faao_mav.validate.comparison import on_the_plans_clock
-from faao_mav.validate.flown import Debriefing, Line, Standing, plan_start, planned_line, standing
+from faao_mav.validate.flown import Debriefing, Line, Standing, plan_start, standing
 from faao_mav.validate.rule import Finding, Level
 from faao_mav.validate.words import by_rule, count_of, line_of
 
@@ -23,52 +22,48 @@ _NO_VOLTAGE = 65_535
 """What SYS_STATUS says of a voltage that is not known."""
 
 
-def _predicted_line(solution: Solution, track: Track | None) -> Line:
-    return planned_line(solution) if track is None else Line(*on_the_plans_clock(solution, track))
-
-
 class Telling:
     """Tells what a watch sees: called after its every step, it says what is new.
 
     `say` is given events, {"note": text}, of which one has "findings" too, what the gate before the
-    flight found, and once a second how the flight stands: where the
-    vehicle is, and beside `solution`, of which `track` is the predicted flight, how late it is and
-    what it delivers. A `feed` tells radios the slots of `solution` meanwhile.
+    flight found, and once a second how the flight stands: where the vehicle is, and beside
+    `solution`, of which `track` is the predicted flight, how late it is and what it delivers.
+    `radios` are told the slots of `solution` meanwhile.
     """
 
     def __init__(
         self,
         solution: Solution | None,
         track: Track | None,
-        feed: "Feed | None",
+        radios: Radios | None,
         say: Callable[[dict[str, Any]], object],
     ) -> None:
-        self._solution, self._feed, self._say = solution, feed, say
+        self._solution, self._radios, self._say = solution, radios, say
+        self._line = None if solution is None else predicted_line(solution, track)
         self._start: float | None = None
-        self._told, self._next, self._last = 0, 0.0, -_PERIOD
+        self._told, self._heard, self._next, self._last = 0, 0, 0.0, -_PERIOD
         self._found: tuple[Finding, ...] | None = None
-        self._line = None if solution is None else _predicted_line(solution, track)
 
     def __call__(self, watch: Watch) -> None:
         """Say what has happened since the last call, and once a second how the flight stands."""
-        seen = watch.seen
-        if watch.findings is not self._found and watch.findings is not None:
-            self._found = watch.findings
-            told = [asdict(each) for each in self._found]
-            self._say({"note": findings_text(self._found), "findings": told})
+        seen, found, fixes = watch.seen, watch.findings, watch.seen.fixes
+        if found is not None and found != self._found:
+            self._found = found
+            self._say({"note": findings_text(found), "findings": [asdict(each) for each in found]})
         for text in seen.told[self._told :]:
             self._say({"note": text})
         self._told = len(seen.told)
-        if self._feed is not None:
-            self._feed(watch, self._start if watch.relay_start is None else watch.relay_start)
-        now, t = time.monotonic(), seen.fixes[-1].t if seen.fixes else float("-inf")
-        if seen.heartbeat is None or now < self._next or t < self._last + _PERIOD:
+        start = self._start if watch.relay_start is None else watch.relay_start
+        if self._radios is not None and self._solution is not None and len(fixes) > self._heard:
+            self._heard = len(fixes)
+            place = FlightRecord.of(fixes[-1]).line(self._solution).w[0]
+            self._radios.tell(None if start is None else fixes[-1].t - start, place)
+        now = time.monotonic()
+        ready = seen.heartbeat is not None and fixes and fixes[-1].t >= self._last + _PERIOD
+        if not ready or now < self._next:
             return
-        self._next, self._last = now + _PERIOD, t
-        stands = None
-        if watch.phase not in ("checking", "engaging", "arming", "starting", "waiting"):
-            stands = self._standing(watch)
-        self._say(_as_dict(watch, stands, self._solution))
+        self._next, self._last = now + _PERIOD, fixes[-1].t
+        self._say(_as_dict(watch, self._standing(watch), self._solution))
 
     def debriefing(self, report: FlightReport) -> Debriefing | None:
         """Return what became of the plan; None without one, or without its flight."""
@@ -78,10 +73,10 @@ class Telling:
 
     def _standing(self, watch: Watch) -> Standing | None:
         """Return how the flight stands; None before it has left w_I, and when it is over."""
-        if self._solution is None or self._line is None:
+        before = watch.phase in ("checking", "engaging", "arming", "starting", "waiting")
+        if self._solution is None or self._line is None or before:
             return None
-        flight = watch.seen.record().line(self._solution)
-        start = watch.relay_start
+        flight, start = watch.seen.record().line(self._solution), watch.relay_start
         if start is None and not watch.streams:
             self._start = start = plan_start(self._solution, self._line, flight)
         if start is None:
@@ -90,43 +85,21 @@ class Telling:
         return None if stands.over else stands
 
 
-class Feed:
-    """Tells radios the slots that are reached: called after every step of a watch."""
-
-    def __init__(self, solution: Solution, to: str) -> None:
-        self._solution = solution
-        self._feed, self._radio = RadioFeed(solution), UdpRadio(to)
-        self._seen = 0
-        self.slots_per_second = 1 / solution.plan.flight.time_step
-
-    def __call__(self, watch: Watch, start: float | None) -> None:
-        """Send what is new; the plan's clock read 0 at `start`, s on the vehicle's."""
-        fixes = watch.seen.fixes
-        if len(fixes) == self._seen:
-            return
-        self._seen = len(fixes)
-        t = None if start is None else fixes[-1].t - start
-        place = FlightRecord.of(fixes[-1]).line(self._solution).w[0]
-        if (line := self._feed.line(t, place)) is not None:
-            self._radio.send(line)
-
-
 def _as_dict(watch: Watch, stands: Standing | None, solution: Solution | None) -> dict[str, Any]:
     """Return a line of `--json`: s, degrees, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
-    last, status = watch.seen.fixes[-1], watch.seen.status
-    volts = status.voltage_battery if status is not None else _NO_VOLTAGE
-    percent = status.battery_remaining if status is not None else -1
+    seen, last = watch.seen, watch.seen.fixes[-1]
+    volts = _NO_VOLTAGE if seen.status is None else seen.status.voltage_battery
     told: dict[str, Any] = {
         "t": last.t,
         "phase": watch.phase,
-        "mode": watch.seen.mode,
-        "item": watch.seen.row,
+        "mode": seen.mode,
+        "item": seen.row,
         "latitude": last.latitude,
         "longitude": last.longitude,
-        "height": watch.seen.height,
+        "height": seen.height,
         "volts": None if volts == _NO_VOLTAGE else volts / 1000,
-        "battery": None if percent < 0 else percent,
-        "plan": asdict(stands) if stands is not None else None,
+        "battery": seen.battery,
+        "plan": None if stands is None else asdict(stands),
     }
     if stands is not None and solution is not None:
         for name in ("delivered", "expected"):
@@ -137,8 +110,7 @@ def _as_dict(watch: Watch, stands: Standing | None, solution: Solution | None) -
 
 def findings_text(findings: Sequence[Finding]) -> str:
     """Return what the gate before a flight found, for people: a line for each rule."""
-    counts = ", ".join(count_of(findings, level) for level in Level)
-    lines = [f"before the flight: {counts}"]
+    lines = [f"before the flight: {', '.join(count_of(findings, level) for level in Level)}"]
     for group in by_rule(findings):
         action = f"; to do: {group[0].action}" if group[0].action else ""
         lines.append(f"   {line_of(group)}{action}")

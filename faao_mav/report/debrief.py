@@ -5,11 +5,9 @@ from collections.abc import Iterator, Sequence
 
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import FlightReport
-from faao_mav.fly.record import FlightRecord
+from faao_mav.fly.record import FlightRecord, predicted_line
 from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import Line
-from faao_mav.validate import flown
-from faao_mav.validate.comparison import on_the_plans_clock
 from faao_mav.validate.flown import Debriefing
 from faao_mav.workflow import Result
 
@@ -33,9 +31,8 @@ def debriefed(
 
     Of several `records` it is the nearest to the plan. Raises `FaaoError` where none is.
     """
-    line = flown.planned_line(result.solution)
-    if result.check is not None and result.check.track is not None:
-        line = flown.Line(*on_the_plans_clock(result.solution, result.check.track))
+    track = None if result.check is None else result.check.track
+    line = predicted_line(result.solution, track)
     debriefings = ((record, record.debriefing(result.solution, line)) for record in records)
     found = [(record, each) for record, each in debriefings if each is not None]
     if not found:
