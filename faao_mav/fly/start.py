@@ -2,49 +2,41 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.telemetry import Ending
 from faao_mav.fly.watch import Watch
 from faao_mav.wire.messages import CommandAck, CommandLong, Heartbeat, Message, WireItem
-from faao_mav.wire.protocol import LOCAL_POSITION, Address, MavCommand, command_result
+from faao_mav.wire.protocol import LOCAL_POSITION, MavCommand, command_result
 from faao_mav.wire.transfer.exchange import Peer
 
 _ACCEPTED, _IN_PROGRESS = 0, 5
 """MAV_RESULT."""
 
-_LISTEN = 2.0
-"""Seconds of listening for other ground stations before anything is started: two of their
-heartbeats."""
+_LISTEN, _WORDS = 2.0, 1.0
+"""Seconds of listening for other ground stations before anything is started, two of their
+heartbeats; and of waiting for what the vehicle says of a denial, chosen."""
 
 _AGAIN, _TRIES = 1.5, 5
 """Seconds after which a command without an answer is repeated, and how often it is sent, or
 refused: as the MAVLink guide has it for missions."""
 
-_WORDS = 1.0
-"""Seconds for which what the vehicle says of a denial is waited for; chosen."""
 
-
+@dataclass(slots=True)
 class Order:
-    """A command to `target` that is repeated until it is answered, or what it asks for is seen.
+    """A command that is repeated until it is answered, or what it asks for is seen.
 
-    `next` is when it is due again; `answer` is what became of it, in words.
+    `due` is when it is sent next, s; `answer` is what became of it, in words.
     """
 
-    def __init__(self, target: Address, command: MavCommand, params: Sequence[float], now: float):
-        self.target, self.command, self.params = target, command, params
-        self.sent, self.refusals, self.next, self.answer = 0, 0, now, "does not answer"
-
-    def again(self, now: float) -> Sequence[Message]:
-        """Return it once more."""
-        self.sent, self.next = self.sent + 1, now + _AGAIN
-        return [CommandLong(self.target, self.command, min(self.sent - 1, 255), *self.params)]
-
-    def hear(self, result: int) -> None:
-        """Take note of the answer: it is not repeated, but for what is said of a denial."""
-        self.answer = f"answers {self.command.name} with {command_result(result)}"
-        self.refusals += result != _ACCEPTED
+    command: MavCommand
+    params: tuple[float, ...]
+    due: float
+    sent: int = 0
+    refusals: int = 0
+    answer: str = "does not answer"
 
 
 class Start(Watch):
@@ -70,11 +62,12 @@ class Start(Watch):
         self._readiness = readiness
         self.seen.ask_for(LOCAL_POSITION, 1.0)
         self.phase = "checking"
-        self._begun, self._said_before = 0.0, 0
         self._order: Order | None = None
-        self._mode_before = -1
+        self._asked: set[int | None] = set()
+        """Modes in which it may be meanwhile: any other was set by somebody else."""
+        self._before = -1
+        self._begun, self._said_before, self._unattended = 0.0, 0, False
         self._then = Ending("refused", "")
-        self._unattended = False
 
     def start(self, now: float) -> Sequence[Message]:
         """Listen, and ask for telemetry."""
@@ -93,7 +86,7 @@ class Start(Watch):
         super().cancel(now)
         if self.phase == "holding" and asked and self.outcome is not None:
             text = f"{self.outcome.text}, and has not confirmed that it holds"
-            self.outcome = Ending("left", text)
+            self.outcome = replace(self.outcome, text=text)
         return self._readiness.cancel(now)
 
     def hang_up(self, now: float) -> Sequence[Message]:
@@ -104,17 +97,18 @@ class Start(Watch):
         self._unattended = True
         if self._order is not None and self.phase in ("holding", "ending", "disarming"):
             return ()
-        if self.streams or self.phase in ("arming", "starting"):
-            return self.cancel(now)
-        return super().hang_up(now)
+        leaves = not self.streams and self.phase not in ("arming", "starting")
+        return super().hang_up(now) if leaves else self.cancel(now)
 
     def _hear(self, message: Message, now: float) -> Sequence[Message]:
+        order = self._order
         match message:
             case CommandAck(target, command, result) if self._peer.own.takes(target):
-                return self._on_ack(command, result, now)
+                if order is not None and command == order.command and result != _IN_PROGRESS:
+                    return self._answered(order, result, now)
             # A first heartbeat may be from before the order.
-            case Heartbeat(armed=False) if self.phase == "disarming" and self._order is not None:
-                if self._armed or self._order.sent > 1:
+            case Heartbeat(armed=False) if self.phase == "disarming" and order is not None:
+                if self._armed or order.sent > 1:
                     self._end(self._then.kind, f"{self._then.text}; it is disarmed{self._words}")
         return super()._hear(message, now)
 
@@ -130,47 +124,35 @@ class Start(Watch):
     # ---- what the vehicle does
 
     def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
-        mission, hold, asked = self._modes.mission, self._modes.hold, self._order is not None
-        match self.phase:
-            case "arming" if mode != self._mode_before:
-                self._step_aside()
-            case "starting" if mode not in (self._mode_before, mission):
-                self._step_aside()
-            case "starting" if self._armed and mode == mission:
-                self._begin()
-            case "disarming" if mode not in (self._mode_before, mission, self._modes.guided):
-                self._leave_armed(f"the pilot or a failsafe has it, in mode {self.seen.mode}")
-            case "holding" if mode == mission and asked:
-                self._mode_before = -1
-            case "holding" if mode == self._mode_before:
-                pass  # the start that was asked for may still be to come
-            case "holding" if mode == hold and asked:
-                self._order, self.seen.patience = None, self._patience
+        if self.phase not in ("arming", "starting", "disarming", "holding"):
+            return super()._on_mode(mode, now)
+        if mode not in self._asked:
+            self._step_aside()
+        elif self.phase == "starting" and self._armed and mode == self._modes.mission:
+            self._begin()
+        elif self.phase == "holding" and mode != self._before and self._order is not None:
+            self._asked.discard(self._before)  # the start that was asked for has come
+            if mode == self._modes.hold:
+                self._order, self._asked, self.seen.patience = None, {mode}, self._patience
                 self.seen.told.append("it holds; interrupt again to leave it")
-            case "holding" if mode != hold:
-                self._step_aside()
-            case _:
-                return super()._on_mode(mode, now)
         return ()
 
-    def _on_ack(self, command: int, result: int, now: float) -> Sequence[Message]:
-        order = self._order
-        if order is None or command != order.command or result == _IN_PROGRESS:
-            return ()
-        order.hear(result)
+    def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
+        """Go on, or end, now that an order is answered."""
+        order.answer = f"answers {order.command.name} with {command_result(result)}"
+        if result == _ACCEPTED:
+            return self._accepted(now)
+        order.refusals += 1
         if self.phase == "disarming" and order.refusals == _TRIES:
             self._leave_armed(f"it {order.answer}")
-        elif self.phase in ("arming", "starting"):
-            return self._accepted(now) if result == _ACCEPTED else self._denied(order, now)
-        return ()
+        return self._denied(order, now) if self.phase in ("arming", "starting") else ()
 
     def _accepted(self, now: float) -> Sequence[Message]:
-        """Go on, now that arming or starting has been accepted."""
         return self._start(now) if self.phase == "arming" else ()
 
     def _denied(self, order: Order, now: float) -> Sequence[Message]:
         """End, now that arming or starting has been denied; why it does not arm may come later."""
-        order.sent, order.next = _TRIES, now + _WORDS * (self.phase == "arming")
+        order.sent, order.due = _TRIES, now + _WORDS * (self.phase == "arming")
         return self._repeat(now)
 
     def _begin(self) -> None:
@@ -185,6 +167,8 @@ class Start(Watch):
         super()._on_disarmed()
 
     def _step_aside(self) -> None:
+        if self.phase == "disarming":
+            self._leave_armed(f"the pilot or a failsafe has it, in mode {self.seen.mode}")
         self._order = None
         super()._step_aside()
 
@@ -196,26 +180,22 @@ class Start(Watch):
         self._readiness.judge(seen, now)
         if self._stopped():
             return ()
+        lacks = self._lacks(now)
         if waited >= self._patience:
-            said = "; ".join(dict.fromkeys(seen.said)) or self._lacks(now)
+            said = "; ".join(dict.fromkeys(seen.said)) or lacks or "it does not say why"
             self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
             return ()
-        if waited < _LISTEN or self._lacks(now) or seen.heartbeat is None:
+        may_arm = seen.status is not None and seen.status.may_arm and seen.current is not None
+        if waited < _LISTEN or lacks or not may_arm:
             return ()
         out = self._readiness.settle(seen, now)
         if out is not None:
             return out
-        if self._stopped() or self._readiness.errors:
-            return ()
-        self._mode_before = seen.heartbeat.custom_mode
-        return self._set_out(now)
+        return () if self._stopped() or self._readiness.errors else self._set_out(now)
 
     def _lacks(self, now: float) -> str:  # noqa: ARG002
-        """Return what it lacks before it can be armed; nothing once it does not."""
-        if not self.seen.knows_place:
-            return "it does not know where it is"
-        ready = self.seen.status is not None and self.seen.status.may_arm
-        return "" if ready and self.seen.current is not None else "it does not say why"
+        """Return what it does not know that it has to, in words."""
+        return "" if self.seen.knows_place else "it does not know where it is"
 
     def _stopped(self) -> bool:
         """End where the gate has found an error, and tell whether it has.
@@ -232,20 +212,27 @@ class Start(Watch):
     def _set_out(self, now: float) -> Sequence[Message]:
         """Arm, now that nothing is against it."""
         self.seen.told.append(f"its own checks pass: arming, and starting {self.seen.items} items")
-        return self._arm(now)
+        return self._arm(self._mode, now)
 
-    def _arm(self, now: float) -> Sequence[Message]:
-        self.phase = "arming"
+    @property
+    def _mode(self) -> int:
+        """The mode that it is in."""
+        return -1 if self.seen.heartbeat is None else self.seen.heartbeat.custom_mode
+
+    def _arm(self, mode: int, now: float) -> Sequence[Message]:
+        self.phase, self._before, self._asked = "arming", mode, {mode}
         return self._say(now, MavCommand.ARM, 1.0)
 
     def _start(self, now: float) -> Sequence[Message]:
         self.phase = "starting"
+        self._asked.add(self._modes.mission)
         return self._say(now, MavCommand.START)
 
     def _ask_to_hold(self, now: float) -> Sequence[Message]:
         """Ask the vehicle to hold, until it does."""
         if self.phase != "starting" or self.streams:
-            self._mode_before = -1
+            self._before = -1
+        self._asked = {self._before, self._modes.mission, self._modes.hold}
         self.phase, self.seen.patience = "holding", math.inf
         self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
         return self._set_mode(now, self._modes.hold)
@@ -255,21 +242,23 @@ class Start(Watch):
 
     def _say(self, now: float, command: MavCommand, *params: float) -> Sequence[Message]:
         """Give an order, and repeat it until it is answered."""
-        self._order = Order(self._peer.address, command, params, now)
+        self._order = Order(command, params, now)
         if self.phase != "disarming":
             self._said_before = len(self.seen.said)
         return self._repeat(now)
 
     def _repeat(self, now: float) -> Sequence[Message]:
         order = self._order
-        if order is None or now < order.next:
+        if order is None or now < order.due:
             return ()
         if order.sent == _TRIES and self.phase == "holding":
             text = f"it does not confirm that it holds, it {order.answer}: it is asked again"
             self.seen.told.append(f"{text} until then")
         if order.sent >= _TRIES and self.phase in ("engaging", "arming", "starting"):
             return self._refused(order, now)
-        return order.again(now)
+        again = min(order.sent, 255)
+        order.sent, order.due = order.sent + 1, now + _AGAIN
+        return [CommandLong(self._peer.address, order.command, again, *order.params)]
 
     # ---- when it does not start
 
@@ -291,14 +280,14 @@ class Start(Watch):
     def _disarm(self, then: Ending, now: float) -> Sequence[Message]:
         """Have it disarm, and end with `then`."""
         self.phase, self._then = "disarming", then
+        self._asked = {self._mode, self._modes.mission, self._modes.guided}
         self.seen.told.append(f"{then.text}: it is asked to disarm")
-        if self.seen.heartbeat is not None:
-            self._mode_before = self.seen.heartbeat.custom_mode
         return self._say(now, MavCommand.ARM, 0.0)
 
     def _leave_armed(self, why: str) -> None:
         """End, though it may still be armed."""
-        self._end(self._then.kind, f"{self._then.text}; it may still be armed: {why}{self._words}")
+        text = f"{self._then.text}; it may still be armed: {why}{self._words}"
+        self._end(self._then.kind, text)
 
     def _end_as_heard(self, now: float) -> Sequence[Message]:
         """End where what was heard says so; what may be armed is disarmed whatever that is."""

@@ -161,7 +161,7 @@ class Stream(Start):
         if lean is not None:
             self.seen.told.append(lean)
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
-        self.phase = "engaging"
+        self.phase, self._asked = "engaging", {self._mode}
         if self._rules.takes_off_by_setpoints:
             return ()  # setpoints come first
         return self._set_mode(now, self._guided)
@@ -181,7 +181,7 @@ class Stream(Start):
     def _denied(self, order: Order, now: float) -> Sequence[Message]:
         if self.phase == "arming" and now < self._begun + self._patience:
             # In this mode it may need what its checks did not ask for before, a position above all.
-            order.sent, order.next = 0, now + _ARM_AGAIN
+            order.sent, order.due = 0, now + _ARM_AGAIN
             return ()
         return super()._denied(order, now)
 
@@ -205,23 +205,17 @@ class Stream(Start):
         super()._on_disarmed()
 
     def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
+        held = self.phase == "holding" and (mode == self._modes.hold or self._order is None)
         match self.phase:
             case "engaging" if mode == self._guided:
-                self._mode_before = mode
-                return self._arm(now)
-            case "engaging" if mode != self._mode_before:
+                return self._arm(mode, now)
+            case "engaging" if mode not in self._asked:
                 self._step_aside()
-            case "starting" if mode != self._guided:
-                self._step_aside()
-            case "engaging" | "starting":
-                pass
             case "ending" if mode == self._finish:
                 self._order = None
                 if not self._lands:
                     self._over()
-            case "holding" if mode == self._modes.hold or self._order is None:
-                return super()._on_mode(mode, now)
-            case "flying" | "holding" | "ending":
+            case "flying" | "holding" | "ending" if not held:
                 self._see_who_flies(mode, now)
             case _:
                 return super()._on_mode(mode, now)
