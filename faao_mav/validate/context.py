@@ -222,8 +222,10 @@ class ValidationContext:
         if not self.mission.fence:
             return ()
         any_inclusion = self.vehicle.type.fence_needs_one_inclusion(self.vehicle)
-        flown = (self.track_positions, self.track.item if self.track is not None else None)
-        ways = (self.legs, self.circles, *flown)
+        flown, heading = np.empty((0, 2)), np.empty(0, dtype=int)
+        if self.track is not None and self.track_positions is not None:
+            flown, heading = self.track_positions[:, :2], self.track.item
+        ways = (self.legs, self.circles, flown, heading)
         return (fence_map(self.mission.fence, self.frame, any_inclusion, *ways),)
 
     @cached_property

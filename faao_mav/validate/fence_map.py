@@ -117,15 +117,14 @@ def fence_map(
     any_inclusion: bool,
     straights: Sequence[Straight],
     circles: dict[int, Real],
-    positions: Real | None,
-    heading_for: Integers | None,
+    flown: Real,
+    heading_for: Integers,
 ) -> FenceMap:
     """Return `fence`, which has places, in the plane of `frame`, else of its own first place.
 
     `any_inclusion`: one inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else
     all have to hold. `circles` are outlines (k, 2), m, by the index of the item that is circled at.
-    The flight is at `positions` (n, 3), m, on the way to the items at the indices `heading_for`
-    (n,); both are None where it is not predicted.
+    The flight is at `flown` (n, 2), m, on the way to the items at the indices `heading_for` (n,).
     """
     import shapely
 
@@ -139,8 +138,6 @@ def fence_map(
     parts = (*inclusions, *exclusions)
     shapely.prepare([part.shape for part in parts])
     ends = np.array([[leg.start.ground, leg.end.ground] for leg in straights]).reshape(-1, 2, 2)
-    flown = np.empty((0, 2)) if positions is None else positions[:, :2]
-    heading = np.empty(0, dtype=int) if heading_for is None else heading_for
 
     def ways(index: Any, shapes: Any) -> Ways:
         shapes = np.array([*shapes], dtype=object)
@@ -153,7 +150,7 @@ def fence_map(
         parts,
         ways([leg.index for leg in straights], _lines(ends)),
         ways([*circles], map(shapely.LineString, circles.values())),
-        ways(heading[1:], _lines(np.stack([flown[:-1], flown[1:]], axis=1))),
+        ways(heading_for[1:], _lines(np.stack([flown[:-1], flown[1:]], axis=1))),
     )
 
 

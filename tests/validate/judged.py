@@ -1,5 +1,22 @@
-"""Missions about a known home, in local metres, and tracks that fly them."""
+"""What is judged, written in a line: `given("px4 square:100 takeoff waypoint:0,50.1,30 return")`.
 
+The words of a line, in any order but for the items, which are flown in theirs:
+
+- `copter`, `plane`, `px4`, `px4-plane`: the vehicle; `NAME=VALUE`: one of its parameters;
+- `max_altitude=50` and so forth: a limit; `airborne`; `home=LATITUDE,LONGITUDE,HEIGHT`, `homeless`;
+- `energy=WH,W`: what the flight takes of 100 Wh, 20 % of which are kept, and the least power;
+- `link`, `link.NAME=VALUE`: a plan that is delivered, but for a value of `LinkCheck`;
+- `fly:PACE;PLACE;PLACE,INDEX;...`: the flight is predicted at so many m/s towards these items;
+- `square:SIDE,EAST`, `area:PLACE;...`, `disc:PLACE,RADIUS`: inclusions, the square about home or
+  a place east of it; `zone:PLACE,RADIUS`: an exclusion; `rally:PLACE`, `back:PLACE`: where a
+  return, and one after a breach, ends;
+- `takeoff`, `return`, `land`: items at home; `row=COUNT,SPACING`: waypoints to the north of home;
+- `waypoint:PLACE,PARAM1,...`: a command, by its name or number, at a place: metres east, north and
+  above home; `waypoint@...`: at degrees; `jump=PARAM1,...`: without a place; `/FRAME` after it: in
+  another frame than 3, or 2; `!` at the end: autocontinue off; `3*` before it: three times.
+"""
+
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,6 +28,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.plan.energy import Battery
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
 from faao_mav.validate.energy import EnergyUse
 
@@ -22,137 +40,8 @@ PLANE = Vehicle("ardupilot", "plane")
 PX4 = Vehicle("px4", "copter")
 PX4_PLANE = Vehicle("px4", "plane")
 VEHICLES = (COPTER, PLANE, PX4, PX4_PLANE)
-
-
-def having(vehicle: Vehicle, **parameters: float) -> Vehicle:
-    return replace(vehicle, parameters=parameters)
-
-
-def latlon(east: float, north: float) -> tuple[float, float]:
-    latitude, longitude = FRAME.to_geodetic([east, north])
-    return float(latitude), float(longitude)
-
-
-def at(
-    east: float,
-    north: float,
-    up: float,
-    *params: float,
-    command: int = Command.NAV_WAYPOINT,
-    frame: int = Frame.GLOBAL_RELATIVE_ALT,
-    autocontinue: bool = True,
-) -> MissionItem:
-    """An item that flies to a local place, by default a waypoint above home."""
-    latitude, longitude = latlon(east, north)
-    return raw(latitude, longitude, up, *params, command=command, frame=frame, go_on=autocontinue)
-
-
-def four(*params: float) -> tuple[float, float, float, float]:
-    one, two, three, last = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return one, two, three, last
-
-
-def raw(
-    x: float,
-    y: float,
-    z: float,
-    *params: float,
-    command: int = Command.NAV_WAYPOINT,
-    frame: int = Frame.GLOBAL_RELATIVE_ALT,
-    go_on: bool = True,
-) -> MissionItem:
-    return MissionItem(command, frame, four(*params), x, y, z, go_on)
-
-
-def do(command: int, *params: float, frame: int = Frame.MISSION) -> MissionItem:
-    """An item without a place."""
-    return MissionItem(command, frame, four(*params))
-
-
-def speed(value: float, kind: float = 1.0) -> MissionItem:
-    return do(Command.DO_CHANGE_SPEED, kind, value, -1.0)
-
-
-TAKEOFF = at(0, 0, 30, command=Command.NAV_TAKEOFF)
-RTL = do(Command.NAV_RETURN_TO_LAUNCH)
-LAND = at(0, 0, 0, command=Command.NAV_LAND)
-
-
-def spline(east: float, north: float, up: float = 30.0, *params: float) -> MissionItem:
-    return at(east, north, up, *params, command=Command.NAV_SPLINE_WAYPOINT)
-
-
-def mission(*items: MissionItem, home: Home | None = HOME, **beside: Any) -> Mission:
-    return Mission(items, home, **beside)
-
-
-def flown(*items: MissionItem, **beside: Any) -> Mission:
-    """Take-off, `items`, return."""
-    return mission(TAKEOFF, *items, RTL, **beside)
-
-
-def row(count: int, spacing: float, up: float = 30.0) -> list[MissionItem]:
-    """`count` waypoints to the north, the first `spacing` from home."""
-    return [at(0, spacing * (k + 1), up) for k in range(count)]
-
-
-def polygon(*corners: tuple[float, float], inclusion: bool = True) -> Polygon:
-    return Polygon(tuple(latlon(*corner) for corner in corners), inclusion)
-
-
-def square(side: float, *, inclusion: bool = True, east: float = 0.0) -> Polygon:
-    """A square about home, or about a place to the east of it."""
-    h = side / 2
-    corners = ((east - h, -h), (east + h, -h), (east + h, h), (east - h, h))
-    return polygon(*corners, inclusion=inclusion)
-
-
-def circle(east: float, north: float, radius: float, *, inclusion: bool = False) -> Circle:
-    return Circle(latlon(east, north), radius, inclusion)
-
-
-def fence(*parts: Polygon | Circle, breach_return: RallyPoint | None = None) -> Fence:
-    return Fence(
-        tuple(part for part in parts if isinstance(part, Polygon)),
-        tuple(part for part in parts if isinstance(part, Circle)),
-        breach_return,
-    )
-
-
-def rally(east: float, north: float, up: float = 50.0) -> RallyPoint:
-    return RallyPoint(*latlon(east, north), up)
-
-
-def track(
-    points: Sequence[tuple[float, float, float]],
-    items: Sequence[int],
-    pace: float | Sequence[float],
-    step: float = 0.1,
-    frame: LocalFrame = FRAME,
-) -> Track:
-    """Straight lines through `points` at `pace` m/s each, towards the items at `items`."""
-    paces = [pace] * len(items) if isinstance(pace, int | float) else list(pace)
-    t, position, velocity, item = [0.0], [np.array(points[0], dtype=float)], [np.zeros(3)], []
-    reached = np.full(max(items) + 1, np.nan)
-    for start, end, index, v in zip(points, points[1:], items, paces, strict=False):
-        a, b = np.array(start, dtype=float), np.array(end, dtype=float)
-        samples = max(1, round(float(np.linalg.norm(b - a)) / v / step))
-        for k in range(samples):
-            t.append(t[-1] + step)
-            position.append(a + (b - a) * (k + 1) / samples)
-            velocity.append((b - a) / (samples * step))
-            item.append(index)
-        reached[index] = t[-1]
-    velocity[0] = velocity[1]
-    return Track(
-        np.array(t),
-        np.array(position),
-        np.array(velocity),
-        np.array([items[0], *item]),
-        reached,
-        frame,
-    )
-
+_NAMED = dict(zip(("copter", "plane", "px4", "px4-plane"), VEHICLES, strict=True))
+_COMMANDS = {c.name.partition("_")[2].lower(): c for c in sorted(Command, reverse=True)}
 
 LINK = LinkCheck(
     planned_rate=2.0,
@@ -168,6 +57,70 @@ LINK = LinkCheck(
 )
 
 
+def latlon(east: float, north: float) -> tuple[float, float]:
+    latitude, longitude = FRAME.to_geodetic([east, north])
+    return float(latitude), float(longitude)
+
+
+def at(
+    east: float, north: float, up: float, *params: float, command: int = 16, frame: int = 3
+) -> MissionItem:
+    """An item that flies to a local place, by default a waypoint above home."""
+    one, two, three, last = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return MissionItem(command, frame, (one, two, three, last), *latlon(east, north), up)
+
+
+def do(command: int, *params: float, frame: int = Frame.MISSION) -> MissionItem:
+    """An item without a place."""
+    return replace(at(0, 0, 0, *params, command=command, frame=frame), x=0.0, y=0.0)
+
+
+TAKEOFF = at(0, 0, 30, command=Command.NAV_TAKEOFF)
+RTL = do(Command.NAV_RETURN_TO_LAUNCH)
+LAND = at(0, 0, 0, command=Command.NAV_LAND)
+
+
+def speed(value: float) -> MissionItem:
+    return do(Command.DO_CHANGE_SPEED, 1.0, value, -1.0)
+
+
+def mission(*items: MissionItem, home: Home | None = HOME, **beside: Any) -> Mission:
+    return Mission(items, home, **beside)
+
+
+def flown(*items: MissionItem, **beside: Any) -> Mission:
+    """Take-off, `items`, return."""
+    return mission(TAKEOFF, *items, RTL, **beside)
+
+
+def polygon(*corners: tuple[float, float], inclusion: bool = True) -> Polygon:
+    return Polygon(tuple(latlon(*corner) for corner in corners), inclusion)
+
+
+def circle(east: float, north: float, radius: float, *, inclusion: bool = False) -> Circle:
+    return Circle(latlon(east, north), radius, inclusion)
+
+
+def track(
+    points: Sequence[Sequence[float]], items: Sequence[int], pace: float, frame: LocalFrame = FRAME
+) -> Track:
+    """Straight lines through `points` at `pace` m/s, towards the items at `items`, at 10 Hz."""
+    t, position, velocity, item = [0.0], [np.array(points[0], dtype=float)], [np.zeros(3)], []
+    reached = np.full(max(items) + 1, np.nan)
+    for start, end, index in zip(points, points[1:], items, strict=False):
+        a, b = np.array(start, dtype=float), np.array(end, dtype=float)
+        samples = max(1, round(float(np.linalg.norm(b - a)) / pace / 0.1))
+        for k in range(samples):
+            t.append(t[-1] + 0.1)
+            position.append(a + (b - a) * (k + 1) / samples)
+            velocity.append((b - a) / (samples * 0.1))
+            item.append(index)
+        reached[index] = t[-1]
+    velocity[0] = velocity[1]
+    samples_of = (np.array(t), np.array(position), np.array(velocity))
+    return Track(*samples_of, np.array([items[0], *item]), reached, frame)
+
+
 @dataclass(frozen=True)
 class Given:
     """What is judged."""
@@ -181,18 +134,80 @@ class Given:
     energy: EnergyUse | None = None
 
     def findings(self) -> tuple[Finding, ...]:
-        return validate(
-            self.mission,
-            self.vehicle,
-            track=self.track,
-            limits=self.limits,
-            link=self.link,
-            airborne=self.airborne,
-            energy=self.energy,
-        )
+        return validate(**vars(self))
 
     def by(self, rule: str) -> list[Finding]:
         return [finding for finding in self.findings() if finding.rule == rule]
+
+
+_WORD = re.compile(r"(?:(\d+)\*)?([\w.-]+)(?:([:=@])([^/!]*)(?:/(\d+))?)?(!?)")
+_ITEMS = {"takeoff": TAKEOFF, "return": RTL, "land": LAND}
+
+
+def given(line: str) -> Given:
+    """Return what `line` says, as the head of this file has it."""
+    case: dict[str, Any] = {"vehicle": COPTER}
+    named: dict[str, dict[str, Any]] = {"NAME": {}, "max": {}, "link": {}}
+    items: list[MissionItem] = []
+    parts: dict[str, list[Any]] = {"polygons": [], "circles": [], "rally": []}
+    home: Home | None = HOME
+    back = None
+    for word in line.split():
+        match = _WORD.fullmatch(word)
+        assert match is not None, word
+        count, head, sign, rest, frame, off = match.groups()
+        rows = [[float(x) for x in row.split(",") if x] for row in (rest or "").split(";")]
+        first, times = rows[0], int(count or 1)
+        kind, _, field = head.rpartition(".") if "." in head else head.partition("_")
+        if head in _NAMED:
+            case["vehicle"] = _NAMED[head]
+        elif head.isupper():
+            named["NAME"][head] = first[0]
+        elif kind in named:
+            named[kind] |= {head if kind == "max" else field: first[0]} if first else {}
+            case["link"] = LINK if kind == "link" else case.get("link")
+        elif head == "airborne":
+            case["airborne"] = True
+        elif head in ("home", "homeless"):
+            home = Home(*first) if first else None
+        elif head == "energy":
+            t, battery = np.array([0.0, 3600.0]), Battery(capacity_wh=100)
+            case["energy"] = EnergyUse(t, t, np.array([0.0, first[0]]), battery, True, first[1])
+        elif head == "fly":
+            case["track"] = track(
+                [r[:3] for r in rows[1:]], [int(r[3]) for r in rows[2:]], first[0]
+            )
+        elif head == "square":
+            (half, east) = first[0] / 2, first[1] if first[1:] else 0.0
+            ways = ((-half, -half), (half, -half), (half, half), (-half, half))
+            parts["polygons"] += [polygon(*((east + x, y) for x, y in ways))] * times
+        elif head == "area":
+            parts["polygons"].append(polygon(*((x, y) for x, y in rows)))
+        elif head in ("disc", "zone"):
+            parts["circles"].append(circle(first[0], first[1], first[2], inclusion=head == "disc"))
+        elif head in ("rally", "back"):
+            point = RallyPoint(*latlon(*first[:2]), first[2])
+            parts["rally"] += [point] * times if head == "rally" else []
+            back = back if head == "rally" else point
+        elif head == "row":
+            items += [at(0, first[1] * (k + 1), 30) for k in range(int(first[0]))]
+        elif not sign:
+            items += [_ITEMS[head]] * times
+        else:
+            command = int(head) if head.isdigit() else _COMMANDS[head]
+            item = do(command, *first, frame=int(frame or 2))
+            if sign != "=":
+                item = at(*(first if sign == ":" else [0, 0, *first[2:]]), command=command)
+                item = replace(item, frame=int(frame or 3))
+            if sign == "@":
+                item = replace(item, x=first[0], y=first[1])
+            items += [replace(item, autocontinue=not off)] * times
+    fence = Fence(tuple(parts["polygons"]), tuple(parts["circles"]), back)
+    case["vehicle"] = replace(case["vehicle"], parameters=named["NAME"])
+    case["limits"] = Limits(**named["max"])
+    if case.get("link") is not None:
+        case["link"] = replace(LINK, **named["link"])
+    return Given(mission(*items, home=home, fence=fence, rally=tuple(parts["rally"])), **case)
 
 
 def check(rule: str, trips: Given, item: int | None, passes: Given) -> None:

@@ -1,10 +1,11 @@
 """Any mission can be judged, for any vehicle."""
 
 import math
+from dataclasses import replace
 
 import hypothesis.strategies as st
 from hypothesis import given, settings
-from judged import HOME, VEHICLES, having, track
+from judged import HOME, VEHICLES, track
 
 from faao_mav.mission.command import Command
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
@@ -54,7 +55,7 @@ missions = st.builds(
     rally=st.lists(places.map(lambda place: RallyPoint(*place, 50.0)), max_size=2).map(tuple),
 )
 ZEROS = ("WPNAV_SPEED", "WPNAV_ACCEL", "WPNAV_JERK", "MPC_ACC_HOR", "MPC_JERK_AUTO", "NAV_ACC_RAD")
-STRICT = {
+STRICT = dict.fromkeys(ZEROS, 0.0) | {
     "ARMING_MIS_ITEMS": 127.0,
     "FENCE_ENABLE": 1.0,
     "FENCE_TYPE": 15.0,
@@ -62,23 +63,16 @@ STRICT = {
     "GF_MAX_HOR_DIST": 10.0,
     "GF_MAX_VER_DIST": 10.0,
 }
+LIMITS = Limits(1.0, 50.0, 20.0, 5.0, 2.0)
 
 
-@given(mission=missions, bare=st.booleans())
-@settings(max_examples=100)
-def test_any_mission_can_be_judged(mission: Mission, bare: bool) -> None:
-    for vehicle in VEHICLES:
-        judged = vehicle if bare else having(vehicle, **dict.fromkeys(ZEROS, 0.0), **STRICT)
-        limits = None if bare else Limits(60.0, 500.0, 50.0, 5.0, 2.0)
-        for finding in validate(mission, judged, limits=limits):
-            assert finding.item is None or 1 <= finding.item <= len(mission.items)
-
-
-@given(mission=missions.filter(lambda mission: len(mission.items) >= 2))
-@settings(max_examples=25)
-def test_any_mission_can_be_judged_with_a_flight(mission: Mission) -> None:
+@given(mission=missions, bare=st.booleans(), flown=st.booleans())
+@settings(max_examples=125)
+def test_any_mission_can_be_judged(mission: Mission, bare: bool, flown: bool) -> None:
     flight = track(((0, 0, 0), (0, 0, 30), (0, 90, 30)), [0, 1], 5.0)
+    known = flight if flown and len(mission.items) >= 2 else None
     for vehicle in VEHICLES:
-        limits = Limits(1.0, 50.0, 20.0, 5.0, 2.0)
-        for finding in validate(mission, vehicle, track=flight, limits=limits):
+        judged = vehicle if bare else replace(vehicle, parameters=STRICT)
+        found = validate(mission, judged, track=known, limits=None if bare else LIMITS)
+        for finding in found:
             assert finding.item is None or 1 <= finding.item <= len(mission.items)

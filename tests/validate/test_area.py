@@ -1,0 +1,156 @@
+"""Fences in the plane, against plain distances."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given as drawn
+from judged import COPTER, FRAME, circle, given, polygon
+from shapely.geometry.base import BaseGeometry
+
+from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import areas_of, free_area
+from faao_mav.validate.context import ValidationContext
+
+metres = st.floats(-500, 500)
+places = st.tuples(metres, metres)
+Place = tuple[float, float]
+
+
+def broken(line: str) -> list[bool]:
+    """Which legs of a mission leave its fence."""
+    case = given(line)
+    return [bool(out) for out in ValidationContext(case.mission, COPTER).fences[0].legs.leave]
+
+
+def between(a: Place, b: Place, fence: str) -> bool:
+    """Whether the leg from a to b leaves the fence."""
+    return broken(f"{fence} waypoint:{a[0]!r},{a[1]!r},30 waypoint:{b[0]!r},{b[1]!r},30")[1]
+
+
+def distance_to_segment(point: Place, a: Place, b: Place) -> float:
+    return float(shapely.distance(shapely.Point(point), shapely.LineString([a, b])))
+
+
+@drawn(a=places, b=places, center=places, radius=st.floats(1, 300))
+def test_a_leg_enters_a_circle_when_it_comes_nearer_than_the_radius(
+    a: Place, b: Place, center: Place, radius: float
+) -> None:
+    spare = distance_to_segment(center, a, b) - radius
+    if abs(spare) > 1e-3 * radius:
+        assert between(a, b, f"zone:{center[0]!r},{center[1]!r},{radius!r}") == (spare < 0)
+
+
+@drawn(a=places, b=places, center=places, radius=st.floats(1, 1000))
+def test_a_leg_stays_in_a_circle_when_its_ends_do(
+    a: Place, b: Place, center: Place, radius: float
+) -> None:
+    spare = radius - max(math.dist(center, a), math.dist(center, b))
+    if abs(spare) > 1e-3 * radius:
+        assert between(a, b, f"disc:{center[0]!r},{center[1]!r},{radius!r}") == (spare < 0)
+
+
+def test_circles_err_on_the_safe_side() -> None:
+    both = (circle(0, 0, 100, inclusion=True), circle(0, 0, 100))
+    inclusion, exclusion = areas_of(Fence(circles=both), FRAME)
+    assert inclusion.shape.area < math.pi * 100**2 < exclusion.shape.area
+    assert inclusion.shape.area == pytest.approx(exclusion.shape.area, rel=1e-3)
+
+
+def margin(line: str) -> tuple[float, int | None]:
+    """The margin that is told of a mission, and its item."""
+    (told,) = given(line).by("fence-margin")
+    return float(told.message.split(" m ")[0]), told.item
+
+
+def test_the_margin_is_the_distance_to_the_nearest_edge() -> None:
+    for spare in (3.0, 25.0, 40.0):
+        inside = margin(f"square:200 takeoff waypoint:0,{100 - spare},30 return")
+        around = margin(f"zone:{50 + spare},50,50 takeoff waypoint:0,100,30 return")
+        assert inside[0] == pytest.approx(spare, abs=0.06)
+        assert around[0] == pytest.approx(spare, abs=0.06)
+    posts = " ".join(f"zone:{40 + 20 * k},{30 * (k % 9)},5" for k in range(255))
+    assert margin(f"square:20000 {posts} takeoff row=9,25 return")[0] == 35.0
+    nested = " ".join(f"zone:0,60,{10 + k}" for k in range(100))
+    out = given(f"{nested} takeoff waypoint:0,300,30 return").by("fence-leg")[0]
+    assert out.message.count("m of it inside exclusion circle") == 3  # of many three are named
+
+
+def test_the_predicted_flight_counts_for_the_margin() -> None:
+    way = "takeoff waypoint:0,100,30 return"
+    bulge = "fly:5;0,0,0;60,50,30,0;0,100,30,1"
+    assert margin(f"square:300 {bulge} {way}")[0] == 50.0
+    assert margin(f"square:300 fly:5;0,0,0;120,50,30,1 {way}") == (30.0, 2)
+
+
+def test_legs_by_jumps_count() -> None:
+    around = "waypoint:-90,60,30 waypoint:-90,0,30 waypoint:90,0,30 waypoint:90,60,30"
+    case = given(f"zone:-22,-30,10 takeoff {around} waypoint:0,-60,30 jump=2,1 return")
+    assert [finding.item for finding in case.by("fence-leg")] == [7]
+    assert "by a jump" in case.by("fence-leg")[0].message
+
+
+@pytest.mark.parametrize("vehicle", ["plane", "px4-plane"])
+def test_circles_of_planes_count(vehicle: str) -> None:
+    for command in ("loiter_unlim", "loiter_turns", "loiter_time", "loiter_to_alt"):
+        radius = "0,150" if command == "loiter_to_alt" else "0,0,150"
+        way = f"{vehicle} takeoff {command}:600,0,60,{radius}"
+        found = given(f"zone:600,140,30 {way}").by("fence-circle")
+        assert [finding.item for finding in found] == [2]
+        center = given(f"zone:600,0,60 {way}")  # round what is not to be flown over
+        assert not center.by("fence-circle") + center.by("fence-leg")
+
+
+@pytest.mark.parametrize(
+    ("line", "leaves"),
+    [
+        ("plane zone:0,60,10 takeoff waypoint:900,0,60 return", True),
+        ("copter zone:0,60,10 takeoff waypoint:900,0,60 return", False),
+        ("plane zone:900,60,10 takeoff waypoint:900,0,60", True),
+        ("plane zone:900,60,10 takeoff waypoint:900,0,60 land", False),
+    ],
+)
+def test_a_plane_circles_where_it_returns_and_where_it_ends(line: str, leaves: bool) -> None:
+    loiter = "WP_LOITER_RAD=60 " if line.startswith("plane") else ""
+    assert bool(given(loiter + line).by("fence-circle")) is leaves
+
+
+def test_between_two_inclusions_is_outside_all() -> None:
+    (out,) = given("px4 square:100 square:100,180 takeoff waypoint:180,0,30").by("fence-leg")
+    assert "80.0 m of it outside all inclusions" in out.message
+
+
+@drawn(st.lists(places, min_size=3, max_size=9, unique=True))
+def test_what_outlines_that_cross_themselves_enclose(corners: list[Place]) -> None:
+    """An odd number of turns encloses what an odd number of triangles to one corner covers."""
+    outline = polygon(*corners)
+    (area,) = areas_of(Fence((outline,)), FRAME)
+    first, *others = FRAME.to_local(*np.transpose(outline.vertices))
+    odd: BaseGeometry = shapely.Polygon()
+    for edge in pairwise(others):
+        odd = odd.symmetric_difference(shapely.Polygon([first, *edge]))
+    assert area.shape.is_valid
+    assert shapely.symmetric_difference(area.shape, odd).area < 1e-3
+
+
+def test_an_outline_that_crosses_itself_everywhere_counts_on_the_safe_side() -> None:
+    corners = [(100 * math.cos(2.4 * k), 100 * math.sin(2.4 * k)) for k in range(3000)]
+    for inclusion in (True, False):
+        (area,) = areas_of(Fence((polygon(*corners, inclusion=inclusion),)), FRAME)
+        assert area.crosses_itself
+        assert area.shape.area == pytest.approx(0 if inclusion else math.pi * 100**2, rel=1e-3)
+
+
+def test_a_polygon_without_an_area_lets_nothing_in() -> None:
+    areas = areas_of(Fence((polygon((0, 0), (50, 50), (100, 100)),)), FRAME)
+    free = free_area(areas, any_inclusion=False)
+    assert free is not None
+    assert free.area < 1e-6
+    assert free_area((), any_inclusion=False) is None
+    point = Fence((polygon((20, 0), (20, 0), (20, 0), inclusion=False),))  # encloses nothing
+    case = ValidationContext(given("takeoff row=9,25 return").mission, COPTER)
+    assert ValidationContext(replace(case.mission, fence=point), COPTER).fences[0].nearest is None

@@ -1,0 +1,218 @@
+"""`faao-mission validate`, by itself."""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import typer
+from conftest import MISSIONS
+from judged import given, track
+from typer.testing import CliRunner
+
+import faao_mav
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.files import plan_target
+from faao_mav.cli.validate import validate
+from faao_mav.errors import InfeasibleError
+from faao_mav.mission.formats import render_mission
+from faao_mav.mission.item import Mission
+from faao_mav.validate import RULES
+
+Run = Callable[..., Any]
+
+WAY = "waypoint:0,100,30,6 waypoint:100,150,30 waypoint:200,160,30,10"
+SOUND = f"takeoff change_speed=1,8,-1 {WAY} return"
+SLOW = "takeoff change_speed=1,0,-1 waypoint:0,200,30 return"  # a warning and nothing worse
+BROKEN = "takeoff waypoint:0,9,9/1 return"
+LEVEL = track(((0, 0, 0), (0, 0, 30), (0, 100, 30)), [0, 2], 8.0)
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run the command with a prediction that is always the same, or none."""
+    app = typer.Typer()
+    app.command()(validate)
+
+    def runner(*arguments: object, predicted: bool = False) -> Any:
+        def predict(mission: Mission, vehicle: Vehicle, **_: object) -> object:
+            if predicted:
+                return LEVEL
+            raise InfeasibleError(f"no model of {len(mission.items)} items for {vehicle.autopilot}")
+
+        fake = SimpleNamespace(predict=predict)
+        monkeypatch.setitem(sys.modules, "faao_mav.autopilot.predict", fake)
+        return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+    return runner
+
+
+def rules(result: Any) -> set[str]:
+    return {finding["rule"] for finding in json.loads(result.stdout)["findings"]}
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def written(line: str, name: str = "mission.waypoints", vehicle: Vehicle | None = None) -> Path:
+        path = tmp_path / name
+        path.write_text(render_mission(given(line).mission, path, plan_target(vehicle)))
+        return path
+
+    return written
+
+
+@pytest.fixture
+def sound(write: Callable[..., Path]) -> Path:
+    return write(SOUND, "sound.waypoints")
+
+
+def test_nothing_wrong(run: Run, sound: Path) -> None:
+    result = run(sound)
+    assert result.exit_code == 0
+    assert "sound.waypoints: 6 items, for ArduPilot and a copter (by default" in result.stdout
+    assert "flight not predicted: no model of 6 items for ardupilot" in result.stdout
+    assert "0 errors, 0 warnings, 0 notes" in result.stdout
+
+
+def test_the_python_names() -> None:
+    limits = faao_mav.Limits(max_altitude=20)
+    check = faao_mav.check(given(SOUND).mission, faao_mav.Vehicle("px4"), limits=limits)
+    assert isinstance(check.findings[0], faao_mav.Finding)
+
+
+def test_errors_fail_and_say_item_rule_and_cure(run: Run, write: Callable[..., Path]) -> None:
+    broken = write(BROKEN)
+    result = run(broken)
+    assert result.exit_code == 1
+    assert "error: item 2: " in result.stdout
+    assert "[refused-on-upload]" in result.stdout
+    assert "to do: give one of 0, 2, 3" in result.stdout
+    answer = json.loads(run(broken, "--json", predicted=True).stdout)
+    assert (answer["autopilot"], answer["type"], answer["items"]) == ("ardupilot", "copter", 3)
+    assert answer["errors"] == 1
+    assert answer["predicted"]["duration"] == pytest.approx(float(LEVEL.t[-1]))
+    finding = answer["findings"][0]
+    assert (finding["level"], finding["rule"], finding["item"]) == ("error", "refused-on-upload", 2)
+    assert finding["message"]
+    assert finding["action"]
+
+
+def test_warnings_fail_only_when_strict(run: Run, write: Callable[..., Path]) -> None:
+    slow = write(SLOW)
+    assert run(slow).exit_code == 0
+    assert run(slow, "--strict").exit_code == 1
+
+
+def test_many_of_a_kind_are_one_line(run: Run, write: Callable[..., Path]) -> None:
+    half = [f"waypoint:0,{50 * k},30,2.5" for k in (1, 2, 3, 5)]
+    path = write(" ".join(["takeoff", *half[:3], "change_speed=1,5,-1", half[3]]))
+    found = [line for line in run(path).stdout.splitlines() if "[hold-changed]" in line]
+    assert len(found) == 1
+    assert "items 2-4, 6: " in found[0]
+    assert "(and 3 more like it)" in found[0]
+
+
+def test_who_flies_it(run: Run, write: Callable[..., Path]) -> None:
+    plan = write(SOUND, "px4.plan", Vehicle("px4", "copter"))
+    assert "for PX4 and a copter (as the file says)" in run(plan).stdout
+    asked = run(plan, "--autopilot", "ardupilot", "--type", "plane").stdout
+    assert "for ArduPilot and a plane (as asked)" in asked
+    assert run(plan, "--autopilot", "betaflight").exit_code == 2
+    assert run(plan, "--type", "boat").exit_code == 2
+
+
+def test_a_flight_without_a_model_is_not_predicted(sound: Path) -> None:
+    app = typer.Typer()
+    app.command()(validate)
+    told = CliRunner().invoke(app, [str(sound), "--autopilot", "px4", "--type", "plane"]).stdout
+    assert "flight not predicted: there is no model of how PX4 flies planes" in told
+
+
+def test_parameters_come_from_a_file(run: Run, sound: Path) -> None:
+    given_file, beside = sound.with_name("given.param"), sound.with_suffix(".param")
+    given_file.write_text("ARMING_MIS_ITEMS,1\n")
+    found = run(sound, "--parameters", given_file, "--json")
+    assert rules(found) == {"ardupilot-required-item"}
+    assert run(sound, "--parameters", sound.with_name("none.param")).exit_code == 2
+    for path, options in ((given_file, ("--parameters", given_file)), (beside, ())):
+        path.write_text("WPNAV_SPEED,-5\n")
+        result = run(sound, *options)
+        assert result.exit_code == 2
+        assert f"{path}" in result.stderr
+        assert "WPNAV_SPEED: -5; give a number of at least" in result.stderr
+
+
+def test_limits(run: Run, sound: Path) -> None:
+    asked = ("--max-altitude", 20, "--max-distance", 150, "--max-duration", 30)
+    assert rules(run(sound, *asked, "--json")) == {"above-ceiling", "beyond-distance", "too-long"}
+    assert "predicted flight: 16 s" in run(sound, "--max-duration", 17, predicted=True).stdout
+    assert run(sound, "--max-duration", 17, predicted=True).exit_code == 0
+    assert run(sound, "--max-duration", 16, predicted=True).exit_code == 1
+    for option in ("--max-duration", "--max-distance", "--max-altitude"):
+        for value in ("nan", "inf", "0", "-5"):
+            result = run(sound, option, value)
+            assert result.exit_code == 2
+            assert result.stderr == f"faao-mission: {option} {value}: expected a number above 0\n"
+
+
+def test_a_plan_tells_vehicle_and_top_speed(run: Run, sound: Path) -> None:
+    text = (MISSIONS / "copter_relay.yaml").read_text()
+    plan = sound.with_name("plan.yaml")
+    plan.write_text(text.replace("max_speed: 8", "max_speed: 7"))
+    assert plan.read_text() != text
+    assert rules(run(sound, "--plan", plan, "--json")) == {"speed-above-limit"}
+    assert "(as the plan says)" in run(sound, "--plan", plan).stdout
+
+
+def test_what_cannot_be_read(run: Run, tmp_path: Path) -> None:
+    missing = run(tmp_path / "none.waypoints")
+    assert missing.exit_code == 2
+    assert "none.waypoints" in missing.stderr
+    assert missing.stdout == ""
+    assert run().exit_code == 2
+
+
+def test_rules_are_listed(run: Run) -> None:
+    text = run("--rules")
+    assert text.exit_code == 0
+    assert len(text.stdout.splitlines()) == len(RULES)
+    listed = json.loads(run("--rules", "--json").stdout)["rules"]
+    assert [rule["id"] for rule in listed] == [rule.id for rule in RULES]
+    assert {"level", "summary", "source", "autopilot", "type"} <= listed[0].keys()
+
+
+def test_a_terminal_gets_tables(write: Callable[..., Path]) -> None:
+    from rich.console import Console
+
+    from faao_mav.cli.findings import CheckedFile, show, show_rules
+    from faao_mav.validate.check import Check
+
+    case, console = given(BROKEN), Console(force_terminal=True, width=100, record=True)
+    check = Check(case.mission, Vehicle(), LEVEL, findings=case.findings())
+    show(CheckedFile(write(BROKEN), "asked", check), console)
+    show_rules(RULES, console)
+    shown = console.export_text()
+    assert "refused-on-upload" in shown
+    assert "what is the case, and what to do" in shown
+    assert "px4-null-island" in shown
+
+
+def test_a_page_of_a_mission_by_itself(run: Run, sound: Path) -> None:
+    page = sound.with_suffix(".html")
+    assert run(sound, "--report", page, predicted=True).exit_code == 0
+    text = page.read_text()
+    for heading in ("Result", "Findings", "Mission", "Flight"):
+        assert f"<h2>{heading}</h2>" in text
+    assert "<h2>Route</h2>" not in text
+    assert sound.name in text
+    odd, page = (sound.with_name(os.fsdecode(b"\xff" + end)) for end in (b".waypoints", b".html"))
+    odd.write_bytes(sound.read_bytes())
+    assert run(odd, "--report", page, "--json", predicted=True).exit_code == 0
+    assert r"<title>\udcff.waypoints</title>" in page.read_text()
+    wrong = run(sound, "--report", sound)
+    assert wrong.exit_code == 2
+    assert "--report" in wrong.stderr

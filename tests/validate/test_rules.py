@@ -1,0 +1,126 @@
+"""The rules: each speaks and is silent on both sides of its limit, and what holds for all."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from conftest import SMALL, edited
+from judged import LINK, VEHICLES, Given, check, flown, given
+
+from faao_mav.plan import Radio, parse_plan
+from faao_mav.plan.body import CopterBody
+from faao_mav.plan.radio_values import doubtful_values
+from faao_mav.validate import RULES, Level, Stretch, ardupilot, validate
+
+LIMITS = Path(__file__).parents[1] / "data" / "validate" / "limits.tsv"
+ROWS = [line.split("\t") for line in LIMITS.read_text().splitlines() if not line.startswith("#")]
+
+
+@pytest.mark.parametrize(("rule", "item", "trips", "passes"), ROWS)
+def test_the_rule_speaks_and_is_silent(rule: str, item: str, trips: str, passes: str) -> None:
+    check(rule, given(trips), None if item == "-" else int(item), given(passes))
+
+
+def test_every_rule_is_tried_from_both_sides() -> None:
+    assert {row[0] for row in ROWS} | {"radio-values"} == {rule.id for rule in RULES}
+
+
+def radio(**changes: float) -> Radio:
+    return parse_plan(edited(SMALL, {f"radio.{key}": v for key, v in changes.items()})).radio
+
+
+@pytest.mark.parametrize(
+    ("trips", "passes"),
+    [
+        ({"relay.noise_dbm": 91}, {"relay.noise_dbm": -91}),
+        ({"relay.noise_dbm": -174}, {"relay.noise_dbm": -140}),
+        ({"relay.noise_dbm": -110, "bandwidth_mhz": 20}, {"relay.noise_dbm": -101}),
+        ({"base_station.power_dbm": 100}, {"base_station.power_dbm": 40}),
+    ],
+)
+def test_a_doubtful_radio_is_told(trips: dict[str, float], passes: dict[str, float]) -> None:
+    sides = [replace(LINK, radio=radio(**changes)) for changes in (trips, passes)]
+    check("radio-values", *(Given(flown(), link=sides[0]), None), Given(flown(), link=sides[1]))
+
+
+def test_a_doubtful_value_names_the_likely_slip() -> None:
+    told = dict(doubtful_values(radio(**{"relay.noise_dbm": 91, "bandwidth_mhz": 20})))
+    assert list(told.values()) == ["did you mean -91?"]
+    density = dict(doubtful_values(radio(**{"ground_user.noise_dbm": -174, "bandwidth_mhz": 20})))
+    assert list(density.values()) == ["if it is a density (dBm/Hz), give -101.0 for the band"]
+
+
+def test_the_airframe_decides_what_leaning_gives() -> None:
+    fast = given("copter takeoff change_speed=1,8,-1 return")
+    sleek = replace(fast.vehicle, body=CopterBody(linear_drag=0, quadratic_drag=0))
+    draggy = replace(fast, vehicle=replace(fast.vehicle, body=CopterBody(linear_drag=1.0)))
+    quick = given("copter takeoff change_speed=1,20,-1 return")
+    check("speed-lean", draggy, 2, replace(quick, vehicle=sleek))
+
+
+def test_what_was_lost_says_where() -> None:
+    link = replace(LINK, predicted_delivered=0.5, worst=Stretch(30, 41, 0.05))
+    (found,) = Given(flown(), link=link).by("link-rate-reduced")
+    assert "25.0 %; 0.05 of it between 30 and 41 s" in found.message
+
+
+def test_of_a_plan_of_another_place_nothing_else_is_said() -> None:
+    far = replace(LINK, path_error=7e6, away=7e6, rms_position_error=7e6, predicted_delivered=0.0)
+    assert [each.rule for each in Given(flown(), link=far).findings()] == ["link-elsewhere"]
+
+
+def test_exchanged_coordinates_are_named() -> None:
+    (found,) = given("home=47.4,8.5,400 waypoint@8.5012,47.4003,30").by("too-far")
+    assert found.action == "latitude and longitude look exchanged: correct them"
+
+
+def test_of_px4_it_is_told_that_it_flies_all_the_same() -> None:
+    (finding,) = given("px4 square:100,50.1 takeoff return").by("fence-home")
+    assert "PX4 says so (Geofence invalid), and flies the mission all the same" in finding.message
+
+
+def test_rules_can_be_cited() -> None:
+    assert len({rule.id for rule in RULES}) == len(RULES)
+    assert set(ardupilot.checks) < {rule.id for rule in RULES}
+    for rule in RULES:
+        assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", rule.id)
+        assert rule.summary
+        assert rule.source
+
+
+ODD = (
+    "takeoff change_speed=1,20,-1 waypoint@0,0,30 waypoint:0,9,0,2.5,3,3,3 waypoint:0,9,9/1 return"
+)
+
+
+def test_rules_of_the_other_autopilot_are_silent_and_all_say_what_to_do() -> None:
+    for vehicle in VEHICLES:
+        found = validate(given(ODD).mission, vehicle)
+        other = "px4-" if vehicle.autopilot == "ardupilot" else "ardupilot-"
+        assert found
+        for finding in found:
+            assert not finding.rule.startswith(other)
+            assert finding.action == finding.action.strip()
+            assert not finding.action.endswith(".")
+
+
+def test_worst_first_then_by_item() -> None:
+    order = [Level.ERROR, Level.WARNING, Level.NOTE]
+    found = given("homeless waypoint:0,9,0 waypoint:0,9,9/1 change_speed=1,0,-1").findings()
+    levels = [order.index(finding.level) for finding in found]
+    assert levels == sorted(levels)
+    assert len(set(levels)) == 3
+    errors = [finding.item or 0 for finding in found if finding.level is Level.ERROR]
+    assert errors == sorted(errors)
+
+
+def test_a_sound_mission_has_no_findings() -> None:
+    way = "waypoint:0,100,30,6 waypoint:100,150,30 waypoint:200,160,30,10"
+    for vehicle in ("copter", "px4"):
+        assert given(f"{vehicle} takeoff change_speed=1,8,-1 {way} return").findings() == ()
+
+
+def test_parameters_that_are_no_numbers_count_as_not_given() -> None:
+    line = "takeoff waypoint:0,9,9 return"
+    assert given(f"px4 GF_MAX_HOR_DIST=nan {line}").findings() == given(f"px4 {line}").findings()

@@ -1,0 +1,128 @@
+"""Missions in files, and what ArduCopter, ArduPlane and PX4 made of missions (tests/data/verdicts).
+
+The verdicts are recorded by `tests/real_autopilots/record_verdicts.py`, which says what each means.
+"""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from judged import HOME
+from typer.testing import CliRunner
+
+from faao_mav.autopilot import Vehicle
+from faao_mav.cli.validate import validate as command
+from faao_mav.errors import MissionFileError
+from faao_mav.mission.fence import Fence, Polygon
+from faao_mav.mission.formats import read_mission, read_mission_file
+from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.validate import Finding, Level, validate
+
+DATA = Path(__file__).parent.parent / "data"
+CORPUS = DATA / "validate"
+ROWS = [
+    line.split("\t")
+    for line in (CORPUS / "expected.tsv").read_text().splitlines()
+    if not line.startswith("#")
+]
+
+
+def test_the_table_is_about_the_files() -> None:
+    files = {path.name for path in CORPUS.iterdir() if path.suffix != ".tsv"}
+    assert files == {row[0] for row in ROWS}
+    assert len(files) >= 40
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
+def test_each_file_gets_its_errors_and_warnings(row: list[str]) -> None:
+    """Also on the command line, which predicts the flight, and never shows a traceback."""
+    name, autopilot, kind, parameters, expected = row
+    app = typer.Typer()
+    app.command()(command)
+    told = ["--autopilot", autopilot, "--type", kind, "--json"]
+    run = CliRunner().invoke(app, [str(CORPUS / name), *told])
+    assert isinstance(run.exception, SystemExit | None)
+    if expected == "unreadable":
+        assert run.exit_code == 2
+        assert name in run.stderr
+        with pytest.raises(MissionFileError, match=name):
+            read_mission(CORPUS / name)
+        return
+    assert run.exit_code == (1 if json.loads(run.stdout)["errors"] else 0)
+    pairs = [] if parameters == "-" else [pair.split("=") for pair in parameters.split()]
+    vehicle = Vehicle(autopilot, kind, {name: float(value) for name, value in pairs})
+    found = validate(read_mission(CORPUS / name), vehicle)
+    rules = sorted({finding.rule for finding in found if finding.level is not Level.NOTE})
+    assert rules == ([] if expected == "-" else expected.split())
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_missions_that_were_flown_have_no_errors(autopilot: str) -> None:
+    folder = DATA / "flights" / {"ardupilot": "arducopter"}.get(autopilot, autopilot)
+    paths = sorted(folder.glob("*.waypoints"))
+    assert paths
+    for path in paths:
+        found = validate(read_mission_file(path).mission, Vehicle(autopilot, "copter"))
+        assert [finding for finding in found if finding.level is Level.ERROR] == [], path.name
+
+
+VEHICLES = {
+    "arducopter": ("ardupilot", "copter"),
+    "arduplane": ("ardupilot", "plane"),
+    "px4": ("px4", "copter"),
+}
+RECORDED: dict[str, dict[str, Any]] = {
+    f"{vehicle}/{name}": mission
+    for vehicle in VEHICLES
+    for name, mission in json.loads((DATA / "verdicts" / f"{vehicle}.json").read_text()).items()
+}
+NOT_FLOWN = {"refused", "rejected", "not armed", "not started", "on the ground", "crashed"}
+CUT_SHORT = {"stuck", "ended early"}
+
+STRICTER = {"px4/home-outside-fence": "PX4 says so and flies: nothing keeps it within the fence"}
+"""Missions that were flown in the simulator and are errors here, and why."""
+
+MILDER = {
+    "arducopter/700-items": "a warning: boards differ in how many they store",
+    "arducopter/nan-hold": "a warning: for what is not set our own upload sends 0",
+    "arducopter/script-time": "builds with scripting take it",
+}
+"""Missions that were not flown as they are written, with less than is asked here, and why."""
+
+
+def findings(name: str) -> tuple[Finding, ...]:
+    recorded = RECORDED[name]
+    items = []
+    for times, its, frame, *values, autocontinue in recorded["items"]:
+        p1, p2, p3, p4, x, y, z = (math.nan if v is None else v for v in values)
+        items += [MissionItem(its, frame, (p1, p2, p3, p4), x, y, z, bool(autocontinue))] * times
+    corners = tuple((latitude, longitude) for latitude, longitude in recorded.get("fence", ()))
+    fence = Fence((Polygon(corners, inclusion=True),)) if corners else Fence()
+    vehicle = Vehicle(*VEHICLES[name.split("/")[0]], recorded["parameters"])
+    return validate(Mission(tuple(items), HOME, fence), vehicle)
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_the_worst_finding_is_as_bad_as_the_verdict(name: str) -> None:
+    recorded, found = RECORDED[name], findings(name)
+    errors = [finding for finding in found if finding.level is Level.ERROR]
+    warned = errors or [finding for finding in found if finding.level is Level.WARNING]
+    if recorded["verdict"] in NOT_FLOWN:
+        assert bool(errors) is (name not in MILDER)
+    elif recorded["verdict"] in CUT_SHORT:
+        assert bool(warned) is (name not in MILDER)
+    else:
+        assert recorded["verdict"] == "flown"
+        assert bool(errors) is (name in STRICTER), errors
+    if "item" in recorded and name not in MILDER:
+        assert recorded["item"] in {finding.item for finding in errors}
+
+
+def test_there_are_verdicts_of_all_kinds_and_all_vehicles() -> None:
+    assert {name.split("/")[0] for name in RECORDED} == set(VEHICLES)
+    kinds = {mission["verdict"] for mission in RECORDED.values()}
+    assert kinds == NOT_FLOWN | CUT_SHORT | {"flown"}
+    assert set(STRICTER) | set(MILDER) <= set(RECORDED)
