@@ -1,9 +1,8 @@
 """What of a mission and its flight leaves the fence."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
-from faao_mav.mission.fence_area import Area, areas_of, free_area
+from faao_mav.mission.fence_area import Area, FreeArea, areas_of, free_area
 from faao_mav.validate.straight import Straight
 
 if TYPE_CHECKING:
@@ -20,31 +19,6 @@ if TYPE_CHECKING:
 
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""
-
-_NAMED = 3
-"""Parts of the fence that a way is told to break, at most; chosen: more help nobody."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """What of a fence is not to be left, an `inclusion`, or not to be entered.
-
-    `broken` is what who breaks it is, as in "inside exclusion circle".
-    """
-
-    broken: str
-    inclusion: bool
-    shape: "BaseGeometry"
-
-    def broken_by(self, ways: Shapes) -> Flags:
-        """Return which of `ways` (n,) break it; to touch its edge does not."""
-        import shapely
-
-        if self.inclusion:
-            return np.asarray(~shapely.covers(self.shape, ways))
-        inside = shapely.intersects(self.shape, ways)
-        inside[inside] = ~shapely.touches(self.shape, ways[inside])
-        return np.asarray(inside)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,53 +34,51 @@ class Ways:
 class FenceMap:
     """A fence in the plane of `frame`, with the mission's `legs`, `circles` and predicted `flight`.
 
-    `free` is where the inclusions let the aircraft be, None if there are none.
+    `allowed` is where the areas let the aircraft be, their edges included. `any_inclusion`: to be
+    inside one of the inclusions is enough, else all have to hold.
     """
 
     frame: LocalFrame
     areas: tuple[Area, ...]
-    free: "BaseGeometry | None"
-    parts: tuple[_Part, ...]
+    any_inclusion: bool
+    allowed: FreeArea
     legs: Ways
     circles: Ways
     flight: Ways
 
     def leave(self, shapes: Shapes) -> Flags:
         """Return which of `shapes` (n,) leave the fence."""
-        return _leaving(self.parts, shapes)
+        return _outside(self.allowed, shapes)
 
-    def broken_by(self, shape: "BaseGeometry") -> list[tuple[str, float]]:
-        """Return the first parts of the fence that `shape` breaks, and by which length of it, m."""
-        import shapely
-
-        broken = (part for part in self.parts if part.broken_by(np.array([shape])).any())
-        return [
-            (
-                part.broken,
-                shapely.length(shape - part.shape if part.inclusion else shape & part.shape),
-            )
-            for part in islice(broken, _NAMED)
-        ]
+    def broken_by(self, shape: "BaseGeometry") -> Iterator[tuple[str, float]]:
+        """Yield in words which parts of the fence `shape` breaks, and by which length of it, m."""
+        inclusions = [(f"outside {a.name}", a.shape) for a in self.areas if a.inclusion]
+        if self.any_inclusion and len(inclusions) > 1:
+            free = free_area(self.areas, any_inclusion=True)
+            inclusions = [("outside all inclusions", free)] if free is not None else []
+        for broken, area in inclusions:
+            if not area.covers(shape):
+                yield broken, (shape - area).length
+        for each in self.areas:
+            met = not each.inclusion and each.shape.intersects(shape)
+            if met and not each.shape.touches(shape):
+                yield f"inside {each.name}", (shape & each.shape).length
 
     @cached_property
     def nearest(self) -> tuple[int, float] | None:
         """The index of the item at which legs, circles and flight come nearest, and how near, m.
 
-        None if there are no legs, or if anything leaves the fence.
+        None if there are no legs, if anything leaves the fence, or if it encloses nothing.
         """
         import shapely
 
-        ways = (self.legs, self.circles, self.flight)
-        if not len(self.legs.shapes) or any(each.leave.any() for each in ways):
+        ways, edges = (self.legs, self.circles, self.flight), self.allowed.edges()
+        if not edges or not len(self.legs.shapes) or any(each.leave.any() for each in ways):
             return None
         index = np.concatenate([each.index for each in ways])
-        edges = [part.shape for part in self.parts if not part.inclusion]
-        if self.free is not None:
-            edges.append(self.free.boundary)
         tree = shapely.STRtree(np.concatenate([each.shapes for each in ways]))
-        (_, found), margins = tree.query_nearest(edges, return_distance=True)
-        if not len(margins):  # exclusions that enclose nothing
-            return None
+        rings = [shapely.LinearRing(edge) for edge in edges]
+        (_, found), margins = tree.query_nearest(rings, return_distance=True)
         nearest = int(np.argmin(margins))
         return int(index[found[nearest]]), float(margins[nearest])
 
@@ -130,43 +102,30 @@ def fence_map(
 
     frame = frame or LocalFrame(*fence.place)
     areas = areas_of(fence, frame)
-    free = free_area(areas, any_inclusion=any_inclusion)
-    inclusions = [_Part(f"outside {a.name}", True, a.shape) for a in areas if a.inclusion]
-    if free is not None and any_inclusion and len(inclusions) > 1:
-        inclusions = [_Part("outside all inclusions", True, free)]
-    exclusions = [_Part(f"inside {a.name}", False, a.shape) for a in areas if not a.inclusion]
-    parts = (*inclusions, *exclusions)
-    shapely.prepare([part.shape for part in parts])
+    allowed = FreeArea.of(areas, any_inclusion=any_inclusion)
+    shapely.prepare(allowed.shape)
     ends = np.array([[leg.start.ground, leg.end.ground] for leg in straights]).reshape(-1, 2, 2)
 
-    def ways(index: Any, shapes: Any) -> Ways:
-        shapes = np.array([*shapes], dtype=object)
-        return Ways(np.array(index, dtype=int), shapes, _leaving(parts, shapes))
+    outlines = np.array([*circles.values()]) if circles else ends[:0]
+
+    def ways(index: Any, lines: Real) -> Ways:
+        shapes = np.asarray(shapely.linestrings(lines), dtype=object)
+        still = (lines == lines[:, :1]).all(axis=(1, 2))
+        shapes[still] = shapely.points(lines[still, 0])
+        return Ways(np.array(index, dtype=int), shapes, _outside(allowed, shapes))
 
     return FenceMap(
         frame,
         areas,
-        free,
-        parts,
-        ways([leg.index for leg in straights], _lines(ends)),
-        ways([*circles], map(shapely.LineString, circles.values())),
-        ways(heading_for[1:], _lines(np.stack([flown[:-1], flown[1:]], axis=1))),
+        any_inclusion,
+        allowed,
+        ways([leg.index for leg in straights], ends),
+        ways([*circles], outlines),
+        ways(heading_for[1:], np.stack([flown[:-1], flown[1:]], axis=1)),
     )
 
 
-def _leaving(parts: Sequence[_Part], ways: Shapes) -> Flags:
-    """Return which of `ways` (n,) break any of `parts`."""
-    broken = np.zeros(len(ways), dtype=np.bool_)
-    for part in parts:
-        broken |= part.broken_by(ways)
-    return broken
-
-
-def _lines(ends: Real) -> Shapes:
-    """Return the straights between `ends` (n, 2, 2), m; a point where both are the same."""
+def _outside(allowed: FreeArea, shapes: Shapes) -> Flags:
     import shapely
 
-    lines = np.asarray(shapely.linestrings(ends), dtype=object)
-    still = (ends[:, 0] == ends[:, 1]).all(axis=1)
-    lines[still] = shapely.points(ends[still, 0])
-    return lines
+    return np.asarray(~shapely.covers(allowed.shape, shapes), dtype=np.bool_)

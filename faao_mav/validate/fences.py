@@ -1,6 +1,7 @@
 """The fence: what of the mission leaves it, how near it comes, whether the vehicle keeps it."""
 
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ checks = Checks()
 LEAST_MARGIN = 2.0
 """The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
 what a change costs is not measured."""
+
+_NAMED = 3
+"""Parts of the fence that a way is told to break, at most. Chosen: more help nobody."""
 
 _STILL = 0.1
 """The speed, m/s, below which an aircraft heads nowhere. Chosen."""
@@ -65,7 +69,7 @@ def _where(fence: FenceMap, place: Any) -> str:
 
 def _broken(fence: FenceMap, shape: Any) -> str:
     """Return in words which parts of the fence `shape` breaks, "" if none."""
-    return " and ".join(broken for broken, _ in fence.broken_by(shape))
+    return " and ".join(broken for broken, _ in islice(fence.broken_by(shape), _NAMED))
 
 
 @checks("fence-leg")
@@ -73,7 +77,7 @@ def _(context: ValidationContext) -> Hits:
     for fence in context.fences:
         for k in np.flatnonzero(fence.legs.leave).tolist():
             leg = context.legs[k]
-            broken = fence.broken_by(fence.legs.shapes[k])
+            broken = islice(fence.broken_by(fence.legs.shapes[k]), _NAMED)
             parts = " and ".join(f"{length:.1f} m of it {what}" for what, length in broken)
             jump = " by a jump" if leg.jump else ""
             yield at(leg.index, leg=leg, jump=jump, parts=parts)
