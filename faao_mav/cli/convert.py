@@ -1,12 +1,20 @@
 """`faao-mission convert MISSION --out OTHER`: from one mission format to another."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from faao_mav.cli.shared import AsJson, Whose, check_known, exit_status, note, option
+from faao_mav.cli.shared import (
+    AsJson,
+    Whose,
+    check_known,
+    exit_status,
+    note,
+    option,
+    read_noted,
+    show,
+)
 from faao_mav.files import check_apart, check_writable
 
 
@@ -31,28 +39,24 @@ def convert(
     from faao_mav.autopilot import Vehicle, kind_by_number
     from faao_mav.autopilot.files import plan_target
     from faao_mav.cli.vehicle import told_vehicle
-    from faao_mav.mission.formats import (
-        check_readable,
-        check_suffix,
-        read_mission_file,
-        write_mission,
-    )
+    from faao_mav.mission.formats import check_readable, check_suffix, write_mission
 
     check_known(autopilot, None)
     check_readable(mission_file)
     check_suffix(out)
     check_writable(out)
     check_apart({"--out": out}, {"MISSION": mission_file})
-    read = read_mission_file(mission_file)
+    read = read_noted(mission_file)
     kind = kind_by_number(read.vehicle_type) or "copter"
     told = told_vehicle(mission_file, read, None, None, (autopilot, None, None))
     vehicle = Vehicle(autopilot, kind) if autopilot else told[0] if told is not None else None
     target = plan_target(vehicle)
     written = write_mission(read.mission, out, target)
-    for line in (*read.warnings, *(f"{out}: {line}" for line in written.lost)):
-        note(line)
-    items = len(read.mission.items)
-    if as_json:
-        typer.echo(json.dumps({"items": items, "lost": written.lost, "written": str(out)}))
-    else:
-        typer.echo(f"{items} items written to {' and '.join(map(str, written.contents))}")
+    for line in written.lost:
+        note(f"{out}: {line}")
+    items, names = len(read.mission.items), " and ".join(map(str, written.contents))
+    show(
+        lambda: {"items": items, "lost": written.lost, "written": str(out)},
+        lambda: [f"{items} items written to {names}"],
+        as_json=as_json,
+    )

@@ -1,15 +1,24 @@
 """`faao-mission debrief`: what became of a plan in a real flight, from its log."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
-from faao_mav.cli.shared import AsJson, File, Radio, System, exit_status, note, option
+from faao_mav.cli.shared import (
+    AsJson,
+    File,
+    Radio,
+    System,
+    check_page,
+    exit_status,
+    note,
+    option,
+    show,
+)
 from faao_mav.errors import InputError
-from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
+from faao_mav.files import write_whole
 
 
 @exit_status()
@@ -35,11 +44,7 @@ def debrief(
     check_one(plan_file, solution_file)
     if plan_file is None and solution_file is None:
         raise InputError("--plan or --solution: give the plan that was flown")
-    if report is not None:
-        check_ending(report, "--report", PAGES)
-        check_writable(report)
-    read = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
-    check_apart({"--report": report}, read)
+    check_page(report, {"LOG": log, "--plan": plan_file, "--solution": solution_file})
     from faao_mav.fly.logs import read_log
     from faao_mav.fly.radio import Radios
     from faao_mav.report.debrief import debriefed, other_parameters, remarks_on
@@ -60,16 +65,17 @@ def debrief(
 
         page = render_report(result, title=f"{log.name}", debriefing=found, remarks=remarks)
         write_whole(report, page.encode())
-    if as_json:
-        wind = record.mean_wind(found.start, solution.plan.flight.duration)
-        told = debriefing_as_dict(found) | {
-            "wind": None if wind is None else wind.tolist(),
-            "parameters": other_parameters(record, result),
-            "system": record.system,
-        }
-        typer.echo(json.dumps(told, allow_nan=False))
-    else:
-        typer.echo(joined([*debriefing_lines(found), *remarks]))
+    wind = record.mean_wind(found.start, solution.plan.flight.duration)
+    own = {
+        "wind": None if wind is None else wind.tolist(),
+        "parameters": other_parameters(record, result),
+        "system": record.system,
+    }
+    show(
+        lambda: debriefing_as_dict(found) | own,
+        lambda: [joined([*debriefing_lines(found), *remarks])],
+        as_json=as_json,
+    )
     if radios is not None:
         flight = record.line(solution)
         count = radios.replay(Line(flight.t - found.start, flight.w))

@@ -21,6 +21,7 @@ from faao_mav.cli.shared import (
     flag,
     note,
     option,
+    read_noted,
 )
 from faao_mav.errors import InputError
 
@@ -78,7 +79,6 @@ def fly(
     from faao_mav.fly.radio import Radios
     from faao_mav.fly.telemetry import POSITION_RATE
     from faao_mav.fly.telling import HEADER, Telling, as_text
-    from faao_mav.mission.formats import read_mission_file
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.lines import joined
 
@@ -97,9 +97,7 @@ def fly(
     for name, given in (("--stream", stream), ("--radio", radio)):
         if given and plan_file is None and solution_file is None:
             raise InputError(f"{name}: needs --plan or --solution: the flight that is planned")
-    file = read_mission_file(mission_file)
-    for line in file.warnings:
-        note(line)
+    file = read_noted(mission_file)
     solution = planned(plan_file, solution_file)
     radios = Radios(solution, radio) if solution is not None and radio is not None else None
     flight = _flight(mission_file, file, solution, streamed=stream)

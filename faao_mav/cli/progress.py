@@ -1,4 +1,7 @@
-"""Progress on a terminal: one line on standard error while there is work."""
+"""Progress on a terminal: one line on standard error while there is work.
+
+Each gives an observer of the work, or None where nothing is `shown`.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,9 +16,8 @@ if TYPE_CHECKING:
 
 @contextmanager
 def optimizer_progress(*, shown: bool) -> "Iterator[Observer | None]":
-    """Give an observer of the work on a plan, or None where nothing is `shown`."""
-    columns = ("BarColumn", "TimeElapsedColumn", "{task.description}")
-    with _line(columns, shown=shown, first="starting", total=None) as update:
+    """Give an observer of the work on a plan."""
+    with _line("BarColumn", "TimeElapsedColumn", "{task.description}", shown=shown) as update:
 
         def observe(now: "Progress") -> None:
             step = f"iteration {now.iteration} of at most {now.max_iterations}"
@@ -27,9 +29,8 @@ def optimizer_progress(*, shown: bool) -> "Iterator[Observer | None]":
 
 @contextmanager
 def transfer_progress(*, shown: bool) -> "Iterator[Observe | None]":
-    """Give an observer of a transfer to or from a vehicle, or None where nothing is `shown`."""
-    columns = ("{task.description}", "BarColumn", "MofNCompleteColumn")
-    with _line(columns, shown=shown, first="starting") as update:
+    """Give an observer of a transfer to or from a vehicle."""
+    with _line("{task.description}", "BarColumn", "MofNCompleteColumn", shown=shown) as update:
 
         def observe(what: str, done: int, total: int) -> None:
             update(description=what, completed=done, total=total or None)
@@ -39,27 +40,18 @@ def transfer_progress(*, shown: bool) -> "Iterator[Observe | None]":
 
 @contextmanager
 def study_progress(total: int, *, shown: bool) -> "Iterator[Callable[[StudyRow], None] | None]":
-    """Give an observer of the `total` rows of a study, or None where nothing is `shown`."""
+    """Give an observer of the `total` rows of a study."""
     columns = ("BarColumn", "MofNCompleteColumn", "TimeRemainingColumn", "{task.description}")
-    with _line(columns, shown=shown, total=total) as update:
-
-        def observe(row: "StudyRow") -> None:
-            update(advance=1, description=row.scheme)
-
-        yield observe if shown else None
+    with _line(*columns, shown=shown) as update:
+        update(total=total, description="")
+        yield (lambda row: update(advance=1, description=row.scheme)) if shown else None
 
 
 @contextmanager
-def _line(
-    columns: tuple[str, ...],
-    *,
-    shown: bool,
-    first: str = "",
-    total: float | None = None,
-) -> Iterator[Callable[..., Any]]:
+def _line(*columns: str, shown: bool) -> Iterator[Callable[..., Any]]:
     """Give what updates the line, if one is `shown`.
 
-    `columns` are names of classes of `rich.progress`, or templates of text, `first` the first text.
+    `columns` are names of classes of `rich.progress`, or templates of text.
     """
     if not shown:
         yield lambda **_: None
@@ -71,4 +63,4 @@ def _line(
         progress.TextColumn(name) if "{" in name else getattr(progress, name)() for name in columns
     ]
     with progress.Progress(*made, console=Console(stderr=True), transient=True) as line:
-        yield partial(line.update, line.add_task(first, total=total))
+        yield partial(line.update, line.add_task("starting", total=None))

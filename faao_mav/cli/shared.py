@@ -1,6 +1,8 @@
 """What the commands share: options, exit statuses, messages."""
 
-from collections.abc import Iterator
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -8,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from faao_mav.errors import FaaoError, InputError
+from faao_mav.files import PAGES, check_apart, check_ending, check_writable
 
 if TYPE_CHECKING:
+    from faao_mav.mission.formats import MissionFile
     from faao_mav.plan import Vector
 
 
@@ -96,6 +100,32 @@ def read_wind(given: str | None) -> "Vector | None":
         wanted = " and ".join(reference()[key].accepted for key in keys)
         raise InputError(f"--wind {given}: expected SPEED,FROM: {wanted}") from None
     return wind.velocity
+
+
+def read_noted(mission_file: Path) -> "MissionFile":
+    """Return what a mission file tells, and note what is odd about it."""
+    from faao_mav.mission.formats import read_mission_file
+
+    file = read_mission_file(mission_file)
+    for line in file.warnings:
+        note(line)
+    return file
+
+
+def check_page(report: Path | None, inputs: Mapping[str, Path | None]) -> None:
+    """Raise `InputError` for a --report that cannot be written, or is one of the `inputs`."""
+    if report is not None:
+        check_ending(report, "--report", PAGES)
+        check_writable(report)
+    check_apart({"--report": report}, inputs)
+
+
+def show(
+    record: Callable[[], dict[str, Any]], lines: Callable[[], Iterable[str]], *, as_json: bool
+) -> None:
+    """Print what a command found: with --json its `record` as one object, else its `lines`."""
+    text = json.dumps(record(), allow_nan=False) if as_json else "\n".join(lines())
+    sys.stdout.write(f"{text}\n")  # typer.echo writes UTF-8 where ASCII is asked for
 
 
 def note(message: str) -> None:

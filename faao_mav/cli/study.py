@@ -1,6 +1,5 @@
 """`faao-mission study PLAN.yaml`: one plan with many values, schemes and seeds."""
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from faao_mav.cli.shared import AsJson, File, exit_status, note, option
+from faao_mav.cli.shared import AsJson, File, exit_status, note, option, show
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,7 +59,8 @@ def study(
     from faao_mav.plan.keys import POWER
     from faao_mav.plan.sections import Study
     from faao_mav.study import make_cases, parse_vary, run_study
-    from faao_mav.study.frontier import POINTS, frontier_cases, parse_frontier
+    from faao_mav.study.frontier import POINTS, frontier_cases, frontier_table, parse_frontier
+    from faao_mav.study.rows import as_dict, comparison
     from faao_mav.study.sweep import join_grid, parse_schemes, parse_values
 
     if jobs == 0:
@@ -98,7 +98,12 @@ def study(
         note(f"interrupted; {kept}")
         raise typer.Exit(_INTERRUPTED) from None
     written = _draw(rows, plan, along, out) if out is not None else []
-    _tell(rows, plan, along, written, as_json)
+    text = frontier_table(rows, plan, along) if along else comparison(rows)
+    show(
+        lambda: {"rows": [as_dict(row) for row in rows], "written": list(map(str, written))},
+        lambda: [text, *(f"written      {path}" for path in written)],
+        as_json=as_json,
+    )
     if all(row.error for row in rows):
         raise typer.Exit(1)
 
@@ -136,22 +141,3 @@ def _check_cases(cases: "Sequence[StudyCase]") -> None:
             first = first or error
     if first is not None:
         raise first
-
-
-def _tell(
-    rows: "Sequence[StudyRow]",
-    plan: "Plan",
-    along: str | None,
-    written: Sequence[Path],
-    as_json: bool,
-) -> None:
-    from faao_mav.study.frontier import frontier_table
-    from faao_mav.study.rows import as_dict, comparison
-
-    files = [str(path) for path in written]
-    if as_json:
-        found = {"rows": [as_dict(row) for row in rows], "written": files}
-        typer.echo(json.dumps(found, allow_nan=False))
-    else:
-        text = frontier_table(rows, plan, along) if along else comparison(rows)
-        typer.echo("\n".join([text, *(f"written      {path}" for path in files)]))

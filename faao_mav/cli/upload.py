@@ -1,6 +1,5 @@
 """`faao-mission upload`: a mission file to a vehicle, verified."""
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,6 +21,8 @@ from faao_mav.cli.shared import (
     flag,
     note,
     option,
+    read_noted,
+    show,
 )
 
 if TYPE_CHECKING:
@@ -59,15 +60,12 @@ def upload(
     """
     from faao_mav.autopilot.files import made_for
     from faao_mav.cli.progress import transfer_progress
-    from faao_mav.mission.formats import read_mission_file
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.wire.client import upload as run
     from faao_mav.wire.parameters import check_settable
     from faao_mav.wire.upload_text import upload_text
 
-    file = read_mission_file(mission_file)
-    for line in file.warnings:
-        note(line)
+    file = read_noted(mission_file)
     values = None if parameters is None else read_parameters(parameters)
     check_settable(values or (), parameters)
     with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
@@ -87,10 +85,10 @@ def upload(
             observe=observe,
             note=note,
         )
-    typer.echo(json.dumps(as_dict(report), allow_nan=False) if as_json else upload_text(report))
+    show(lambda: as_dict(report), lambda: [upload_text(report)], as_json=as_json)
     if not report.verified:
         if not as_json:
-            typer.echo("faao-mission: the mission is not verified; do not fly it", err=True)
+            note("the mission is not verified; do not fly it")
         raise typer.Exit(1)
 
 

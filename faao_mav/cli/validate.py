@@ -1,9 +1,7 @@
 """`faao-mission validate MISSION`: whether it will be accepted, can be flown, delivers the link."""
 
-import json
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -15,20 +13,16 @@ from faao_mav.cli.shared import (
     Number,
     Whose,
     check_known,
+    check_page,
     exit_status,
     flag,
-    note,
     option,
+    read_noted,
     read_wind,
+    show,
 )
 from faao_mav.errors import InputError, printable
-from faao_mav.files import PAGES, check_apart, check_ending, check_writable, write_whole
-
-if TYPE_CHECKING:
-    from faao_mav.autopilot import Autopilot, Kind
-    from faao_mav.cli.findings import CheckedFile
-    from faao_mav.optimizer.solution import Solution
-    from faao_mav.plan import Vector
+from faao_mav.files import write_whole
 
 
 @exit_status()
@@ -74,92 +68,41 @@ def validate(
     Exit status: 0 nothing is wrong; 1 errors, with --strict also warnings; 2 unusable arguments
     or a file that cannot be read.
     """
-    from faao_mav.validate import Level
+    from faao_mav.cli.findings import CheckedFile, rule_lines, rules_as_dict
+    from faao_mav.cli.vehicle import choose_vehicle
+    from faao_mav.validate import RULES, Level, Limits
+    from faao_mav.validate.check import check
 
     if rules:
-        _list_rules(as_json)
+        show(lambda: rules_as_dict(RULES), lambda: rule_lines(RULES), as_json=as_json)
         return
     if mission_file is None:
         raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
     check_one(plan_file, solution_file)
     check_known(autopilot, kind)
-    _check_options((max_duration, max_distance, max_altitude), report)
-    air = read_wind(wind)
-    read = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
-    check_apart({"--report": report}, read)
-    solution = planned(plan_file, solution_file)
-    limits = (max_duration, max_distance, max_altitude)
-    checked = _judge(mission_file, solution, (autopilot, kind, parameters), limits, air)
-    if report is not None:
-        _write_report(report, checked, solution)
-    _show(checked, as_json)
-    if checked.check.of(Level.ERROR) or (strict and checked.check.of(Level.WARNING)):
-        raise typer.Exit(1)
-
-
-def _list_rules(as_json: bool) -> None:
-    from rich.console import Console
-
-    from faao_mav.cli.findings import rules_as_dict, show_rules
-    from faao_mav.validate import RULES
-
-    if as_json:
-        typer.echo(json.dumps(rules_as_dict(RULES)))
-    else:
-        show_rules(RULES, Console())
-
-
-def _check_options(
-    limits: "tuple[float | None, float | None, float | None]", report: Path | None
-) -> None:
-    """Refuse limits that are none, and a page that cannot be written, before the work."""
-    for name, value in zip(("duration", "distance", "altitude"), limits, strict=True):
+    most = {"duration": max_duration, "distance": max_distance, "altitude": max_altitude}
+    for name, value in most.items():
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"--max-{name} {value:g}: expected a number above 0")
-    if report is not None:
-        check_ending(report, "--report", PAGES)
-        check_writable(report)
-
-
-def _judge(
-    mission_file: Path,
-    solution: "Solution | None",
-    asked: "tuple[Autopilot | None, Kind | None, Path | None]",
-    given: tuple[float | None, float | None, float | None],
-    wind: "Vector | None",
-) -> "CheckedFile":
-    from faao_mav.cli.findings import CheckedFile
-    from faao_mav.cli.vehicle import choose_vehicle
-    from faao_mav.mission.formats import read_mission_file
-    from faao_mav.validate import Limits
-    from faao_mav.validate.check import check
-
+    air = read_wind(wind)
+    check_page(report, {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file})
+    solution = planned(plan_file, solution_file)
     plan = solution.plan if solution is not None else None
-    limits = Limits(*given, max_speed=plan.vehicle.max_speed if plan is not None else None)
-    file = read_mission_file(mission_file)
-    for line in file.warnings:
-        note(line)
-    vehicle, chosen_by = choose_vehicle(mission_file, file, plan, asked)
+    file = read_noted(mission_file)
+    vehicle, chosen_by = choose_vehicle(mission_file, file, plan, (autopilot, kind, parameters))
     if vehicle.type.flight_model is not None:
         vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement
-    found = check(file.mission, vehicle, limits=limits, solution=solution, wind=wind)
-    return CheckedFile(mission_file, chosen_by, found)
+    max_speed = plan.vehicle.max_speed if plan is not None else None
+    limits = Limits(max_duration, max_distance, max_altitude, max_speed)
+    found = check(file.mission, vehicle, limits=limits, solution=solution, wind=air)
+    if report is not None:
+        from faao_mav.report.page import render_report
+        from faao_mav.workflow import Result
 
-
-def _write_report(report: Path, checked: "CheckedFile", solution: "Solution | None") -> None:
-    from faao_mav.report.page import render_report
-    from faao_mav.workflow import Result
-
-    about = Result(solution, check=checked.check) if solution is not None else checked.check
-    write_whole(report, render_report(about, title=printable(checked.source.name)).encode())
-
-
-def _show(checked: "CheckedFile", as_json: bool) -> None:
-    from rich.console import Console
-
-    from faao_mav.cli.findings import as_dict, show
-
-    if as_json:
-        typer.echo(json.dumps(as_dict(checked), allow_nan=False))
-    else:
-        show(checked, Console())
+        about = Result(solution, check=found) if solution is not None else found
+        page = render_report(about, title=printable(mission_file.name))
+        write_whole(report, page.encode())
+    checked = CheckedFile(mission_file, chosen_by, found)
+    show(checked.as_dict, checked.lines, as_json=as_json)
+    if found.of(Level.ERROR) or (strict and found.of(Level.WARNING)):
+        raise typer.Exit(1)

@@ -185,23 +185,26 @@ def test_rules_are_listed(run: Run) -> None:
     assert {"level", "summary", "source", "autopilot", "type"} <= listed[0].keys()
 
 
-def test_a_terminal_gets_tables(write: Callable[..., Path]) -> None:
-    from rich.console import Console
-
-    from faao_mav.cli.findings import CheckedFile, show, show_rules
-    from faao_mav.validate.check import Check
-
-    case, console = given(BROKEN), Console(force_terminal=True, width=100, record=True)
-    check = Check(case.mission, Vehicle(), LEVEL, findings=case.findings())
-    show(CheckedFile(write(BROKEN), "asked", check), console)
-    show_rules(RULES, console)
-    shown = console.export_text()
-    assert "refused-on-upload" in shown
-    assert "what is the case, and what to do" in shown
-    assert "px4-null-island" in shown
+@pytest.mark.parametrize("option", ["--max-duration", "--max-distance", "--max-altitude"])
+def test_a_limit_that_is_none_is_named_as_it_was_given(run: Run, sound: Path, option: str) -> None:
+    for value in ("nan", "inf", "0", "-5"):
+        result = run(sound, option, value)
+        assert result.exit_code == 2
+        assert result.stderr == f"faao-mission: {option} {value}: expected a number above 0\n"
 
 
-def test_a_page_of_a_mission_by_itself(run: Run, sound: Path) -> None:
+def test_a_useless_parameter_is_refused(run: Run, sound: Path) -> None:
+    given = sound.with_name("given.param")
+    beside = sound.with_suffix(".param")
+    for path, options in ((given, ("--parameters", given)), (beside, ())):
+        path.write_text("WPNAV_SPEED,-5\n")
+        result = run(sound, *options)
+        assert result.exit_code == 2
+        assert f"{path}" in result.stderr
+        assert "WPNAV_SPEED: -5; give a number of at least" in result.stderr
+
+
+def test_a_page_of_a_mission_by_itself_and_beside_its_plan(run: Run, sound: Path) -> None:
     page = sound.with_suffix(".html")
     assert run(sound, "--report", page, predicted=True).exit_code == 0
     text = page.read_text()

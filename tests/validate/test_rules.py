@@ -8,8 +8,8 @@ import pytest
 from conftest import SMALL, edited
 from judged import LINK, VEHICLES, Given, check, flown, given
 
+from faao_mav.autopilot.body import CopterBody
 from faao_mav.plan import Radio, parse_plan
-from faao_mav.plan.body import CopterBody
 from faao_mav.plan.radio_values import doubtful_values
 from faao_mav.validate import RULES, Level, Stretch, ardupilot, validate
 
