@@ -12,7 +12,7 @@ from typing import Any
 from xml.etree import ElementTree as Xml
 from xml.parsers import expat
 
-from faao_mav.errors import MissionFileError, quote
+from faao_mav.errors import MissionFileError, quote, shortened
 from faao_mav.files import read_bytes, read_text
 from faao_mav.mission.fence import MAX_CORNERS, Fence, LatLon
 from faao_mav.mission.formats import naming, read_mission
@@ -137,7 +137,8 @@ def _unzipped(content: bytes) -> bytes:
             with archive.open(names[0]) as file:
                 kml = file.read(MAX_BYTES + 1)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise MissionFileError(f"not a KMZ archive that can be read: {error}") from None
+        told = shortened(str(error))
+        raise MissionFileError(f"not a KMZ archive that can be read: {told}") from None
     if len(kml) > MAX_BYTES:
         raise MissionFileError(f"{quote(names[0])} in it is larger than {MAX_BYTES:,} bytes")
     return kml
@@ -161,7 +162,7 @@ def _tree(content: bytes) -> Xml.Element:
     try:
         parser.Parse(content, True)
     except (expat.ExpatError, LookupError, ValueError) as error:
-        raise MissionFileError(f"not XML: {error}") from None
+        raise MissionFileError(f"not XML: {shortened(str(error))}") from None
     return builder.close()
 
 
