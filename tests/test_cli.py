@@ -188,10 +188,12 @@ TINY = edited(FLYABLE, {"flight.duration": 3, "flight.end": [5, 45], "optimizer.
 VALUES = st.one_of(
     st.none(),
     st.booleans(),
-    st.integers(-3, 300),
+    st.integers(-3, 300) | st.integers(-(10**20), 10**20),
     st.floats(-500, 500) | st.sampled_from([float("nan"), float("inf")]),
-    st.sampled_from(["hover", "free", "qpsk", "none", "all_ones", "mrt", "land", ""]),
-    st.lists(st.floats(-20, 20), min_size=2, max_size=2),
+    st.sampled_from(["hover", "free", "qpsk", "none", "all_ones", "mrt", "land", ""])
+    | st.text(max_size=8),
+    st.lists(st.floats(-20, 20), max_size=3),
+    st.dictionaries(st.sampled_from(["latitude", "longitude", "x"]), st.floats(), max_size=3),
 )
 
 

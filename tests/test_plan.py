@@ -28,13 +28,9 @@ def refused(changes: dict[str, Any]) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["paper", "paper_active", "copter_relay", "fenced_relay", "plane_relay", "quickest_delivery"],
-)
-def test_sample_plans_are_valid(name: str) -> None:
-    plan = read_plan(MISSIONS / f"{name}.yaml")
-    assert plan.text == (MISSIONS / f"{name}.yaml").read_text()
+def test_every_sample_plan_is_read_as_it_stands() -> None:
+    for path in sorted(MISSIONS.glob("*.yaml")):
+        assert read_plan(path).text == path.read_text()
 
 
 def test_the_paper_plan_is_section_iv() -> None:
@@ -85,12 +81,6 @@ def test_degrees_become_local_metres() -> None:
     assert plan.flight.start == pytest.approx((30, 40), abs=1e-6)
 
 
-@pytest.mark.parametrize("written", ["1e-4", "1.0e-4", "0.0001", "1E-4"])
-def test_exponents_are_numbers(written: str) -> None:
-    plan = parse_plan(SMALL + f"optimizer: {{tolerance: {written}}}\n")
-    assert plan.optimizer.tolerance == 1e-4
-
-
 def test_values_are_those_of_yaml_1_2() -> None:
     text = "{a: 010, b: no, c: 2:30, d: 2024-01-01, e: -.inf, f: .5, g: 0x1F, h: 1_0, i: ~, <<: =}"
     assert load_yaml(text, "plan") == {
@@ -98,6 +88,8 @@ def test_values_are_those_of_yaml_1_2() -> None:
         "h": "1_0", "i": None, "<<": "=",
     }  # fmt: skip
     assert load_yaml("%YAML 1.1\n---\na: 010\n", "plan") == {"a": 10}
+    for written in ("1e-4", "1.0e-4", "0.0001", "1E-4"):
+        assert load_yaml(f"a: {written}", "plan") == {"a": 1e-4}
 
 
 @given(st.dictionaries(st.text(), st.recursive(
@@ -182,6 +174,13 @@ def test_a_body_is_numbers_over_those_of_the_autopilots_simulator() -> None:
             ["site.origin", "149.165", "look swapped"],
         ),
         (
+            {
+                "site.origin": {"latitude": 47.4, "longitude": 8.5, "elevation": 400.0},
+                "flight.start": {"latitude": 8.5, "longitude": 47.4},
+            },
+            ["look swapped"],
+        ),
+        (
             {"flight.start": {"latitude": 35.363, "longitude": 149.165}},
             ["flight.start", "km from site.origin", "south and west are negative"],
         ),
@@ -224,25 +223,17 @@ def test_message_names_key_value_and_what_is_accepted(
     assert message.count("\n") == 0
 
 
-def test_positions_with_swapped_degrees_in_range_are_recognised() -> None:
-    origin = {"latitude": 47.4, "longitude": 8.5, "elevation": 400.0}
-    message = refused({"site.origin": origin, "flight.start": {"latitude": 8.5, "longitude": 47.4}})
-    assert "look swapped" in message
-
-
-@pytest.mark.parametrize("key", ["site.origin", "flight.start", "flight.end", "flight.duration",
-                                 "flight.altitude", "vehicle.max_speed",
-                                 "vehicle.max_acceleration", "radio.base_station.position",
-                                 "radio.ground_user.position"])  # fmt: skip
-def test_required_keys(key: str) -> None:
-    data = load_yaml(SMALL, "test")
-    *parents, last = key.split(".")
-    section = data
-    for parent in parents:
-        section = section[parent]
-    del section[last]
-    with pytest.raises(PlanError, match=rf"{key}: missing; give "):
-        parse_plan(dump_yaml(data))
+def test_required_keys() -> None:
+    for key in ("site.origin", "flight.start", "flight.end", "flight.duration", "flight.altitude",
+                "vehicle.max_speed", "vehicle.max_acceleration", "radio.base_station.position",
+                "radio.ground_user.position"):  # fmt: skip
+        data = section = load_yaml(SMALL, "test")
+        *parents, last = key.split(".")
+        for parent in parents:
+            section = section[parent]
+        del section[last]
+        with pytest.raises(PlanError, match=rf"{key}: missing; give "):
+            parse_plan(dump_yaml(data))
 
 
 def _wall(west: float, east: float) -> dict[str, Any]:
@@ -445,67 +436,6 @@ def test_method_replaces_the_plans() -> None:
     assert parse_plan(plan.text).optimizer == plan.optimizer
 
 
-LEAVES = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(-(10**20), 10**20),
-    st.floats(),
-    st.text(max_size=8),
-    st.sampled_from(["hover", "free", "qpsk", "ula", "realization", "rtl"]),
-    st.lists(st.floats(), max_size=3),
-    st.dictionaries(st.sampled_from(["latitude", "longitude", "x"]), st.floats(), max_size=3),
-)
-
-
-@st.composite
-def mutated_plans(draw: st.DrawFn) -> str:
-    """The small plan with a few keys removed, added, or given another value."""
-    data = load_yaml(SMALL, "test")
-    for _ in range(draw(st.integers(1, 3))):
-        section = data
-        while True:
-            key = draw(st.sampled_from([*sorted(section, key=str), "extra"]))
-            inner = section.get(key)
-            if not isinstance(inner, dict) or not inner or draw(st.booleans()):
-                break
-            section = inner
-        if draw(st.integers(0, 3)) == 0:
-            section.pop(key, None)
-            if not section:
-                break
-        else:
-            section[key] = draw(LEAVES)
-    return dump_yaml(data)
-
-
-@given(mutated_plans())
-def test_any_mutation_gives_a_plan_or_one_error(text: str) -> None:
-    try:
-        plan = parse_plan(text)
-    except PlanError as error:
-        assert str(error).startswith("plan: ")
-        assert len(str(error)) < 5000
-    else:
-        assert isinstance(plan, Plan)
-        assert 3 <= plan.flight.slots <= 100_000
-        assert math.isfinite(plan.radio.relay.noise)
-        assert plan.radio.relay.noise > 0
-
-
-@given(st.text(max_size=300) | st.binary(max_size=300).map(lambda b: b.decode("latin-1")))
-def test_any_text_gives_a_plan_or_one_error(text: str) -> None:
-    with pytest.raises(PlanError):
-        parse_plan(text)
-
-
-@given(st.integers(0, len(SMALL)), st.integers(0, 20), st.text(max_size=10))
-def test_any_cut_or_insertion_gives_a_plan_or_one_error(at: int, cut: int, new: str) -> None:
-    try:
-        parse_plan(SMALL[:at] + new + SMALL[at + cut :])
-    except PlanError as error:
-        assert str(error).startswith("plan: ")
-
-
 def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
     keys = reference()
     assert all(key.description and key.accepted for key in keys.values())
@@ -543,22 +473,9 @@ def test_a_changed_plan_is_checked_and_its_text_is_its_own() -> None:
     assert len(other.zones) == 1
     assert contents(Plan.from_dict(load_yaml(other.text, "x"))) == contents(other)
     assert plan.flight.altitude == 40
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("radio.duplex", "hlf"),
-        ("radio.fading", "ergodc"),
-        ("radio.csi", "instant"),
-        ("radio.inputs", "gausian"),
-        ("flight.height", 60),
-        ("flight.altitude", object()),
-    ],
-)
-def test_a_changed_plan_with_a_mistake_is_refused(key: str, value: object) -> None:
-    with pytest.raises(PlanError):
-        parse_plan(SMALL).changed({key: value})
+    for key, value in (("radio.duplex", "hlf"), ("flight.height", 6), ("flight.end", object())):
+        with pytest.raises(PlanError):
+            plan.changed({key: value})
 
 
 def test_a_plan_is_not_replaced_past_its_check() -> None:

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import MakePlan
 
@@ -129,37 +128,6 @@ def test_a_run_that_did_not_converge_says_so(result: Result) -> None:
     text = summary(replace(result, solution=stopped))
     assert "NOT CONVERGED" in text
     assert "stopped after 3 steps" in text
-
-
-def test_numbers_for_programs_are_the_solutions(result: Result, conversion: Conversion) -> None:
-    data = result.as_dict()
-    assert data["average_rate"] == result.solution.rates.R_avg
-    assert data["upper_bound"] == 2 * result.solution.rates.R_avg
-    prediction = result.prediction
-    assert prediction is not None
-    assert data["mission"]["items"] == len(conversion.mission.items)
-    assert data["mission"]["parameters"] == conversion.parameters
-    route = conversion.schedule.route
-    relay = route.positions[route.first : route.last + 1]
-    assert data["mission"]["distance"] == pytest.approx(
-        np.linalg.norm(np.diff(relay, axis=0), axis=1).sum()
-    )
-    predicted = data["predicted"]
-    assert predicted["average_rate"] == min(predicted["rate_bs_uav"], predicted["rate_uav_user"])
-    assert predicted["duration"] == data["mission"]["duration"] == prediction.duration
-    assert predicted["rms_position_error"] == prediction.rms_position_error
-    assert data["seconds"] == {"optimize": 1.0, "total": 2.0}
-
-
-def test_it_says_how_the_mission_will_fly_and_what_it_needs(
-    result: Result, conversion: Conversion
-) -> None:
-    text, prediction = summary(result, verbose=True), result.prediction
-    assert prediction is not None
-    assert f"predicted    {prediction.rates.R_avg:.4f} bit/s/Hz" in text
-    assert f"{prediction.rms_position_error:.1f} m rms from the plan" in text
-    for name, value in conversion.parameters.items():
-        assert f"{name} {value:g}" in text
 
 
 def test_a_flight_without_a_mission_says_why_and_has_no_figures_of_it(result: Result) -> None:

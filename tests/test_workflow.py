@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import pytest
-from conftest import MISSIONS, SMALL, MakePlan, edited, free_port
-from served import running
+from conftest import SMALL, MakePlan, edited
 
 from faao_mav import (
     Vehicle,
@@ -13,11 +12,9 @@ from faao_mav import (
     plan_mission,
     read_mission,
     read_parameters,
-    upload,
 )
 from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
 from faao_mav.report.summary import result_lines
-from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.workflow import Result, mission_files, optimize_plan
 
 QUICK = {"radio.fading": "none", "optimizer.starts": ["straight"]}
@@ -45,7 +42,7 @@ def test_a_mission_comes_with_the_parameters_that_it_is_timed_for(
     assert mission_files(mission, result.solution.plan) == (mission, beside)
 
 
-def test_what_is_written_is_in_time_and_goes_to_the_vehicle_whole(tmp_path: Path) -> None:
+def test_what_is_written_is_in_time(tmp_path: Path) -> None:
     lively = {"vehicle.max_speed": 8, "flight.end": [120, 0], "flight.duration": 40}
     result = plan_mission(parse_plan(edited(SMALL, QUICK | lively)))
     out, beside = result.write(tmp_path / "m.plan")
@@ -54,10 +51,6 @@ def test_what_is_written_is_in_time_and_goes_to_the_vehicle_whole(tmp_path: Path
     assert [finding.rule for finding in checked.findings if finding.level != "note"] == []
     without = check(mission, Vehicle(), solution=result.solution)
     assert "link-late" in {finding.rule for finding in without.findings}
-    port = free_port()
-    mock = MockAutopilot(behaviour_of("ardupilot"), beat=0.1)
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        assert upload(mission, f"udpout:127.0.0.1:{port}").verified
 
 
 FENCED = QUICK | {
@@ -90,17 +83,7 @@ def test_the_fence_goes_with_the_mission(fenced: Result, tmp_path: Path) -> None
         "m.param",
         "m.fence.waypoints",
     ]
-    read = read_mission(tmp_path / "m.waypoints")
-    assert read.fence == fence
-    port = free_port()
-    mock = MockAutopilot(behaviour_of("ardupilot"), beat=0.1)
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        report = upload(read, f"udpout:127.0.0.1:{port}")
-    assert [(part.part.name, part.verdict) for part in report.parts] == [
-        ("MISSION", "verified"),
-        ("FENCE", "verified"),
-    ]
-    assert mock.mission().fence.polygons[1].inclusion is False
+    assert read_mission(tmp_path / "m.waypoints").fence == fence
 
 
 def test_how_near_the_fence_the_flight_comes(fenced: Result) -> None:
@@ -205,13 +188,3 @@ def test_another_method_is_in_the_plan_of_the_result(paper_plan: MakePlan) -> No
     result = plan_mission(paper_plan(), method="direct")
     assert result.solution.plan.optimizer.method == "direct"
     assert parse_plan(result.solution.plan.text).optimizer.method == "direct"
-
-
-def test_flyable_is_without_errors(result: Result) -> None:
-    brief = {"flight.duration": 20, "flight.time_step": 1}
-    paper = plan_mission(parse_plan(edited((MISSIONS / "paper_fig3.yaml").read_text(), brief)))
-    assert paper.conversion is not None
-    assert not paper.flyable
-    slow = {"vehicle.max_speed": 8, "vehicle.max_acceleration": 1.5, "flight.duration": 16}
-    gentle = plan_mission(parse_plan(edited(SMALL, QUICK | slow)))
-    assert gentle.flyable
