@@ -31,7 +31,7 @@ def to(request: pytest.FixtureRequest) -> str:
 
 def vehicle(to: str, kind: Any = "ardupilot", **options: Any) -> Any:
     """Return a mock autopilot that runs at `to` for as long as a `with` block lasts."""
-    settings: dict[str, Any] = {"home": HOME, "fly": fly, "beat": 0.1, "speedup": 20.0} | options
+    settings: dict[str, Any] = {"home": HOME, "fly": fly, "beat": 0.1, "speedup": 60.0} | options
     listen = to.replace("udpout", "udpin")
     return running(MockAutopilot(behaviour_of(kind), **settings), listen)
 
