@@ -71,10 +71,12 @@ class Follower:
         self._aim, self._since, self._airspeed, self._carries_on = aim, now, airspeed, carries_on
 
     def hold(self, now: float, airspeed: float) -> None:
-        """Stop, and come back to where it is now."""
+        """Stop, and come back to where it is now; on the ground stand until it is sent away."""
         here, rest = self.at(now).position, np.zeros(3)
-        self.pursue(now, np.array([here, rest, rest]), airspeed)
-        self._v = self._v if self.flies(now) else rest
+        if here[2] < _GROUND:
+            self.play(np.array([math.inf]), np.array([here]), np.array([self._item]))
+        else:
+            self.pursue(now, np.array([here, rest, rest]), airspeed)
 
     @property
     def arrives(self) -> float:

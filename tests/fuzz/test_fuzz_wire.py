@@ -5,9 +5,9 @@ from harness import Target, fuzz, outcome
 from tapes import datagrams
 from wire_targets import wire_targets
 
-_MOCKS = ("mock_ardupilot", "mock_px4", "mock_px4_legacy_first")
-CASES = {"client": 50, **dict.fromkeys(_MOCKS, 20), "signed": 150}
-"""Cases of each target in the suite; chosen: half a second each."""
+CASES = {"client": 50, "mock_ardupilot": 20, "mock_px4": 10, "mock_px4_legacy_first": 5,
+         "signed": 150}  # fmt: skip
+"""Cases of each target in the suite; chosen: PX4's predicted flights take a second each."""
 
 
 @pytest.fixture(scope="module")
