@@ -30,7 +30,7 @@ from faao_mav.optimizer.interior.maximize import objectives
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.rates.rate_model import CurveRate
+from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
@@ -97,7 +97,9 @@ def by_ipopt(problem: Problem, field: RateField, random: int) -> tuple[float, li
     for flight in flights.values():
         began = time.process_time()
         rates = [
-            curve(link, rate, k) if isinstance(rate, CurveRate) else at_best(link, flight.w)
+            curve(link, rate, k)
+            if isinstance(rate, TableRate) and rate.kind == "curve"
+            else at_best(link, flight.w)
             for k, (link, rate) in enumerate(zip(field.links, field.rates, strict=True))
         ]
         model = model or Model(kin, rates, PATIENCE, relay)

@@ -29,7 +29,7 @@ from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.rates.rate_model import CurveRate
+from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.ways import along, shortest_by
 
 PATIENCE = 60.0
@@ -66,7 +66,9 @@ def by_ipopt(problem: Problem, field: RateField, flights: list[Trajectory]) -> t
     model, best, kept = None, 0.0, 0
     for flight in flights:
         rates = [
-            curve(link, rate, k) if isinstance(rate, CurveRate) else at_best(link, flight.w)
+            curve(link, rate, k)
+            if isinstance(rate, TableRate) and rate.kind == "curve"
+            else at_best(link, flight.w)
             for k, (link, rate) in enumerate(zip(field.links, field.rates, strict=True))
         ]
         model = model or Model(kin, rates, PATIENCE, relay, fence)

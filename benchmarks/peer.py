@@ -18,7 +18,7 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.rates.rate_model import CurveRate
+from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.radio.relay import RelayQueue
 
@@ -95,7 +95,7 @@ def _hurried(kin: Kinematics, stops: Sequence[Real]) -> Trajectory:
     return Trajectory(w, v, a)
 
 
-def curve(link: Link, rate: CurveRate, number: int) -> Curve:
+def curve(link: Link, rate: TableRate, number: int) -> Curve:
     """The curve of `rate` over the logarithm of the path gain."""
     grid = rate.gain_log
     spline = ca.interpolant(f"rate{number}", "bspline", [grid], rate.value(grid, 0 * grid))

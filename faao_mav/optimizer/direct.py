@@ -36,9 +36,8 @@ from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.rates.mode_rate import ModeRate
-from faao_mav.optimizer.rates.rate_model import CurveRate
 from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate, unturned
+from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
@@ -207,7 +206,10 @@ def _at_exact_rates(
     With the precoders held, the rates are exact, and whatever they gain the best ones gain too. The
     precoders are returned with it, none where the table is exact.
     """
-    approximate = any(isinstance(rate, ModeRate) and not rate.exact for rate in field.rates)
+    approximate = any(
+        isinstance(rate, TableRate) and rate.kind == "modes" and not rate.exact
+        for rate in field.rates
+    )
     if problem.plan.optimizer.rate != "cutoff" or not approximate:
         return optimum, []
     w, kin = optimum.trajectory.w, problem.kinematics
@@ -295,13 +297,15 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex)
     """
     where = link_coordinates(link, w.T)
     at = where.gain_log, where.cosine
-    if not scheme.optimal or not isinstance(rate, CurveRate | BestRate | ModeRate):
+    if not scheme.optimal or not isinstance(rate, TableRate | BestRate):
         return scheme.precoders(link, H)
     known = rate.initial_precoders(*at)
     if link.measure != "cutoff":
         return known
     carried = scheme.precoders(link, H, start=known)
-    if isinstance(rate, CurveRate) or (min(link.receive, link.transmit) == 1 and not rate.exact):
+    if (isinstance(rate, TableRate) and rate.kind == "curve") or (
+        min(link.receive, link.transmit) == 1 and not rate.exact
+    ):
         return carried
     afresh = scheme.precoders(link, H)
     if rate.exact:

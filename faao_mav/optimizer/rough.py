@@ -1,11 +1,11 @@
 """A rough flight at once: what a person sees while a station is dragged.
 
 One start, one short search, and the rates of the tables alone: no bound, no precoders of their own
-for each slot. The tables do not depend on where the stations are, and are kept.
+for each slot.
 """
 
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maxim
 from faao_mav.optimizer.interior.search import WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
-from faao_mav.optimizer.rates import RateModel
-from faao_mav.optimizer.rates.field import RateField
-from faao_mav.optimizer.rates.rate_model import rate_models
+from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.plan import Plan
@@ -29,10 +27,6 @@ _TOLERANCE, _ITERATIONS, _SLOW_ITERATIONS = 1e-2, 12, 25
 Measured with the user dragged by 70 to 100 m: `copter_relay.yaml` 0.14 % below the finished flight,
 `plane_relay.yaml` 0 to 3 % from a finished flight nearby, 22 to 25 % from none.
 """
-
-_REACH = 1.25
-"""Ratio of the distances from a station for which tables are made. Chosen: a station that is
-dragged by a quarter of the longest flight keeps its table."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +65,7 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
     as far as they keep this plan's limits. Raises `InfeasibleError` where there is no flight.
     """
     problem = build_problem(plan)
-    kin, field = problem.kinematics, _field(problem)
+    kin, field = problem.kinematics, rate_field(problem, design(plan))
     kept = problem.constraints(kin)
     start, warm, slow = _start(problem), False, kin.min_speed > 0
     if near is not None and near.shape == start.v.shape:
@@ -99,44 +93,3 @@ def _start(problem: Problem) -> Trajectory:
         return straight_flight(kin)
     ways = starts_inside(kin, ("straight",), {}, area, problem.constraints(kin))
     return next(iter(ways.values()))
-
-
-def _field(problem: Problem) -> RateField:
-    """Return the rates of `problem`, from tables that plans with other stations share."""
-    plan, kin = problem.plan, problem.kinematics
-    ends = np.array([kin.start, kin.end])
-    stations = np.array([link.station for link in problem.links])
-    away = float(np.linalg.norm(ends[:, None] - stations, axis=2).max())
-    farthest = away + kin.max_speed * kin.time_step * (kin.slots - 1) / 2
-    step = int(np.ceil(np.log(farthest) / np.log(_REACH)))
-    radio = plan.radio
-    anywhere = replace(
-        radio,
-        base_station=replace(radio.base_station, position=(0.0, 0.0)),
-        ground_user=replace(radio.ground_user, position=(0.0, 0.0)),
-    )
-    key = (anywhere, plan.optimizer, plan.flight.altitude, plan.flight.slots, step)
-    return RateField(problem.links, _tables(_Keyed(key, plan)))
-
-
-@dataclass(frozen=True, slots=True)
-class _Keyed:
-    """A plan that equals every other one with the same `key`, whose last entry is the reach."""
-
-    key: tuple[object, ...]
-    plan: Plan
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Keyed) and self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.key)
-
-
-@lru_cache(maxsize=8)
-def _tables(shared: _Keyed) -> tuple[RateModel, ...]:
-    step = shared.key[-1]
-    assert isinstance(step, int)
-    scheme = design(shared.plan)
-    links = [replace(link, station=np.zeros(2)) for link in build_problem(shared.plan).links]
-    return rate_models(links, scheme, [_REACH**step] * len(links))

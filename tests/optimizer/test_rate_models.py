@@ -11,8 +11,9 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
-from faao_mav.optimizer.rates.rate_model import CurveRate, rate_models
+from faao_mav.optimizer.rates.field import rate_models
 from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate, FixedRate, unturned
+from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.radio.precoder import SCHEMES
 from faao_mav.radio.rate import cutoff_rate
 
@@ -174,7 +175,7 @@ def test_both_links_together_have_the_curves_of_each_alone(
     )
     wanted, links = design(plan), build_problem(plan).links
     for link, together in zip(links, rate_models(links, wanted, [FARTHEST] * 2), strict=True):
-        assert isinstance(together, CurveRate)
+        assert isinstance(together, TableRate)
         alone, at = rate_models([link], wanted, [FARTHEST])[0], coordinates(link, places(link))
         assert together.value(*at) == pytest.approx(alone.value(*at), abs=1e-4)
         power = np.sum(np.abs(together.initial_precoders(*at)) ** 2, axis=(-2, -1))
@@ -196,7 +197,7 @@ def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precode
     )
     wanted, link = design(plan), build_problem(plan).bs_uav
     rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
-    assert isinstance(rate, CurveRate)
+    assert isinstance(rate, TableRate)
     at = coordinates(link, w)
     H = link.channel(w, link.small_scale(w))
     P = rate.initial_precoders(*at) if wanted.optimal else wanted.precoders(link, H)

@@ -1,5 +1,7 @@
 """The rough flight of the planner page: feasible, never better than the optimum, and near it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from conftest import FLYABLE, edited
@@ -9,6 +11,7 @@ from faao_mav.optimizer import rough
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.rates import table_rate
 from faao_mav.optimizer.rough import rough_flight
 
 BASE = edited(FLYABLE.replace("  causal: false\n", ""), {"flight.duration": 14})
@@ -37,13 +40,21 @@ def test_a_rough_flight_keeps_its_limits_and_comes_near_the_finished_one(text: s
         assert 0.9 * finished < flight.delivered_rate < finished + 1e-3
 
 
-def test_plans_with_other_stations_share_their_tables() -> None:
-    rough._tables.cache_clear()
-    for east in (60, 62, 64):
+def test_plans_with_other_stations_share_their_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+    table = table_rate._made
+
+    def counted(*args: Any) -> table_rate.Table:
+        made.append(args)
+        return table(*args)
+
+    monkeypatch.setattr(table_rate, "_made", counted)
+    table_rate._tables.clear()
+    for east in (60, 61, 62):
         rough_flight(parse_plan(edited(BASE, {"radio.ground_user.position": [east, 60]})))
-    assert rough._tables.cache_info().misses == 1
-    rough_flight(parse_plan(edited(BASE, {"radio.relay.power_dbm": 11})))
-    assert rough._tables.cache_info().misses == 2
+    assert len(made) == 1  # both links have it
+    rough_flight(parse_plan(edited(BASE, {"radio.relay.power_dbm": 30})))
+    assert len(made) == 2
 
 
 def test_a_flight_of_another_length_is_no_start() -> None:

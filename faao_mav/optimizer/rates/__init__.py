@@ -9,27 +9,24 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
 
 A rate model (``RateModel``) therefore works with l and u, and ``LinkCoordinates`` carries its
 derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
-six models:
+four models:
 
 ====================  ==================================  =========================================
 model                 fading, precoders                   method
 ====================  ==================================  =========================================
-``CurveRate``         none or averaged over, depends on   cubic spline over l
-                      the distance alone
-``SurfaceRate``       the same, depends on the direction  bicubic spline over l and u
-                      too
-``ModeRate``          known per slot, best precoders,     bicubic spline over the singular values,
-                      two modes at most                   shared by all slots
+``TableRate``         none or averaged over; known per    spline over l + shift and a second
+                      slot, best precoders, two modes     coordinate, tables are kept
+                      at most
 ``BestRate``          known per slot, best precoders,     search in every slot, envelope theorem
                       more modes
 ``DifferencedRate``   known per slot, classical scheme    central differences
-``FixedRate``         given precoders                     closed-form derivatives
+``FixedRate``         given precoders                     exact slopes, differences of these
 ====================  ==================================  =========================================
 
 To change which model a plan gets, or to add one: write a class with ``value`` and ``partials`` and
-return it from ``rate_model.rate_models``, the only place that chooses. What counts as the rate
-(cutoff rate, mutual information) is ``radio.measure``; Gaussian inputs and how precoders follow a
-channel are ``optimizer.design``.
+return it from ``field.rate_models``, the only place that chooses. What counts as the rate (cutoff
+rate, mutual information) is ``radio.rate``; Gaussian inputs and how precoders follow a channel are
+``optimizer.design``.
 """
 
 from dataclasses import dataclass

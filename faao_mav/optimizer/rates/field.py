@@ -1,15 +1,17 @@
 """Both links' rates as functions of the UAV's position: what a flight maximises the means of."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
-from faao_mav.optimizer.rates.rate_model import rate_models
+from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate
+from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,3 +50,31 @@ def rate_field(problem: Problem, design: Design) -> RateField:
         from_ends = max(np.linalg.norm(end - link.station) for end in (kin.start, kin.end))
         farthest.append(float(from_ends) + reach / 2)
     return RateField(problem.links, rate_models(problem.links, design, farthest))
+
+
+def rate_models(
+    links: Sequence[Link], design: Design, farthest: Sequence[float]
+) -> tuple[RateModel, ...]:
+    """Return the quickest exact rate model of each of the `links` under `design`.
+
+    `farthest` are the largest horizontal distances from their stations, in metres, that they cover.
+    """
+    tabled, spans = [], []
+    for link, distance in zip(links, farthest, strict=True):
+        if kind_of(link, design):
+            tabled.append(link)
+            squared_distance = np.array([distance, 0.0]) ** 2 + link.altitude**2
+            spans.append(np.log(link.reference_gain / squared_distance))
+    tables = iter(table_rates(tabled, design, spans))
+    return tuple(
+        next(tables) if kind_of(link, design) else _slot_rate(link, design) for link in links
+    )
+
+
+def _slot_rate(link: Link, design: Design) -> RateModel:
+    """Return the rate model of a `link` with known draws that has no table."""
+
+    def rate_of(H: Complex) -> Real:
+        return design.rate(link, H, design.precoders(link, H))
+
+    return BestRate(link) if design.optimal else DifferencedRate(link, rate_of)

@@ -7,8 +7,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.rates.mode_rate import has_few_modes, mode_rates
-from faao_mav.optimizer.rates.rate_model import best_curves
+from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 from faao_mav.radio.best_precoder import has_closed_form
 from faao_mav.radio.rate import cutoff_rate
 
@@ -30,7 +29,7 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
     if link.nlos is None or optimal.averaged:
         span = np.array([gain_log.min(), gain_log.max()])
-        curve = best_curves([link], optimal, [span])[0]
+        (curve,) = table_rates([link], optimal, [span])
         return curve.value(gain_log, gain_log), not optimal.averaged and exact
     singular = _largest_singular_values(link, len(r))
     H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
@@ -42,8 +41,8 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
         H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
         return cutoff_rate(H, best[:, None], link.classes, link.noise), True
     diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
-    if has_few_modes(link):
-        (rate,) = mode_rates([diagonal], [np.array([gain_log.min(), gain_log.max()])])
+    if kind_of(diagonal, optimal):
+        (rate,) = table_rates([diagonal], optimal, [np.array([gain_log.min(), gain_log.max()])])
         return np.stack([rate.value(column, column) for column in gain_log.T], axis=1), False
     # One distance after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
