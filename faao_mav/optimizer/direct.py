@@ -27,11 +27,7 @@ from faao_mav.optimizer.interior.maximize import (
     maximize_all,
     objectives,
 )
-from faao_mav.optimizer.interior.search import (
-    NEAR_START,
-    WARM_SHARES,
-    WARM_START,
-)
+from faao_mav.optimizer.interior.search import WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
@@ -46,8 +42,7 @@ from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solut
 
 LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded where there is a least speed, or a
-queue has a buffer or shares. The plans of `_CENTRING_BILINEAR` in `interior.search` need up to 300
-steps."""
+queue has a buffer or shares. Random plans for planes need up to 250 steps."""
 
 _EXACT_ITERATIONS = 12
 """Iterations at exact rates, after those in a table, at most. Chosen. Measured with QPSK on 2, 3
@@ -96,7 +91,6 @@ def direct(
     fenced_in = problem.fence is not None
     long = shared or (relay is not None and math.isfinite(relay.buffer))
     long = long or slow or fenced_in or problem.energy < math.inf
-    warm = NEAR_START if slow or fenced_in else WARM_SHARES if shared else WARM_START
     steps = options.max_iterations * (LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
@@ -155,7 +149,7 @@ def direct(
             constraints=kept,
             tolerance=options.tolerance,
             max_iterations=steps,
-            strategy=None if cold else warm,
+            strategy=None if cold else WARM_START,
             relay=relay,
         )
 
@@ -228,7 +222,7 @@ def _at_exact_rates(
         constraints=problem.constraints(kin),
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=_EXACT_ITERATIONS,
-        strategy=NEAR_START if kin.min_speed > 0 else None,
+        strategy=WARM_START,
         relay=problem.maximised_queue,
     )
     return replace(optimum, trajectory=further.trajectory, value=further.value), held

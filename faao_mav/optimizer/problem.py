@@ -204,8 +204,9 @@ class Problem:
         model = self.plan.power_model
         assert model is not None  # plans that limit the energy have one
         most = self.energy - self._radiated(kin)
-        curved = kin.min_speed > 0
-        return EnergyLimit(model, most, kin.time_step, kin.max_speed, kin.wind, curved)
+        return EnergyLimit(
+            model, most, kin.time_step, kin.max_speed, kin.max_acceleration, kin.wind
+        )
 
     def _radiated(self, kin: Kinematics) -> float:
         """Return what the relay's radio sends, J."""

@@ -231,7 +231,7 @@ def test_the_published_flight_is_reached() -> None:
     )
     start = straight_flight(kin)
     stage = links(gaussian, 1e7)
-    best = maximize(kin, stage, start, max_iterations=300)
+    best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=300)
     assert worst(kin, best.trajectory) < 1e-6
     assert reward(stage, start) == pytest.approx(4.01, abs=0.06)
     assert best.value == pytest.approx(9.53, rel=5e-3)

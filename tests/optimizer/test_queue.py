@@ -1,7 +1,6 @@
 """What a relay delivers, maximised: against convex programs, KKT conditions and known optima."""
 
 import math
-import tracemalloc
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,7 @@ from test_interior import ACTIVE, HEIGHT, STATIONS, bpsk, copter, links, plane, 
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.optimizer.interior.maximize import maximize, maximize_all, objectives
-from faao_mav.optimizer.interior.queue import Queue, QueueRewards
+from faao_mav.optimizer.interior.maximize import maximize, objectives
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
@@ -101,17 +99,6 @@ def test_the_residual_is_a_gain_that_can_be_had() -> None:
         assert kkt_residual(kin, ACTIVE, best.trajectory, relay=relay) < 2e-5
 
 
-def test_searches_side_by_side_are_each_its_own() -> None:
-    kin = copter(100, time_step=0.5)
-    begun = [straight_flight(kin), maximize(kin, ACTIVE, straight_flight(kin)).trajectory]
-    for relay in (FULL, HALF):
-        together = maximize_all(kin, ACTIVE, begun, relay=relay, max_iterations=10)
-        for flight, both in zip(begun, together, strict=True):
-            alone = maximize(kin, ACTIVE, flight, relay=relay, max_iterations=10)
-            assert both.value == pytest.approx(alone.value, rel=1e-9)
-            assert both.value >= objectives(ACTIVE(flight.w.T[:, None]).value, kin, relay)[0]
-
-
 def test_flat_rates_leave_the_start_as_it_is() -> None:
     kin = plane(50)
     start = straight_flight(kin)
@@ -152,15 +139,6 @@ def test_the_sample_delivers_what_is_known_to_be_possible(known: Known) -> None:
     assert solution.history[-1] == solution.delivered_rate
     assert solution.is_feasible()
     assert still_gained(solution) < 1e-4
-
-
-def test_what_a_queue_adds_to_the_matrix_grows_linearly() -> None:
-    queue = Queue(QueueRewards(ACTIVE, np.zeros((2, 1, 4))))
-    tracemalloc.start()
-    queue.entries(10_000, 8)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 100 * 10_000
 
 
 @pytest.mark.parametrize(

@@ -1,21 +1,16 @@
 """Turns within what a plane's guidance follows at its speed, whatever its least speed is."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from conftest import MakePlan
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from test_interior import plane, worst
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import Forces, Move, ScaledFlight, Start, quadratic
-from faao_mav.optimizer.interior.neighbours import Neighbours
-from faao_mav.optimizer.interior.speed_change import speed_change
-from faao_mav.optimizer.interior.turn_rate import turn_rate
 from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.search.turning import turning_curves
@@ -56,31 +51,6 @@ def turned(solution: Solution) -> Real:
     squares = (solution.v**2).sum(axis=1)
     most = TURN * np.sqrt((squares[1:] + squares[:-1]) / 2)
     return np.asarray(np.linalg.norm(solution.a[:-1], axis=1) / most)
-
-
-@given(st.sampled_from([speed_change, turn_rate]), WINDS, st.integers(0, 10**6))
-@settings(max_examples=20)
-def test_gradients_and_curvatures_are_those_of_the_limits(
-    limit_of: Callable[[Kinematics], Neighbours], wind: Vector, seed: int
-) -> None:
-    kin, random = cruiser(4, 8.0, wind), np.random.default_rng(seed)
-    limit, flight = limit_of(kin), ScaledFlight(kin, (limit_of(kin),))
-    v, step = 2.0 + 0.1 * random.normal(size=(2, 2, 1, kin.slots))
-    step = 1e-4 * (step - 2.0)
-    start = limit.begin(flight, Start(0 * v, v, np.ones((1, 1)), 1.0, slice(0)))
-    (ds, _, twice, held), _ = start.solved(Move(0 * v, step, np.zeros(0)), None, Forces())
-    before, after = (start.at(v + sign * step).slack for sign in (-1, 1))
-    assert (after - before) / 2 == pytest.approx(ds + start.margin, abs=1e-9)
-    assert after - 2 * start.slack + before == pytest.approx(twice, abs=1e-9)
-
-    # what the method takes for -z times the curvature, and for z / s ds^2, is just that
-    stiff, z = start.stiffness(), start.z
-    turning = quadratic(np.asarray(stiff.turning), step)
-    assert turning == pytest.approx(-(z * (twice + held)).sum(), rel=1e-6)
-    between = np.einsum("ijbn,ibn,jbn->b", stiff.between, step[..., :-1], step[..., 1:])
-    kept = quadratic(np.asarray(stiff.v), step) + 2 * between
-    squares = z / start.s * (ds + start.margin) ** 2 + z * held
-    assert kept == pytest.approx(squares.sum(), rel=1e-6)
 
 
 @given(WINDS, st.floats(1, 25), st.lists(st.floats(0, 1), min_size=6, max_size=6))

@@ -12,14 +12,12 @@ of its sides, which do not turn.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.optimizer.fence_geometry import FenceGeometry
-from faao_mav.optimizer.interior.constraint import Constraint, ScaledFlight
-from faao_mav.optimizer.interior.half_planes import HalfPlanes
+from faao_mav.optimizer.interior.constraint import Constraint, Grid, Rows, W
 from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
@@ -29,7 +27,7 @@ def fence_constraints(fence: FenceGeometry, kin: Kinematics) -> tuple[Constraint
     room = fence.room(kin) / LENGTH
     kept: list[Constraint] = []
     if len(fence.obstacles):
-        kept.append(KeepOut(fence, fence.obstacles.scaled(LENGTH), room))
+        kept.append(KeepOut(fence, room, fence.obstacles.scaled(LENGTH)))
     if len(fence.offsets):
         most = np.maximum(np.append(room, 0), np.insert(room, 0, 0))
         kept.append(KeepIn(fence, most))
@@ -37,53 +35,13 @@ def fence_constraints(fence: FenceGeometry, kin: Kinematics) -> tuple[Constraint
 
 
 @dataclass(frozen=True)
-class KeepOut(HalfPlanes):
-    """Both ends of every interval beyond a half-plane of every obstacle: 2 P rows of slots.
-
-    The first P rows are the half-planes of the interval that begins at a slot, the others those of
-    the one that ends there. `obstacles` and `room` (n - 1,), margin and bulge, are in solver units.
-    """
+class _Fence(Constraint):
+    """`room` is margin and bulge of intervals or slots in solver units."""
 
     geometry: FenceGeometry
-    obstacles: ConvexObstacles
     room: Real
-    quantity: ClassVar = "w"
-
-    @property
-    def headroom(self) -> float:
-        """The slack, in 100 m, that starts are given where they have less.
-
-        Of 0.1, 0.02 and 0.005 it led a start among forty polygons farthest.
-        """
-        return 0.02
-
-    @property
-    def turns(self) -> bool:
-        """True: where a flight slides along an obstacle every half-plane turns."""
-        return True
-
-    def slack(self, x: Real) -> tuple[Real, Real]:
-        """Return u . w - h(u) - room (2 P, flights, n) and u."""
-        u, h = self.obstacles.separation(x[..., :-1], x[..., 1:])
-        least = h + self.room
-        pieces, slots = len(self.obstacles), x.shape[-1]
-        g = np.ones((2 * pieces, *x.shape[1:]))
-        turned = np.zeros((2, *g.shape))
-        for rows, at in (
-            (slice(None, pieces), slice(None, -1)),
-            (slice(pieces, None), slice(1, slots)),
-        ):
-            g[rows, :, at] = u[0] * x[0, :, at] + u[1] * x[1, :, at] - least
-            turned[:, rows, :, at] = u
-        return g, turned
-
-    def held(self, flight: ScaledFlight, shape: tuple[int, ...]) -> Real:
-        """Return one where a slot is free and begins (ends) an interval, else 0."""
-        on = np.array(super().held(flight, shape))
-        pieces = len(self.obstacles)
-        on[:pieces, :, -1] = 0
-        on[pieces:, :, 0] = 0
-        return on
+    of = W
+    inside = 1e-6
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:
         """Return `FenceGeometry.excess`."""
@@ -91,23 +49,48 @@ class KeepOut(HalfPlanes):
 
 
 @dataclass(frozen=True)
-class KeepIn(HalfPlanes):
-    """normal . w <= offset - room for every side of the areas to stay in: m rows of slots.
+class KeepOut(_Fence):
+    """Both ends of every interval beyond a half-plane of every obstacle: 2 P rows of slots.
 
-    `room` (n,), margin and bulge, is in solver units.
+    The first P rows are the half-planes of the interval that begins at a slot, the others those of
+    the one that ends there. The slack that starts are given, in 100 m, was chosen: of 0.1, 0.02 and
+    0.005 it led a start among forty polygons farthest.
     """
 
-    geometry: FenceGeometry
-    room: Real
-    quantity: ClassVar = "w"
+    obstacles: ConvexObstacles
+    turns = True
+    headroom = 0.02
 
-    def slack(self, x: Real) -> tuple[Real, Real]:
-        """Return offset - room - normal . w (m, flights, n) and -normal."""
-        normals = self.geometry.normals.T[:, :, None, None]
-        away = self.geometry.offsets[:, None, None] / LENGTH - self.room
-        g = away - normals[0] * x[0] - normals[1] * x[1]
-        return g, np.broadcast_to(-normals, (2, *g.shape))
+    def rows(self, x: Real) -> Rows:
+        """Return u . w - h(u) - room and u."""
+        u, h = (
+            part[..., 0, :] for part in self.obstacles.separation(x[:, None, :-1], x[:, None, 1:])
+        )
+        least = h + self.room
+        pieces = len(self.obstacles)
+        value, slope = np.ones((2 * pieces, x.shape[1])), np.zeros((2 * pieces, 2, x.shape[1]))
+        for rows, at in (
+            (slice(None, pieces), slice(None, -1)),
+            (slice(pieces, None), slice(1, None)),
+        ):
+            value[rows, at] = u[0] * x[0, at] + u[1] * x[1, at] - least
+            slope[rows, :, at] = u.swapaxes(0, 1)
+        return Rows(value, slope)
 
-    def excess(self, kin: Kinematics, flight: Trajectory) -> float:
-        """Return `FenceGeometry.excess`."""
-        return self.geometry.excess(kin, flight)
+    def on(self, grid: Grid, rows: int) -> Flags:
+        """Return where a slot is free and begins, or ends, an interval."""
+        on = super().on(grid, rows).copy()
+        on[: rows // 2, -1] = False
+        on[rows // 2 :, 0] = False
+        return on
+
+
+@dataclass(frozen=True)
+class KeepIn(_Fence):
+    """normal . w <= offset - room for every side of the areas to stay in: m rows of slots."""
+
+    def rows(self, x: Real) -> Rows:
+        """Return offset - room - normal . w and -normal."""
+        normals = self.geometry.normals
+        value = self.geometry.offsets[:, None] / LENGTH - self.room - normals @ x
+        return Rows(value, np.repeat(-normals[:, :, None], x.shape[1], axis=2))

@@ -1,25 +1,18 @@
-"""The best flight for a max-min of smooth stage rewards, from given starts."""
+"""The best flight for a max-min of smooth stage rewards, from a given start."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import Constraint
-from faao_mav.optimizer.interior.limits import AirspeedLimit, FlightLimits
-from faao_mav.optimizer.interior.min_speed import limits_with_least_speed
-from faao_mav.optimizer.interior.queue import Queue, QueueRewards
-from faao_mav.optimizer.interior.rewards import ScaledRewards, Stage
-from faao_mav.optimizer.interior.search import (
-    COLD_START,
-    SLOW_START,
-    Search,
-    StartStrategy,
-)
-from faao_mav.optimizer.interior.speed_change import speed_change
-from faao_mav.optimizer.interior.turn_rate import turn_rate
+from faao_mav.optimizer.interior.constraint import A, Constraint, V, every_excess, unknowns
+from faao_mav.optimizer.interior.queue import Queue
+from faao_mav.optimizer.interior.rewards import Rewards, Stage
+from faao_mav.optimizer.interior.search import COLD_START, SLOW_START, Search, StartStrategy
+from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
 
@@ -64,8 +57,8 @@ def maximize(
     >>> from faao_mav.optimizer.interior.rewards import StageValues
     >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
     >>> def near(w):  # the reward falls with the squared distance from (50, 40), as 1 / km^2
-    ...     away = (w - np.array([50.0, 40.0]).reshape(2, *[1] * (w.ndim - 1)))[:, None]
-    ...     packed = np.array([-2e-6, 0, -2e-6]).reshape(3, *[1] * w.ndim)
+    ...     away = (w - np.array([[50.0], [40.0]]))[:, None]
+    ...     packed = np.array([-2e-6, 0, -2e-6])[:, None, None]
     ...     value = -1e-6 * (away * away).sum(axis=0)
     ...     return StageValues(value, -2e-6 * away, np.broadcast_to(packed, (3, *value.shape)))
     >>> start = kin.follow(np.full((41, 2), [5.0, 0.0]))
@@ -73,66 +66,36 @@ def maximize(
     >>> best.converged, best.trajectory.w[20].round().tolist()
     (True, [50.0, 40.0])
     """
-    (optimum,) = maximize_all(
+    kept = (*constraints_of(kin), *constraints)
+    rewards = Rewards(stage, start.w.T)
+    first = float(objectives(rewards.base[:, None], kin, relay)[0])
+    if rewards.flat:
+        means = rewards.base.mean(axis=1)
+        lowest = means == means.min()
+        return LocalOptimum(start, first, lowest / lowest.sum(), 0, 0.0, True)
+    search = Search(
         kin,
-        stage,
-        [start],
-        constraints=constraints,
+        kept,
+        rewards if relay is None else Queue(rewards, relay, kin.time_step),
+        unknowns(kin, start),
         tolerance=tolerance,
-        max_iterations=max_iterations,
-        strategy=strategy,
-        relay=relay,
+        strategy=strategy or (SLOW_START if kin.min_speed > 0 else COLD_START),
     )
-    return optimum
+    with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
+        end = search.run(max_iterations)
+    flight = feasible(kin, start, end.v.T * kin.max_speed, kept)
+    value = float(objectives(stage(flight.w.T).value[:, None], kin, relay)[0])
+    converged = end.converged and value > first - tolerance * abs(first)
+    if not value >= first:
+        flight, value = start, first
+    return LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
 
 
 def maximize_all(
-    kin: Kinematics,
-    stage: Stage,
-    starts: Sequence[Trajectory],
-    *,
-    constraints: Sequence[Constraint] = (),
-    tolerance: float = 1e-6,
-    max_iterations: int = 100,
-    strategy: StartStrategy | None = None,
-    relay: RelayQueue | None = None,
+    kin: Kinematics, stage: Stage, starts: Sequence[Trajectory], **options: Any
 ) -> list[LocalOptimum]:
-    """Return what `maximize` finds from each of the `starts`; the searches run side by side."""
-    kept: Sequence[Constraint] = (*constraints_of(kin), *constraints)
-    strategy = strategy or (SLOW_START if kin.min_speed > 0 else COLD_START)
-    w, v = (np.stack(each, axis=1) for each in zip(*((s.w.T, s.v.T) for s in starts), strict=True))
-    if relay is None:
-        rewards = ScaledRewards(stage, w)
-    else:
-        rewards = QueueRewards(stage, w)
-        kept = (*kept, Queue(rewards, relay.half, relay.buffer / kin.time_step))
-    first = objectives(rewards.base, kin, relay)
-    search = Search(kin, kept, rewards, w, v, tolerance=tolerance, strategy=strategy)
-    with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
-        results = search.run(max_iterations)
-    flights = [
-        feasible(kin, start, results[k].v.T * kin.max_speed, kept) if k in results else start
-        for k, start in enumerate(starts)
-    ]
-    reached = objectives(stage(np.stack([f.w.T for f in flights], axis=1)).value, kin, relay)
-    optima = []
-    for k, start in enumerate(starts):
-        least, value = float(first[k]), float(reached[k])
-        if k not in results:
-            means = rewards.first[:, k, 0]
-            lowest = means == means.min()
-            optima.append(LocalOptimum(start, least, lowest / lowest.sum(), 0, 0.0, True))
-            continue
-        end = results[k]
-        # inside a search that keeps its limits a start is as good an end as any, else only where
-        # what was found is as good to the tolerance
-        equal = value > least - tolerance * abs(least) or isinstance(kept[0], FlightLimits)
-        converged = end.converged and equal
-        flight, value = (flights[k], value) if value >= least else (start, least)
-        optima.append(
-            LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
-        )
-    return optima
+    """Return what `maximize` finds from each of the `starts`."""
+    return [maximize(kin, stage, start, **options) for start in starts]
 
 
 def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
@@ -144,15 +107,22 @@ def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
 
 
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
-    """Return the constraints of `kin` itself, the limits on speed and acceleration first."""
-    if kin.min_speed > 0:
-        changes = () if math.isinf(kin.most_fall) else (speed_change(kin),)
-        turns = (turn_rate(kin),) if kin.turn_binds else ()
-        return (*limits_with_least_speed(kin), *changes, *turns)
-    if math.isinf(kin.max_airspeed):
-        return (FlightLimits(),)
+    """Return the limits of `kin` itself."""
     east, north = (part / kin.max_speed for part in kin.wind)
-    return FlightLimits(), AirspeedLimit(kin.max_airspeed / kin.max_speed, (east, north))
+    gain = kin.max_acceleration * kin.time_step / kin.max_speed
+    limits: list[Constraint] = [Disc(V), Disc(A)]
+    if math.isfinite(kin.max_airspeed):
+        limits.append(Disc(V, kin.max_airspeed / kin.max_speed, (east, north)))
+    if kin.min_speed > 0:
+        limits.append(Disc(V, kin.min_speed / kin.max_speed, (east, north), 1.0))
+        if math.isfinite(kin.most_fall):
+            fall = kin.most_fall * kin.time_step / kin.max_speed
+            rise = kin.most_power * kin.time_step / kin.max_speed**2
+            limits.append(SpeedChange(gain, fall, rise, (east, north)))
+        if kin.turn_binds:
+            per_speed = kin.most_turn * kin.max_speed / kin.max_acceleration
+            limits.append(TurnRate(gain, per_speed, kin.wind_in_turns**2 / kin.max_speed**2))
+    return tuple(limits)
 
 
 def feasible(
@@ -166,22 +136,13 @@ def feasible(
     The share of `start` is the least of 0, 1e-9, 1e-8 ... 0.1 and 1 that will do.
     """
     kept = constraints_of(kin) if constraints is None else constraints
-
-    def excess(flight: Trajectory) -> float:
-        return max(constraint.excess(kin, flight) for constraint in kept)
-
-    exact, allowed = kin.follow(v), max(_ALLOWED, excess(start))
+    exact, allowed = kin.follow(v), max(_ALLOWED, every_excess(kin, kept, start))
     for share in (0.0, *10.0 ** np.arange(-9, 0)):
-        blend = Trajectory(
-            *(
-                (1 - share) * own + share * other
-                for own, other in (
-                    (exact.w, start.w),
-                    (exact.v, start.v),
-                    (exact.a, start.a),
-                )
-            )
+        mixed = (
+            (1 - share) * own + share * other
+            for own, other in ((exact.w, start.w), (exact.v, start.v), (exact.a, start.a))
         )
-        if excess(blend) <= allowed:
+        blend = Trajectory(*mixed)
+        if every_excess(kin, kept, blend) <= allowed:
             return blend
     return start

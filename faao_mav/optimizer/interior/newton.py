@@ -1,278 +1,288 @@
-"""One Newton step of the interior-point method, by a banded LU and a border of J + 1.
+"""One Newton step of the interior-point method: the system of all constraints at an iterate.
 
-From (w, v, t), constraints with multipliers z, slacks F - t with multipliers `weights`, and the
-multipliers y of the motion, the step solves
+With unknowns x, inequalities g(x) >= 0 of slacks s and multipliers z, which s may exceed by a
+`margin`, and multipliers y of A x = 0, the step solves
 
-    H dw + A_w^T y+ - G^T weights+ = forces of z+ on w     A (dw, dv) = -A (w, v)
-    A_v^T y+ = forces of z+ on v and a                     z+ + K ds = mu s^-1 - correction
-    G dw - dt + (F - t) weights+ / weights = mu c / weights     sum weights+ = 1
+    H dx + A^T y+ - J^T z+ = c          z+ + (z / s) ds = target,    ds = J dx - margin
+    A dx = -A x
 
-with + for new multipliers, H = -sum_j weights_j Hessian(F_j), G the gradients of the F_j, c the
-share of the barrier that keeps t below the F_j, and K, ds, s of every constraint: see
-`constraint`. Several flights take their steps side by side, each its own: see `iterate`.
+with + for new multipliers, J the gradients of g, c that of the objective and H the Hessian of the
+Lagrangian, as much of it as leaves the model convex. Slot by slot z+ is eliminated, which adds
+J^T (z / s) J to H. Sums over all slots, F_j - t >= 0 of rewards and a budget of energy, are a
+border of the banded matrix; the unknown t is in the border too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
-from typing import Any
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Real
-from faao_mav.optimizer.interior.banded import Entry, Factors, Q, V, W, Y
-from faao_mav.optimizer.interior.constraint import (
-    Forces,
-    Move,
-    ScaledFlight,
-    Stiffness,
-    added,
-    positive_part,
-    quadratic,
-    summed,
-)
-from faao_mav.optimizer.interior.iterate import Direction, Iterate
+from faao_mav.arrays import Real
+from faao_mav.optimizer.interior.chain import Chain
+from faao_mav.optimizer.interior.constraint import COMMON, Constraint, Grid, Rows, V, W
+from faao_mav.optimizer.interior.rewards import Goal
 
-_UNBOUNDED = np.array([1e20, 0.0, 1e20])[:, None, None]
-"""The compliance of an acceleration without a limit: large enough that its force is nothing."""
+_SHARES = (0.9, 0.75, 0.5, 0.25)
+"""Shares of the curvature of the wrong sign that are tried before it is cut. Chosen."""
 
-_MIN_CURVATURE = 1e-8
-"""The least curvature along a direction, per squared length, that counts as that of a minimum.
 
-Chosen; what a change costs is not measured.
-"""
+_BARRIER_SHARE = 0.1
+"""c / n: the weight of the barrier that keeps t below the F_j, in those of a slot's limits.
+
+Chosen: half or twice as much cost 3 to 4 % more iterations of an earlier form of this search."""
 
 
 @dataclass(frozen=True, slots=True)
-class Newton:
-    """The factored system at an iterate; `curvature` (3, flights, n) is H with its proximal term.
+class _Part:
+    """A constraint with the places of its unknowns in a slot, and of its rows among all."""
 
-    `proximal` (flights, 1) is that term, which holds the places `held` of a slot's unknowns too.
-    `turning` (3, flights, n) and `across` (2, 2, flights, n - 1) are what constraints curve on v_n,
-    and between v_n and v_{n+1}: the share that leaves the model concave, with a proximal term.
+    constraint: Constraint
+    places: list[int]
+    rows: slice
 
-    `columns` are the solutions for the gradients of the F_j, and for mu = 0 without correction;
-    `border` (flights, J, J) is what the first ones leave for the weights.
+
+@dataclass(frozen=True, slots=True)
+class Functions:
+    """The inequalities at x (k, n): `rows` of each part, all `values` (m,) less what is `inside`.
+
+    First those of the slots where they hold, then the sums, with gradients `slopes` (T, k, n).
     """
 
-    flight: ScaledFlight
-    at: Iterate
-    barrier_share: float
-    proximal: Real
-    held: Sequence[int]
-    curvature: Real
-    turning: Real | float
-    across: Real | float
-    compliance: Real
-    factors: Factors
-    columns: Real
-    border: Real
+    x: Real
+    rows: list[Rows]
+    values: Real
+    slopes: Real
 
-    @classmethod
-    def factored(
-        cls,
-        flight: ScaledFlight,
-        at: Iterate,
-        *,
-        barrier_share: float,
-        proximal: Real,
-        cut: Flags,
-    ) -> "Newton":
-        """Factor the system, with the negative part of H cut where `cut` (flights, 1)."""
-        matrix, (links, flights) = flight.matrix, at.total.shape[:2]
-        n = matrix.slots
-        stiffness = [state.stiffness() for state in at.states]
-        curvature = -np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.hessian)
-        curvature += added(each.curvature for each in stiffness)
-        whole = curvature
-        if cut.any():
-            curvature = np.where(cut, positive_part(curvature), curvature)
-        wrong = whole - curvature
-        curvature[::2] += proximal
-        compliance = np.empty((3, flights, n))  # the last slot has none
-        compliance[..., :-1] = _compliance(stiffness)
-        compliance[..., :-1] /= flight.gain**2
-        if not flight.gains.all():
-            compliance[..., :-1] = np.where(flight.gains > 0, compliance[..., :-1], _UNBOUNDED)
-        held = [place for each in stiffness for place in each.held]
-        entries = [entry for each in stiffness for entry in each.entries]
-        entries += [Entry(place, place, np.repeat(proximal, n, axis=1)) for place in held]
-        on_w = np.asarray(added([curvature, *(each.w for each in stiffness)]))
-        on_v = np.asarray(added(each.v for each in stiffness))
-        turning, across, between = (added(getattr(e, part) for e in stiffness) for part in _ON_V)
-        if isinstance(turning, np.ndarray):
-            stiff, wrong_parts = (on_w, on_v, between), (wrong, turning, across)
-            share = _concave_share(flight, stiff, wrong_parts, compliance)
-            on_w, curvature = on_w + share * wrong, curvature + share * wrong
-            turning = share * turning
-            turning[::2] += proximal
-            on_v += turning
-            across = share * across if isinstance(across, np.ndarray) else across
-        coupled = added((across, between))
-        if isinstance(coupled, np.ndarray):
-            entries += [Entry(V.start + j, V.start + i, coupled[i, j], 1) for i, j in _PAIRS]
-        factors = matrix.factor(
-            on_w,
-            on_v,
-            compliance,
-            entries,
-        )
+    @property
+    def finite(self) -> bool:
+        """Whether there are rewards at x."""
+        return bool(np.isfinite(self.values.sum() + self.slopes.sum()))
 
-        right = np.zeros((links + 1, flights, n, matrix.size))
-        right[:links, ..., W] = at.gradient.transpose(1, 2, 3, 0)
-        _load(right[links], flight, compliance, [state.push(None) for state in at.states])
-        ahead = matrix.dynamics(at.w, at.v)
-        np.negative(ahead.transpose(1, 2, 0), out=right[links, :, :-1, Y])
-        columns = factors.solve(right)
 
-        border = np.einsum("cibn,jbnc->bij", at.gradient, columns[:links, ..., W])
-        room = (at.total - at.floor) / at.weights
-        border[:, range(links), range(links)] += room[..., 0].T
-        return cls(
-            flight,
-            at,
-            barrier_share,
-            proximal,
-            held,
-            curvature,
-            turning,
-            across,
-            compliance,
-            factors,
-            columns,
-            border,
-        )
+class System:
+    """What a search keeps and maximises, and its places among the unknowns of a slot.
 
-    def looks_convex(self, direction: Direction) -> Flags:
-        """Tell whether the systems look like those of minima, by two signs, (flights, 1)."""
-        both = self.border + np.swapaxes(self.border, 1, 2)
-        both = np.where(np.isfinite(both).all(axis=(1, 2), keepdims=True), both, 0.0)
-        move = direction.move
-        size = sum(np.einsum("cbn,cbn->b", x, x) for x in (move.w, move.v))
-        falls = self.decrease(direction, self.bend(direction)) > _MIN_CURVATURE * size[:, None]
-        return np.asarray((np.linalg.eigvalsh(both) > 0).all(axis=1, keepdims=True) & falls)
+    The m inequalities are those of the slots where they are `on` (rows, n), then the sums, from
+    `first_sum` on, the rewards first. `weight` (m,) is that of the barrier, `each` (m,) one, for
+    sums one per slot; `floored` (m,) is one for rewards, `turns` (m,) tells which half-planes turn.
+    """
+
+    def __init__(self, grid: Grid, goal: Goal, constraints: Sequence[Constraint], x: Real) -> None:
+        """Take unknowns x (k, n) to count the inequalities at."""
+        self.goal, n = goal, grid.slots
+        self.free = np.concatenate([grid.free, goal.free(n)])
+        self.chain = Chain(grid, goal, self.free)
+        self.objective = np.zeros(x.shape)
+        self.objective[COMMON:] = goal.slope[:, None] * self.free[COMMON:]
+        slotwise, sums = list[_Part](), list[_Part]()
+        on = [np.zeros((0, n), dtype=np.bool_)]
+        for each in (goal, *constraints):
+            places = [*each.of, *(range(COMMON, len(x)) if each is goal else ())]
+            kept = sums if each.total else slotwise
+            count = len(each.rows(x[places]).value)
+            first = kept[-1].rows.stop if kept else 0
+            kept.append(_Part(each, places, slice(first, first + count)))
+            if not each.total:
+                on.append(each.on(grid, count))
+        self.on, self.first_sum = np.concatenate(on), int(sum(map(np.sum, on)))
+        self.parts, self._slotwise = [*slotwise, *sums], len(slotwise)
+        # each constraint as often as it has inequalities, and in how many slots each of these is
+        often = [(part.constraint, int(self.on[part.rows].sum()), 1) for part in slotwise]
+        often += [(part.constraint, part.rows.stop - part.rows.start, n) for part in sums]
+
+        def of_each(value: Callable[[Constraint, int], float]) -> Real:
+            return np.repeat([value(each, s) for each, _, s in often], [k for _, k, _ in often])
+
+        self.inside = of_each(lambda each, slots: slots * each.inside)
+        self.headroom = of_each(lambda each, slots: slots * each.headroom)
+        self.each = of_each(lambda _, slots: 1 / slots)
+        self.turns = of_each(lambda each, _: each.turns) > 0
+        self.floored = of_each(lambda each, _: each is goal and goal.total)
+        self.weight = np.where(self.floored, _BARRIER_SHARE * n, 1.0)
+        # positions, speeds and what else the goal says are held by the proximal term
+        self.held = [*W, *V, *(COMMON + place for place in goal.held)]
+
+    def at(self, x: Real) -> Functions:
+        """Return the inequalities at x (k, n)."""
+        rows = [part.constraint.rows(x[part.places]) for part in self.parts]
+        split = self._slotwise
+        g = np.concatenate([np.zeros((0, x.shape[1])), *(each.value for each in rows[:split])])
+        sums = [each.value.sum(axis=1) for each in rows[split:]]
+        values = np.concatenate([g[self.on], *sums])
+        slopes = np.zeros((sum(map(len, sums)), *x.shape))
+        for part, each in zip(self.parts[split:], rows[split:], strict=True):
+            slopes[part.rows, part.places] = each.slope
+        return Functions(x, rows, values - self.inside, slopes * self.free)
+
+    def spread(self, z: Real) -> tuple[Real, Real]:
+        """Return z (m,) as those of slots, (rows, n), and those of sums (T,)."""
+        rows = np.zeros(self.on.shape)
+        rows[self.on] = z[: self.first_sum]
+        return rows, z[self.first_sum :]
+
+    def pull(self, at: Functions, z: Real) -> Real:
+        """Return J^T z, (k, n), of z (m,)."""
+        per_slot, sums = self.spread(z)
+        force = np.einsum("t,tkn->kn", sums, at.slopes)
+        for part, rows in self._in_slots(at):
+            force[part.places] += np.einsum("mn,min->in", per_slot[part.rows], rows.slope)
+        return np.asarray(force * self.free)
+
+    def along(self, at: Functions, dx: Real) -> Real:
+        """Return J dx, (m,)."""
+        change = np.empty(self.on.shape)
+        for part, rows in self._in_slots(at):
+            change[part.rows] = np.einsum("min,in->mn", rows.slope, dx[part.places])
+        return np.concatenate([change[self.on], np.einsum("tkn,kn->t", at.slopes, dx)])
+
+    def stiffness(self, at: Functions, weights: Real) -> Real:
+        """Return J^T diag(`weights`) J of the inequalities in slots, (k, k, n)."""
+        stiff, _ = self.spread(weights)
+        found = np.zeros((len(at.x), *at.x.shape))
+        for part, rows in self._in_slots(at):
+            J = rows.slope
+            block = np.einsum("min,mjn->ijn", stiff[part.rows, None] * J, J)
+            found[np.ix_(part.places, part.places)] += block
+        return found
+
+    def curvature(self, at: Functions, z: Real) -> Real:
+        """Return the Hessian of the Lagrangian, (k, k, n), at multipliers z."""
+        per_slot, sums = self.spread(z)
+        everywhere = np.repeat(sums[:, None], at.x.shape[1], axis=1)
+        found = np.zeros((len(at.x), *at.x.shape))
+        for part, rows in zip(self.parts, at.rows, strict=True):
+            if rows.bend is not None:
+                weights = (everywhere if part.constraint.total else per_slot)[part.rows]
+                block = np.einsum("mn,mijn->ijn", weights, rows.bend)
+                found[np.ix_(part.places, part.places)] -= block
+        return found
+
+    def steepness(self, at: Functions, z: Real) -> float:
+        """Return the largest gradient of what the goal has of w, weighted by z."""
+        per_slot, sums = self.spread(z)
+        first = 0 if not self.goal.total else self._slotwise
+        slope, rows = at.rows[first].slope[:, :2], self.parts[first].rows
+        weights = sums[rows, None] if self.goal.total else per_slot[rows]
+        return float((np.abs(slope) * weights[:, None]).sum(axis=0).max())
+
+    def bent(self, at: Functions, dx: Real) -> Real:
+        """Return half the second-order change of each inequality along dx in its slot, (m,)."""
+        change = np.zeros(self.on.shape)
+        for part, rows in self._in_slots(at):
+            if rows.bend is not None and part.constraint is not self.goal:
+                d = dx[part.places]
+                change[part.rows] = np.einsum("in,mijn,jn->mn", d, rows.bend, d) / 2
+        return np.append(change[self.on], np.zeros(len(at.slopes)))
+
+    def _in_slots(self, at: Functions) -> list[tuple[_Part, Rows]]:
+        return list(zip(self.parts, at.rows, strict=True))[: self._slotwise]
+
+
+@dataclass(frozen=True, slots=True)
+class Iterate:
+    """Functions `at` x, multipliers y, slacks s, multipliers z and margins (m,), the floor t."""
+
+    at: Functions
+    y: Real
+    s: Real
+    z: Real
+    margin: Real
+    floor: float
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """Changes of an `Iterate`."""
+
+    x: Real
+    y: Real
+    s: Real
+    z: Real
+    floor: float
+
+
+class Newton:
+    """The factored system at an iterate, with a proximal term; `curvature` (k, k, n) is its H.
+
+    Raises `numpy.linalg.LinAlgError` where it is singular.
+    """
+
+    def __init__(self, system: System, iterate: Iterate, proximal: float) -> None:
+        self.system, self.iterate = system, iterate
+        at, chain = iterate.at, system.chain
+        weights = iterate.z / iterate.s
+        stiff = system.stiffness(at, weights)
+        held = np.zeros((len(at.x), len(at.x), 1))
+        held[system.held, system.held] = proximal
+        whole = system.curvature(at, iterate.z)
+        self.curvature = _convex_part(chain, whole, stiff + held) + held
+        solve = chain.factored(self.curvature + stiff)
+        if solve is None:
+            raise np.linalg.LinAlgError("singular")
+        self._solve: Callable[[Real], Real] = solve
+        k, n = at.x.shape
+        sums = len(at.slopes)
+        right = np.zeros((sums + 1, k + len(chain.after), n))
+        right[:sums, :k] = at.slopes
+        right[sums, :k] = system.objective + self._pushed(weights * iterate.margin)
+        right[sums, k:, :-1] = -chain.missed(at.x)
+        self._columns = solve(right)
+        border = np.zeros((sums + 1, sums + 1))
+        border[:sums, :sums] = np.einsum("ikn,jkn->ij", at.slopes, self._columns[:sums, :k])
+        border[range(sums), range(sums)] += 1 / weights[system.first_sum :]
+        rewards = system.floored[system.first_sum :]
+        border[:sums, sums], border[sums, :sums] = -1.0 * rewards, rewards
+        border[sums, sums] = not rewards.any()
+        self._border = border
 
     def predictor(self) -> Direction:
-        """Return the direction for mu = 0 without a correction."""
-        return self._direction(self.columns[-1], np.zeros((1, 1)), (None,) * len(self.at.states))
+        """Return the direction to targets of zero."""
+        return self._direction(self._columns[-1], np.zeros_like(self.iterate.s))
 
-    def corrector(self, mu: Real, ahead: Direction, share: Real) -> Direction:
-        """Return the direction for mu (flights, 1), corrected by `share` of `ahead`."""
-        steps = zip(self.at.states, ahead.steps, strict=True)
-        return self.aimed(mu, tuple(state.target(mu, step, share) for state, step in steps))
+    def corrector(self, mu: float, ahead: Direction, share: float) -> Direction:
+        """Return the direction to mu, corrected by `share` of `ahead` (Mehrotra)."""
+        system, iterate = self.system, self.iterate
+        correction = np.where(np.arange(len(ahead.s)) < system.first_sum, share**2, 0.0)
+        target = (system.weight * mu - correction * ahead.s * ahead.z) / iterate.s
+        right = np.zeros((1, *self._columns.shape[1:]))
+        right[0, : len(iterate.at.x)] = self._pushed(target)
+        return self._direction(self._columns[-1] + self._solve(right)[0], target)
 
-    def aimed(self, mu: Real, targets: tuple[Any, ...]) -> Direction:
-        """Return the direction for mu (flights, 1) and the `targets` of the constraints."""
-        flight, states = self.flight, self.at.states
-        right = np.zeros((1, self.at.w.shape[1], flight.matrix.slots, flight.matrix.size))
-        pushes = [state.push(target) for state, target in zip(states, targets, strict=True)]
-        _load(right[0], flight, self.compliance, pushes)
-        return self._direction(self.columns[-1] + self.factors.solve(right)[0], mu, targets)
+    def _pushed(self, z: Real) -> Real:
+        """Return J^T z of the inequalities in slots, (k, n)."""
+        in_slots = np.where(np.arange(len(z)) < self.system.first_sum, z, 0.0)
+        return self.system.pull(self.iterate.at, in_slots)
 
-    def _direction(self, alone: Real, mu: Real, targets: tuple[Any, ...]) -> Direction:
-        """Return the direction that is `alone` without the pull of the rewards."""
-        at, flight = self.at, self.flight
-        links, flights = at.total.shape[:2]
-        # G dw - dt + (F - t) weights+ / weights = mu c / weights, and the weights sum to one
-        system = np.ones((flights, links + 1, links + 1))
-        system[:, :links, :links] = self.border
-        system[:, :links, links], system[:, links, links] = -1, links == 0
-        right = np.ones((flights, links + 1, 1))
-        gained = np.einsum("cjbn,bnc->bj", at.gradient, alone[..., W])
-        right[:, :links, 0] = (mu * self.barrier_share / at.weights)[..., 0].T - gained
-        solved = np.linalg.solve(system, right).transpose(1, 0, 2)
-        weights, floor = solved[:links], solved[links]
-        unknowns = alone + np.einsum("jb,jbnk->bnk", weights[..., 0], self.columns[:links])
+    def _direction(self, alone: Real, target: Real) -> Direction:
+        """Return the direction that is `alone` without the multipliers of sums."""
+        system, iterate = self.system, self.iterate
+        at, k = iterate.at, len(iterate.at.x)
+        sums = len(at.slopes)
+        first = system.first_sum
+        weights = iterate.z / iterate.s
+        right = np.append((target / weights + iterate.margin)[first:], float(system.goal.total))
+        right[:sums] -= np.einsum("tkn,kn->t", at.slopes, alone[:k])
+        solved = np.linalg.solve(self._border, right)
+        both = alone + np.einsum("t,tkn->kn", solved[:sums], self._columns[:sums])
+        x, y, rise = both[:k], both[k:, :-1], float(solved[-1])
+        s = system.along(at, x) - iterate.margin - rise * system.floored
+        z = target - weights * s
+        z[first:] = solved[:sums]
+        return Direction(x, y - iterate.y, s, z - iterate.z, rise)
 
-        dw, dv, q, y = (unknowns[..., part].transpose(2, 0, 1) for part in (W, V, Q, Y))
-        q, y = q[..., :-1], y[..., :-1]
-        on_a = q * flight.per_gain
-        rest, move = Forces(v=flight.forces_asked(y, on_a), a=on_a), Move(dw, dv, unknowns)
-        steps: list[Any] = []
-        for state, target in zip(at.states[:0:-1], targets[:0:-1], strict=True):
-            step, supplied = state.solved(move, target, rest)
-            rest = rest.less(supplied)
-            steps.append(step)
-        steps.append(at.states[0].solved(move, targets[0], rest)[0])
-        return Direction(
-            move=move,
-            y=y - at.y,
-            steps=tuple(reversed(steps)),
-            weights=weights - at.weights,
-            total=np.einsum("cjbn,cbn->jb", at.gradient, dw)[..., None],
-            floor=floor,
-        )
-
-    def bend(self, direction: Direction) -> Real:
-        """Return dw^T H dw, and what the proximal term has of other unknowns, (flights, 1)."""
-        own = direction.move.unknowns[..., self.held]
-        others = (own * own).sum(axis=(1, 2))[:, None]
-        return np.asarray(quadratic(self.curvature, direction.move.w) + self.proximal * others)
-
-    def decrease(self, direction: Direction, bend: Real) -> Real:
-        """Return the curvature of the whole model along a `direction` of `bend`, (flights, 1)."""
-        at = self.at
-        kink = at.weights / (at.total - at.floor) * (direction.total - direction.floor) ** 2
-        dv = direction.move.v
-        if isinstance(self.turning, np.ndarray):
-            bend = bend + quadratic(self.turning, dv)
-        if isinstance(self.across, np.ndarray):
-            both = [self.across[i, j] * dv[i, :, :-1] * dv[j, :, 1:] for i, j in _PAIRS]
-            bend = bend + 2 * summed(np.stack(both))
-        of_constraints = [
-            state.curvature(step) for state, step in zip(at.states, direction.steps, strict=True)
-        ]
-        return np.asarray(reduce(np.add, of_constraints, bend) + kink.sum(axis=0))
+    def bend(self, direction: Direction) -> float:
+        """Return dx^T H dx of a `direction`."""
+        return float(np.einsum("in,ijn,jn->", direction.x, self.curvature, direction.x))
 
 
-_ON_V = "turning", "across", "between"
-_PAIRS = (0, 0), (0, 1), (1, 0), (1, 1)
-
-_SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0)
-"""Shares of the curvature of the wrong sign that are tried. Chosen."""
-
-
-def _concave_share(
-    flight: ScaledFlight,
-    stiff: tuple[Real, Real, Real | float],
-    wrong: tuple[Real, Real, Real | float],
-    compliance: Real,
-) -> Real:
-    """Return the largest share (flights, 1) of what is `wrong` with which the model is concave.
-
-    `stiff` are the blocks on w and v and between v_n and v_{n+1}, `wrong` what more there is.
-    """
-    xx, xy, yy = compliance
-    on_a = np.stack([yy, -xy, xx]) / (xx * yy - xy * xy)
-    on_w, on_v, between = stiff
-    share = np.full((on_w.shape[1], 1), _SHARES[0])
-    for lower in _SHARES[1:]:
-        more_w, more_v, across = (share * each for each in wrong)
-        sound = flight.matrix.positive(on_w + more_w, on_v + more_v, on_a, between + across)
-        if sound.all():
-            break
-        share = np.where(sound, share, lower)
-    return share
-
-
-def _load(right: Real, flight: ScaledFlight, compliance: Real, pushes: list[Forces]) -> None:
-    """Enter what the forces `pushes` of the constraints make of the right-hand side."""
-    matrix, total = flight.matrix, Forces.total(pushes)
-    if isinstance(total.w, np.ndarray):
-        right[..., W] = (total.w * matrix.moves_w).transpose(1, 2, 0)
-    right[..., V] = (total.v * matrix.moves_v).transpose(1, 2, 0)
-    x, y = flight.gains * total.a
-    xx, xy, yy = compliance[..., :-1]
-    right[:, :-1, Q.start] = xx * x + xy * y
-    right[:, :-1, Q.start + 1] = xy * x + yy * y
-    for push, own in zip(pushes, flight.own, strict=True):
-        right[..., own] = push.own
-
-
-def _compliance(stiffness: list[Stiffness]) -> Real:
-    """Return the inverse of the whole stiffness on the accelerations, (3, flights, n - 1)."""
-    acting = [each for each in stiffness if np.ndim(each.a)]
-    if len(acting) == 1 and acting[0].compliance is not None:
-        return acting[0].compliance
-    xx, xy, yy = np.asarray(added(each.a for each in acting))
-    return np.asarray(np.stack([yy, -xy, xx]) / (xx * yy - xy * xy))
+def _convex_part(chain: Chain, whole: Real, more: Real) -> Real:
+    """Return as much of H `whole` (k, k, n) as is positive definite along A x = 0 with `more`."""
+    if chain.convex(whole + more):
+        return whole
+    low, vectors = np.linalg.eigh(whole.transpose(2, 0, 1))
+    kept = np.einsum("nia,na,nja->ijn", vectors, np.maximum(low, 0), vectors)
+    for share in _SHARES:
+        part = kept + share * (whole - kept)
+        if chain.convex(part + more):
+            return np.asarray(part)
+    return np.asarray(kept)

@@ -1,15 +1,19 @@
-"""What it is worth to be somewhere: smooth rewards of the slots, and their sums in solver units."""
+"""What a flight maximises: the smallest of the sums of some rewards of its slots."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.optimizer.interior.cones import TINY
-from faao_mav.optimizer.kinematics import LENGTH
+from faao_mav.optimizer.interior.constraint import TINY, Constraint, Rows, W
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
-_FLAT = 1e-9  # a gain per 100 m, relative to the reward, that is not worth a detour
+_FLAT = 1e-9
+"""A gain per 100 m, relative to the reward, that is not worth a detour. Chosen."""
+
+_PACKED = np.array([[0, 1], [1, 2]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,53 +35,69 @@ class Stage(Protocol):
         """Return the rewards at w (2, ..., n), m; not-a-number where there is none."""
 
 
-class ScaledRewards:
-    """The F_j of some flights in solver units, relative to their starts: small gains keep digits.
+class Goal(Constraint):
+    """What is maximised, with the `own` unknowns per slot that it takes beside `of`.
 
-    `first` (J, flights, 1) are the F_j of the starts, in the unit of the rewards.
+    `slope` (own,) is the objective's. The unknowns of a slot and the next one keep
+    `after` x_{n+1} = `before` x_n, both (k, own).
     """
 
+    of = W
+    inside = 0.0
+    headroom = 0.0
+    noise: float
+    held: tuple[int, ...] = ()
+    slope: Real = np.zeros(0)
+    before: Real = np.zeros((0, 0))
+    after: Real = np.zeros((0, 0))
+
+    @abstractmethod
+    def begin(self, *, cold: bool) -> Real:
+        """Return its unknowns (own, n) to begin with."""
+
+    def free(self, slots: int) -> Flags:
+        """Return which of its unknowns are not given, (own, `slots`)."""
+        return np.ones((len(self.slope), slots), dtype=np.bool_)
+
+    def excess(self, kin: Kinematics, flight: Trajectory) -> float:  # noqa: ARG002
+        """Return 0: every flight has its rewards."""
+        return 0.0
+
+
+class Rewards(Goal):
+    """min_j F_j, the sums of `stage` over the slots, relative to a start: small gains keep digits.
+
+    The unit is the largest gradient at the start w (2, n), m. `flat` tells that there is none.
+    """
+
+    total = True
+
     def __init__(self, stage: Stage, w: Real) -> None:
-        """Take the starts w (2, flights, n), m."""
         self.stage, self.values = stage, stage(w)
         self.base = self.values.value
-        self.first = self.base.mean(axis=-1, keepdims=True)
-        steepest = np.abs(self.values.gradient).max(axis=(0, -1))[..., None] * LENGTH
-        above = self.first - self.first.min(axis=0)
+        first = self.base.mean(axis=-1, keepdims=True)
+        steepest = np.abs(self.values.gradient).max(axis=(0, -1))[:, None] * LENGTH
+        self.above = first - first.min(axis=0)
         # an F_j far above the least one has no say in the unit
-        near = steepest / np.maximum(steepest + above, TINY)
-        unit = (near * steepest).max(axis=0)
-        self.flat: Flags = ~(unit > _FLAT * np.abs(self.first).max(axis=0))
-        self.unit = np.where(self.flat, 1.0, unit)
-        self.least = self.first.min(axis=0)
-        self.offset = above * w.shape[-1] / self.unit
-        rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1, keepdims=True)
-        self.noise = 1e-9 + rounding.max(axis=0) / self.unit
+        unit = float((steepest**2 / np.maximum(steepest + self.above, TINY)).max())
+        self.flat = not unit > _FLAT * np.abs(first).max()
+        self.unit = 1.0 if self.flat else unit
+        rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1).max()
+        self.noise = 1e-9 + rounding / self.unit
 
-    def keep(self, flights: Flags) -> None:
-        """Forget all flights but these."""
-        self.base, self.offset = self.base[:, flights], self.offset[:, flights]
-        self.unit, self.noise = self.unit[flights], self.noise[flights]
-        self.least = self.least[flights]
+    def begin(self, *, cold: bool) -> Real:  # noqa: ARG002
+        """Return no unknowns."""
+        return np.zeros((0, self.base.shape[-1]))
 
-    def mean(self, total: Real) -> Real:
-        """Return F_j `total` (..., flights, 1) as means over the slots, in the stage's unit."""
-        return np.asarray(self.least + total * self.unit / self.base.shape[-1])
-
-    def __call__(self, w: Real) -> tuple[Real, Real, Real]:
-        """Return the F_j (J, flights, 1), their gradients and Hessians at scaled w."""
-        return self.scaled(self.stage(w * LENGTH))
-
-    def scaled(self, values: StageValues) -> tuple[Real, Real, Real]:
-        """Return the same for `values`."""
-        total = (values.value - self.base).sum(axis=-1, keepdims=True) / self.unit + self.offset
-        scaled = self.in_units(values)
-        return total, scaled.gradient, scaled.hessian
-
-    def in_units(self, values: StageValues) -> StageValues:
-        """Return `values` in the unit of each flight, with derivatives by scaled w."""
-        return StageValues(
-            values.value / self.unit,
-            values.gradient * (LENGTH / self.unit),
-            values.hessian * (LENGTH**2 / self.unit),
+    def scaled(self, w: Real, base: Real | float = 0.0) -> tuple[Real, Real, Real]:
+        """Return rewards above `base` at scaled w (2, n), with derivatives as `Rows` has them."""
+        at = self.stage(w * LENGTH)
+        return (
+            (at.value - base) / self.unit,
+            at.gradient.swapaxes(0, 1) * (LENGTH / self.unit),
+            at.hessian[_PACKED].transpose(2, 0, 1, 3) * (LENGTH**2 / self.unit),
         )
+
+    def rows(self, x: Real) -> Rows:
+        """Return the rewards relative to those of the start."""
+        return Rows(*self.scaled(x, self.base - self.above))

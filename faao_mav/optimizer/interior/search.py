@@ -1,161 +1,84 @@
-"""The iteration of the interior-point method: searches from several starts, side by side.
+"""The iteration of the interior-point method.
 
-A numpy call on one flight of some hundred slots costs more in the call than in the arithmetic, so
-that five flights at once take little longer than one. Each search is its own; arrays end in
-(flights, slots), and what belongs to a flight as a whole in (flights, 1). Flights whose search has
-ended are left out.
-
-Lifecycle: `Search(...)` once, from the starts; `run` iterates. An iteration measures the residual
-(`_measure`), factors the Newton system (`_newton`), takes the predictor's reach to choose the
-barrier parameter mu (Mehrotra), and tries the corrector's direction (`_advance`, `_accept`); a
-direction that is refused is tried anew with a proximal term, iterates that hug the limits are
-centred anew (`_centre`).
+Lifecycle: `Search(...)` once, from a start; `run` iterates. An iteration measures the residual,
+factors the Newton system, takes the predictor's reach to choose the barrier parameter mu (Mehrotra)
+and tries the corrector's direction. One that is refused is tried anew with a proximal term;
+iterates that hug the limits are given multipliers from a larger mu.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import reduce
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.optimizer.interior.constraint import (
-    Constraint,
-    Forces,
-    ScaledFlight,
-    largest,
-    summed,
-)
-from faao_mav.optimizer.interior.iterate import Direction, Iterate, best_floor, merged, only
-from faao_mav.optimizer.interior.newton import Newton
-from faao_mav.optimizer.interior.rewards import ScaledRewards
-from faao_mav.optimizer.kinematics import LENGTH, Kinematics
-
-# The constants were chosen, and what a change costs was measured on 26 flights of up to 500 slots,
-# nine of them with a least speed, to a tolerance of 1e-4: the iterations of all flights together
-# (1,144) and the mean gain over the starts (100.1 %). No change that was tried gained more than
-# 0.1 % or 1 % of the iterations.
-
-_BARRIER_SHARE = 0.1
-"""c / n: the weight of the barrier that keeps t below the F_j, in those of a slot's limits.
-
-Half or twice as much costs 3 to 4 % more iterations, five times as much 0.3 % of the value.
-"""
+from faao_mav.arrays import Real
+from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, V
+from faao_mav.optimizer.interior.newton import Direction, Functions, Iterate, Newton, System
+from faao_mav.optimizer.interior.rewards import Goal
+from faao_mav.optimizer.kinematics import Kinematics
 
 _TO_BOUNDARY = 0.99
-"""The share of the way to the boundary that a step may go; 0.9 costs 5 % more iterations."""
+"""The share of the way to the boundary that a step may go. Chosen."""
 
 _MISFIT = 0.25
-"""The shortfall of rewards allowed, in shares of the model's decrease; 0.1 to 1 do as well."""
+"""The shortfall allowed, in shares of the model's decrease. Chosen."""
 
-_SHORT_STEP, _SHORT_BILINEAR = 0.2, 0.1
-"""Steps below this share of the direction are short. 0.1 and 0.3 lose 0.1 % of the value.
+_SHORT, _PATIENCE = 0.1, 4
+"""Steps below this share of the direction are short, and so many in a row are hugging. Chosen."""
 
-The second is for a bilinear constraint: see `_CENTRING_BILINEAR`.
-"""
-
-_PATIENCE, _PATIENCE_BILINEAR = 2, 4
-"""The short steps in a row after which the multipliers are centred; 3 lose 0.1 % of the value."""
-
-_MAX_CENTRINGS = 8
-"""The centrings after which a search is given up; 4 lose 0.1 % of the value, 16 gain nothing."""
-
-_CENTRING_FACTOR, _CENTRING_BILINEAR = 1000.0, 10.0
-"""mu after a centring, in mean gaps before it. 100 and 10,000 lose up to 0.1 % of the value.
-
-The second is for a bilinear constraint. There short steps come from saddles as well: after each the
-proximal term is raised, after four the multipliers are centred by less, and mu is monotone from the
-start. Measured on `copter_relay.yaml` in half duplex: with T = 70, 120 and 200 s and buffers of 2,
-5, 10 and 20 MB at 20 MHz, and on 16 random plans (T = 72 to 150 s, 2 to 37 MB, 5 to 40 MHz, BPSK to
-16-QAM), the best of the starts converges; of the twelve with the adaptive rule, five.
-"""
-
-_CENTRING_TURNING = 100.0
-"""The same where half-planes turn. Measured on seven sites of forty random polygons, in 40 slots:
-five searches converge with 100, two with 1,000 and three with 10, one of those 6 % lower."""
+_CENTRING, _MAX_CENTRINGS = 10.0, 8
+"""mu after a centring, in mean gaps before it; the centrings after which a search ends. Measured on
+five hard random plans: with 100 in place of 10 one does not converge, and one loses 8 %."""
 
 _MAX_ATTEMPTS = 6
-"""The directions tried at one iterate before its multipliers are centred; 3 to 12 do as well."""
+"""The directions tried at one iterate before its multipliers are centred. Chosen."""
 
-_FIRST_PROXIMAL = 1e-3
-"""The proximal term of the second direction tried at one iterate, then eight times as much; 1e-4 to
-1e-2 do as well."""
+_FIRST_PROXIMAL, _MORE_PROXIMAL = 1e-3, 8.0
+"""The first proximal term, and by how much the next one is larger. Chosen."""
 
-_STEPS_CUT = 2
-"""The steps for which the curvature stays cut once it had to be; 1 loses 0.1 % of the value."""
+_SLOWEST = 0.3
+"""The least share of the mean gap that mu falls to in a step. On 19 flights of the tests 0.3 takes
+473 iterations, 0.1 534 and 0.4 517."""
 
-_WIDEST = 1.0
-"""The change of velocity in one step, in v_max, that limits with curvature are modelled for. Longer
-directions are cut short, and the proximal term is raised. 0.5 does as well."""
+_FALL, _SOLVED = 0.2, 1.0
+"""Where mu waits for the iterates, it falls to this share when the scaled gradient is below so many
+mu. Measured on nine random plans with a least speed: with 3 and 10 mu one and four do not converge.
+"""
+
+_MU_PER_TOLERANCE, _MOST_PER_SLOT = 1 / 20, 10.0
+"""The least mu, in tolerances; the inequalities per slot from which it is smaller. Chosen."""
 
 _STRICT = 1e-4
-"""The tolerance that limits with curvature are kept to where a search asks for less: so much is
-what their `inside` leaves room for."""
+"""The tolerance that limits are kept to where a search asks for less: so much is what their
+`inside` leaves room for."""
 
-_QUEUE_FALL = 0.3
-"""The least share of mu that a step leaves where a queue is to be emptied.
+_MOST_MISSED = 0.3
+"""What a step may miss of a limit in second order, where its slack is less. Chosen."""
 
-Measured on 16 flights of up to 400 slots, from 68 starts: 1,283 iterations, 1 start that does not
-converge. With 0.01 to 0.1 as elsewhere: 1,749 and 4.
-"""
+_WIDEST = 1.0
+"""The change of velocity in one step, in v_max, that limits are modelled for. Chosen."""
 
-_MONOTONE_AFTER = 2
-_SOLVED = 3.0
-_MONOTONE_FALL = 0.2
-"""With a queue, the centrings after which mu stays until the scaled gradient is below `_SOLVED` mu,
-and then falls to this share: iterates that hug the limits again and again are led along the centre.
-
-Measured on eight flights of the samples with buffers of 5 to 100 MB or a least speed, to a
-tolerance of 1e-4: 7 converge, 3 with the adaptive rule alone.
-"""
-
-_SOLVED_TURNING = 30.0
-"""The same where the half-planes of a fence turn with the flight: mu is monotone from the start.
-
-Measured on two sample flights round obstacles, by a gap and by zones that touch: 134 and 95
-iterations. With 100 in place of 30 neither converges in 300, with 300 one does, in 294.
-"""
-
-_MU_PER_TOLERANCE = 1 / 20
-"""The least mu, in tolerances; up to 1/5 does as well, with 1/2 nothing converges."""
-
-
-_MOST_PER_SLOT = 10.0
-"""The inequalities per slot from which the least mu is smaller: the gap is their sum. Chosen."""
+_LEFT = 0.1
+"""The share of a linear slack that a half-plane which turns leaves at least, by a wider margin:
+where an obstacle's nearest side changes, g may be below 0 after a step that ends above. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class StartStrategy:
-    """How a search begins: the first barrier parameter mu, and the margin of the limits.
-
-    Limits are widened by `margin` (in v_max, a_max) beyond the start. A smaller mu follows the
-    start, a larger one the middle of the limits. A tenth or ten times the mu of `COLD_START`, or a
-    third or three times its margin, costs up to 6 % more iterations and 0.1 to 0.5 % of the value.
-    """
+    """How a search begins: the first barrier parameter mu, and the share of the `headroom`."""
 
     mu: float
-    margin: float
+    room: float
 
 
-COLD_START = StartStrategy(mu=10.0, margin=1.0)
+COLD_START = StartStrategy(mu=10.0, room=1.0)
 """For any start: the optimum may be far away."""
 
-WARM_START = StartStrategy(mu=0.1, margin=0.03)
+SLOW_START = StartStrategy(mu=0.1, room=1.0)
+"""The same with a least speed, where what turns where is not to be forgotten."""
+
+WARM_START = StartStrategy(mu=1e-2, room=0.03)
 """For starts that are nearly optimal."""
-
-WARM_SHARES = StartStrategy(mu=0.1, margin=0.1)
-"""The same in half duplex. Measured on seven plans (T = 40 to 120 s, BPSK to 16-QAM): a third of
-this margin takes 24 iterations for 12 at T = 70 s. Ten times mu leaves two starts unconverged with
-a buffer of 20 MB."""
-
-
-NEAR_START = StartStrategy(mu=1e-3, margin=0.01)
-"""The same with a least speed. Measured on five plans: 15 to 71 steps from a rough optimum to the
-tolerance, where `COLD_START` takes 40 to 250 and may end at a lower value."""
-
-
-SLOW_START = StartStrategy(mu=0.1, margin=1.0)
-"""For any start with a least speed: `COLD_START` forgets what turns where."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,264 +92,208 @@ class SearchResult:
     converged: bool
 
 
-@dataclass(slots=True)
-class _Control:
-    """What steers each search, (flights, 1).
+def best_floor(total: Real, weight: float) -> float:
+    """Return the t that maximises t + `weight` sum_j log(total_j - t) of `total` (J,).
 
-    `attempts` counts the directions refused at this iterate, `short` the short steps in a row,
-    `cut_left` the steps for which the curvature stays cut; `steepness` is how much steeper the
-    rewards are than at the start. `best` and `best_v` (2, flights, n) are the largest min_j F_j
-    within the limits so far and its speeds.
+    >>> best_floor(np.array([3.0]), 0.5)
+    2.5
     """
-
-    mu: Real
-    proximal: Real
-    steepness: Real
-    best: Real
-    best_v: Real
-    iterations: Integers
-    attempts: Integers
-    short: Integers
-    cut_left: Integers
-    centrings: Integers
+    floor = float(total.min()) - weight
+    # from above the optimum, where the gradient is convex in t, Newton's method is monotone
+    for _ in range(50):
+        per_gap = 1 / (total - floor)
+        excess = weight * float(per_gap.sum()) - 1
+        if abs(excess) < 1e-12:
+            break
+        floor -= excess / (weight * float((per_gap * per_gap).sum()))
+    return floor
 
 
 class Search:
-    """Searches from starts w, v (2, flights, n) in SI units."""
+    """A search from the unknowns w, v, a (6, n) of a start, in solver units."""
 
     def __init__(
         self,
         kin: Kinematics,
         constraints: Sequence[Constraint],
-        rewards: ScaledRewards,
-        w: Real,
-        v: Real,
+        goal: Goal,
+        x: Real,
         *,
         tolerance: float,
         strategy: StartStrategy,
     ) -> None:
-        """Begin at the starts."""
-        self.rewards, self.tolerance = rewards, tolerance
-        self.flight = ScaledFlight(kin, constraints)
-        self.turning = any(constraint.turns for constraint in constraints)
-        self.bilinear = any(constraint.bilinear for constraint in constraints)
-        self.curved = any(constraint.curved for constraint in constraints)
-        self.barrier_share = _BARRIER_SHARE * kin.slots
-        flights = w.shape[1]
-        self.rows = np.arange(flights)
-        one, none = np.ones((flights, 1)), np.zeros((flights, 1), dtype=np.int_)
-        mu = strategy.mu * one
-        w, v = w / LENGTH, v / kin.max_speed
-        total, gradient, hessian = rewards.scaled(rewards.values)
-        floor = best_floor(total, self.barrier_share * mu)
-        weights = 1 / (total - floor)
-        self.at = Iterate(
-            w=w,
-            v=v,
-            y=np.zeros((2, flights, kin.slots - 1)),
-            states=self.flight.begin(w, v, mu, strategy.margin),
-            weights=weights / weights.sum(axis=0),
-            total=total,
-            floor=floor,
-            gradient=gradient * self.flight.matrix.moves_w,
-            hessian=hessian,
+        """Begin at x."""
+        self.goal, self.tolerance, self.mu = goal, tolerance, strategy.mu
+        x = np.concatenate([x, goal.begin(cold=strategy.room >= 1)])
+        self.system = system = System(Grid.of(kin), goal, constraints, x)
+        # where half-planes turn, or a flight may turn as a whole, mu waits for the iterates
+        self.waits = kin.min_speed > 0 or bool(system.turns.any())
+        at = system.at(x)
+        s = np.maximum(at.values, strategy.room * system.headroom)
+        y = np.zeros((len(system.chain.after), kin.slots - 1))
+        floor, s = self._floor(at, s)
+        z = np.where(system.floored, 1.0, system.weight * self.mu) / s
+        self.iterate = Iterate(
+            at, y, s, self._weighted(z), np.where(system.floored, 0.0, s - at.values), floor
         )
-        self.control = _Control(mu, 0 * one, one, -np.inf * one, v, none, none, none, none, none)
+        self.proximal, self.steepness = 0.0, 1.0
+        self.iterations = self.attempts = self.short = self.centrings = 0
+        self.best, self.best_v = -np.inf, x[list(V)]
 
-    def run(self, max_iterations: int) -> dict[int, SearchResult]:
-        """Iterate until every search has ended; flights with flat rewards are left out."""
-        results: dict[int, SearchResult] = {}
-        self._keep(~self.rewards.flat)
-        while self.rows.size:
-            slope, residual = self._measure()
-            control = self.control
-            converged = residual < self.tolerance
-            # not finite: the limits have no interior left
-            lost = control.iterations >= max_iterations
-            lost |= control.centrings > _MAX_CENTRINGS
-            over = converged | ~np.isfinite(residual) | (lost & (control.attempts == 0))
-            for k in np.flatnonzero(over).tolist():
-                results[int(self.rows[k])] = self._result(k, residual[k, 0], converged[k, 0])
-            if over.all():
-                break
-            self._keep(~over)
-            self._advance(slope[~over[:, 0]])
-        return results
-
-    def _result(self, k: int, residual: float, converged: bool) -> SearchResult:
-        """Return the best flight within the limits so far, else the last one."""
-        control, at = self.control, self.at
-        return SearchResult(
-            v=(control.best_v if control.best[k, 0] > -np.inf else at.v)[:, k],
-            weights=at.weights[:, k, 0],
-            iterations=int(control.iterations[k, 0]),
-            residual=float(residual) if np.isfinite(residual) else np.inf,
-            converged=bool(converged),
-        )
-
-    def _keep(self, flights: Flags) -> None:
-        """Go on with the flights that `flights` (flights, 1) marks alone."""
-        if flights.all():
-            return
-        chosen = flights[:, 0]
-        self.rows = self.rows[chosen]
-        self.at, self.control = only(self.at, chosen), only(self.control, chosen)
-        self.rewards.keep(chosen)
-
-    def _measure(self) -> tuple[Real, Real]:
-        """Return the scaled gradient of the Lagrangian and the residual; note the best iterate."""
-        at, control, matrix = self.at, self.control, self.flight.matrix
-        n = matrix.slots
-        forces = [state.forces() for state in at.states]
-        on_w = matrix.pull(at.y) - np.einsum("jb,cjbn->cbn", at.weights[..., 0], at.gradient)
-        total = Forces.total(forces)
-        if isinstance(total.w, np.ndarray):
-            on_w -= total.w * matrix.moves_w
-        on_v = self.flight.forces_asked(at.y, np.asarray(total.a)) - total.v * matrix.moves_v
-        slope = np.maximum(largest(on_w), largest(on_v))
-        size, gap = summed(np.abs(at.y)), (at.weights * (at.total - at.floor)).sum(axis=0)
-        broken = largest(matrix.dynamics(at.w, at.v))
-        for state, force in zip(at.states, forces, strict=True):
-            size, gap = size + state.size(), gap + state.gap()
-            broken = np.maximum(broken, state.violation())
-            if isinstance(force.own, np.ndarray):
-                slope = np.maximum(slope, np.abs(force.own).max(axis=(1, 2))[:, None])
-        slope /= np.maximum(1, size / (80 * n))
-        # a flight that is taken for an end has to be inside limits with curvature
-        broken = broken * (max(1.0, self.tolerance / _STRICT) if self.curved else 1.0)
-        least = at.value()
-        better = (broken < self.tolerance / 10) & (least > control.best)
-        control.best = np.where(better, least, control.best)
-        control.best_v = np.where(better, at.v, control.best_v)
-        # where the rewards are steeper than at the start, their unit is larger
-        steepest = (np.abs(at.gradient).max(axis=(0, -1))[..., None] * at.weights).sum(axis=0)
-        steepest = reduce(np.maximum, [state.steepness() for state in at.states], steepest)
-        control.steepness = np.maximum(1, steepest)
-        slope, gap = slope / control.steepness, gap / control.steepness
-        return slope, np.maximum(np.maximum(slope, broken), gap / n)
-
-    def _advance(self, slope: Real) -> None:
-        """Try one direction of every flight; a refused one is tried anew with a proximal term."""
-        control, at = self.control, self.at
-        fresh = control.attempts == 0
-        control.iterations = control.iterations + fresh
-        newton, ahead = self._newton()
-        share = np.minimum(1, ahead.reach(at))
-        now, left = at.mean_gap(), at.mean_gap(share, ahead)
-        queued = not len(at.total)
-        slowest = _QUEUE_FALL if queued else np.where(slope < 1, 0.01, 0.1)
-        keep = np.maximum((left / now) ** 3, slowest)
-        per_slot = sum(state.count() for state in at.states) / at.w.shape[-1]
-        fewer = np.minimum(1, _MOST_PER_SLOT / per_slot)
-        least = self.tolerance * _MU_PER_TOLERANCE * control.steepness * fewer
-        adaptive = np.fmin(control.mu, keep * now)
-        near = _SOLVED_TURNING if self.turning else _SOLVED
-        solved = slope * control.steepness < near * control.mu
-        solved |= self.turning & (slope < self.tolerance)
-        monotone = np.where(solved, _MONOTONE_FALL, 1.0) * control.mu
-        hugged = queued & (control.centrings >= _MONOTONE_AFTER)
-        waits = hugged | self.turning | self.bilinear | self.curved
-        control.mu = np.fmax(np.where(waits, monotone, adaptive), least)
-        direction = newton.corrector(control.mu, ahead, share)
-        share = np.minimum(1, _TO_BOUNDARY * direction.reach(at))
-        fastest = np.sqrt((direction.move.v**2).sum(axis=0).max(axis=-1, keepdims=True))
-        wild = self.curved & (fastest > _WIDEST)
-        share = np.where(wild, np.minimum(share, _WIDEST / fastest), share)
-        sound = newton.factors.sound
-        moved = self._accept(newton, direction, share, sound)
-        if not moved.all():
-            share = np.where(moved, share, share / 2)
-            moved = moved | self._accept(newton, direction, share, sound & ~moved)
-
-        lower = np.where(control.proximal > _FIRST_PROXIMAL, control.proximal / 4, 0)
-        higher = np.maximum(8 * control.proximal, _FIRST_PROXIMAL)
-        short = moved & (share < (_SHORT_BILINEAR if self.bilinear else _SHORT_STEP))
-        eased = moved & ~(short & self.bilinear | wild)
-        control.proximal = np.where(eased, np.where(fresh, lower, control.proximal), higher)
-        control.attempts = np.where(moved, 0, control.attempts + 1)
-        failed = (control.attempts >= _MAX_ATTEMPTS) | ~sound
-        short |= failed
-        control.short = np.where(short, control.short + 1, np.where(moved, 0, control.short))
-        patience = _PATIENCE_BILINEAR if self.bilinear else _PATIENCE
-        hugging = moved & (control.short >= patience) & (control.centrings < _MAX_CENTRINGS)
-        hugging &= not self.curved
-        if (failed | hugging).any():
-            self._centre(failed | hugging)
-
-    def _newton(self) -> tuple[Newton, Direction]:
-        """Factor the systems, with the true curvature where that will do, else with it cut.
-
-        Return also the predictor, the direction for mu = 0.
-        """
-        control = self.control
-        # the signs that tell a minimum by are those of the border: without one, do not try;
-        # where limits are curved, as much of it counts as leaves the model concave
-        cut = (control.cut_left > 0) | (len(self.at.total) == 0) | self.curved
-        control.cut_left = np.maximum(0, control.cut_left - 1)
+    def run(self, max_iterations: int) -> SearchResult:
+        """Iterate until the search has ended."""
         while True:
-            newton = Newton.factored(
-                self.flight,
-                self.at,
-                barrier_share=self.barrier_share,
-                proximal=control.proximal,
-                cut=cut,
-            )
+            slope, residual = self._measure()
+            converged = residual < self.tolerance
+            lost = self.iterations >= max_iterations or self.centrings > _MAX_CENTRINGS
+            # not finite: the limits have no interior left
+            if converged or not np.isfinite(residual) or (lost and not self.attempts):
+                weights = self.iterate.z[self.system.floored]
+                v = self.best_v if self.best > -np.inf else self.iterate.at.x[list(V)]
+                return SearchResult(
+                    v,
+                    weights,
+                    self.iterations,
+                    residual if np.isfinite(residual) else np.inf,
+                    bool(converged),
+                )
+            self._advance(slope)
+
+    def _floor(self, at: Functions, s: Real) -> tuple[float, Real]:
+        """Return t at its optimum, and the slacks s (m,) with those of the rewards above t."""
+        floored = self.system.floored
+        if not floored.any():
+            return 0.0, s
+        floor = best_floor(at.values[floored], self.mu * float(self.system.weight[floored][0]))
+        return floor, np.where(floored, at.values - floor, s)
+
+    def _weighted(self, z: Real) -> Real:
+        """Return the multipliers z (m,) with those of the rewards summing to one."""
+        floored = self.system.floored
+        return np.where(floored, z / float(z[floored].sum()), z) if floored.any() else z
+
+    def _value(self, at: Functions) -> float:
+        """Return what is maximised."""
+        if self.goal.total:
+            return float(at.values[self.system.floored].min())
+        return float((self.system.objective * at.x).sum())
+
+    def _measure(self) -> tuple[float, float]:
+        """Return the scaled gradient of the Lagrangian and the residual; note the best iterate."""
+        system, it = self.system, self.iterate
+        at, n = it.at, it.at.x.shape[1]
+        gradient = system.objective + system.pull(at, it.z) - system.chain.pull(it.y)
+        slope, gap = float(np.abs(gradient).max()), float((it.s * it.z).sum())
+        slope /= max(1.0, float(it.z.sum() + np.abs(it.y).sum()) / (80 * n))
+        # what is missed in second order counts tenfold
+        broken = 10 * float((system.each * np.abs(it.margin)).max())
+        broken = max(broken, float(np.abs(system.chain.missed(at.x)).max()))
+        broken *= max(1.0, self.tolerance / _STRICT)
+        value = self._value(at)
+        if broken < self.tolerance and value > self.best:
+            self.best, self.best_v = value, at.x[list(V)]
+        # where the rewards are steeper than at the start, their unit is larger
+        self.steepness = max(1.0, system.steepness(at, it.z))
+        slope, gap = slope / self.steepness, gap / self.steepness
+        return slope, max(slope, broken, gap / n)
+
+    def _advance(self, slope: float) -> None:
+        """Try one direction; a refused one is tried anew with a proximal term."""
+        fresh = self.attempts == 0
+        self.iterations += fresh
+        share = 0.0
+        try:
+            newton = Newton(self.system, self.iterate, self.proximal * self.steepness)
             ahead = newton.predictor()
-            will_do = cut | newton.looks_convex(ahead)
-            if will_do.all():
-                return newton, ahead
-            control.cut_left = np.where(will_do, control.cut_left, _STEPS_CUT)
-            cut = cut | ~will_do
+            self._choose_mu(slope, ahead)
+            direction = newton.corrector(self.mu, ahead, min(1.0, self._reach(ahead)))
+        except np.linalg.LinAlgError:
+            self.attempts = _MAX_ATTEMPTS
+        else:
+            share = self._share(direction)
+            if not self._accept(newton, direction, share):
+                share = share / 2 if self._accept(newton, direction, share / 2) else 0.0
+            # a step that is cut short by the model, or of shares to a saddle, is held back more
+            held_back = share * self._fastest(direction) > 0.99 * _WIDEST
+            held_back |= share < _SHORT and len(self.goal.held) > 0
+            if share == 0 or held_back:
+                self.proximal = max(_MORE_PROXIMAL * self.proximal, _FIRST_PROXIMAL)
+            elif fresh:
+                self.proximal = self.proximal / 4 if self.proximal > _FIRST_PROXIMAL else 0.0
+            self.attempts = 0 if share > 0 else self.attempts + 1
+            if share > 0:
+                self.short = self.short + 1 if share < _SHORT else 0
+        hugging = self.short >= _PATIENCE and self.centrings < _MAX_CENTRINGS
+        if self.attempts >= _MAX_ATTEMPTS or hugging:
+            self._centre()
 
-    def _accept(self, newton: Newton, direction: Direction, share: Real, asked: Flags) -> Flags:
-        """Move those of the flights `asked` whose rewards do not fall short of the model."""
-        at, control, move = newton.at, self.control, direction.move
-        asked = asked & np.isfinite(largest(move.w) + largest(move.v))
-        w = np.where(asked, at.w + share * move.w, at.w)  # rewards are not asked for nowhere
-        v = np.where(asked, at.v + share * move.v, at.v)
-        total, gradient, hessian = self.rewards(w)
-        finite = np.isfinite(total.sum(axis=0) + summed(gradient) + summed(hessian))
-        weights = at.weights + share * direction.weights
-        missing = (weights * (at.total + share * direction.total - total)).sum(axis=0)
-        states = tuple(
-            state.moved(w, v, share, step)
-            for state, step in zip(at.states, direction.steps, strict=True)
-        )
-        for state, step, then in zip(at.states, direction.steps, states, strict=True):
-            missing += state.missing(share, step, then)
-        bend = newton.bend(direction)
-        missing -= share**2 * bend / 2
-        decrease = newton.decrease(direction, bend)
-        allowed = _MISFIT * share * np.maximum(decrease, 0) + self.rewards.noise
-        taken: Flags = asked & finite & (missing <= allowed)
-        if self.bilinear or self.curved:  # the direction to a saddle is refused
-            taken = taken & (decrease > 0)
-        if not taken.any():
-            return taken
-        trial = Iterate(
-            w=w,
-            v=v,
-            y=at.y + np.where(control.iterations == 1, 1.0, share) * direction.y,
-            states=states,
-            weights=weights / weights.sum(axis=0),
-            total=total,
-            floor=best_floor(total, self.barrier_share * control.mu),
-            gradient=gradient * self.flight.matrix.moves_w,
-            hessian=hessian,
-        )
-        self.at = merged(taken, trial, self.at)
-        return taken
+    def _share(self, direction: Direction) -> float:
+        """Return how far of `direction` to go: inside the limits, as far as they are modelled."""
+        it = self.iterate
+        bent = np.abs(self.system.bent(it.at, direction.x))
+        missed = float((bent / np.maximum(it.s, _MOST_MISSED)).max())
+        most = min(1 / np.sqrt(max(missed, TINY)), _WIDEST / max(self._fastest(direction), TINY))
+        return float(min(1.0, _TO_BOUNDARY * self._reach(direction), most))
 
-    def _centre(self, chosen: Flags) -> None:
-        """Give the flights `chosen` multipliers from a larger mu: that leads away from limits."""
-        control, at = self.control, self.at
-        turned = _CENTRING_TURNING if self.turning else _CENTRING_FACTOR
-        factor = _CENTRING_BILINEAR if self.bilinear else turned
-        larger = np.minimum(COLD_START.mu * control.steepness, factor * at.mean_gap())
-        control.mu = np.where(chosen, larger, control.mu)
-        self.at = merged(chosen, at.centred(control.mu, self.barrier_share), at)
-        control.proximal = np.where(chosen, 0, control.proximal)
-        control.attempts, control.short = (
-            np.where(chosen, 0, count) for count in (control.attempts, control.short)
-        )
-        control.centrings = control.centrings + chosen
+    def _fastest(self, direction: Direction) -> float:
+        """Return the largest change of a velocity, in v_max."""
+        return float(np.hypot(*direction.x[list(V)]).max())
+
+    def _choose_mu(self, slope: float, ahead: Direction) -> None:
+        """Choose mu by how far the direction `ahead` for mu = 0 reaches, or wait."""
+        it = self.iterate
+        if self.waits:
+            solved = slope * self.steepness < _SOLVED * self.mu or slope < self.tolerance
+            self.mu *= _FALL if solved else 1.0
+        else:
+            now, reach = self._mean_gap(it.s, it.z), min(1.0, self._reach(ahead))
+            left = self._mean_gap(it.s + reach * ahead.s, it.z + reach * ahead.z)
+            self.mu = min(self.mu, max((left / now) ** 3, _SLOWEST) * now)
+        fewer = min(1.0, _MOST_PER_SLOT * it.at.x.shape[1] / len(it.s))
+        self.mu = max(self.mu, self.tolerance * _MU_PER_TOLERANCE * self.steepness * fewer)
+
+    def _mean_gap(self, s: Real, z: Real) -> float:
+        return float((s * z).sum() / self.system.weight.sum())
+
+    def _reach(self, step: Direction) -> float:
+        """Return the share of `step` at which a slack or a multiplier vanishes."""
+        it = self.iterate
+        falls = max(float((-step.s / it.s).max()), float((-step.z / it.z).max()))
+        return 1 / max(falls, TINY)
+
+    def _accept(self, newton: Newton, step: Direction, share: float) -> bool:
+        """Move unless the functions fall short of the model."""
+        system, it = self.system, self.iterate
+        if not np.isfinite(step.x).all():
+            return False
+        at = system.at(it.at.x + share * step.x)
+        if not at.finite:
+            return False
+        s, z = it.s + share * step.s, it.z + share * step.z
+        margin = s - at.values + (it.floor + share * step.floor) * system.floored
+        more = z * (margin - (1 - share) * it.margin)
+        missing = float(more[~system.turns].sum())
+        bend = newton.bend(step)
+        decrease = bend + float((it.z / it.s * (step.s + it.margin) ** 2).sum())
+        missing -= share**2 / 2 * bend
+        if not decrease > 0 or missing > _MISFIT * share * decrease + self.goal.noise:
+            return False
+        # half-planes that turn: what they leave is the slack, but for the margin that is left
+        left = np.maximum((1 - share) * it.margin, _LEFT * s - at.values)
+        margin = np.where(system.turns, left, margin)
+        s = np.where(system.turns, at.values + left, s)
+        y = it.y + (1.0 if self.iterations == 1 else share) * step.y
+        floor, s = self._floor(at, s)
+        margin = np.where(system.floored, 0.0, margin)
+        self.iterate = Iterate(at, y, s, self._weighted(z), margin, floor)
+        return True
+
+    def _centre(self) -> None:
+        """Give the iterate multipliers from a larger mu: that leads away from limits."""
+        it = self.iterate
+        self.mu = min(COLD_START.mu * self.steepness, _CENTRING * self._mean_gap(it.s, it.z))
+        floor, s = self._floor(it.at, it.s)
+        z = np.where(self.system.floored, it.z, self.system.weight * self.mu / s)
+        self.iterate = replace(it, s=s, z=z, floor=floor)
+        self.proximal, self.attempts, self.short = 0.0, 0, 0
+        self.centrings += 1

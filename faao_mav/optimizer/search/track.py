@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import Constraint
+from faao_mav.optimizer.interior.constraint import Constraint, every_excess, unknowns
 from faao_mav.optimizer.interior.maximize import constraints_of
-from faao_mav.optimizer.interior.rewards import ScaledRewards, StageValues
+from faao_mav.optimizer.interior.rewards import Rewards, StageValues
 from faao_mav.optimizer.interior.search import COLD_START, Search
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
@@ -63,19 +63,20 @@ def nearest_flight(
     """
     for kept in ((), tuple(constraints)) if constraints else ((),):
         every = (*constraints_of(kin), *kept)
-        w, v = start.w.T[:, None], start.v.T[:, None]
-        rewards = ScaledRewards(Closeness(path), w)
-        search = Search(kin, every, rewards, w, v, tolerance=_TOLERANCE, strategy=COLD_START)
+        rewards = Rewards(Closeness(path), start.w.T)
+        if rewards.flat:
+            continue
+        search = Search(
+            kin, every, rewards, unknowns(kin, start), tolerance=_TOLERANCE, strategy=COLD_START
+        )
         for most in range(_LOOK, steps + _LOOK, _LOOK) if first else (steps,):
             with np.errstate(all="ignore"):
-                results = search.run(min(most, steps))
-            if 0 not in results:
-                break
-            start = kin.follow(results[0].v.T * kin.max_speed)
-            if results[0].converged or (first and _keeps(kin, every, start)):
+                found = search.run(min(most, steps))
+            start = kin.follow(found.v.T * kin.max_speed)
+            if found.converged or (first and _keeps(kin, every, start)):
                 break
     return start if _keeps(kin, (*constraints_of(kin), *constraints), start) else None
 
 
 def _keeps(kin: Kinematics, constraints: Sequence[Constraint], flight: Trajectory) -> bool:
-    return max(each.excess(kin, flight) for each in constraints) <= ALLOWED
+    return every_excess(kin, constraints, flight) <= ALLOWED
