@@ -1,10 +1,10 @@
 """One record for each parameter of an autopilot: its names, unit, default and bounds."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol, Self, TypeAlias
+from typing import Any, Protocol, Self, TypeAlias
 
 from faao_mav.autopilot.body import Body
 
@@ -23,9 +23,8 @@ class Parameter:
     knows one generation, a parameter file may carry both. Values outside `least` to `greatest` are
     no use (of a parameter of `either_sign`: their size); `documented` is the narrower range of the
     autopilot's documentation, if recommended values have to stay in it. The autopilot lowers the
-    value to that of the parameter `capped_by`. `source` says where names and default come from.
-    `motion`: it shapes how the vehicle flies a mission; the others decide about checks, storage,
-    fence and return.
+    value to that of the parameter `capped_by`. `motion`: it shapes how the vehicle flies a mission;
+    the others decide about checks, storage, fence and return.
 
     >>> speed = Parameter("cruise_speed", "m/s", 10.0, {"WP_SPD": 1.0, "WPNAV_SPEED": 0.01})
     >>> speed.name_in({"WPNAV_SPEED": 750})
@@ -43,7 +42,6 @@ class Parameter:
     either_sign: bool = False
     documented: tuple[float, float] = (-math.inf, math.inf)
     capped_by: str = ""
-    source: str = ""
     motion: bool = True
 
     @property
@@ -102,25 +100,38 @@ class ParameterValues(Protocol):
         """Return the value of the parameter `key` in the unit of its table."""
 
 
+def parameter(
+    unit: str, default: float, names: Mapping[str, float], *limits: float, **more: Any
+) -> Any:
+    """Declare a field of a `ParameterRecord`: the parameter whose key is the field's name.
+
+    `limits` are the least and the greatest value.
+    """
+    bounds = dict(zip(("least", "greatest"), limits, strict=False))
+    told = {"unit": unit, "default": default, "names": names, **bounds, **more}
+    return field(default=default, metadata=told)
+
+
 class ParameterRecord:
-    """Values of some parameters of a `table`: base of dataclasses whose fields are its keys.
+    """Values of parameters: base of dataclasses whose fields are declared by `parameter`.
 
     A field `body` is the airframe.
     """
 
     __slots__ = ()
-    _keys: ClassVar[frozenset[str]] = frozenset()
 
-    def __init_subclass__(cls, table: ParameterTable | None = None) -> None:
-        if table is not None:
-            cls._keys = frozenset(table)
+    @classmethod
+    def parameters(cls) -> Iterator[Parameter]:
+        """Yield the parameters that are fields."""
+        for each in fields(cls):  # type: ignore[arg-type]
+            if each.metadata:
+                yield Parameter(each.name, **each.metadata)
 
     @classmethod
     def from_vehicle(cls, vehicle: ParameterValues) -> Self:
         """Return the values that `vehicle` has; raises `InputError` for one that is no use."""
-        own = {each.name for each in fields(cls) if each.init}  # type: ignore[arg-type]
-        values: dict[str, Any] = {key: vehicle.value(key) for key in own & cls._keys}
-        if "body" in own and vehicle.airframe is not None:
+        values: dict[str, Any] = {each.key: vehicle.value(each.key) for each in cls.parameters()}
+        if vehicle.airframe is not None:
             values["body"] = vehicle.airframe
         return cls(**values)
 

@@ -47,7 +47,6 @@ def test_every_record_is_whole() -> None:
     for each, parameter in PARAMETERS:
         said = f"{label(each)} {parameter.key}"
         assert parameter.unit in UNITS, said
-        assert parameter.source, said
         assert parameter.least <= parameter.default <= parameter.greatest, said
         low, high = parameter.documented
         assert low <= parameter.default <= high, said

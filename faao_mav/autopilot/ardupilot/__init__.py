@@ -122,12 +122,9 @@ def at_fence(actions: Mapping[int, FenceAction]) -> Callable[[ParameterValues], 
     return response
 
 
-SOURCE = "ArduPilot 4.7: parameter lists of Copter and Plane"
-
-
 def switch(key: str, default: float, name: str, unit: str = "") -> Parameter:
     """Return a parameter of checks, fence or return, with one name in all generations."""
-    return Parameter(key, unit, default, {name: 1.0}, source=SOURCE, motion=False)
+    return Parameter(key, unit, default, {name: 1.0}, motion=False)
 
 
 SHARED = (
@@ -143,7 +140,7 @@ SHARED = (
     switch("mission_options", 0, "MIS_OPTIONS"),
 )
 """Arming, fence, storage and terrain. Each vehicle has defaults of its own for FENCE_OPTIONS and
-FENCE_TYPE, whose bits are 1 ceiling, 2 circle, 4 areas, 8 floor."""
+FENCE_TYPE, whose bits are 1 ceiling, 2 circle, 4 areas, 8 floor. Source: ArduPilot 4.7."""
 
 
 def rally_parameters(limit: float, home: float) -> tuple[Parameter, ...]:
@@ -154,7 +151,7 @@ def rally_parameters(limit: float, home: float) -> tuple[Parameter, ...]:
     """
     names = {"RALLY_LIMIT_KM": 1000.0}
     return (
-        Parameter("rally_limit", "m", limit, names, source=SOURCE, motion=False),
+        Parameter("rally_limit", "m", limit, names, motion=False),
         switch("rally_home", home, "RALLY_INCL_HOME"),
     )
 

@@ -1,42 +1,31 @@
-"""PX4's parameters, of its multicopters and of its planes."""
+"""PX4's parameters, of its multicopters and of its planes.
+
+Source: PX4 1.16, parameter reference.
+"""
 
 from dataclasses import dataclass
-from functools import partial
 from math import inf, radians
+from typing import Any
 
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
-from faao_mav.autopilot.parameter import Parameter, ParameterRecord, table
-
-_SOURCE = "PX4 1.16: parameter reference"
+from faao_mav.autopilot.parameter import Parameter, ParameterRecord, parameter, table
 
 
-def _parameter(
-    key: str,
-    unit: str,
-    default: float,
-    name: str,
-    least: float = -inf,
-    greatest: float = inf,
-    factor: float = 1.0,
-    capped_by: str = "",
-    documented: tuple[float, float] = (-inf, inf),
-    motion: bool = True,
-) -> Parameter:
-    return Parameter(
-        key,
-        unit,
-        default,
-        {name: factor},
-        least,
-        greatest,
-        capped_by=capped_by,
-        documented=documented,
-        source=_SOURCE,
-        motion=motion,
-    )
+def _own(unit: str, default: float, name: str, least: float = 0.1, **more: Any) -> Any:
+    return parameter(unit, default, {name: 1.0}, least, **more)
 
 
-_rule = partial(_parameter, motion=False)
+def _speed(key: str, default: float, name: str, least: float = 0.1) -> Parameter:
+    return Parameter(key, "m/s", default, {name: 1.0}, least)
+
+
+def _angle(key: str, degrees: float, name: str, least: float, greatest: float) -> Parameter:
+    limits = radians(least), radians(greatest)
+    return Parameter(key, "rad", radians(degrees), {name: radians(1)}, *limits)
+
+
+def _rule(key: str, unit: str, default: float, name: str, least: float = -inf) -> Parameter:
+    return Parameter(key, unit, default, {name: 1.0}, least, motion=False)
 
 
 _SHARED = (
@@ -52,65 +41,52 @@ _SHARED = (
 )
 """Mission checks, fence and return."""
 
-COPTER_TABLE = table(
-    _parameter("cruise_speed", "m/s", 5.0, "MPC_XY_CRUISE", 0.1, capped_by="max_speed"),
-    _parameter("max_speed", "m/s", 12.0, "MPC_XY_VEL_MAX", 0.1),
-    _parameter("acceleration", "m/s^2", 3.0, "MPC_ACC_HOR", 0.1, documented=(2.0, 15.0)),
-    _parameter("greatest_acceleration", "m/s^2", 5.0, "MPC_ACC_HOR_MAX", 0.1),
-    _parameter("jerk", "m/s^3", 4.0, "MPC_JERK_AUTO", 0.1),
-    _parameter(
-        "lean_angle", "rad", radians(45), "MPC_TILTMAX_AIR", radians(20), radians(89), radians(1)
-    ),
-    _parameter("corner_gain", "1/s", 0.5, "MPC_XY_TRAJ_P", 0.01),
-    _parameter("error_limit", "m", 2.0, "MPC_XY_ERR_MAX", 0.1),
-    _parameter("acceptance_radius", "m", 2.0, "NAV_ACC_RAD", 0.05),
-    _parameter("height_radius", "m", 0.8, "NAV_MC_ALT_RAD", 0.05),
-    _parameter("climb_speed", "m/s", 3.0, "MPC_Z_V_AUTO_UP", 0.1, capped_by="max_climb_speed"),
-    _parameter("max_climb_speed", "m/s", 3.0, "MPC_Z_VEL_MAX_UP", 0.1),
-    _parameter("descent_speed", "m/s", 1.5, "MPC_Z_V_AUTO_DN", 0.1, capped_by="max_descent_speed"),
-    _parameter("max_descent_speed", "m/s", 1.5, "MPC_Z_VEL_MAX_DN", 0.1),
-    _parameter("climb_acceleration", "m/s^2", 4.0, "MPC_ACC_UP_MAX", 0.1),
-    _parameter("descent_acceleration", "m/s^2", 3.0, "MPC_ACC_DOWN_MAX", 0.1),
-    _parameter("take_off_speed", "m/s", 1.5, "MPC_TKO_SPEED", 0.1),
-    _parameter("landing_speed", "m/s", 0.7, "MPC_LAND_SPEED", 0.05),
-    *_SHARED,
-)
-"""A PX4 multicopter's parameters. In missions it climbs at MPC_Z_V_AUTO_UP, which PX4 lowers to
-MPC_Z_VEL_MAX_UP (mc_pos_control, parameters_update); likewise down, and over the ground."""
-
 
 @dataclass(frozen=True, slots=True)
-class Px4Limits(ParameterRecord, table=COPTER_TABLE):
-    """What bounds a multicopter's flight, in SI units: keys and defaults of `COPTER_TABLE`.
+class Px4Limits(ParameterRecord):
+    """What bounds a multicopter's flight, in SI units; `body` is the aircraft.
 
-    `body` is the aircraft.
+    In missions it climbs at MPC_Z_V_AUTO_UP, which PX4 lowers to MPC_Z_VEL_MAX_UP (mc_pos_control,
+    parameters_update); likewise down, and over the ground.
     """
 
-    cruise_speed: float = COPTER_TABLE["cruise_speed"].default
-    max_speed: float = COPTER_TABLE["max_speed"].default
-    acceleration: float = COPTER_TABLE["acceleration"].default
-    jerk: float = COPTER_TABLE["jerk"].default
-    corner_gain: float = COPTER_TABLE["corner_gain"].default
-    error_limit: float = COPTER_TABLE["error_limit"].default
-    acceptance_radius: float = COPTER_TABLE["acceptance_radius"].default
-    height_radius: float = COPTER_TABLE["height_radius"].default
-    climb_speed: float = COPTER_TABLE["climb_speed"].default
-    descent_speed: float = COPTER_TABLE["descent_speed"].default
-    climb_acceleration: float = COPTER_TABLE["climb_acceleration"].default
-    descent_acceleration: float = COPTER_TABLE["descent_acceleration"].default
+    cruise_speed: float = _own("m/s", 5.0, "MPC_XY_CRUISE", capped_by="max_speed")
+    max_speed: float = _own("m/s", 12.0, "MPC_XY_VEL_MAX")
+    acceleration: float = _own("m/s^2", 3.0, "MPC_ACC_HOR", documented=(2.0, 15.0))
+    jerk: float = _own("m/s^3", 4.0, "MPC_JERK_AUTO")
+    corner_gain: float = _own("1/s", 0.5, "MPC_XY_TRAJ_P", 0.01)
+    error_limit: float = _own("m", 2.0, "MPC_XY_ERR_MAX")
+    acceptance_radius: float = _own("m", 2.0, "NAV_ACC_RAD", 0.05)
+    height_radius: float = _own("m", 0.8, "NAV_MC_ALT_RAD", 0.05)
+    climb_speed: float = _own("m/s", 3.0, "MPC_Z_V_AUTO_UP", capped_by="max_climb_speed")
+    descent_speed: float = _own("m/s", 1.5, "MPC_Z_V_AUTO_DN", capped_by="max_descent_speed")
+    climb_acceleration: float = _own("m/s^2", 4.0, "MPC_ACC_UP_MAX")
+    descent_acceleration: float = _own("m/s^2", 3.0, "MPC_ACC_DOWN_MAX")
     body: CopterBody = PX4_BODY
 
 
+COPTER_TABLE = table(
+    *Px4Limits.parameters(),
+    Parameter("greatest_acceleration", "m/s^2", 5.0, {"MPC_ACC_HOR_MAX": 1.0}, 0.1),
+    _angle("lean_angle", 45, "MPC_TILTMAX_AIR", 20, 89),
+    _speed("max_climb_speed", 3.0, "MPC_Z_VEL_MAX_UP"),
+    _speed("max_descent_speed", 1.5, "MPC_Z_VEL_MAX_DN"),
+    _speed("take_off_speed", 1.5, "MPC_TKO_SPEED"),
+    _speed("landing_speed", 0.7, "MPC_LAND_SPEED", 0.05),
+    *_SHARED,
+)
+"""A PX4 multicopter's parameters."""
+
 PLANE_TABLE = table(
-    _parameter("cruise_speed", "m/s", 15.0, "FW_AIRSPD_TRIM", 1.0),
-    _parameter("min_speed", "m/s", 10.0, "FW_AIRSPD_MIN", 1.0),
-    _parameter("max_speed", "m/s", 20.0, "FW_AIRSPD_MAX", 1.0),
-    _parameter("roll_limit", "rad", radians(50), "FW_R_LIM", radians(5), radians(85), radians(1)),
-    _parameter("climb_speed", "m/s", 5.0, "FW_T_CLMB_MAX", 0.1),
-    _parameter("descent_speed", "m/s", 5.0, "FW_T_SINK_MAX", 0.1),
-    _parameter("landing_angle", "rad", radians(5), "FW_LND_ANG", 0.0, radians(85), radians(1)),
-    _parameter("acceptance_radius", "m", 10.0, "NAV_ACC_RAD", 0.05),
-    _parameter("loiter_radius", "m", 80.0, "NAV_LOITER_RAD"),
+    _speed("cruise_speed", 15.0, "FW_AIRSPD_TRIM", 1.0),
+    _speed("min_speed", 10.0, "FW_AIRSPD_MIN", 1.0),
+    _speed("max_speed", 20.0, "FW_AIRSPD_MAX", 1.0),
+    _angle("roll_limit", 50, "FW_R_LIM", 5, 85),
+    _speed("climb_speed", 5.0, "FW_T_CLMB_MAX"),
+    _speed("descent_speed", 5.0, "FW_T_SINK_MAX"),
+    _angle("landing_angle", 5, "FW_LND_ANG", 0, 85),
+    Parameter("acceptance_radius", "m", 10.0, {"NAV_ACC_RAD": 1.0}, 0.05),
+    Parameter("loiter_radius", "m", 80.0, {"NAV_LOITER_RAD": 1.0}),
     *_SHARED,
 )
 """A PX4 plane's parameters."""

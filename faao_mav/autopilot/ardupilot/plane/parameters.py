@@ -1,64 +1,18 @@
-"""ArduPlane's parameters: the newer names first, the older ones second."""
+"""ArduPlane's parameters: the newer names first, the older ones second.
+
+Source: ArduPilot 4.7, parameter list of Plane.
+"""
 
 import math
 from dataclasses import dataclass
 from math import pi, radians
 
-from faao_mav.autopilot.ardupilot import SHARED, SOURCE, rally_parameters, switch
+from faao_mav.autopilot.ardupilot import SHARED, rally_parameters, switch
 from faao_mav.autopilot.atmosphere import density_ratio
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody
-from faao_mav.autopilot.parameter import Parameter, ParameterRecord, table
+from faao_mav.autopilot.parameter import Parameter, ParameterRecord, parameter, table
 from faao_mav.autopilot.vehicle_type import SpeedRates
 from faao_mav.power import GRAVITY
-
-
-def _parameter(
-    key: str, unit: str, default: float, names: dict[str, float], least: float
-) -> Parameter:
-    return Parameter(key, unit, default, names, least, source=SOURCE)
-
-
-TABLE = table(
-    _parameter("cruise_speed", "m/s", 12.0, {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}, 1.0),
-    _parameter("min_speed", "m/s", 9.0, {"AIRSPEED_MIN": 1.0, "ARSPD_FBW_MIN": 1.0}, 1.0),
-    _parameter("max_speed", "m/s", 22.0, {"AIRSPEED_MAX": 1.0, "ARSPD_FBW_MAX": 1.0}, 1.0),
-    Parameter(
-        "roll_limit",
-        "rad",
-        radians(45),
-        {"ROLL_LIMIT_DEG": radians(1), "LIM_ROLL_CD": radians(0.01)},
-        radians(5),
-        radians(85),
-        source=SOURCE,
-    ),
-    _parameter("roll_time", "s", 0.5, {"RLL2SRV_TCONST": 1.0}, 0.05),
-    _parameter("waypoint_radius", "m", 90.0, {"WP_RADIUS": 1.0}, 1.0),
-    Parameter(
-        "loiter_radius", "m", 60.0, {"WP_LOITER_RAD": 1.0}, 1.0, either_sign=True, source=SOURCE
-    ),
-    _parameter("climb_speed", "m/s", 5.0, {"TECS_CLMB_MAX": 1.0}, 0.1),
-    _parameter("descent_speed", "m/s", 2.0, {"TECS_SINK_MIN": 1.0}, 0.1),
-    _parameter("period", "s", 17.0, {"NAVL1_PERIOD": 1.0}, 1.0),
-    _parameter("damping", "", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1),
-    Parameter(
-        "return_height",
-        "m",
-        100.0,
-        {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01},
-        -1.0,
-        source=SOURCE,
-        motion=False,
-    ),
-    *SHARED,
-    switch("fence_options", 1, "FENCE_OPTIONS"),
-    switch("fence_type", 4, "FENCE_TYPE"),
-    switch("return_lands", 0, "RTL_AUTOLAND"),
-    *rally_parameters(limit=5000.0, home=0),
-)
-"""ArduPlane's parameters. A negative `loiter_radius` turns left; `descent_speed` is the sink rate
-with an idling engine; a `return_height` below 0 keeps the height at which the return begins.
-"""
-
 
 _TURN = 1.2
 """The least radius of a turn over the guidance's look-ahead, both in seconds of flight.
@@ -69,22 +23,30 @@ were flown 17 and 38 m rms from them; planned with 1.2 over ground these were 5.
 
 
 @dataclass(frozen=True, slots=True)
-class ArduPlaneLimits(ParameterRecord, table=TABLE):
-    """What bounds a flight of ArduPlane, in SI units: keys and defaults of `TABLE`.
+class ArduPlaneLimits(ParameterRecord):
+    """What bounds a flight of ArduPlane, in SI units.
 
-    `body` is the aircraft.
+    `descent_speed` is the sink rate with an idling engine; `body` is the aircraft.
     """
 
-    cruise_speed: float = TABLE["cruise_speed"].default
-    min_speed: float = TABLE["min_speed"].default
-    max_speed: float = TABLE["max_speed"].default
-    roll_limit: float = TABLE["roll_limit"].default
-    roll_time: float = TABLE["roll_time"].default
-    waypoint_radius: float = TABLE["waypoint_radius"].default
-    climb_speed: float = TABLE["climb_speed"].default
-    descent_speed: float = TABLE["descent_speed"].default
-    period: float = TABLE["period"].default
-    damping: float = TABLE["damping"].default
+    cruise_speed: float = parameter(
+        "m/s", 12.0, {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}, 1.0
+    )
+    min_speed: float = parameter("m/s", 9.0, {"AIRSPEED_MIN": 1.0, "ARSPD_FBW_MIN": 1.0}, 1.0)
+    max_speed: float = parameter("m/s", 22.0, {"AIRSPEED_MAX": 1.0, "ARSPD_FBW_MAX": 1.0}, 1.0)
+    roll_limit: float = parameter(
+        "rad",
+        radians(45),
+        {"ROLL_LIMIT_DEG": radians(1), "LIM_ROLL_CD": radians(0.01)},
+        radians(5),
+        radians(85),
+    )
+    roll_time: float = parameter("s", 0.5, {"RLL2SRV_TCONST": 1.0}, 0.05)
+    waypoint_radius: float = parameter("m", 90.0, {"WP_RADIUS": 1.0}, 1.0)
+    climb_speed: float = parameter("m/s", 5.0, {"TECS_CLMB_MAX": 1.0}, 0.1)
+    descent_speed: float = parameter("m/s", 2.0, {"TECS_SINK_MIN": 1.0}, 0.1)
+    period: float = parameter("s", 17.0, {"NAVL1_PERIOD": 1.0}, 1.0)
+    damping: float = parameter("", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1)
     body: PlaneBody = ARDUPLANE_BODY
 
     @property
@@ -118,3 +80,19 @@ class ArduPlaneLimits(ParameterRecord, table=TABLE):
         fall = 0.9 * GRAVITY * self.descent_speed / self.cruise_speed
         turn = 1 / (_TURN * self.look_ahead)
         return SpeedRates(fall, 0.5 * GRAVITY * self.climb_speed, turn)
+
+
+TABLE = table(
+    *ArduPlaneLimits.parameters(),
+    Parameter("loiter_radius", "m", 60.0, {"WP_LOITER_RAD": 1.0}, 1.0, either_sign=True),
+    Parameter(
+        "return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0, motion=False
+    ),
+    *SHARED,
+    switch("fence_options", 1, "FENCE_OPTIONS"),
+    switch("fence_type", 4, "FENCE_TYPE"),
+    switch("return_lands", 0, "RTL_AUTOLAND"),
+    *rally_parameters(limit=5000.0, home=0),
+)
+"""ArduPlane's parameters. A negative `loiter_radius` turns left; a `return_height` below 0 keeps
+the height at which the return begins."""
