@@ -67,12 +67,33 @@ class Codec:
             self._mav.signing.sign_outgoing = True
 
     def pack(self, message: Message) -> bytes:
-        """Return the packet that carries `message`."""
+        """Return the packet that carries `message`; fields that it does not have are zeros."""
+        name = _NAMES[type(message)]
+        values = {field.name: getattr(message, field.name) for field in fields(message)}
+        if values.pop("legacy", False):
+            name = name.removesuffix("_INT")
+        if (target := values.pop("target", None)) is not None:
+            values |= {"target_system": target.system, "target_component": target.component}
+        if (item := values.pop("item", None)) is not None:
+            values |= _item_values(item, exact=name.endswith("_INT"))
+        kind = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
+        numbers: list[Any] = []
+        for field, length in zip(kind.ordered_fieldnames, kind.array_lengths, strict=True):
+            value = values.get(field, 0)
+            if isinstance(value, str):
+                numbers.append(value.encode("ascii", "replace")[:length])
+            else:
+                numbers += [value] * max(length, 1)
+        payload = kind.unpacker.pack(*numbers)
+        payload += b"".join(
+            values[name].to_bytes(4, "little") for name in _BEYOND if name in values
+        )
         if self._signing is not None:
             self._mav.signing.timestamp = self._signing.next_tick()
-        packet = self._encode(message)
+        packet = self._dialect.MAVLink_message(kind.id, name)
+        content = packet._pack(self._mav, kind.crc_extra, payload)
         self._mav.seq = (self._mav.seq + 1) % 256
-        return packet
+        return bytes(content)
 
     def parse(self, data: bytes, origin: str = "") -> list[Packet]:
         """Return the packets in `data`, from `origin`; damaged or cut off ones are passed over."""
@@ -85,36 +106,15 @@ class Codec:
         except self._dialect.MAVError:
             return None
         sender = sender_of(raw)
-        verdict, envelope = self._judge(raw), self._envelope(message, sender, origin)
+        verdict: Verdict = "signed" if is_signed(raw) else "unsigned"
+        if self._signing is not None:
+            verdict = self._signing.judge(raw, sender)
+        envelope = self._envelope(message, sender, origin)
         self.versions[sender] = max(version_of(raw), self.versions.get(sender, 1))
         if envelope is not None:
             self.heard.add(verdict)
-        if self._signing is not None and verdict != "signed":
-            return None
-        return Packet(raw, envelope)
-
-    def _judge(self, raw: bytes) -> Verdict:
-        if self._signing is not None:
-            return self._signing.judge(raw, sender_of(raw))
-        return "signed" if is_signed(raw) else "unsigned"
-
-    def _encode(self, message: Message) -> bytes:
-        name = _NAMES[type(message)]
-        values = {field.name: getattr(message, field.name) for field in fields(message)}
-        if values.pop("legacy", False):
-            name = name.removesuffix("_INT")
-        if (target := values.pop("target", None)) is not None:
-            values |= {"target_system": target.system, "target_component": target.component}
-        if (item := values.pop("item", None)) is not None:
-            values |= _item_values(item, exact=name.endswith("_INT"))
-        kind = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
-        packet = kind(*_arguments(kind, values))
-        beyond = next((values[field] for field in _BEYOND if field in values), None)
-        if beyond is None:
-            return bytes(packet.pack(self._mav))
-        known = kind.unpacker.pack(*(values.get(field, 0) for field in kind.ordered_fieldnames))
-        payload = known + beyond.to_bytes(4, "little")
-        return bytes(packet._pack(self._mav, packet.crc_extra, payload))
+        passed_over = self._signing is not None and verdict != "signed"
+        return None if passed_over else Packet(raw, envelope)
 
     def _envelope(self, packet: Any, sender: Address, origin: str) -> Envelope | None:
         name = packet.get_type()
@@ -128,7 +128,8 @@ class Codec:
                 case "target":
                     values["target"] = Address(packet.target_system, packet.target_component)
                 case "opaque_id" | "mission_id" as beyond:
-                    values[beyond] = _number_beyond(packet)
+                    rest = payload_of(bytes(packet.get_msgbuf()))[packet.unpacker.size :]
+                    values[beyond] = int.from_bytes(rest[:4], "little")
                 case "legacy":
                     values["legacy"] = legacy
                 case "item":
@@ -163,30 +164,8 @@ def _wire_item(packet: Any, *, exact: bool) -> WireItem | None:
     return WireItem(packet.command, packet.frame, params, x, y, packet.z, *flags)
 
 
-def _arguments(kind: Any, known: dict[str, Any]) -> list[Any]:
-    """Return the arguments of pymavlink's `kind`; fields that are not `known` are zeros."""
-    sizes = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
-    arguments = []
-    for name, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
-        value = known.get(name)
-        if isinstance(value, str):
-            value = value.encode("ascii", "replace")[: sizes[name]]
-        elif value is None:
-            value = 0
-            if sizes[name]:
-                value = b"" if type_name == "char" else [0] * sizes[name]
-        arguments.append(value)
-    return arguments
-
-
 def _text_or_number(value: Any) -> Any:
     """Return a field as it is, or its text on one line: what moves a terminal's cursor is blank."""
     if not isinstance(value, str):
         return value
     return "".join(letter if letter.isprintable() else " " for letter in value)
-
-
-def _number_beyond(packet: Any) -> int:
-    """Return the next field of a packet that is longer than pymavlink knows it, or 0."""
-    tail = payload_of(bytes(packet.get_msgbuf()))[packet.unpacker.size :][:4]
-    return int.from_bytes(tail, "little")
