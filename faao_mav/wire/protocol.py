@@ -179,9 +179,6 @@ class Address:
         return target.system in (0, self.system) and target.component in (0, self.component)
 
 
-NOBODY = Address(0, 0)
-"""No sender has this address."""
-
 GROUND_STATION = Address(246, 190)
 """This end: MAV_COMP_ID_MISSIONPLANNER of a system number of its own. Chosen: below those of ground
 stations, which are 255 by default and from 250 on by custom, and not MAVSDK's 245."""
