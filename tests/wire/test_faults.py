@@ -14,7 +14,6 @@ from stations import (
     KINDS,
     RALLY,
     VEHICLE,
-    Desk,
     a_mission,
     mock_of,
     peer_of,
@@ -34,8 +33,6 @@ from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
-    Message,
-    MissionAck,
     MissionCount,
     WireItem,
 )
@@ -91,80 +88,35 @@ def test_no_wrong_mission_is_ever_called_verified(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("loss", [0.05, 0.2, 0.4])
-def test_plain_loss_is_overcome(kind: MockKind, loss: float) -> None:
-    for seed in range(15):
-        mock = mock_of(kind)
-        rows = rows_for(kind, 12)
-        report, _ = upload_to(mock, rows, Faults(loss=loss, latency=0.03, seed=seed))
-        assert report.verified, (seed, report)
-        assert vehicle_holds(mock, rows)
+def test_plain_loss_is_overcome(kind: MockKind) -> None:
+    for loss in (0.05, 0.2, 0.3, 0.4):
+        for seed in range(12):
+            mock, rows = mock_of(kind), rows_for(kind, 12)
+            report, _ = upload_to(mock, rows, Faults(loss=loss, latency=0.03, seed=seed))
+            assert report.verified, (loss, seed, report)
+            assert vehicle_holds(mock, rows)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_link_that_dies_for_3_s_is_overcome(kind: MockKind) -> None:
+def test_a_link_that_dies_for_3_s_is_overcome_and_for_a_minute_reported(kind: MockKind) -> None:
     for begin in (0.0, 0.05, 0.2, 0.5, 1.0):
-        mock, rows = mock_of(kind), rows_for(kind, 30)
         faults = Faults(latency=0.01, outages=((begin, begin + 3.0),))
-        report, _ = upload_to(mock, rows, faults)
+        report, _ = upload_to(mock_of(kind), rows_for(kind, 30), faults)
         assert (report.verified, report.attempts) == (True, 1)
+    faults = Faults(latency=0.01, outages=((0.2, 90.0),))
+    report, _ = upload_to(mock_of(kind), rows_for(kind, 30), faults)
+    assert (report.verdict, report.attempts) == ("silent", 3)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_link_that_dies_for_a_minute_is_reported(kind: MockKind) -> None:
-    mock, rows = mock_of(kind), rows_for(kind, 30)
-    report, _ = upload_to(mock, rows, Faults(latency=0.01, outages=((0.2, 90.0),)))
-    assert report.verdict == "silent"
-    assert report.attempts == 3
-
-
-@pytest.mark.parametrize(
-    ("kind", "lost"),
-    [
-        ("ardupilot", Lost(REQUEST, 1)),
-        ("ardupilot", Lost(REQUEST, 4)),
-        ("ardupilot", Lost(ITEM_INT, 4)),
-        ("ardupilot", Lost(COUNT_ID, 1)),
-        ("ardupilot", Lost(MISSION_ACK, 1)),
-        ("px4", Lost(REQUEST_INT, 1)),
-        ("px4", Lost(REQUEST_INT, 4)),
-        ("px4", Lost(ITEM_INT, 4)),
-        ("px4", Lost(COUNT_ID, 1)),
-        ("px4", Lost(MISSION_ACK, 1)),
-    ],
-)
-def test_any_one_packet_may_be_lost(kind: MockKind, lost: Lost) -> None:
-    mock, rows = mock_of(kind), rows_for(kind, 4)
-    report, took = upload_to(mock, rows, Faults(lost=(lost,)))
-    assert (report.verified, report.attempts) == (True, 1)
-    assert took < 4
-
-
-def test_a_lost_last_answer_is_recovered_in_each_autopilots_own_way() -> None:
-    for kind, answer in (("px4", MavResult.ACCEPTED), ("ardupilot", MavResult.ERROR)):
-        mock, rows = mock_of(kind), rows_for(kind, 4)
-        upload: Any = Upload(rows, peer_of(kind))
-        client = Station(upload, GROUND_STATION)
-        heard: list[Message] = []
-        took = simulate(
-            client,
-            Station(mock, VEHICLE),
-            Faults(lost=(Lost(MISSION_ACK, 1),)),
-            heard=lambda *told, heard=heard: heard.append(told[0].message),
-        )
-        assert upload.outcome.status == ("accepted" if kind == "px4" else "unknown")
-        acks = [message for message in heard if isinstance(message, MissionAck)]
-        assert [message.type for message in acks] == [answer]
+@pytest.mark.parametrize(("kind", "ask"), [("ardupilot", REQUEST), ("px4", REQUEST_INT)])
+def test_any_one_packet_may_be_lost(kind: MockKind, ask: int) -> None:
+    """The last acknowledgement too, which PX4 repeats and ArduPilot does not."""
+    once = (Lost(ask, 1), Lost(ask, 4), Lost(ITEM_INT, 4), Lost(COUNT_ID, 1), Lost(MISSION_ACK, 1))
+    for lost in once:
+        report, took = upload_to(mock_of(kind), rows_for(kind, 4), Faults(lost=(lost,)))
+        assert (report.verified, report.attempts) == (True, 1)
+        assert not report.result
         assert took < 2
-
-
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_what_was_asked_about_a_lost_answer_is_no_refusal(kind: MockKind) -> None:
-    mock, rows = mock_of(kind), rows_for(kind, 4)
-    report, took = upload_to(mock, rows, Faults(lost=(Lost(MISSION_ACK, 1),)))
-    assert (report.verified, report.attempts) == (True, 1)
-    assert not report.result
-    assert took < 2
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
@@ -190,13 +142,12 @@ def test_a_refused_mission_leaves_px4_as_it_was() -> None:
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-@pytest.mark.parametrize("when", [0.03, 0.1, 0.2])
-def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind: MockKind, when: float) -> None:
-    mock, rows = mock_of(kind, boot=4.0), rows_for(kind, 40)
-    faults = Faults(latency=0.005)
-    report, _ = upload_to(mock, rows, faults, events=[(4.5 + when, mock.reboot)])
-    assert report.verified
-    assert vehicle_holds(mock, rows)
+def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind: MockKind) -> None:
+    for when in (4.53, 4.6, 4.7):
+        mock, rows = mock_of(kind, boot=4.0), rows_for(kind, 40)
+        report, _ = upload_to(mock, rows, Faults(latency=0.005), events=[(when, mock.reboot)])
+        assert report.verified
+        assert vehicle_holds(mock, rows)
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
@@ -255,14 +206,14 @@ def test_an_upload_stops_at_the_list_that_fails() -> None:
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-@pytest.mark.parametrize("seed", range(6))
-def test_late_packets_and_copies_of_them_end_no_upload(kind: MockKind, seed: int) -> None:
-    mock, rows = mock_of(kind), rows_for(kind, 30)
-    faults = Faults(duplication=0.05, reordering=0.1, delay=0.3, seed=seed)
-    report, took = upload_to(mock, rows, faults)
-    assert report.verified
-    assert places(mock.lists.items(MISSION)) == places(rows)
-    assert took < 60
+def test_late_packets_and_copies_of_them_end_no_upload(kind: MockKind) -> None:
+    for seed in range(6):
+        mock, rows = mock_of(kind), rows_for(kind, 30)
+        faults = Faults(duplication=0.05, reordering=0.1, delay=0.3, seed=seed)
+        report, took = upload_to(mock, rows, faults)
+        assert report.verified
+        assert vehicle_holds(mock, rows)
+        assert took < 60
 
 
 def test_an_accepted_fence_that_is_lost_is_sent_again() -> None:
@@ -310,15 +261,6 @@ def test_an_armed_vehicle_gets_no_fence_after_its_mission(may_be_armed: bool, wh
         assert mock.lists.items(FENCES) == ()
 
 
-def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
-    desk = Desk(Discovery())
-    desk.start()
-    desk.tell(Heartbeat(2, 3, 128, 0, 4))
-    desk.tell(Heartbeat(2, 3, 0, 0, 3))
-    desk.wait(2.0)
-    assert [found.armed for found in desk.machine.outcome] == [True]
-
-
 def test_a_vehicle_that_stores_something_else_is_found_out() -> None:
     class Forgetful(StoredLists):
         def kept(self, part: MissionType, seq: int, row: WireItem) -> WireItem:
@@ -346,20 +288,6 @@ def test_a_vehicle_that_another_station_uploads_to_is_given_up_after_one_attempt
     assert took < 10
     told = explain(report, peer_of("ardupilot"))
     assert told == "mission: refused: DENIED (another ground station is uploading)"
-
-
-def test_who_is_interrupted_frees_the_vehicle() -> None:
-    mock, rows = mock_of("px4"), rows_for("px4", 30)
-    script: Any = Script(upload_parts([(MISSION, rows)], peer_of("px4")))
-    client = Station(script, GROUND_STATION)
-    out: list[Message] = []
-
-    def interrupt(now: float) -> None:
-        out.extend(script.cancel(now))
-
-    simulate(client, Station(mock, VEHICLE), Faults(latency=0.01), events=[(0.1, interrupt)])
-    assert script.outcome[0].verdict == "cancelled"
-    assert out == [MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)]
 
 
 def test_clearing_over_a_bad_link() -> None:
@@ -407,21 +335,6 @@ def test_what_a_channel_does() -> None:
     channel = Channel(Faults(lost=(Lost(MISSION_ACK, 2),)), "x")
     packet = bytes([0xFD, 0, 0, 0, 0, 0, 0, MISSION_ACK, 0, 0])
     assert [len(channel.carry(packet, 0.0)) for _ in range(3)] == [1, 0, 1]
-
-
-def test_messages_used_here_are_what_the_numbers_say() -> None:
-    from faao_mav.wire.codec import Codec
-
-    codec = Codec(VEHICLE)
-    numbers = [
-        int.from_bytes(codec.pack(message)[7:10], "little")
-        for message in (
-            MissionAck(VEHICLE, 0, 0),
-            MissionCount(VEHICLE, 0, 0),
-            Heartbeat(0, 0, 0, 0, 0),
-        )
-    ]
-    assert numbers == [MISSION_ACK, COUNT_ID, 0]
 
 
 @pytest.mark.parametrize(

@@ -118,6 +118,12 @@ def test_another_component_is_it_only_where_there_is_no_first() -> None:
         choose(two, "udpin:0.0.0.0:14550", None, None, 10.0)
 
 
+def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
+    armed = Heartbeat(COPTER, ARDUPILOT, ARMED, 0, 4)
+    (vehicle,), _ = found([(0.1, VEHICLE, armed), (0.5, VEHICLE, BEAT)])
+    assert vehicle.armed
+
+
 def test_what_else_was_heard_is_told() -> None:
     search = Discovery(system=9, patience=1.0)
     search.start(0.0)

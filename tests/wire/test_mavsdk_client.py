@@ -74,20 +74,17 @@ def test_mavsdk_uploads_downloads_and_clears_a_mission(flown: Any) -> None:
     assert mock.mission().items == ()
 
 
-def test_mavsdk_uploads_and_downloads_a_fence(flown: Any) -> None:
+def test_mavsdk_uploads_and_downloads_a_fence_and_rally_points(flown: Any) -> None:
     mock, client = flown
-    rows = wire_items(a_mission(3, fence=FENCE), MissionType.FENCE, mock.vehicle)
-    client.upload_geofence(sdk_items(rows, MissionType.FENCE))
-    assert mock.mission().fence == FENCE
-    assert found_places(client.download_geofence()) == places(rows)
-
-
-def test_mavsdk_uploads_and_downloads_rally_points(flown: Any) -> None:
-    mock, client = flown
-    rows = wire_items(a_mission(3, rally=RALLY), MissionType.RALLY, mock.vehicle)
-    client.upload_rally_points(sdk_items(rows, MissionType.RALLY))
-    assert mock.mission().rally == RALLY
-    assert found_places(client.download_rallypoints()) == places(rows)
+    mission = a_mission(3, fence=FENCE, rally=RALLY)
+    fence, rally = (
+        wire_items(mission, part, mock.vehicle) for part in (MissionType.FENCE, MissionType.RALLY)
+    )
+    client.upload_geofence(sdk_items(fence, MissionType.FENCE))
+    client.upload_rally_points(sdk_items(rally, MissionType.RALLY))
+    assert (mock.mission().fence, mock.mission().rally) == (FENCE, RALLY)
+    assert found_places(client.download_geofence()) == places(fence)
+    assert found_places(client.download_rallypoints()) == places(rally)
 
 
 def test_mavsdk_arms_and_flies_the_mission(flown: Any) -> None:

@@ -129,7 +129,7 @@ def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
         result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
     assert result.exit_code == 1
     assert "failed       mission: refused: INVALID_PARAM7" in result.stdout
-    assert "item 2 (command 16)" in result.stdout
+    assert "at item 2 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
     assert "not verified; do not fly it" in result.stderr
     assert "verified     " not in result.stdout
 

@@ -15,7 +15,6 @@ from faao_mav.errors import InputError
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import RallyPoint
 from faao_mav.wire.codec import Codec, Packet
-from faao_mav.wire.framing import Framer
 from faao_mav.wire.messages import (
     CommandLong,
     Heartbeat,
@@ -201,10 +200,3 @@ def test_damaged_and_unknown_packets_are_passed_over() -> None:
     (packet,) = codec.parse(unknown)
     assert packet.envelope is None
     assert packet.raw == unknown
-
-
-def test_packets_may_come_in_pieces() -> None:
-    framer = Framer()
-    sent = packets(*MESSAGES)
-    found = [packet for byte in b"noise".join(sent) for packet in framer.feed(bytes([byte]))]
-    assert found == sent
