@@ -166,14 +166,10 @@ class Upload(Exchange):
 
     def _time_out(self, now: float) -> Sequence[Message]:
         again, following = super()._time_out(now), self._current + 1
-        if (
-            self._pairs
-            and self._current in self._questions
-            and 0 < following < len(self._items) - 1
-        ):
-            self._paired = True
-            return [self._message(following), *again]
-        return again
+        if not again or self.outcome is not None or not 0 < following < len(self._items) - 1:
+            return again
+        self._paired = self._pairs
+        return [self._message(following), *again] if self._pairs else again
 
     def _give_up(self, now: float) -> Sequence[Message]:
         if self._paired and self._result is not None:
