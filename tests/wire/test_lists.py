@@ -88,23 +88,6 @@ def test_any_row_is_sent_as_often_as_asked_for_in_any_order(firmware: str) -> No
     assert desk.tell(request(3)) == []
 
 
-def test_the_count_is_repeated_then_given_up() -> None:
-    desk = upload("px4")
-    assert desk.wait(60)[-1] == CANCEL
-    assert 5 < desk.sent.count(MissionCount(VEHICLE, 0, 3)) < 40
-    assert desk.machine.outcome.status == "silent"
-
-
-def test_a_slow_vehicle_is_no_silent_one() -> None:
-    desk = upload("px4")
-    for seq in range(3):
-        desk.wait(1.2)
-        desk.tell(request(seq))
-    desk.wait(1.2)
-    desk.tell(ack(MavResult.ACCEPTED))
-    assert desk.machine.outcome.status == "accepted"
-
-
 @pytest.mark.parametrize("asks", [0.25, 100.0])
 def test_a_vehicle_that_gets_no_further_is_given_up_and_told(asks: float) -> None:
     """One that stops asking, and one that asks for the same item for ever."""
@@ -118,66 +101,11 @@ def test_a_vehicle_that_gets_no_further_is_given_up_and_told(asks: float) -> Non
         assert (desk.machine.outcome.status, desk.machine.outcome.last_requested) == ("silent", 0)
 
 
-def test_px4_is_sent_the_next_item_too_but_for_the_last_one() -> None:
-    desk = upload("px4", asked=1)
-    assert seqs(desk.wait(0.1)) == [1, 0, 1, 0]
-    desk.tell(request(1))
-    assert set(seqs(desk.wait(1.0))) == {1}
-    desk.tell(request(2))
-    assert set(seqs(desk.wait(1.0))) == {2}
-    desk.tell(ack(MavResult.ACCEPTED))
-    assert desk.machine.outcome.status == "accepted"
-
-
-@pytest.mark.parametrize("result", [MavResult.INVALID_PARAM1, MavResult.ERROR])
-def test_which_item_px4_refuses_is_found_out(result: MavResult) -> None:
-    desk = upload("px4", 9, asked=1)
-    desk.wait(0.3)
-    desk.tell(ack(result))  # of item 0, or of item 1
-    assert MissionCount(VEHICLE, 0, 9) in desk.wait(1.6)
-    desk.tell(request(0))
-    desk.tell(request(1))
-    assert set(seqs(desk.wait(0.6))) == {1}
-    desk.tell(ack(result))
-    desk.wait(1.6)
-    outcome = desk.machine.outcome
-    assert (outcome.status, outcome.result, outcome.last_requested) == ("refused", result, 1)
-
-
-def test_ardupilot_is_sent_what_follows_an_item_that_it_has() -> None:
-    desk = upload("ardupilot", 9, asked=1)
-    assert desk.tell(ack(MavResult.INVALID_SEQUENCE)) == []  # of something earlier
-    sent: list[int] = []
-    for _ in range(5):
-        desk.wait(1.5)
-        sent += seqs(desk.tell(ack(MavResult.INVALID_SEQUENCE)))
-    assert sent == [1, 2, 3]  # and no further unasked
-    assert seqs(desk.tell(request(2))) == [2]
-
-
 def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
     desk = upload("generic", 9)
     for seq in range(3):
         desk.tell(request(seq))
         assert desk.wait(8.0) == []
-
-
-@BOTH
-def test_without_a_last_answer_it_is_unknown_what_the_vehicle_holds(firmware: str) -> None:
-    desk = upload(firmware, asked=3)
-    assert set(seqs(desk.wait(60))) == {2}
-    assert desk.machine.outcome.status == "unknown"
-
-
-def test_an_error_of_the_last_item_leaves_it_to_reading_back() -> None:
-    """ArduPilot says it of a duplicate; ACCEPTED may have been lost before."""
-    desk = upload("ardupilot", asked=3)
-    desk.tell(ack(MavResult.ERROR))
-    desk.wait(3)
-    assert (desk.machine.outcome.status, desk.machine.outcome.result) == (
-        "unknown",
-        MavResult.ERROR,
-    )
 
 
 def test_an_early_acceptance_is_about_something_else() -> None:
@@ -354,16 +282,6 @@ def test_a_whole_download(firmware: str, acks: int) -> None:
     assert (desk.machine.outcome.status, desk.machine.outcome.items) == ("accepted", ())
 
 
-def test_what_is_not_answered_is_asked_for_again_and_less_often() -> None:
-    desk = reading("generic")
-    for seq in range(3):
-        first, second = desk.wait(1.0), desk.wait(4.0)
-        assert set(seqs(first + second)) == {seq}
-        assert len(second) < 4 * len(first)
-        desk.tell(item(seq))
-    assert desk.machine.outcome.items == ROWS[:3]
-
-
 def test_what_was_not_asked_for_now_or_by_us_is_ignored() -> None:
     desk = Desk(Download(peer_of("generic")))
     desk.start()
@@ -375,16 +293,6 @@ def test_what_was_not_asked_for_now_or_by_us_is_ignored() -> None:
         assert desk.tell(message) == []
     assert seqs(desk.tell(item(0))) == [1]
     assert desk.tell(item(0)) == []
-
-
-def test_ardupilot_is_asked_for_five_rows_at_once() -> None:
-    desk = reading("ardupilot", 9)
-    assert seqs(desk.sent[1:]) == [0, 1, 2, 3, 4]
-    assert seqs(desk.tell(item(3))) == [5]
-    assert set(seqs(desk.wait(0.3))) == {0, 1, 2, 4, 5}
-    for seq in (2, 1, 5, 4, 7, 6, 8, 0):
-        desk.tell(item(seq))
-    assert desk.machine.outcome.items == ROWS
 
 
 def test_a_list_that_changes_meanwhile_is_read_anew() -> None:
