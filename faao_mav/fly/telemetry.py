@@ -22,7 +22,6 @@ from faao_mav.wire.messages import (
     SysStatus,
     WireItem,
 )
-from faao_mav.wire.modes import mode_name
 from faao_mav.wire.protocol import (
     CURRENT_ITEM,
     CURRENT_MODE,
@@ -148,7 +147,7 @@ class Telemetry:
     @property
     def mode(self) -> str:
         """The vehicle's mode by its name."""
-        return "unknown" if self.heartbeat is None else mode_name(self.heartbeat)
+        return "unknown" if self.heartbeat is None else self.heartbeat.mode_name
 
     @property
     def height(self) -> float:

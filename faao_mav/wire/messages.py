@@ -5,7 +5,7 @@ Each type is named after its MAVLink message, and its fields have the message's 
 wire, so that what was sent and what was found can be compared without rounding.
 """
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import dataclass_transform
 
 from faao_mav.mission.item import Params
@@ -191,6 +191,18 @@ class Heartbeat(Message):
     def armed(self) -> bool:
         """Whether the motors may turn, if it is an autopilot's."""
         return bool(self.base_mode & ARMED)
+
+    @property
+    def mode_name(self) -> str:
+        """What people call the mode.
+
+        >>> Heartbeat(type=2, autopilot=3, base_mode=1, custom_mode=17, system_status=4).mode_name
+        'BRAKE'
+        """
+        from pymavlink.dialects.v20.development import MAVLink_heartbeat_message
+        from pymavlink.mavutil import mode_string_v10
+
+        return str(mode_string_v10(MAVLink_heartbeat_message(*astuple(self))))
 
     @property
     def of_autopilot(self) -> bool:

@@ -38,7 +38,7 @@ from faao_mav.wire.messages import (
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.wire.transfer.exchange import TENTATIVE, Peer
-from faao_mav.wire.transfer.session import clear_lists, download_lists, explain, upload_parts
+from faao_mav.wire.transfer.session import clear_lists, explain, upload_parts
 from faao_mav.wire.transfer.upload import Upload
 from faao_mav.wire.wire_items import wire_items
 
@@ -171,28 +171,6 @@ def test_another_vehicle_with_the_same_list_does_not_mix_in() -> None:
     report, _ = upload_to(mock, rows, others=[Station(other, other.address)])
     assert report.verified
     assert other.lists.items(MISSION) == ()
-
-
-def test_all_three_lists_of_a_mission() -> None:
-    for kind in KINDS:
-        firmware, mock = kind, mock_of(kind)
-        mission = a_mission(6, fence=FENCE, rally=RALLY)
-        parts = [(part, wire_items(mission, part, vehicle_of(firmware))) for part in MissionType]
-        script: Any = Script(upload_parts(parts, peer_of(firmware)))
-        simulate(Station(script, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
-        assert [report.verdict for report in script.outcome] == ["verified"] * 3
-        stored = mock.mission()
-        assert (stored.fence, stored.rally) == (mission.fence, mission.rally)
-
-        lists: Any = Script(download_lists(tuple(MissionType), peer_of(firmware)))
-        simulate(Station(lists, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
-        for part, rows in parts:
-            assert places(lists.outcome.items[part]) == places(rows)
-
-        cleared: Any = Script(clear_lists(tuple(MissionType), peer_of(firmware)))
-        simulate(Station(cleared, GROUND_STATION), Station(mock, VEHICLE), Faults(loss=0.1))
-        assert [report.verdict for report in cleared.outcome] == ["verified"] * 3
-        assert mock.mission().items == ()
 
 
 def test_an_upload_stops_at_the_list_that_fails() -> None:
