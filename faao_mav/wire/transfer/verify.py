@@ -1,7 +1,7 @@
 """What was sent against what was read back."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -18,6 +18,9 @@ _CENTIMETRE = 0.0101
 
 _FLOAT32 = 2e-7
 """Relative difference of two numbers that single precision does not tell apart."""
+
+_FIELDS = ("command", "param1", "param2", "param3", "param4", "x", "y", "z", "autocontinue")
+"""The numbers of an item, by name."""
 
 _SAME_FRAMES = {5: 0, 6: 3, 11: 10}
 """Frames with the same meaning: those ending in _INT, and what they are called without."""
@@ -58,68 +61,55 @@ def compare(
     Not a difference: one step of the integer coordinates, single precision, a centimetre of
     altitude, frames that mean the same (3 and 6), the frame of a command without a place, "not
     set" read back as 0, autocontinue of a fence or rally point, which nothing comes after. A home
-    item is the vehicle's own: told as dropped where it differs by
-    more than a metre or so.
+    item is the vehicle's own: told as dropped where it differs by more than a metre or so.
     """
-    differences = []
+    differences: list[Difference] = []
     home = home_items(vehicle, part)
     if home and sent and found:
-        differences += _compare_home(mission_item(sent[0]), mission_item(found[0]))
+        was, is_ = ((item.x, item.y, item.z) for item in map(mission_item, (sent[0], found[0])))
+        away = [abs(one - other) for one, other in zip(was, is_, strict=True)]
+        if any(was) and not (max(away[:2]) < 1e-5 and away[2] < 1):
+            differences.append(Difference(part, None, "home", was, is_, "dropped"))
     if len(sent) != len(found):
-        was, is_ = (max(len(items) - home, 0) for items in (sent, found))
-        differences.append(Difference(part, None, "count", was, is_, "wrong"))
+        given, there = (max(len(items) - home, 0) for items in (sent, found))
+        differences.append(Difference(part, None, "count", given, there, "wrong"))
     for index, (one, other) in enumerate(zip(sent[home:], found[home:], strict=False)):
-        pair = mission_item(one), mission_item(other)
-        differences += _compare_items(*pair, index, part, vehicle)
+        differences += _compare(mission_item(one), mission_item(other), index, part, vehicle)
     return tuple(differences)
 
 
-def _compare_home(sent: MissionItem, found: MissionItem) -> list[Difference]:
-    places = ((sent.x, sent.y, sent.z), (found.x, found.y, found.z))
-    (x, y, z), (x_found, y_found, z_found) = places
-    if not (x or y or z) or (
-        abs(x - x_found) < 1e-5 and abs(y - y_found) < 1e-5 and abs(z - z_found) < 1
-    ):
-        return []
-    return [Difference(MissionType.MISSION, None, "home", *places, "dropped")]
-
-
-def _compare_items(
+def _compare(
     sent: MissionItem,
     found: MissionItem,
     index: int,
     part: MissionType,
     vehicle: VehicleType | None,
-) -> list[Difference]:
+) -> Iterator[Difference]:
     stored, unknown = sent, False
     if vehicle is not None:
         stored = vehicle.dialect.stored(sent)
         unknown = part is MissionType.MISSION and not vehicle.dialect.is_known(sent.command)
-    differences = []
-    values = zip(
-        _fields(sent).items(), _fields(found).values(), _fields(stored).values(), strict=True
+    sent_frame, found_frame, kept_frame = (
+        _SAME_FRAMES.get(item.frame, item.frame) for item in (sent, found, stored)
     )
-    for (field, was), is_, kept in values:
-        if field == "autocontinue" and part is not MissionType.MISSION:
-            continue
-        if field == "frame" and not _same_frame(sent, int(is_), stored):
-            differences.append(Difference(part, index, field, was, is_, "wrong"))
-        if field == "frame" or _same(field, was, is_, sent.frame):
-            continue
-        if math.isnan(was) and is_ == 0:
+    if found_frame not in (sent_frame, kept_frame):
+        yield Difference(part, index, "frame", sent.frame, found.frame, "wrong")
+    values = zip(_values(sent), _values(found), _values(stored), strict=True)
+    for field, (was, is_, kept) in zip(_FIELDS, values, strict=True):
+        unset = math.isnan(was) and is_ == 0
+        idle = field == "autocontinue" and part is not MissionType.MISSION
+        if unset or idle or _same(field, was, is_, sent.frame):
             continue
         # What is not known to be kept may be lost, but not replaced.
         lost = _same(field, kept, is_, found.frame) or (
             unknown and field not in ("x", "y", "command") and is_ == 0
         )
-        differences.append(Difference(part, index, field, was, is_, "dropped" if lost else "wrong"))
-    return differences
+        yield Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
 
 
-def _fields(item: MissionItem) -> dict[str, float]:
-    params = {f"param{number}": value for number, value in enumerate(item.params, start=1)}
-    rest = {"x": item.x, "y": item.y, "z": item.z, "autocontinue": float(item.autocontinue)}
-    return {"command": item.command, "frame": item.frame, **params, **rest}
+def _values(item: MissionItem) -> tuple[float, ...]:
+    """Return the values of `_FIELDS`."""
+    return (item.command, *item.params, item.x, item.y, item.z, float(item.autocontinue))
 
 
 def _same(field: str, one: float, other: float, frame: int) -> bool:
@@ -127,12 +117,4 @@ def _same(field: str, one: float, other: float, frame: int) -> bool:
         return math.isnan(one) and math.isnan(other)
     if field in ("x", "y"):
         return abs(one - other) * coordinate_scale(frame) < 1.5
-    tolerance = _FLOAT32 * abs(one)
-    return abs(one - other) <= (tolerance + _CENTIMETRE if field == "z" else tolerance)
-
-
-def _same_frame(sent: MissionItem, found: int, stored: MissionItem) -> bool:
-    return _SAME_FRAMES.get(found, found) in (
-        _SAME_FRAMES.get(sent.frame, sent.frame),
-        _SAME_FRAMES.get(stored.frame, stored.frame),
-    )
+    return abs(one - other) <= _FLOAT32 * abs(one) + (_CENTIMETRE if field == "z" else 0.0)
