@@ -11,13 +11,15 @@ from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
-from faao_mav.validate.rule import rules_of
+from faao_mav.validate.rule import read_rules
 
 _MODULES = (ardupilot, delivery, extent, fences, items, px4, speeds)
+_CONSTANTS: dict[str, object] = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 
-RULES = tuple(rules_of({name: each for module in _MODULES for name, each in module.checks.items()}))
+RULES = tuple(read_rules(_CONSTANTS))
 """All rules, in the order of their table, in which findings about one item are given."""
 
+_PLACE = {rule.id: n for n, rule in enumerate(RULES)}
 _WORST_FIRST = list(Level)
 
 
@@ -45,6 +47,15 @@ def validate(
     ['empty']
     """
     context = ValidationContext(mission, vehicle, track, limits or Limits(), link, airborne, energy)
-    about = (rule for rule in RULES if rule.applies_to(vehicle))
-    found = (finding for rule in about for finding in rule.findings(context))
-    return tuple(sorted(found, key=lambda f: (_WORST_FIRST.index(f.level), f.item or 0)))
+    shown = {**_CONSTANTS, "vehicle": context.vehicle, "limits": context.limits, "link": link}
+    found = []
+    for name, index, values in (hit for module in _MODULES for hit in module.checks.hits(context)):
+        rule = RULES[_PLACE[name]]
+        if rule.applies_to(vehicle):
+            found.append(rule.finding(index, shown | context.about(index) | values))
+
+    def order(finding: Finding) -> tuple[int, int, int]:
+        level = _WORST_FIRST.index(finding.level)
+        return level, finding.item or 0, _PLACE[finding.rule]
+
+    return tuple(sorted(found, key=order))

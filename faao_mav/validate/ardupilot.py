@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, at_zero
-from faao_mav.validate.rule import Checks, Hits, at
+from faao_mav.validate.rule import Checks, Hits, hit
 
 checks = Checks()
 
@@ -45,118 +45,79 @@ _ON_GROUND = {
 }
 
 
-@checks("ardupilot-required-item")
-def _(context: ValidationContext) -> Hits:
+@checks("ardupilot")
+def _arming(context: ValidationContext) -> Hits:
+    """What arming asks for."""
     bits = int(context.vehicle.value("arming_items"))
     for bit, command in _REQUIRED.items():
         if bits & bit and not any(context.each(command)):
-            yield at(bits=bits, bit=bit, name=command.name)
-
-
-@checks("ardupilot-required-rally")
-def _(context: ValidationContext) -> Hits:
-    bits, limit = int(context.vehicle.value("arming_items")), context.vehicle.value("rally_limit")
+            yield hit("ardupilot-required-item", bits=bits, bit=bit, name=command.name)
+    above = [k for k, item in context.each(*FLOWN_TO) if item.frame in ABOVE_TERRAIN]
+    off = ", and TERRAIN_ENABLE is 0" if context.vehicle.value("terrain_enable") == 0 else ""
+    if above:
+        yield hit("ardupilot-terrain", above[0], count=len(above), off=off)
     if not bits & RALLY_BIT or context.frame is None:
         return
+    limit = context.vehicle.value("rally_limit")
     places = (context.frame.to_local(p.latitude, p.longitude) for p in context.mission.rally)
     nearest = min((math.hypot(*place) for place in places), default=math.inf)
     if not nearest < (limit or math.inf):
+        within = f" within {limit:g} m" if limit else ""
         there = f"the nearest is {nearest:.0f} m away" if nearest < math.inf else "there is none"
-        yield at(bits=bits, within=f" within {limit:g} m" if limit else "", there=there)
+        yield hit("ardupilot-required-rally", bits=bits, within=within, there=there)
 
 
-@checks("ardupilot-no-takeoff")
-def _(context: ValidationContext) -> Hits:
-    return () if context.airborne else _without_takeoff(context)
-
-
-@checks("ardupilot-begins-in-the-air")
-def _(context: ValidationContext) -> Hits:
-    return _without_takeoff(context) if context.airborne else ()
-
-
-def _without_takeoff(context: ValidationContext) -> Hits:
-    kind = context.vehicle.kind
-    if context.items and not any(context.each(*_TAKEOFFS[kind])):
-        yield at(does=_ON_GROUND[kind])
-
-
-@checks("ardupilot-takeoff-first")
-def _(context: ValidationContext) -> Hits:
-    kind = context.vehicle.kind
-    takeoff = next((index for index, _ in context.each(*_TAKEOFFS[kind])), 0)
-    before = next((k + 1 for k, command in context.flying if command != Command.NAV_DELAY), 0)
-    if 0 < before <= takeoff and not context.airborne:
-        yield at(takeoff, before=before, does=_ON_GROUND[kind])
-
-
-@checks("ardupilot-land-start")
-def _(context: ValidationContext) -> Hits:
-    if context.vehicle.value("return_lands") == 0:
-        yield from (at(k) for k, _ in context.each(Command.DO_LAND_START))
-
-
-@checks("ardupilot-spline-delay")
-def _(context: ValidationContext) -> Hits:
-    for (before, first), (index, second) in pairwise(context.flying):
-        if (first, second) == (Command.NAV_SPLINE_WAYPOINT, Command.NAV_DELAY):
-            yield at(index, before=before + 1)
-
-
-@checks("ardupilot-spline-last")
-def _(context: ValidationContext) -> Hits:
-    *_, before, last = [(-1, 0), (-1, 0), *context.flying]
-    if last[1] == Command.NAV_SPLINE_WAYPOINT != before[1]:
-        yield at(last[0])
-
-
-@checks("ardupilot-land-approach")
-def _(context: ValidationContext) -> Hits:
-    landing = (Command.NAV_TAKEOFF, Command.NAV_LAND)
-    return (at(k) for (_, one), (k, two) in pairwise(context.flying) if (one, two) == landing)
-
-
-@checks("ardupilot-set-home")
-def _(context: ValidationContext) -> Hits:
-    takeoffs = [index for index, _ in context.each(*_TAKEOFFS[context.vehicle.kind])]
-    for index, item in context.each(Command.DO_SET_HOME):
+@checks("ardupilot")
+def _takeoff(context: ValidationContext) -> Hits:
+    """How the mission begins, and home that is moved after that."""
+    takeoffs = [k for k, _ in context.each(*_TAKEOFFS[context.vehicle.kind])]
+    does, before = _ON_GROUND[context.vehicle.kind], 0
+    if context.items and not takeoffs:
+        air = context.airborne
+        yield hit("ardupilot-begins-in-the-air" if air else "ardupilot-no-takeoff", does=does)
+    if takeoffs and not context.airborne:
+        before = next(k + 1 for k, command in context.flying if command != Command.NAV_DELAY)
+    if 0 < before <= min(takeoffs, default=0):
+        yield hit("ardupilot-takeoff-first", takeoffs[0], before=before, does=does)
+    for k, item in context.each(Command.DO_SET_HOME):
         same_height = item.params[0] == 0 and abs(context.height(item)) < _SAME_HEIGHT
-        if not same_height and (context.airborne or min(takeoffs, default=index) < index):
-            yield at(index)
+        if not same_height and (context.airborne or min(takeoffs, default=k) < k):
+            yield hit("ardupilot-set-home", k)
 
 
-@checks("ardupilot-guided")
-def _(context: ValidationContext) -> Hits:
-    return (at(k) for k, item in context.each(Command.NAV_GUIDED_ENABLE) if item.params[0] > 0)
+@checks("ardupilot")
+def _in_order(context: ValidationContext) -> Hits:
+    """Items that do not go with the one before them."""
+    for (before, first), (k, second) in pairwise(context.flying):
+        if (first, second) == (Command.NAV_SPLINE_WAYPOINT, Command.NAV_DELAY):
+            yield hit("ardupilot-spline-delay", k, before=before + 1)
+        if (first, second) == (Command.NAV_TAKEOFF, Command.NAV_LAND):
+            yield hit("ardupilot-land-approach", k)
+    *_, (_, first), (last, second) = [(-1, 0), (-1, 0), *context.flying]
+    if second == Command.NAV_SPLINE_WAYPOINT != first:
+        yield hit("ardupilot-spline-last", last)
 
 
-@checks("ardupilot-stays")
-def _(context: ValidationContext) -> Hits:
-    waypoints = context.each(Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
-    return (at(k) for k, item in waypoints if at_zero(item))
+@checks("ardupilot", "plane")
+def _land_start(context: ValidationContext) -> Hits:
+    if context.vehicle.value("return_lands") == 0:
+        yield from (hit("ardupilot-land-start", k) for k, _ in context.each(Command.DO_LAND_START))
 
 
-@checks("ardupilot-frame-mission")
-def _(context: ValidationContext) -> Hits:
-    return (at(k) for k, item in context.each(*FLOWN_TO) if item.frame == Frame.MISSION)
-
-
-@checks("ardupilot-command-skipped")
-def _(context: ValidationContext) -> Hits:
-    return (at(k) for k, _ in context.each(*_SKIPPED[context.vehicle.kind]))
-
-
-@checks("ardupilot-terrain")
-def _(context: ValidationContext) -> Hits:
-    above = [index for index, item in context.each(*FLOWN_TO) if item.frame in ABOVE_TERRAIN]
-    off = ", and TERRAIN_ENABLE is 0" if context.vehicle.value("terrain_enable") == 0 else ""
-    if above:
-        yield at(above[0], count=len(above), off=off)
-
-
-@checks("altitude-rounded")
-def _(context: ValidationContext) -> Hits:
+@checks("ardupilot")
+def _items(context: ValidationContext) -> Hits:
+    """Items by themselves."""
+    for k, item in enumerate(context.items):
+        if item.command == Command.NAV_GUIDED_ENABLE and item.params[0] > 0:
+            yield hit("ardupilot-guided", k)
+        if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) and at_zero(item):
+            yield hit("ardupilot-stays", k)
+        if item.command in FLOWN_TO and item.frame == Frame.MISSION:
+            yield hit("ardupilot-frame-mission", k)
+        if item.command in _SKIPPED[context.vehicle.kind]:
+            yield hit("ardupilot-command-skipped", k)
     pairs = [(k, item.z, kept.z) for k, item, kept in context.stored if item.command in FLOWN_TO]
     changed = [(k, kept) for k, up, kept in pairs if abs(kept - up) > 1e-4 * max(1.0, abs(up))]
-    for index, kept in changed[:1]:
-        yield at(index, kept=kept, more=f", and so in {len(changed)} items" if changed[1:] else "")
+    for k, kept in changed[:1]:
+        more = f", and so in {len(changed)} items" if changed[1:] else ""
+        yield hit("altitude-rounded", k, kept=kept, more=more)

@@ -10,7 +10,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle
-from faao_mav.autopilot.dialect import SpeedChange
+from faao_mav.autopilot.dialect import SpeedChange, name_of
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
@@ -56,6 +56,12 @@ class ValidationContext:
     def each(self, *commands: int) -> Iterator[tuple[int, MissionItem]]:
         """Yield index and item of the items with one of `commands`."""
         return ((k, item) for k, item in enumerate(self.items) if item.command in commands)
+
+    def about(self, index: int | None) -> dict[str, object]:
+        """Return the `item` at `index` and its `command` by name; nothing for no item."""
+        if index is None:
+            return {}
+        return {"item": self.items[index], "command": name_of(self.items[index].command)}
 
     @property
     def flying(self) -> Iterator[tuple[int, int]]:

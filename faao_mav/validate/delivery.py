@@ -2,8 +2,7 @@
 
 from faao_mav.plan.radio_values import doubtful_values
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.demands import LinkCheck
-from faao_mav.validate.rule import Checks, Hits, at
+from faao_mav.validate.rule import Checks, Hits, hit
 
 checks = Checks()
 
@@ -31,65 +30,35 @@ NOTHING = 1e-3
 20 MHz."""
 
 
-@checks("link-nothing")
-def _(context: ValidationContext) -> Hits:
+@checks()
+def _plan(context: ValidationContext) -> Hits:
+    """What is wrong with the plan itself, or with its place."""
     link = context.link
     if link is not None and link.planned_delivered < NOTHING:
-        yield at(rate=link.planned_delivered)
+        yield hit("link-nothing")
+    for told, instead in doubtful_values(link.radio) if link and link.radio else ():
+        yield hit("radio-values", told=told, instead=instead)
+    if link is not None and link.elsewhere:
+        yield hit("link-elsewhere", away=link.away / 1000)
 
 
-@checks("radio-values")
-def _(context: ValidationContext) -> Hits:
-    if context.link is not None and context.link.radio is not None:
-        for told, instead in doubtful_values(context.link.radio):
-            yield at(told=told, instead=instead)
-
-
-@checks("link-elsewhere")
-def _(context: ValidationContext) -> Hits:
-    if context.link is not None and context.link.elsewhere:
-        yield at(away=context.link.away / 1000)
-
-
-def _links(context: ValidationContext) -> tuple[LinkCheck, ...]:
-    """Return how the mission carries out the plan; nothing without one, or at another place."""
-    return () if context.link is None or context.link.elsewhere else (context.link,)
-
-
-@checks("link-rate-reduced")
-def _(context: ValidationContext) -> Hits:
-    for link in _links(context):
-        where = ""
-        if (worst := link.worst) is not None:
-            where = f"; {worst.rate_lost:.3g} of it between {worst.start:.0f} and {worst.end:.0f} s"
-        if 100 * link.share < GOOD_PERCENT:
-            yield at(link=link, percent=100 * link.share, where=where)
-
-
-@checks("link-path")
-def _(context: ValidationContext) -> Hits:
-    for link in _links(context):
-        if link.path_error > link.path_tolerance + PATH_ALLOWANCE:
-            yield at(link=link)
-
-
-@checks("link-late")
-def _(context: ValidationContext) -> Hits:
-    for link in _links(context):
-        if link.late > max(LATE, LATE_PERCENT / 100 * link.planned_duration):
-            yield at(link=link)
-
-
-@checks("link-apart")
-def _(context: ValidationContext) -> Hits:
-    return (at(link=link) for link in _links(context) if link.rms_position_error > APART)
-
-
-@checks("link-altitude")
-def _(context: ValidationContext) -> Hits:
-    return (at(link=link) for link in _links(context) if link.altitude_error > ALTITUDE_ERROR)
-
-
-@checks("link-timing")
-def _(context: ValidationContext) -> Hits:
-    return (at(link=link, percent=100 * link.share) for link in _links(context))
+@checks()
+def _flight(context: ValidationContext) -> Hits:
+    """How the flight carries the plan out; nothing is said of one at another place."""
+    link = context.link
+    if link is None or link.elsewhere:
+        return
+    percent, where = 100 * link.share, ""
+    if (worst := link.worst) is not None:
+        where = f"; {worst.rate_lost:.3g} of it between {worst.start:.0f} and {worst.end:.0f} s"
+    if percent < GOOD_PERCENT:
+        yield hit("link-rate-reduced", percent=percent, where=where)
+    if link.path_error > link.path_tolerance + PATH_ALLOWANCE:
+        yield hit("link-path")
+    if link.late > max(LATE, LATE_PERCENT / 100 * link.planned_duration):
+        yield hit("link-late")
+    if link.rms_position_error > APART:
+        yield hit("link-apart")
+    if link.altitude_error > ALTITUDE_ERROR:
+        yield hit("link-altitude")
+    yield hit("link-timing", percent=percent)

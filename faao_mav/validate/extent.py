@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
-from faao_mav.plan.energy import Battery
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Checks, Hits, at
+from faao_mav.validate.rule import Checks, Hits, hit
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
 
 checks = Checks()
@@ -40,20 +39,28 @@ _HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_
 _DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
 
-@checks("below-home")
-def _(context: ValidationContext) -> Hits:
-    for place in context.places:
-        if place.up < 0 and context.items[place.index].command not in LANDINGS | TAKEOFFS:
-            yield at(place.index, below=-place.up, **_raised(context, place))
-
-
-@checks("near-ground")
-def _(context: ValidationContext) -> Hits:
+@checks()
+def _heights(context: ValidationContext) -> Hits:
+    """How high the places are."""
+    ceiling, highest = context.limits.max_altitude, None
     for place in context.places:
         command = context.items[place.index].command
-        meant = command in LANDINGS or (place.up < 0 and command not in TAKEOFFS)
-        if place.up < LEAST_HEIGHT and not meant:
-            yield at(place.index, place=place, **_raised(context, place))
+        if place.up < 0 and command not in LANDINGS | TAKEOFFS:
+            yield hit("below-home", place.index, below=-place.up, **_raised(context, place))
+        elif place.up < LEAST_HEIGHT and command not in LANDINGS:
+            yield hit("near-ground", place.index, place=place, **_raised(context, place))
+        if place.up > HIGHEST:
+            yield hit("too-high", place.index, place=place)
+        if ceiling is not None and place.up > ceiling:
+            yield hit("above-ceiling", place.index, place=place)
+        if place.up > max(COMMON_CEILING, highest.up if highest else 0.0):
+            highest = place
+    if highest is not None and ceiling is None:
+        yield hit("above-120-m", highest.index, place=highest)
+    height, name = context.parameter("return_height")
+    if ceiling is not None and height > ceiling:
+        newest = context.vehicle.type.parameters["return_height"].newest_name
+        yield hit("return-above-ceiling", height=height, name=name, newest=newest)
 
 
 def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
@@ -65,80 +72,59 @@ def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
     return {"sea": sea, "instead": "use frame 3, height above home, or raise the item"}
 
 
-@checks("too-far")
-def _(context: ValidationContext) -> Hits:
-    home, farthest = context.mission.home, _FARTHEST[context.vehicle.type.hovers]
-    for place in context.places:
-        away, item = place.from_origin / 1000, context.items[place.index]
+@checks()
+def _distances(context: ValidationContext) -> Hits:
+    """How far the places are from home, and from each other."""
+    home, farthest = context.mission.home, 1000 * _FARTHEST[context.vehicle.type.hovers]
+    limit = context.limits.max_distance
+    for place in context.places if home is not None else ():
+        away, item = place.from_origin, context.items[place.index]
         if home is not None and away > farthest:
             swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < _SWAPPED
             slip = "latitude and longitude look exchanged: correct them"
-            yield at(place.index, away=away, slip=slip if swapped else "correct it")
+            yield hit(
+                "too-far", place.index, away=away / 1000, slip=slip if swapped else "correct it"
+            )
+        elif limit is None and away > 1000 * FAR:
+            yield hit("far-from-home", place.index, away=away / 1000)
+        if limit is not None and away > limit:
+            yield hit("beyond-distance", place.index, place=place)
+    for leg in context.legs:
+        near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
+        if leg.length > 1000 * FAR and near and HOME not in (leg.start.index, leg.end.index):
+            yield hit("long-leg", leg.index, leg=leg, length=leg.length / 1000)
 
 
-@checks("too-high")
-def _(context: ValidationContext) -> Hits:
-    return _above(context, HIGHEST)
-
-
-@checks("above-ceiling")
-def _(context: ValidationContext) -> Hits:
-    return _above(context, context.limits.max_altitude)
-
-
-@checks("beyond-distance")
-def _(context: ValidationContext) -> Hits:
-    return _beyond(context, context.limits.max_distance)
-
-
-def _above(context: ValidationContext, limit: float | None) -> Hits:
-    most = math.inf if limit is None else limit
-    return (at(p.index, place=p, limit=limit) for p in context.places if p.up > most)
-
-
-def _beyond(context: ValidationContext, limit: float | None) -> Hits:
-    most = math.inf if limit is None or context.home is None else limit
-    return (at(p.index, place=p, limit=limit) for p in context.places if p.from_origin > most)
-
-
-def _fenced(context: ValidationContext, key: str, bit: int) -> float | None:
-    """Return the bound `key`, m, if FENCE_ENABLE and the `bit` of FENCE_TYPE switch it on."""
+@checks("ardupilot")
+def _cage(context: ValidationContext) -> Hits:
+    """The bounds about home that FENCE_ENABLE and the bits of FENCE_TYPE switch on."""
     value = context.vehicle.value
-    on = value("fence_enable") != 0 and int(value("fence_type")) & bit
-    return value(key) if on else None
-
-
-@checks("ardupilot-fence-ceiling")
-def _(context: ValidationContext) -> Hits:
-    return _above(context, _fenced(context, "fence_ceiling", bit=1))
-
-
-@checks("ardupilot-fence-floor")
-def _(context: ValidationContext) -> Hits:
-    limit = _fenced(context, "fence_floor", bit=8)
-    for place in context.places if limit is not None else ():
+    kinds = int(value("fence_type")) if value("fence_enable") != 0 else 0
+    ceiling, floor, radius = (value(f"fence_{key}") for key in ("ceiling", "floor", "radius"))
+    for place in context.places:
         lands = context.items[place.index].command == Command.NAV_LAND
-        if not lands and place.up < (limit or 0.0):
-            yield at(place.index, place=place, limit=limit)
+        if kinds & 1 and place.up > ceiling:
+            yield hit("ardupilot-fence-ceiling", place.index, place=place, limit=ceiling)
+        if kinds & 8 and place.up < floor and not lands:
+            yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
+        if kinds & 2 and context.home is not None and place.from_origin > radius:
+            yield hit("ardupilot-fence-circle", place.index, place=place, limit=radius)
 
 
-@checks("ardupilot-fence-circle")
-def _(context: ValidationContext) -> Hits:
-    return _beyond(context, _fenced(context, "fence_radius", bit=2))
+@checks("px4")
+def _px4_cage(context: ValidationContext) -> Hits:
+    """The bounds about home that are on above 0."""
+    far, high = context.vehicle.value("fence_distance"), context.vehicle.value("fence_height")
+    for place in context.places:
+        if 0 < far < place.from_origin and context.home is not None:
+            yield hit("px4-max-horizontal", place.index, place=place, limit=far)
+        if 0 < high < place.up:
+            yield hit("px4-max-vertical", place.index, place=place, limit=high)
 
 
-@checks("px4-max-horizontal")
-def _(context: ValidationContext) -> Hits:
-    return _beyond(context, max(context.vehicle.value("fence_distance"), 0.0) or None)
-
-
-@checks("px4-max-vertical")
-def _(context: ValidationContext) -> Hits:
-    return _above(context, max(context.vehicle.value("fence_height"), 0.0) or None)
-
-
-@checks("predicted-beyond")
-def _(context: ValidationContext) -> Hits:
+@checks()
+def _predicted(context: ValidationContext) -> Hits:
+    """How far the predicted flight goes."""
     track, positions, limits = context.track, context.track_positions, context.limits
     if track is None or positions is None or not len(track.t):
         return
@@ -150,66 +136,26 @@ def _(context: ValidationContext) -> Hits:
     ):
         worst = int(np.argmax(flown))
         if limit is not None and flown[worst] > limit + _WOBBLE:
-            yield at(int(track.item[worst]), worst=flown[worst], what=what, limit=limit)
+            told = {"worst": flown[worst], "what": what, "limit": limit}
+            yield hit("predicted-beyond", int(track.item[worst]), **told)
 
 
-@checks("above-120-m")
-def _(context: ValidationContext) -> Hits:
-    high = [place for place in context.places if place.up > COMMON_CEILING]
-    if high and context.limits.max_altitude is None:
-        top = max(high, key=lambda place: place.up)
-        yield at(top.index, place=top)
-
-
-@checks("return-above-ceiling")
-def _(context: ValidationContext) -> Hits:
-    ceiling, (height, name) = context.limits.max_altitude, context.parameter("return_height")
-    newest = context.vehicle.type.parameters["return_height"].newest_name
-    if ceiling is not None and height > ceiling:
-        yield at(height=height, name=name, ceiling=ceiling, newest=newest)
-
-
-@checks("far-from-home")
-def _(context: ValidationContext) -> Hits:
-    if context.home is not None and context.limits.max_distance is None:
-        for place in context.places:
-            if FAR < place.from_origin / 1000 <= _FARTHEST[context.vehicle.type.hovers]:
-                yield at(place.index, away=place.from_origin / 1000)
-
-
-@checks("long-leg")
-def _(context: ValidationContext) -> Hits:
-    farthest = 1000 * _FARTHEST[context.vehicle.type.hovers]
-    for leg in context.legs:
-        near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
-        if leg.length > 1000 * FAR and near and HOME not in (leg.start.index, leg.end.index):
-            yield at(leg.index, leg=leg, length=leg.length / 1000)
-
-
-@checks("too-long")
-def _(context: ValidationContext) -> Hits:
-    limit = context.limits.max_duration
-    if limit is not None and (least := least_duration(context)) > limit:
-        yield at(least=least, limit=limit)
-
-
-@checks("battery-reserve")
-def _(context: ValidationContext) -> Hits:
-    if (energy := context.energy) is not None:
-        least = least_duration(context) * energy.least_power / JOULES_PER_WH
-        yield from _short(energy.battery, least)
-
-
-@checks("battery-tight")
-def _(context: ValidationContext) -> Hits:
-    energy = context.energy
-    return _short(energy.battery, energy.total) if energy is not None else ()
-
-
-def _short(battery: Battery | None, takes: float) -> Hits:
-    """Tell of a flight that `takes` so many Wh and leaves less than the reserve."""
-    if battery is not None and takes > battery.usable:
-        yield at(takes=takes, battery=battery)
+@checks()
+def _duration(context: ValidationContext) -> Hits:
+    """How long the flight lasts, and what it takes of a battery."""
+    limit, energy, least = context.limits.max_duration, context.energy, 0.0
+    if limit is not None or energy is not None:
+        least = least_duration(context)
+    if limit is not None and least > limit:
+        yield hit("too-long", least=least)
+    battery = energy.battery if energy is not None else None
+    if energy is not None and battery is not None:
+        for rule, takes in (
+            ("battery-reserve", least * energy.least_power / JOULES_PER_WH),
+            ("battery-tight", energy.total),
+        ):
+            if takes > battery.usable:
+                yield hit(rule, takes=takes, battery=battery)
 
 
 def least_duration(context: ValidationContext) -> float:

@@ -13,8 +13,7 @@ from faao_mav.mission.command import (
 )
 from faao_mav.mission.item import MissionItem
 from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
-from faao_mav.validate.rule import Checks, Hits, at
-from faao_mav.validate.straight import HOME
+from faao_mav.validate.rule import Checks, Hits, hit
 
 checks = Checks()
 
@@ -25,44 +24,44 @@ _LAND = (-430.0, 8849.0)
 """The lowest and the highest land on Earth, m above sea level: the Dead Sea's shore, Everest."""
 
 
-@checks("empty")
-def _(context: ValidationContext) -> Hits:
-    return () if context.items else (at(),)
-
-
-@checks("no-home")
-def _(context: ValidationContext) -> Hits:
-    return (at(),) if context.items and context.mission.home is None else ()
-
-
-@checks("home-height")
-def _(context: ValidationContext) -> Hits:
-    home = context.mission.home
+@checks()
+def _beside(context: ValidationContext) -> Hits:
+    """Whether there is anything, and what stands beside the items."""
+    home, back = context.mission.home, context.mission.fence.breach_return
+    if not context.items:
+        yield hit("empty")
+    if context.items and home is None:
+        yield hit("no-home")
     if home is not None and not _LAND[0] <= home.altitude <= _LAND[1]:
         told = f"home is {home.altitude:,.0f} m above sea level, where no land is"
         if math.isnan(home.altitude):
             told = "the file has no height of home: heights above sea level are not checked"
-        yield at(told=told)
-
-
-@checks("rally-height")
-def _(context: ValidationContext) -> Hits:
+        yield hit("home-height", told=told)
     for n, point in enumerate(context.mission.rally, start=1):
         if math.isnan(point.altitude):
-            yield at(place=f"rally point {n}", then="`upload` refuses it")
-    back = context.mission.fence.breach_return
+            yield hit("rally-height", place=f"rally point {n}", then="`upload` refuses it")
     if back is not None and math.isnan(back.altitude):
-        yield at(place="the return point after a breach", then="the vehicle's parameters set it")
+        place, then = "the return point after a breach", "the vehicle's parameters set it"
+        yield hit("rally-height", place=place, then=then)
 
 
-@checks("unreachable")
-def _(context: ValidationContext) -> Hits:
-    end = next((k for k in range(len(context.items)) if _ends(context, k)), len(context.items))
+@checks()
+def _order(context: ValidationContext) -> Hits:
+    """How the mission ends, and what stands behind that."""
+    last = len(context.items)
+    end = next((k for k in range(last) if _ends(context, k)), last)
     rest = [k for k, _ in context.flying if k > end]
     # A landing sequence, or the target of a jump, is there on purpose.
     meant = any(k > end for k, _ in context.each(*_LANDING_SEQUENCES))
     if rest and not meant and not any((target or 0) > end for _, _, target in context.jumps):
-        yield at(rest[0], end=end + 1)
+        yield hit("unreachable", rest[0], end=end + 1)
+    landing = next((k for k, _ in context.each(*LANDINGS)), last)
+    if landing < end and any(k > landing for k, _ in context.flying):
+        yield hit("flies-on", landing)
+    if context.items and not any(context.each(*_ENDINGS)):
+        yield hit(
+            "no-ending", last - 1, does="hovers" if context.vehicle.type.hovers else "circles"
+        )
 
 
 def _ends(context: ValidationContext, index: int) -> bool:
@@ -73,61 +72,50 @@ def _ends(context: ValidationContext, index: int) -> bool:
     return command in dialect.endings
 
 
-@checks("flies-on")
-def _(context: ValidationContext) -> Hits:
-    landing = next((k for k, _ in context.each(*LANDINGS)), len(context.items))
-    flown = any(k > landing for k, _ in context.flying)
-    if flown and not any(_ends(context, k) for k in range(landing + 1)):
-        yield at(landing)
-
-
-@checks("no-ending")
-def _(context: ValidationContext) -> Hits:
-    if context.items and not any(context.each(*_ENDINGS)):
-        does = "hovers" if context.vehicle.type.hovers else "circles"
-        yield at(len(context.items) - 1, does=does)
-
-
-@checks("mixed-heights")
-def _(context: ValidationContext) -> Hits:
+@checks()
+def _among(context: ValidationContext) -> Hits:
+    """Items beside other items: heights, jumps, places."""
     sea, home = (
         [k for k, item in context.each(*FLOWN_TO) if item.frame in frames]
         for frames in (ABOVE_SEA, ABOVE_HOME)
     )
     if sea and home:
-        yield at(sea[0], other=home[0] + 1)
-
-
-@checks("jump-target")
-def _(context: ValidationContext) -> Hits:
-    return (at(index) for index, _, target in context.jumps if target is None)
-
-
-@checks("jump-forever")
-def _(context: ValidationContext) -> Hits:
-    for index, item, target in context.jumps:
-        if target is not None and target <= index and item.params[1] < 0:
-            yield at(index, target=target + 1)
-
-
-@checks("same-place")
-def _(context: ValidationContext) -> Hits:
+        yield hit("mixed-heights", sea[0], other=home[0] + 1)
+    jumps, limit = [*context.jumps], context.vehicle.type.dialect.jumps
+    for k, item, target in jumps:
+        if target is None:
+            yield hit("jump-target", k)
+        elif target <= k and item.params[1] < 0:
+            yield hit("jump-forever", k, target=target + 1)
+    if limit is not None and len(jumps) > limit.sure:
+        yield hit("many-jumps", jumps[limit.sure][0], count=len(jumps), limit=limit)
+    plain = {k for k, _ in context.each(Command.NAV_WAYPOINT)}
     for leg in context.legs:
-        start, end = leg.start.index, leg.end.index
-        if HOME in (start, end) or leg.jump or leg.length >= 0.05:
-            continue
-        both = {context.items[start].command, context.items[end].command}
-        if both == {Command.NAV_WAYPOINT} and abs(leg.rise) < 0.05:
-            yield at(end, leg=leg)
+        level = leg.length < 0.05 and abs(leg.rise) < 0.05
+        if level and not leg.jump and {leg.start.index, leg.end.index} <= plain:
+            yield hit("same-place", leg.end.index, leg=leg)
 
 
-@checks("refused-on-upload")
-def _(context: ValidationContext) -> Hits:
+@checks()
+def _refused(context: ValidationContext) -> Hits:
+    """What is refused on upload."""
     dialect = context.vehicle.type.dialect
-    for index, item in enumerate(context.items):
-        if (refusal := dialect.refusal(dialect.sent(item))) is not None:
-            reason, _, instead = refusal.partition("; ")
-            yield at(index, reason=reason, instead=instead or _replacement(item))
+    for k, item in enumerate(context.items):
+        unset, refused = dialect.refusal(item), dialect.refusal(dialect.sent(item))
+        reason, _, instead = (refused or unset or "").partition("; ")
+        if refused is not None:
+            yield hit("refused-on-upload", k, reason=reason, instead=instead or _replacement(item))
+        elif unset is not None:
+            yield hit("not-set", k, reason=reason, instead=instead)
+        if not fits_message(item):
+            largest = max(abs(v) for v in (*item.params, item.z) if not math.isnan(v))
+            yield hit("number-too-large", k, largest=largest, most=LARGEST)
+    rows = len(context.items) + dialect.home_row
+    if rows > dialect.items.sure and not dialect.unlimited(context.vehicle):
+        rule = "storage-full" if rows > dialect.items.most else "storage-tight"
+        room = f", or {dialect.make_room}" if dialect.make_room else ""
+        home = " with home" if dialect.home_row else ""
+        yield hit(rule, rows=rows, home=home, fit=dialect.items, room=room)
 
 
 def _replacement(item: MissionItem) -> str:
@@ -138,52 +126,6 @@ def _replacement(item: MissionItem) -> str:
     if item.command not in FLOWN_TO and item.frame != Frame.MISSION:
         return "set the frame to 2, or remove the item"
     return "remove the item, or use a command that the autopilot has"
-
-
-@checks("not-set")
-def _(context: ValidationContext) -> Hits:
-    dialect = context.vehicle.type.dialect
-    for index, item in enumerate(context.items):
-        refusal = dialect.refusal(item)
-        if refusal is not None and dialect.refusal(dialect.sent(item)) is None:
-            reason, _, instead = refusal.partition("; ")
-            yield at(index, reason=reason, instead=instead)
-
-
-@checks("number-too-large")
-def _(context: ValidationContext) -> Hits:
-    for index, item in enumerate(context.items):
-        if not fits_message(item):
-            largest = max(abs(v) for v in (*item.params, item.z) if not math.isnan(v))
-            yield at(index, largest=largest, LARGEST=LARGEST)
-
-
-@checks("storage-full")
-def _(context: ValidationContext) -> Hits:
-    return _too_many(context, context.vehicle.type.dialect.items.most, math.inf)
-
-
-@checks("storage-tight")
-def _(context: ValidationContext) -> Hits:
-    limit = context.vehicle.type.dialect.items
-    return _too_many(context, limit.sure, limit.most)
-
-
-def _too_many(context: ValidationContext, sure: int, most: float) -> Hits:
-    """Tell of more than `sure` rows, and no more than `most`."""
-    dialect = context.vehicle.type.dialect
-    rows = len(context.items) + dialect.home_row
-    if sure < rows <= most and not dialect.unlimited(context.vehicle):
-        room = f", or {dialect.make_room}" if dialect.make_room else ""
-        home = " with home" if dialect.home_row else ""
-        yield at(rows=rows, home=home, sure=sure, room=room)
-
-
-@checks("many-jumps")
-def _(context: ValidationContext) -> Hits:
-    limit, jumps = context.vehicle.type.dialect.jumps, [index for index, _, _ in context.jumps]
-    if limit is not None and len(jumps) > limit.sure:
-        yield at(jumps[limit.sure], count=len(jumps), limit=limit)
 
 
 _HELD = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
@@ -197,36 +139,32 @@ _INSTEAD = {
 """What to do for them where the vehicle hovers."""
 
 
-@checks("hold-changed")
-def _(context: ValidationContext) -> Hits:
-    for index, item, stored in context.stored:
-        if item.command not in _HELD or _same(item.params[0], stored.params[0]):
-            continue
-        instead = "use whole seconds from 0 to 65535, or a NAV_DELAY after a plain waypoint"
-        if not context.vehicle.type.hovers and item.command == Command.NAV_WAYPOINT:
-            instead = "use NAV_LOITER_TIME: a plane waits in a circle"
-        yield at(index, kept=stored.params[0], instead=instead)
-
-
-@checks("value-dropped")
-def _(context: ValidationContext) -> Hits:
+@checks()
+def _stored(context: ValidationContext) -> Hits:
+    """What the vehicle's storage loses."""
     found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
-    for index, item, stored in context.stored:
+    hovers = context.vehicle.type.hovers
+    for k, item, stored in context.stored:
+        waypoint, of = item.command == Command.NAV_WAYPOINT, item.command
         for n, (value, kept) in enumerate(zip(item.params, stored.params, strict=True)):
-            if item.command not in FLOWN_TO or (n == 0 and item.command in _HELD):
-                continue  # a hold is the rule above's
             turned = n == _YAW and _same(value % 360, kept)
-            if value != 0 and not turned and not _same(value, kept):
-                found.setdefault((item.command, n), []).append((index, value, kept))
-    for (command, n), places in found.items():
-        index, value, kept = places[0]
-        waypoint = command == Command.NAV_WAYPOINT
+            if _same(value, kept) or turned or of not in FLOWN_TO:
+                continue
+            if n == 0 and of in _HELD:
+                instead = "use whole seconds from 0 to 65535, or a NAV_DELAY after a plain waypoint"
+                if waypoint and not hovers:
+                    instead = "use NAV_LOITER_TIME: a plane waits in a circle"
+                yield hit("hold-changed", k, kept=kept, instead=instead)
+            elif value != 0:
+                found.setdefault((of, n), []).append((k, value, kept))
+    for (of, n), places in found.items():
+        k, value, kept = places[0]
+        waypoint = of == Command.NAV_WAYPOINT
         meaning = _MEANING.get(n, "") if waypoint else ""
         more = f", and so in {len(places)} items" if places[1:] else ""
-        instead = _INSTEAD.get(n) if waypoint and context.vehicle.type.hovers else None
-        instead = instead or "write what can be stored"
-        told = {"value": value, "kept": kept, "more": more, "instead": instead}
-        yield at(index, n=n + 1, meaning=meaning, **told)
+        other = _INSTEAD.get(n) if waypoint and hovers else None
+        told = {"value": value, "kept": kept, "meaning": meaning, "more": more}
+        yield hit("value-dropped", k, n=n + 1, instead=other or "write what can be stored", **told)
 
 
 def _same(value: float, kept: float) -> bool:

@@ -7,10 +7,12 @@ from itertools import pairwise
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero
-from faao_mav.validate.rule import Checks, Hits, at
+from faao_mav.validate.rule import Checks, Hits, hit
 from faao_mav.validate.straight import HOME, Straight
 
 checks = Checks()
+
+_CONDITIONS = (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
 
 _SINGLE = 1e-3
 """The least height above home, m, that is above 0 to PX4: it adds home's height above the sea, in
@@ -35,53 +37,78 @@ _STRAIGHT = math.radians(5)
 """The turn up to which the way back to a waypoint is no detour, rad. Chosen."""
 
 
-@checks("px4-command-rejected")
-def _(context: ValidationContext) -> Hits:
-    conditions = context.each(Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
-    return (at(k) for k, item in conditions if item.frame == Frame.MISSION)
+@checks("px4")
+def _items(context: ValidationContext) -> Hits:
+    """Items by themselves."""
+    for k, item in enumerate(context.items):
+        if item.command in _CONDITIONS and item.frame == Frame.MISSION:
+            yield hit("px4-command-rejected", k)
+        if item.command in (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000):
+            yield hit("px4-vtol-items", k)
+        if item.command in FLOWN_TO and at_zero(item) and item.frame != Frame.MISSION:
+            yield hit("px4-null-island", k)
+        if item.command in FLOWN_TO and math.isnan(item.z):
+            yield hit("px4-altitude-missing", k)
+        if not item.autocontinue and k + 1 < len(context.items):
+            yield hit("px4-stops", k)
+        allowed, mode = (0, 1, 2) if item.frame == Frame.MISSION else (0, 3), item.params[0]
+        taken = not math.isnan(mode) and math.trunc(mode) in allowed
+        if item.command in (80, Command.DO_SET_ROI) and not taken:
+            yield hit("px4-roi", k, allowed=", ".join(map(str, allowed)))
 
 
-@checks("px4-vtol-items")
-def _(context: ValidationContext) -> Hits:
-    vtol = (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000)
-    return (at(k) for k, _ in context.each(*vtol))
+@checks("px4")
+def _whole(context: ValidationContext) -> Hits:
+    """The mission as a whole, its jumps, and what beside it is to be stored."""
+    if context.items and context.items[0].command in LANDINGS:
+        yield hit("px4-starts-with-land", 0)
+    if context.items and not any(context.each(*FLOWN_TO)):
+        yield hit("px4-nothing-to-fly")
+    limit = context.vehicle.value("first_waypoint_distance")
+    for place in context.places[:1] if context.home is not None else ():
+        if 0 < limit <= place.from_origin:
+            yield hit("px4-first-waypoint-far", place.index, place=place, limit=limit)
+    for k, item, target in context.jumps:
+        # A jump to itself is flown.
+        between = context.items[target:k] if target is not None else ()
+        flies = any(each.command <= NAV_LAST for each in between)
+        if item.command == Command.DO_JUMP and item.params[1] != 0 and between and not flies:
+            yield hit("jump-in-place", k, target=(target or 0) + 1)
+    fence, dialect = context.mission.fence, context.vehicle.type.dialect
+    vertices = sum(len(polygon.vertices) for polygon in fence.polygons) + len(fence.circles)
+    for count, most, what in (
+        (vertices, dialect.fence_rows, "fence vertices"),
+        (len(context.mission.rally), dialect.rally_rows, "rally points"),
+    ):
+        if count > most:
+            yield hit("px4-fence-size", count=count, limit=most, what=what)
 
 
-@checks("px4-starts-with-land")
-def _(context: ValidationContext) -> Hits:
-    return (at(k) for k, _ in context.each(*LANDINGS) if k == 0)
-
-
-@checks("px4-takeoff-first")
-def _(context: ValidationContext) -> Hits:
+@checks("px4")
+def _takeoff(context: ValidationContext) -> Hits:
+    """Where the take-off stands, where it leads, and whether there has to be one."""
+    takeoffs = [k for k, _ in context.each(*TAKEOFFS)]
     before = next((k for k, item in enumerate(context.items) if item.command in _FLIES), 0)
     which, instead = "the take-off comes", f"move it before item {before + 1}"
-    if any(k == before for k, _ in context.each(*TAKEOFFS)):
+    if before in takeoffs:
         which, instead = "a second take-off,", "remove it"
-    for index, _ in context.each(*TAKEOFFS):
-        if before < index:
-            yield at(index, which=which, before=before + 1, instead=instead)
-
-
-@checks("px4-takeoff-altitude")
-def _(context: ValidationContext) -> Hits:
-    return (at(p.index, place=p) for p in context.places_of(TAKEOFFS) if p.up < _SINGLE)
-
-
-@checks("px4-takeoff-low")
-def _(context: ValidationContext) -> Hits:
+    for k in takeoffs:
+        if before < k:
+            yield hit("px4-takeoff-first", k, which=which, before=before + 1, instead=instead)
     radius, radius_name = context.parameter("acceptance_radius")
     first, height_name = context.parameter("takeoff_height")
-    names, least = {"radius": radius_name, "height": height_name}, max(radius + 1, first)
+    told = {"radius": radius_name, "height": height_name, "old": radius + 1, "first": first}
+    least = max(radius + 1, first)
     for place in context.places_of(TAKEOFFS):
+        away = context.home is not None and place.from_origin > radius
+        if place.up < _SINGLE:
+            yield hit("px4-takeoff-altitude", place.index, place=place)
         if 0 < place.up < least:
-            yield at(place.index, place=place, old=radius + 1, first=first, least=least, **names)
-
-
-@checks("px4-takeoff-or-landing-missing")
-def _(context: ValidationContext) -> Hits:
+            yield hit("px4-takeoff-low", place.index, place=place, least=least, **told)
+        if away and context.items[place.index].command == Command.NAV_TAKEOFF:
+            yield hit("px4-takeoff-elsewhere", place.index, place=place)
     required = int(context.vehicle.value("takeoff_land_required"))
-    takeoff, landing = any(context.each(*TAKEOFFS)), any(context.each(Command.NAV_LAND))
+    takeoff, landing = bool(takeoffs), any(context.each(Command.NAV_LAND))
     both_or_none = "both a take-off and a landing, or neither", takeoff == landing
     what, there = {
         1: ("a take-off", takeoff),
@@ -92,22 +119,8 @@ def _(context: ValidationContext) -> Hits:
     }.get(required, ("", True))
     if not there:
         missing = Command.NAV_LAND if takeoff else Command.NAV_TAKEOFF
-        yield at(required=required, what=what, missing=missing.name)
-
-
-@checks("px4-first-waypoint-far")
-def _(context: ValidationContext) -> Hits:
-    limit = context.vehicle.value("first_waypoint_distance")
-    first = context.places[:1] if context.home is not None else ()
-    return (at(p.index, place=p, limit=limit) for p in first if 0 < limit <= p.from_origin)
-
-
-@checks("px4-approach-entrance")
-def _(context: ValidationContext) -> Hits:
-    for index, _ in context.each(Command.NAV_LAND):
-        before = context.items[index - 1].command if index else Command.NAV_WAYPOINT
-        if before in FLOWN_TO and before not in _ENTRANCES:
-            yield at(index, name=name_of(before))
+        rule = "px4-takeoff-or-landing-missing"
+        yield hit(rule, required=required, what=what, missing=missing.name)
 
 
 def _approaches(context: ValidationContext) -> Iterator[tuple[int, float, float, float]]:
@@ -122,106 +135,43 @@ def _approaches(context: ValidationContext) -> Iterator[tuple[int, float, float,
             yield landing.index, entrance.up - landing.up, away, radius
 
 
-@checks("px4-approach-below")
-def _(context: ValidationContext) -> Hits:
-    return (at(k, below=-above) for k, above, _, _ in _approaches(context) if above <= 0)
-
-
-@checks("px4-approach-orbit")
-def _(context: ValidationContext) -> Hits:
-    found = ((k, away, radius) for k, _, away, radius in _approaches(context))
-    return (at(k, away=away, radius=radius) for k, away, radius in found if 0 < radius >= away)
-
-
-@checks("px4-approach-steep")
-def _(context: ValidationContext) -> Hits:
+@checks("px4", "plane")
+def _landing(context: ValidationContext) -> Hits:
+    """The approach to a landing: it starts above it, outside its own orbit, and is not steep."""
     angle = math.degrees(context.vehicle.value("landing_angle"))
     slope = math.tan(math.radians(angle + _SPARE_ANGLE))
-    for index, above, away, radius in _approaches(context):
-        if context.items[index - 1].command not in _ENTRANCES or away <= radius:
-            continue
-        way = math.sqrt(away**2 - radius**2)
-        if above > slope * way:
+    for k, above, away, radius in _approaches(context):
+        entrance = context.items[k - 1].command
+        if above <= 0:
+            yield hit("px4-approach-below", k, below=-above)
+        if 0 < radius >= away:
+            yield hit("px4-approach-orbit", k, away=away, radius=radius)
+        way = math.sqrt(max(away**2 - radius**2, 0.0))
+        if entrance in _ENTRANCES and away > radius and above > slope * way:
             steep, most, least = math.atan2(above, way), slope * way, math.ceil(above / slope)
             told = {"above": above, "way": way, "steep": math.degrees(steep), "angle": angle}
-            yield at(index, **told, most=most, least=least)
+            yield hit("px4-approach-steep", k, **told, most=most, least=least)
+    for k, _ in context.each(Command.NAV_LAND):
+        before = context.items[k - 1].command if k else Command.NAV_WAYPOINT
+        if before in FLOWN_TO and before not in _ENTRANCES:
+            yield hit("px4-approach-entrance", k, name=name_of(before))
 
 
-@checks("px4-land-start")
-def _(context: ValidationContext) -> Hits:
-    starts = [index for index, _ in context.each(Command.DO_LAND_START)]
+@checks("px4", "plane")
+def _land_start(context: ValidationContext) -> Hits:
+    starts = [k for k, _ in context.each(Command.DO_LAND_START)]
     for second in starts[1:]:
         what = f"a second DO_LAND_START, after item {starts[0] + 1}"
-        yield at(second, what=what, instead="remove it")
+        yield hit("px4-land-start", second, what=what, instead="remove it")
     for start in starts[:1]:
         what = f"a return to launch after the DO_LAND_START of item {start + 1}"
-        for index, _ in context.each(Command.NAV_RETURN_TO_LAUNCH):
-            if index > start:
-                yield at(index, what=what, instead="remove one of both")
+        for k, _ in context.each(Command.NAV_RETURN_TO_LAUNCH):
+            if k > start:
+                yield hit("px4-land-start", k, what=what, instead="remove one of both")
         # The landing's approach, the item before it, may be the DO_LAND_START itself.
-        if not any(index - 1 >= start for index, _ in context.each(*LANDINGS)):
+        if not any(k - 1 >= start for k, _ in context.each(*LANDINGS)):
             what = "there is no landing after DO_LAND_START"
-            yield at(start, what=what, instead="add NAV_LAND, or remove it")
-
-
-@checks("px4-null-island")
-def _(context: ValidationContext) -> Hits:
-    placed = ((k, item) for k, item in context.each(*FLOWN_TO) if item.frame != Frame.MISSION)
-    return (at(k) for k, item in placed if at_zero(item))
-
-
-@checks("px4-altitude-missing")
-def _(context: ValidationContext) -> Hits:
-    return (at(k) for k, item in context.each(*FLOWN_TO) if math.isnan(item.z))
-
-
-@checks("px4-stops")
-def _(context: ValidationContext) -> Hits:
-    return (at(k) for k, item in enumerate(context.items[:-1]) if not item.autocontinue)
-
-
-@checks("jump-in-place")
-def _(context: ValidationContext) -> Hits:
-    for index, item, target in context.jumps:
-        # A jump to itself is flown.
-        if item.command != Command.DO_JUMP or item.params[1] == 0 or target is None:
-            continue
-        between = context.items[target:index]
-        if between and all(each.command > NAV_LAST for each in between):
-            yield at(index, target=target + 1)
-
-
-@checks("px4-nothing-to-fly")
-def _(context: ValidationContext) -> Hits:
-    if context.items and not any(context.each(*FLOWN_TO)):
-        yield at()
-
-
-@checks("px4-takeoff-elsewhere")
-def _(context: ValidationContext) -> Hits:
-    radius = context.vehicle.value("acceptance_radius")
-    takeoffs = context.places_of({Command.NAV_TAKEOFF}) if context.home is not None else ()
-    return (at(place.index, place=place) for place in takeoffs if place.from_origin > radius)
-
-
-@checks("px4-roi")
-def _(context: ValidationContext) -> Hits:
-    for index, item in context.each(80, Command.DO_SET_ROI):
-        allowed, mode = (0, 1, 2) if item.frame == Frame.MISSION else (0, 3), item.params[0]
-        if math.isnan(mode) or math.trunc(mode) not in allowed:
-            yield at(index, allowed=", ".join(map(str, allowed)))
-
-
-@checks("px4-fence-size")
-def _(context: ValidationContext) -> Hits:
-    fence, dialect = context.mission.fence, context.vehicle.type.dialect
-    vertices = sum(len(polygon.vertices) for polygon in fence.polygons) + len(fence.circles)
-    for count, limit, what in (
-        (vertices, dialect.fence_rows, "fence vertices"),
-        (len(context.mission.rally), dialect.rally_rows, "rally points"),
-    ):
-        if count > limit:
-            yield at(count=count, limit=limit, what=what)
+            yield hit("px4-land-start", start, what=what, instead="add NAV_LAND, or remove it")
 
 
 def _radii(context: ValidationContext) -> Iterator[tuple[Straight, float]]:
@@ -233,22 +183,17 @@ def _radii(context: ValidationContext) -> Iterator[tuple[Straight, float]]:
             yield leg, item.params[1] if item.params[1] > 0 else default
 
 
-@checks("px4-radius-covers-leg")
-def _(context: ValidationContext) -> Hits:
+@checks("px4")
+def _radius(context: ValidationContext) -> Hits:
+    """Acceptance radii beside the legs and beside each other."""
     for leg, radius in _radii(context):
         held = context.items[leg.index].params[0] > 0  # it is held at all the same
         if leg.start.index != HOME and 0.05 <= leg.length <= radius and not held:
-            yield at(leg.index, leg=leg, radius=radius)
-
-
-@checks("px4-radius-small")
-def _(context: ValidationContext) -> Hits:
-    return (at(leg.index, radius=r) for leg, r in _radii(context) if r < SMALLEST)
-
-
-@checks("px4-radius-narrows")
-def _(context: ValidationContext) -> Hits:
+            yield hit("px4-radius-covers-leg", leg.index, leg=leg, radius=radius)
+        if radius < SMALLEST:
+            yield hit("px4-radius-small", leg.index, radius=radius)
     for (leg, radius), (onward, smaller) in pairwise(_radii(context)):
         passed = leg.end is onward.start and not context.items[leg.index].params[0] > 0
         if passed and radius > smaller + _NARROWER and leg.turn(onward) > _STRAIGHT:
-            yield at(leg.index, radius=radius, smaller=smaller, onward=onward.end)
+            told = {"radius": radius, "smaller": smaller, "onward": onward.end}
+            yield hit("px4-radius-narrows", leg.index, **told)

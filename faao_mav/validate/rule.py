@@ -1,4 +1,4 @@
-"""What a rule is and finds; the table of all rules, and how modules give the checks of its rows."""
+"""What a rule is and finds, the table of all rules, and how modules give the checks behind it."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,6 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
-from faao_mav.autopilot.dialect import name_of
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
@@ -42,20 +41,6 @@ class Finding:
     action: str
 
 
-Hit: TypeAlias = tuple[int | None, dict[str, object]]
-"""Where a rule holds: the index of an item in `Mission.items`, None for none, and the values that
-go into the rule's texts, by their names."""
-
-
-def at(index: int | None = None, **values: object) -> Hit:
-    """Return that a rule holds at the item `index`, with `values`."""
-    return index, values
-
-
-Hits: TypeAlias = Iterable[Hit]
-Check: TypeAlias = Callable[["ValidationContext"], Hits]
-
-
 @dataclass(frozen=True, slots=True)
 class Rule:
     """One thing that is checked.
@@ -63,10 +48,8 @@ class Rule:
     `id` is short and stays the same from version to version. `autopilot` and `kind` are the
     autopilot and the type of vehicle that it is about, None: all. `summary` says in a line what is
     wrong when the rule speaks. `says` is that with the values of a hit, "" where there are none,
-    and `do` what to do about it; a name in braces stands for a value of the hit, the `item` there
-    or its `command`, the `vehicle`, or a constant of the check's module. `source` names where the
-    rule comes from: a function or document of the autopilot with its version, a measurement, or
-    the limits that were set.
+    and `do` what to do about it. `source` names where the rule comes from: a function or document
+    of the autopilot with its version, a measurement, or the limits that were set.
     """
 
     level: Level
@@ -77,44 +60,61 @@ class Rule:
     says: str
     do: str
     source: str
-    check: Check
 
     def applies_to(self, vehicle: Vehicle) -> bool:
         """Say whether the rule is about `vehicle`."""
         return self.autopilot in (None, vehicle.autopilot) and self.kind in (None, vehicle.kind)
 
-    def findings(self, context: "ValidationContext") -> Iterator[Finding]:
-        """Yield what the rule finds in `context`."""
-        for index, values in self.check(context):
-            about: dict[str, object] = {"vehicle": context.vehicle}
-            if index is not None:
-                item = context.items[index]
-                about |= {"item": item, "command": name_of(item.command)}
-            told = self.check.__globals__ | about | values
-            says, do = (text.format_map(told) for text in (self.says or self.summary, self.do))
-            yield Finding(self.level, self.id, None if index is None else index + 1, says, do)
+    def finding(self, index: int | None, values: Mapping[str, object]) -> Finding:
+        """Return what it says of the item at `index`, with `values` for the names in braces."""
+        says, do = (text.format_map(values) for text in (self.says or self.summary, self.do))
+        return Finding(self.level, self.id, None if index is None else index + 1, says, do)
 
 
-class Checks(dict[str, Check]):
-    """The checks of one module, by the rules' ids: an instance decorates them."""
+def read_rules(constants: Mapping[str, object]) -> Iterator[Rule]:
+    """Yield the rules of the table beside this module, in which "-" is nothing.
 
-    def __call__(self, rule: str) -> Callable[[Check], Check]:
-        """Return a decorator that makes a function the check of `rule`."""
-
-        def register(check: Check) -> Check:
-            self[rule] = check
-            return check
-
-        return register
-
-
-def rules_of(checks: Mapping[str, Check]) -> Iterator[Rule]:
-    """Yield the rules of the table beside this module, each with its check; "-" is nothing."""
+    A summary may name `constants` in braces.
+    """
     table = files("faao_mav.validate").joinpath("rules.tsv").read_text(encoding="utf-8")
     for row in table.splitlines()[1:]:
         level, name, *rest = row.split("\t")
         autopilot, kind, summary, says, do, source = ("" if each == "-" else each for each in rest)
-        check = checks[name]
-        summary = summary.format_map(check.__globals__)
-        whose = (autopilot or None, kind or None)
-        yield Rule(Level(level), name, *whose, summary, says, do, source, check)
+        summary = summary.format_map(constants)
+        yield Rule(Level(level), name, autopilot or None, kind or None, summary, says, do, source)
+
+
+Hit: TypeAlias = tuple[str, int | None, dict[str, object]]
+"""That a rule, by its id, holds at the index of an item in `Mission.items`, or at none; and the
+values that go into the rule's texts, by their names."""
+
+
+def hit(rule: str, index: int | None = None, **values: object) -> Hit:
+    """Return that `rule` holds at the item `index`, with `values` for its texts."""
+    return rule, index, values
+
+
+Hits: TypeAlias = Iterable[Hit]
+Checker: TypeAlias = Callable[["ValidationContext"], Hits]
+
+
+class Checks(list[tuple[str | None, str | None, Checker]]):
+    """The checks of one module: an instance decorates the functions that find where rules hold."""
+
+    def __call__(
+        self, autopilot: str | None = None, kind: str | None = None
+    ) -> Callable[[Checker], Checker]:
+        """Return a decorator of a check for vehicles of `autopilot` and `kind`, None: all."""
+
+        def register(check: Checker) -> Checker:
+            self.append((autopilot, kind, check))
+            return check
+
+        return register
+
+    def hits(self, context: "ValidationContext") -> Iterator[Hit]:
+        """Yield what the checks about the vehicle of `context` find."""
+        vehicle = context.vehicle
+        for autopilot, kind, check in self:
+            if autopilot in (None, vehicle.autopilot) and kind in (None, vehicle.kind):
+                yield from check(context)

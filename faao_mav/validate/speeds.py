@@ -10,7 +10,7 @@ from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.mission.command import Command
 from faao_mav.power import GRAVITY
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Checks, Hits, at
+from faao_mav.validate.rule import Checks, Hits, hit
 from faao_mav.validate.straight import HOME, Straight
 
 checks = Checks()
@@ -50,97 +50,71 @@ _CLIMB_SHARE = 0.8
 steep. Chosen."""
 
 
-def _asked(context: ValidationContext) -> Iterator[tuple[int, float, float]]:
-    """Return index, type and speed, m/s, of each DO_CHANGE_SPEED."""
-    return ((k, *item.params[:2]) for k, item in context.each(Command.DO_CHANGE_SPEED))
+@checks("ardupilot")
+def _ignored(context: ValidationContext) -> Hits:
+    for k, item in context.each(Command.DO_CHANGE_SPEED):
+        throttle = 0.0 if context.vehicle.type.hovers else item.params[2]
+        if context.changes[k] is None and not throttle > 0:
+            yield hit("ardupilot-speed-ignored", k)
 
 
-@checks("speed-lean")
-def _(context: ValidationContext) -> Hits:
+@checks("px4")
+def _asked(context: ValidationContext) -> Hits:
+    default, default_name = context.parameter("cruise_speed")
+    limit, limit_name = context.parameter("max_speed")
+    for k, item in context.each(Command.DO_CHANGE_SPEED):
+        kind, speed, *_ = item.params
+        if not speed > 0:
+            yield hit("px4-speed-default", k, default=default, name=default_name)
+        elif kind in (2, 3):
+            yield hit("px4-speed-type", k)
+        if speed > limit:
+            yield hit("px4-speed-capped", k, limit=limit, name=limit_name)
+
+
+@checks("ardupilot", "plane")
+@checks("px4", "plane")
+def _airspeeds(context: ValidationContext) -> Hits:
+    least, top = context.vehicle.value("min_speed"), context.vehicle.value("max_speed")
+    for k, item in context.each(Command.DO_CHANGE_SPEED):
+        kind, speed, *_ = item.params
+        if speed > 0 and not least <= speed <= top:
+            yield hit("px4-plane-speed", k, least=least, top=top)
+            if kind == 0:
+                yield hit("ardupilot-plane-speed", k, least=least, top=top)
+
+
+@checks(kind="copter")
+def _lean(context: ValidationContext) -> Hits:
     top = context.vehicle.top_airspeed
     changes = ((change, -k) for k, change in enumerate(context.changes) if change is not None)
     level = ((change.speed or 0.0, k) for change, k in changes if change.axis == "horizontal")
     fastest, k = max(level, default=(0.0, 0))
     if fastest > top:
         angle, name = context.parameter("lean_angle")
-        yield at(-k, speed=fastest, top=top, angle=math.degrees(angle), name=name)
+        yield hit("speed-lean", -k, speed=fastest, top=top, angle=math.degrees(angle), name=name)
 
 
-@checks("ardupilot-speed-ignored")
-def _(context: ValidationContext) -> Hits:
-    own = context.vehicle.type
-    for index, item in context.each(Command.DO_CHANGE_SPEED):
-        throttle = 0.0 if own.hovers else item.params[2]
-        if own.dialect.speed_change(item) is None and not throttle > 0:
-            yield at(index)
-
-
-@checks("ardupilot-plane-speed")
-def _(context: ValidationContext) -> Hits:
-    return _airspeeds(context, (0,))
-
-
-@checks("px4-plane-speed")
-def _(context: ValidationContext) -> Hits:
-    return _airspeeds(context, ())
-
-
-def _airspeeds(context: ValidationContext, kinds: tuple[float, ...]) -> Hits:
-    """Yield the airspeeds outside those that a plane flies, asked for by one of `kinds`, or any."""
-    least, top = context.vehicle.value("min_speed"), context.vehicle.value("max_speed")
-    for index, kind, speed in _asked(context):
-        if (kind in kinds or not kinds) and speed > 0 and not least <= speed <= top:
-            yield at(index, least=least, top=top)
-
-
-@checks("px4-speed-default")
-def _(context: ValidationContext) -> Hits:
-    default, name = context.parameter("cruise_speed")
-    asked = (k for k, _, speed in _asked(context) if not speed > 0)
-    return (at(k, default=default, name=name) for k in asked)
-
-
-@checks("px4-speed-type")
-def _(context: ValidationContext) -> Hits:
-    return (at(k) for k, kind, speed in _asked(context) if kind in (2, 3) and speed > 0)
-
-
-@checks("px4-speed-capped")
-def _(context: ValidationContext) -> Hits:
-    limit, name = context.parameter("max_speed")
-    asked = (k for k, _, speed in _asked(context) if speed > limit)
-    return (at(k, limit=limit, name=name) for k in asked)
-
-
-@checks("speed-not-reached")
-def _(context: ValidationContext) -> Hits:
-    # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
-    for legs, reached in _slow_runs(context) if context.link is None else ():
-        times = (
+@checks(kind="copter")
+def _slow(context: ValidationContext) -> Hits:
+    """Legs that stay below their commanded speed."""
+    for legs, reached in _slow_runs(context):
+        mean, commanded = float(np.mean(reached)), float(np.mean([leg.speed for leg in legs]))
+        told = {"count": len(legs), "last": legs[-1].index + 1, "asked": max(x.speed for x in legs)}
+        lost = sum(
             leg.length * (1 / max(v, _SLOWEST) - 1 / leg.speed)
             for leg, v in zip(legs, reached, strict=True)
         )
-        if sum(times) >= TIME_LOST and not _crawls(legs, reached):
+        if len(legs) >= CRAWL_LEGS and 100 * mean < CRAWL_PERCENT * commanded:
+            spacing = float(np.mean([leg.length for leg in legs]))
+            yield hit("crawl", legs[0].index, spacing=spacing, mean=mean, **told)
+        # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
+        elif lost >= TIME_LOST and context.link is None:
             where = f"on this leg of {legs[0].length:.0f} m"
             if len(legs) > 1:
                 where = f"on the {len(legs)} legs from here to item {legs[-1].index + 1}"
             span = " to ".join(dict.fromkeys(f"{each(reached):.1f}" for each in (min, max)))
-            yield at(legs[0].index, where=where, span=span, asked=max(leg.speed for leg in legs))
-
-
-@checks("crawl")
-def _(context: ValidationContext) -> Hits:
-    for legs, reached in _slow_runs(context):
-        if _crawls(legs, reached):
-            spacing, mean = (float(np.mean(x)) for x in ([leg.length for leg in legs], reached))
-            told = {"count": len(legs), "last": legs[-1].index + 1, "spacing": spacing}
-            yield at(legs[0].index, **told, mean=mean, asked=max(leg.speed for leg in legs))
-
-
-def _crawls(legs: list[Straight], reached: list[float]) -> bool:
-    """Tell whether a run of legs is long and slow enough to be called a crawl."""
-    commanded = sum(leg.speed for leg in legs)
-    return len(legs) >= CRAWL_LEGS and 100 * sum(reached) < CRAWL_PERCENT * commanded
+            yield hit("speed-not-reached", legs[0].index, where=where, span=span, **told)
 
 
 def _slow_runs(context: ValidationContext) -> Iterator[tuple[list[Straight], list[float]]]:
@@ -175,37 +149,27 @@ def _long_legs(context: ValidationContext) -> Iterator[Straight]:
     return (leg for leg in context.legs if leg.length >= _SHORTEST)
 
 
-@checks("speed-above-limit")
-def _(context: ValidationContext) -> Hits:
-    return (at(k, speed=v, limit=limit) for k, v, limit in _faster_than(context, OVERSPEED))
-
-
-@checks("speed-headroom")
-def _(context: ValidationContext) -> Hits:
-    above = ((v, -k, limit) for k, v, limit in _faster_than(context, 1.0) if v <= OVERSPEED * limit)
-    for speed, index, limit in sorted(above)[-1:]:
-        yield at(-index, speed=speed, limit=limit)
-
-
-def _faster_than(context: ValidationContext, share: float) -> Iterator[tuple[int, float, float]]:
-    """Yield where a speed above `share` of the limit begins: the leg's index, speed, limit, m/s."""
-    before, limit = None, context.limits.max_speed or math.inf
+@checks()
+def _limits(context: ValidationContext) -> Hits:
+    """Speeds and accelerations beside those of the plan's vehicle."""
+    before, most, above = None, context.limits.max_speed or math.inf, []
     for leg in _long_legs(context):
-        if leg.speed > share * limit and leg.speed != before:
-            yield leg.index, leg.speed, limit
+        if most < leg.speed <= OVERSPEED * most:
+            above.append(leg)
+        elif leg.speed > most and leg.speed != before:
+            yield hit("speed-above-limit", leg.index, leg=leg)
         before = leg.speed
-
-
-@checks("acceleration-above-limit")
-def _(context: ValidationContext) -> Hits:
+    if above:
+        fastest = max(above, key=lambda leg: leg.speed)
+        yield hit("speed-headroom", fastest.index, leg=fastest)
     limit, track = context.limits.max_acceleration, context.track
     if limit is None or track is None or len(track.t) < 3:
         return
     acceleration = np.hypot(*np.gradient(track.velocity[:, :2], track.t, axis=0).T)
     worst = int(np.argmax(acceleration))
     if acceleration[worst] > 1.05 * limit:
-        told = {"acceleration": acceleration[worst], "time": track.t[worst], "limit": limit}
-        yield at(int(track.item[worst]), **told)
+        told = {"acceleration": acceleration[worst], "time": track.t[worst]}
+        yield hit("acceleration-above-limit", int(track.item[worst]), **told)
 
 
 def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, float]]:
@@ -219,35 +183,35 @@ def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, f
             yield before, after, before.turn(after)
 
 
-@checks("sharp-corners")
-def _(context: ValidationContext) -> Hits:
-    at_speed = [
-        (math.degrees(turn), leg) for leg, _, turn in _corners(context) if leg.speed > _SLOW
+@checks(kind="copter")
+def _sharp(context: ValidationContext) -> Hits:
+    sharp = [
+        (math.degrees(turn), -leg.index, leg)
+        for leg, _, turn in _corners(context)
+        if leg.speed > _SLOW and math.degrees(turn) > SHARP
     ]
-    sharp = [(turn, leg) for turn, leg in at_speed if turn > SHARP]
     if sharp:
-        turn, leg = max(sharp, key=lambda corner: corner[0])
-        slow, passing = "", context.vehicle.type.corner_speed
+        (turn, _, leg), slow, passing = max(sharp), "", context.vehicle.type.corner_speed
         if passing is not None:
             slow = f", passed at about {passing(context.vehicle, math.radians(turn)):.1f} m/s"
         count = "1 corner" if len(sharp) == 1 else f"{len(sharp)} corners"
-        yield at(leg.index, count=count, turn=turn, speed=leg.speed, slow=slow)
+        yield hit("sharp-corners", leg.index, count=count, turn=turn, leg=leg, slow=slow)
 
 
-@checks("turn-too-tight")
-def _(context: ValidationContext) -> Hits:
+@checks(kind="plane")
+def _tight(context: ValidationContext) -> Hits:
     bank = context.vehicle.value("roll_limit")
     for before, after, turn in _corners(context):
         radius = before.speed * before.speed / (GRAVITY * math.tan(bank))
         needed = radius * math.tan(min(turn, math.radians(179)) / 2)
         room = min(before.length, after.length)
         if needed > room:
-            told = {"turn": math.degrees(turn), "bank": math.degrees(bank)}
-            yield at(before.index, leg=before, **told, needed=needed, room=room)
+            told = {"turn": math.degrees(turn), "bank": math.degrees(bank), "needed": needed}
+            yield hit("turn-too-tight", before.index, leg=before, room=room, **told)
 
 
-@checks("steep-leg")
-def _(context: ValidationContext) -> Hits:
+@checks()
+def _steep(context: ValidationContext) -> Hits:
     climb, descent = (context.vehicle.value(each) for each in ("climb_speed", "descent_speed"))
     waypoints = {k for k, _ in context.each(Command.NAV_WAYPOINT)}
     for leg in _long_legs(context):
@@ -256,4 +220,6 @@ def _(context: ValidationContext) -> Hits:
         steep = math.isfinite(vertical) and level < _CLIMB_SHARE * vertical
         if steep and leg.index in waypoints and leg.start.index != HOME:
             told = {"rise": abs(leg.rise), "limit": limit, "vertical": vertical, "level": level}
-            yield at(leg.index, leg=leg, way=way, slower=leg.length / vertical, **told)
+            yield hit(
+                "steep-leg", leg.index, leg=leg, way=way, slower=leg.length / vertical, **told
+            )
