@@ -137,14 +137,6 @@ def test_what_outlines_that_cross_themselves_enclose(corners: list[Place]) -> No
     assert shapely.symmetric_difference(area.shape, odd).area < 1e-3
 
 
-def test_an_outline_that_crosses_itself_everywhere_counts_on_the_safe_side() -> None:
-    corners = [(100 * math.cos(2.4 * k), 100 * math.sin(2.4 * k)) for k in range(3000)]
-    for inclusion in (True, False):
-        (area,) = areas_of(Fence((polygon(*corners, inclusion=inclusion),)), FRAME)
-        assert area.crosses_itself
-        assert area.shape.area == pytest.approx(0 if inclusion else math.pi * 100**2, rel=1e-3)
-
-
 def test_a_polygon_without_an_area_lets_nothing_in() -> None:
     areas = areas_of(Fence((polygon((0, 0), (50, 50), (100, 100)),)), FRAME)
     free = free_area(areas, any_inclusion=False)
