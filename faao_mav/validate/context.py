@@ -18,7 +18,7 @@ from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.mission.jumps import JUMPS, jump_target
 from faao_mav.validate.demands import Limits, LinkCheck
 from faao_mav.validate.energy import EnergyUse
-from faao_mav.validate.fence_map import FenceMap, fence_map
+from faao_mav.validate.fence_map import FenceMap
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
 
 NAV_LAST = 95
@@ -228,11 +228,7 @@ class ValidationContext:
         if not self.mission.fence:
             return ()
         any_inclusion = self.vehicle.type.fence_needs_one_inclusion(self.vehicle)
-        flown, heading = np.empty((0, 2)), np.empty(0, dtype=int)
-        if self.track is not None and self.track_positions is not None:
-            flown, heading = self.track_positions[:, :2], self.track.item
-        ways = (self.legs, self.circles, flown, heading)
-        return (fence_map(self.mission.fence, self.frame, any_inclusion, *ways),)
+        return (FenceMap.of(self.mission.fence, self.frame, any_inclusion=any_inclusion),)
 
     @cached_property
     def track_positions(self) -> Real | None:

@@ -1,18 +1,17 @@
-"""What of a mission and its flight leaves the fence."""
+"""A fence in the plane: what leaves it, by which of its parts, and how near something comes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from itertools import islice
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of, free_area
-from faao_mav.validate.straight import Straight
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -20,38 +19,45 @@ if TYPE_CHECKING:
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""
 
-
-@dataclass(frozen=True, slots=True)
-class Ways:
-    """Ways (n,), to the items at the indices `index` (n,), and which of them `leave` the fence."""
-
-    index: Integers
-    shapes: Shapes
-    leave: Flags
+_NAMED = 3
+"""Parts of the fence that a way is told to break, at most. Chosen: more help nobody."""
 
 
 @dataclass(frozen=True)
 class FenceMap:
-    """A fence in the plane of `frame`, with the mission's `legs`, `circles` and predicted `flight`.
+    """A fence in the plane of `frame`.
 
-    `allowed` is where the areas let the aircraft be, their edges included. `any_inclusion`: to be
-    inside one of the inclusions is enough, else all have to hold.
+    `allowed` is where its `areas` let the aircraft be, their edges included. `any_inclusion`: one
+    inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else all have to hold.
     """
 
     frame: LocalFrame
     areas: tuple[Area, ...]
     any_inclusion: bool
     allowed: FreeArea
-    legs: Ways
-    circles: Ways
-    flight: Ways
+
+    @classmethod
+    def of(cls, fence: Fence, frame: LocalFrame | None, *, any_inclusion: bool) -> Self:
+        """Return `fence`, not an empty one, about `frame`'s origin, else about its first place."""
+        import shapely
+
+        frame = frame or LocalFrame(*fence.place)
+        areas = areas_of(fence, frame)
+        allowed = FreeArea.of(areas, any_inclusion=any_inclusion)
+        shapely.prepare(allowed.shape)
+        return cls(frame, areas, any_inclusion, allowed)
 
     def leave(self, shapes: Shapes) -> Flags:
-        """Return which of `shapes` (n,) leave the fence."""
-        return _outside(self.allowed, shapes)
+        """Return which of `shapes` (n,) leave the fence, (n,)."""
+        import shapely
 
-    def broken_by(self, shape: "BaseGeometry") -> Iterator[tuple[str, float]]:
-        """Yield in words which parts of the fence `shape` breaks, and by which length of it, m."""
+        return np.asarray(~shapely.covers(self.allowed.shape, shapes), dtype=np.bool_)
+
+    def broken_by(self, shape: "BaseGeometry") -> list[tuple[str, float]]:
+        """Return in words the first parts that `shape` breaks, and which length of it does, m."""
+        return [*islice(self._broken_by(shape), _NAMED)]
+
+    def _broken_by(self, shape: "BaseGeometry") -> Iterator[tuple[str, float]]:
         inclusions = [(f"outside {a.name}", a.shape) for a in self.areas if a.inclusion]
         if self.any_inclusion and len(inclusions) > 1:
             free = free_area(self.areas, any_inclusion=True)
@@ -64,68 +70,26 @@ class FenceMap:
             if met and not each.shape.touches(shape):
                 yield f"inside {each.name}", (shape & each.shape).length
 
-    @cached_property
-    def nearest(self) -> tuple[int, float] | None:
-        """The index of the item at which legs, circles and flight come nearest, and how near, m.
+    def nearest(self, shapes: Shapes) -> tuple[int, float] | None:
+        """Return which of `shapes` (n,) comes nearest to an edge, and how near, m.
 
-        None if there are no legs, if anything leaves the fence, or if it encloses nothing.
+        None where there is no edge: a fence that encloses nothing.
         """
         import shapely
 
-        ways, edges = (self.legs, self.circles, self.flight), self.allowed.edges()
-        if not edges or not len(self.legs.shapes) or any(each.leave.any() for each in ways):
+        rings = [shapely.LinearRing(edge) for edge in self.allowed.edges()]
+        if not rings:
             return None
-        index = np.concatenate([each.index for each in ways])
-        tree = shapely.STRtree(np.concatenate([each.shapes for each in ways]))
-        rings = [shapely.LinearRing(edge) for edge in edges]
-        (_, found), margins = tree.query_nearest(rings, return_distance=True)
+        (_, found), margins = shapely.STRtree(shapes).query_nearest(rings, return_distance=True)
         nearest = int(np.argmin(margins))
-        return int(index[found[nearest]]), float(margins[nearest])
+        return int(found[nearest]), float(margins[nearest])
 
 
-def fence_map(
-    fence: Fence,
-    frame: LocalFrame | None,
-    any_inclusion: bool,
-    straights: Sequence[Straight],
-    circles: dict[int, Real],
-    flown: Real,
-    heading_for: Integers,
-) -> FenceMap:
-    """Return `fence`, which has places, in the plane of `frame`, else of its own first place.
-
-    `any_inclusion`: one inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else
-    all have to hold. `circles` are outlines (k, 2), m, by the index of the item that is circled at.
-    The flight is at `flown` (n, 2), m, on the way to the items at the indices `heading_for` (n,).
-    """
+def lines(corners: Real) -> Shapes:
+    """Return the polylines with these `corners` (n, k, 2), m; a point where all are the same."""
     import shapely
 
-    frame = frame or LocalFrame(*fence.place)
-    areas = areas_of(fence, frame)
-    allowed = FreeArea.of(areas, any_inclusion=any_inclusion)
-    shapely.prepare(allowed.shape)
-    ends = np.array([[leg.start.ground, leg.end.ground] for leg in straights]).reshape(-1, 2, 2)
-
-    outlines = np.array([*circles.values()]) if circles else ends[:0]
-
-    def ways(index: Any, lines: Real) -> Ways:
-        shapes = np.asarray(shapely.linestrings(lines), dtype=object)
-        still = (lines == lines[:, :1]).all(axis=(1, 2))
-        shapes[still] = shapely.points(lines[still, 0])
-        return Ways(np.array(index, dtype=int), shapes, _outside(allowed, shapes))
-
-    return FenceMap(
-        frame,
-        areas,
-        any_inclusion,
-        allowed,
-        ways([leg.index for leg in straights], ends),
-        ways([*circles], outlines),
-        ways(heading_for[1:], np.stack([flown[:-1], flown[1:]], axis=1)),
-    )
-
-
-def _outside(allowed: FreeArea, shapes: Shapes) -> Flags:
-    import shapely
-
-    return np.asarray(~shapely.covers(allowed.shape, shapes), dtype=np.bool_)
+    shapes = np.asarray(shapely.linestrings(corners), dtype=object)
+    still = (corners == corners[:, :1]).all(axis=(1, 2))
+    shapes[still] = shapely.points(corners[still, 0])
+    return shapes

@@ -1,13 +1,12 @@
 """The fence: what of the mission leaves it, how near it comes, whether the vehicle keeps it."""
 
 from collections.abc import Iterator
-from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.fence_map import FenceMap
+from faao_mav.validate.fence_map import FenceMap, Shapes, lines
 from faao_mav.validate.rule import Checks, Hits, hit
 from faao_mav.vector import lengths
 
@@ -16,9 +15,6 @@ checks = Checks()
 LEAST_MARGIN = 2.0
 """The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
 what a change costs is not measured."""
-
-_NAMED = 3
-"""Parts of the fence that a way is told to break, at most. Chosen: more help nobody."""
 
 _STILL = 0.1
 """The speed, m/s, below which an aircraft heads nowhere. Chosen."""
@@ -51,39 +47,53 @@ def _outside(fence: FenceMap, place: Any) -> str:
 
 def _broken(fence: FenceMap, shape: Any) -> str:
     """Return in words which parts of the fence `shape` breaks, "" if none."""
-    return " and ".join(broken for broken, _ in islice(fence.broken_by(shape), _NAMED))
+    return " and ".join(broken for broken, _ in fence.broken_by(shape))
 
 
 @checks()
 def _ways(context: ValidationContext) -> Hits:
-    """Legs, circles and the predicted flight, of which what is told of a leg is not told again."""
+    """Legs, circles and the predicted flight, of which no item is told twice, and the margin."""
     for fence in context.fences:
-        for k in np.flatnonzero(fence.legs.leave).tolist():
-            leg, broken = context.legs[k], islice(fence.broken_by(fence.legs.shapes[k]), _NAMED)
+        legs, circles, flight = _shapes(context)
+        heading = context.track.item[1:] if context.track is not None else np.empty(0, dtype=int)
+        told = set()
+        for k in np.flatnonzero(fence.leave(legs)).tolist():
+            leg, broken = context.legs[k], fence.broken_by(legs[k])
             parts = " and ".join(f"{length:.1f} m of it {what}" for what, length in broken)
             jump = " by a jump" if leg.jump else ""
+            told.add(leg.index)
             yield hit("fence-leg", leg.index, leg=leg, jump=jump, parts=parts)
-        for k in np.flatnonzero(fence.circles.leave).tolist():
-            where = _broken(fence, fence.circles.shapes[k])
-            yield hit("fence-circle", int(fence.circles.index[k]), where=where)
-        told = [each.index[each.leave] for each in (fence.legs, fence.circles)]
-        leave = fence.flight.leave & ~np.isin(fence.flight.index, np.concatenate(told))
-        for index, first in _firsts(leave, fence.flight.index):
-            time = context.track.t[first] if context.track is not None else 0.0
-            where = _broken(fence, fence.flight.shapes[first])
-            yield hit("fence-flight", index, where=where, time=time)
-        if fence.nearest is not None:
-            index, margin = fence.nearest
+        for k in np.flatnonzero(fence.leave(circles)).tolist():
+            index = [*context.circles][k]
+            told.add(index)
+            yield hit("fence-circle", index, where=_broken(fence, circles[k]))
+        outside = fence.leave(flight)
+        for index, k in _firsts(outside, heading):
+            if index not in told and context.track is not None:
+                where = _broken(fence, flight[k])
+                yield hit("fence-flight", index, where=where, time=context.track.t[k])
+        nearest = None
+        if len(legs) and not told and not outside.any():
+            nearest = fence.nearest(np.concatenate([legs, circles, flight]))
+        if nearest is not None:
+            k, margin = nearest
+            index = [*(leg.index for leg in context.legs), *context.circles, *heading.tolist()][k]
             rule = "fence-close" if margin < LEAST_MARGIN else "fence-margin"
             yield hit(rule, index, margin=margin)
+            if "fence_margin" in context.vehicle.type.parameters:
+                keep, name = context.parameter("fence_margin")
+                if margin < keep:
+                    yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)
 
 
-@checks("ardupilot")
-def _margin(context: ValidationContext) -> Hits:
-    keep, name = context.parameter("fence_margin")
-    for index, margin in (fence.nearest for fence in context.fences if fence.nearest is not None):
-        if margin < keep:
-            yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)
+def _shapes(context: ValidationContext) -> list[Shapes]:
+    """Return legs, circles, and the predicted flight from sample to sample."""
+    legs = np.array([[leg.start.ground, leg.end.ground] for leg in context.legs])
+    circles, flown = np.array([*context.circles.values()]), np.empty((1, 2))
+    if context.track_positions is not None:
+        flown = context.track_positions[:, :2]
+    steps = np.stack([flown[:-1], flown[1:]], axis=1)
+    return [lines(each if len(each) else steps[:0]) for each in (legs, circles, steps)]
 
 
 @checks()

@@ -9,27 +9,21 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given as drawn
-from judged import COPTER, FRAME, circle, given, polygon
+from judged import FRAME, circle, given, polygon
 from shapely.geometry.base import BaseGeometry
 
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import areas_of, free_area
-from faao_mav.validate.context import ValidationContext
 
 metres = st.floats(-500, 500)
 places = st.tuples(metres, metres)
 Place = tuple[float, float]
 
 
-def broken(line: str) -> list[bool]:
-    """Which legs of a mission leave its fence."""
-    case = given(line)
-    return [bool(out) for out in ValidationContext(case.mission, COPTER).fences[0].legs.leave]
-
-
 def between(a: Place, b: Place, fence: str) -> bool:
     """Whether the leg from a to b leaves the fence."""
-    return broken(f"{fence} waypoint:{a[0]!r},{a[1]!r},30 waypoint:{b[0]!r},{b[1]!r},30")[1]
+    case = given(f"{fence} waypoint:{a[0]!r},{a[1]!r},30 waypoint:{b[0]!r},{b[1]!r},30")
+    return 2 in {finding.item for finding in case.by("fence-leg")}
 
 
 def distance_to_segment(point: Place, a: Place, b: Place) -> float:
@@ -144,5 +138,6 @@ def test_a_polygon_without_an_area_lets_nothing_in() -> None:
     assert free.area < 1e-6
     assert free_area((), any_inclusion=False) is None
     point = Fence((polygon((20, 0), (20, 0), (20, 0), inclusion=False),))  # encloses nothing
-    case = ValidationContext(given("takeoff row=9,25 return").mission, COPTER)
-    assert ValidationContext(replace(case.mission, fence=point), COPTER).fences[0].nearest is None
+    case = given("takeoff row=9,25 return")
+    beside = replace(case, mission=replace(case.mission, fence=point))
+    assert not beside.by("fence-margin") + beside.by("fence-leg")
