@@ -8,7 +8,7 @@ from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Checks, Hits, hit
-from faao_mav.validate.straight import HOME, PlacedItem, Straight
+from faao_mav.validate.straight import HOME, PlacedItem
 
 checks = Checks()
 
@@ -165,16 +165,13 @@ def least_duration(context: ValidationContext) -> float:
     Jumps are not followed; circles without end are left out.
     """
     climb, track = context.vehicle.value("climb_speed"), context.track
-    flying = sum(_leg_duration(leg, climb) for leg in context.legs if not leg.jump)
+    flying = 0.0
+    for leg in (leg for leg in context.legs if not leg.jump):
+        up = leg.rise / climb if leg.rise > 0 and climb > 0 else 0.0
+        flying += max(leg.length / leg.speed if leg.speed > 0 else 0.0, up)
     holds = (item.params[0] for k, item in context.each(*_DELAYS) if k not in context.orbits)
     waiting = sum(hold for hold in holds if hold > 0)
-    circling = sum(
-        orbit.lasting(context.speeds[k]) for k, orbit in context.orbits.items() if not orbit.endless
-    )
+    orbits = ((k, orbit) for k, orbit in context.orbits.items() if not orbit.endless)
+    circling = sum(orbit.lasting(context.speeds[k]) for k, orbit in orbits)
     predicted = float(track.t[-1]) if track is not None and len(track.t) else math.inf
     return min(flying + waiting + circling, predicted)
-
-
-def _leg_duration(leg: Straight, climb: float) -> float:
-    up = leg.rise / climb if leg.rise > 0 and climb > 0 else 0.0
-    return max(leg.length / leg.speed if leg.speed > 0 else 0.0, up)

@@ -28,25 +28,21 @@ def _points(context: ValidationContext) -> Hits:
         for area in fence.areas:
             if area.crosses_itself:
                 yield hit("fence-crosses-itself", name=area.name)
-        if context.home is not None and (where := _outside(fence, (0.0, 0.0))):
+        if context.home is not None and (where := _broken(fence, (0.0, 0.0))):
             yield hit("fence-home", where=where, then=f"; {then}" if then else "")
         for n, point in enumerate(context.mission.rally, start=1):
-            if where := _outside(fence, fence.frame.to_local(point.latitude, point.longitude)):
+            if where := _broken(fence, fence.frame.to_local(point.latitude, point.longitude)):
                 yield hit("fence-rally", n=n, where=where)
         for point in (back,) if back is not None else ():
-            if where := _outside(fence, fence.frame.to_local(point.latitude, point.longitude)):
+            if where := _broken(fence, fence.frame.to_local(point.latitude, point.longitude)):
                 yield hit("fence-return", where=where)
 
 
-def _outside(fence: FenceMap, place: Any) -> str:
-    """Return where `place` (2,), m, is if it is not within the fence, else ""."""
+def _broken(fence: FenceMap, shape: Any) -> str:
+    """Return in words which parts of the fence `shape`, or a place (2,), m, breaks, "" if none."""
     import shapely
 
-    return _broken(fence, shapely.Point(place))
-
-
-def _broken(fence: FenceMap, shape: Any) -> str:
-    """Return in words which parts of the fence `shape` breaks, "" if none."""
+    shape = shape if isinstance(shape, shapely.Geometry) else shapely.Point(shape)
     return " and ".join(broken for broken, _ in fence.broken_by(shape))
 
 

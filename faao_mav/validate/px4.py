@@ -123,38 +123,31 @@ def _takeoff(context: ValidationContext) -> Hits:
         yield hit(rule, required=required, what=what, missing=missing.name)
 
 
-def _approaches(context: ValidationContext) -> Iterator[tuple[int, float, float, float]]:
-    """Yield the index of each landing and the item before it: m above, m away, m of its orbit."""
-    by_index = {place.index: place for place in context.places}
-    for landing in context.places_of({Command.NAV_LAND}):
-        if (entrance := by_index.get(landing.index - 1)) is not None:
-            away = math.hypot(entrance.east - landing.east, entrance.north - landing.north)
-            item = context.items[entrance.index]
-            orbits = item.command == Command.NAV_LOITER_TO_ALT and not math.isnan(item.params[1])
-            radius = abs(item.params[1]) if orbits else 0.0
-            yield landing.index, entrance.up - landing.up, away, radius
-
-
 @checks("px4", "plane")
 def _landing(context: ValidationContext) -> Hits:
     """The approach to a landing: it starts above it, outside its own orbit, and is not steep."""
     angle = math.degrees(context.vehicle.value("landing_angle"))
     slope = math.tan(math.radians(angle + _SPARE_ANGLE))
-    for k, above, away, radius in _approaches(context):
-        entrance = context.items[k - 1].command
+    by_index = {place.index: place for place in context.places}
+    for k, _ in context.each(Command.NAV_LAND):
+        item = context.items[max(k - 1, 0)]
+        if k and item.command in FLOWN_TO and item.command not in _ENTRANCES:
+            yield hit("px4-approach-entrance", k, name=name_of(item.command))
+        if k - 1 not in by_index or k not in by_index:
+            continue
+        entrance, landing = by_index[k - 1], by_index[k]
+        orbits = item.command == Command.NAV_LOITER_TO_ALT and not math.isnan(item.params[1])
+        radius, above = abs(item.params[1]) if orbits else 0.0, entrance.up - landing.up
+        away = math.hypot(entrance.east - landing.east, entrance.north - landing.north)
+        way = math.sqrt(max(away**2 - radius**2, 0.0))
         if above <= 0:
             yield hit("px4-approach-below", k, below=-above)
         if 0 < radius >= away:
             yield hit("px4-approach-orbit", k, away=away, radius=radius)
-        way = math.sqrt(max(away**2 - radius**2, 0.0))
-        if entrance in _ENTRANCES and away > radius and above > slope * way:
+        elif item.command in _ENTRANCES and away > 0 and above > slope * way:
             steep, most, least = math.atan2(above, way), slope * way, math.ceil(above / slope)
             told = {"above": above, "way": way, "steep": math.degrees(steep), "angle": angle}
             yield hit("px4-approach-steep", k, **told, most=most, least=least)
-    for k, _ in context.each(Command.NAV_LAND):
-        before = context.items[k - 1].command if k else Command.NAV_WAYPOINT
-        if before in FLOWN_TO and before not in _ENTRANCES:
-            yield hit("px4-approach-entrance", k, name=name_of(before))
 
 
 @checks("px4", "plane")

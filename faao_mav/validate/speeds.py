@@ -97,8 +97,12 @@ def _lean(context: ValidationContext) -> Hits:
 
 @checks(kind="copter")
 def _slow(context: ValidationContext) -> Hits:
-    """Legs that stay below their commanded speed."""
-    for legs, reached in _slow_runs(context):
+    """Runs of neighbouring legs that stay below their commanded speed."""
+    pairs = _reached_speeds(context)
+    for slow, run in groupby(pairs, lambda pair: 100 * pair[1] < REACHED_PERCENT * pair[0].speed):
+        if not slow:
+            continue
+        legs, reached = zip(*run, strict=True)
         mean, commanded = float(np.mean(reached)), float(np.mean([leg.speed for leg in legs]))
         told = {"count": len(legs), "last": legs[-1].index + 1, "asked": max(x.speed for x in legs)}
         lost = sum(
@@ -115,15 +119,6 @@ def _slow(context: ValidationContext) -> Hits:
                 where = f"on the {len(legs)} legs from here to item {legs[-1].index + 1}"
             span = " to ".join(dict.fromkeys(f"{each(reached):.1f}" for each in (min, max)))
             yield hit("speed-not-reached", legs[0].index, where=where, span=span, **told)
-
-
-def _slow_runs(context: ValidationContext) -> Iterator[tuple[list[Straight], list[float]]]:
-    """Yield neighbouring legs that stay below their commanded speed, and what they reach, m/s."""
-    pairs = _reached_speeds(context)
-    for slow, run in groupby(pairs, lambda pair: 100 * pair[1] < REACHED_PERCENT * pair[0].speed):
-        if slow:
-            legs, reached = zip(*run, strict=True)
-            yield list(legs), list(reached)
 
 
 def _reached_speeds(context: ValidationContext) -> list[tuple[Straight, float]]:
