@@ -18,7 +18,6 @@ from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.mission.jumps import JUMPS, jump_target
 from faao_mav.validate.demands import Limits, LinkCheck
 from faao_mav.validate.energy import EnergyUse
-from faao_mav.validate.fence_map import FenceMap
 from faao_mav.validate.straight import HOME, PlacedItem, Straight
 
 NAV_LAST = 95
@@ -221,14 +220,6 @@ class ValidationContext:
         chosen = self.vehicle.type.rally(self.vehicle).chosen(here.ground, home.ground, rally)
         east, north = (home.ground if chosen is None else rally[chosen]).tolist()
         return PlacedItem(HOME, east, north, math.nan)
-
-    @cached_property
-    def fences(self) -> tuple[FenceMap, ...]:
-        """The fence in the local frame, or nothing."""
-        if not self.mission.fence:
-            return ()
-        any_inclusion = self.vehicle.type.fence_needs_one_inclusion(self.vehicle)
-        return (FenceMap.of(self.mission.fence, self.frame, any_inclusion=any_inclusion),)
 
     @cached_property
     def track_positions(self) -> Real | None:

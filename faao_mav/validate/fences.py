@@ -1,103 +1,187 @@
 """The fence: what of the mission leaves it, how near it comes, whether the vehicle keeps it."""
 
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
+from faao_mav.arrays import Flags
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.fence_area import Area, FreeArea, areas_of, free_area
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.fence_map import FenceMap, Shapes, lines
 from faao_mav.validate.rule import Checks, Hits, hit
 from faao_mav.vector import lengths
 
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
 checks = Checks()
+
+Shapes: TypeAlias = NDArray[np.object_]
+"""Geometries of the local frame."""
 
 LEAST_MARGIN = 2.0
 """The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
 what a change costs is not measured."""
 
+_NAMED = 3
+"""Parts of the fence that a way is told to break, at most. Chosen: more help nobody."""
+
 _STILL = 0.1
 """The speed, m/s, below which an aircraft heads nowhere. Chosen."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Fence:
+    """A fence in the plane of `frame`.
+
+    `allowed` is where its `areas` let the aircraft be, their edges included. `any_inclusion`: one
+    inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else all have to hold.
+    """
+
+    frame: LocalFrame
+    areas: tuple[Area, ...]
+    any_inclusion: bool
+    allowed: FreeArea
+
+    @classmethod
+    def of(cls, context: ValidationContext) -> Self:
+        """Return the fence of a mission that has one, without a local frame about its own place."""
+        import shapely
+
+        frame = context.frame or LocalFrame(*context.mission.fence.place)
+        any_inclusion = context.vehicle.type.fence_needs_one_inclusion(context.vehicle)
+        areas = areas_of(context.mission.fence, frame)
+        allowed = FreeArea.of(areas, any_inclusion=any_inclusion)
+        shapely.prepare(allowed.shape)
+        return cls(frame, areas, any_inclusion, allowed)
+
+    def leave(self, shapes: Shapes) -> Flags:
+        """Return which of `shapes` (n,) leave the fence, (n,)."""
+        import shapely
+
+        return np.asarray(~shapely.covers(self.allowed.shape, shapes), dtype=np.bool_)
+
+    def broken_by(self, shape: "BaseGeometry") -> list[tuple[str, float]]:
+        """Return in words the first parts that `shape` breaks, and which length of it does, m."""
+        return [*islice(self._broken_by(shape), _NAMED)]
+
+    def _broken_by(self, shape: "BaseGeometry") -> Iterator[tuple[str, float]]:
+        inclusions = [(f"outside {a.name}", a.shape) for a in self.areas if a.inclusion]
+        if self.any_inclusion and len(inclusions) > 1:
+            free = free_area(self.areas, any_inclusion=True)
+            inclusions = [("outside all inclusions", free)] if free is not None else []
+        for broken, area in inclusions:
+            if not area.covers(shape):
+                yield broken, (shape - area).length
+        for each in self.areas:
+            met = not each.inclusion and each.shape.intersects(shape)
+            if met and not each.shape.touches(shape):
+                yield f"inside {each.name}", (shape & each.shape).length
+
+    def where(self, shape: Any) -> str:
+        """Return in words which parts `shape`, or a place (2,), m, breaks; "" if none."""
+        import shapely
+
+        shape = shape if isinstance(shape, shapely.Geometry) else shapely.Point(shape)
+        return " and ".join(broken for broken, _ in self.broken_by(shape))
+
+    def nearest(self, shapes: Shapes) -> tuple[int, float] | None:
+        """Return which of `shapes` (n,) comes nearest to an edge, and how near, m.
+
+        None where there is no edge: a fence that encloses nothing.
+        """
+        import shapely
+
+        rings = [shapely.LinearRing(edge) for edge in self.allowed.edges()]
+        if not rings:
+            return None
+        (_, found), margins = shapely.STRtree(shapes).query_nearest(rings, return_distance=True)
+        nearest = int(np.argmin(margins))
+        return int(found[nearest]), float(margins[nearest])
+
+
 @checks()
-def _points(context: ValidationContext) -> Hits:
-    """The fence itself, and the points beside the items that lie outside."""
-    back, then = context.mission.fence.breach_return, context.vehicle.type.home_outside_fence
-    for fence in context.fences:
-        for area in fence.areas:
-            if area.crosses_itself:
-                yield hit("fence-crosses-itself", name=area.name)
-        if context.home is not None and (where := _broken(fence, (0.0, 0.0))):
-            yield hit("fence-home", where=where, then=f"; {then}" if then else "")
-        for n, point in enumerate(context.mission.rally, start=1):
-            if where := _broken(fence, fence.frame.to_local(point.latitude, point.longitude)):
-                yield hit("fence-rally", n=n, where=where)
-        for point in (back,) if back is not None else ():
-            if where := _broken(fence, fence.frame.to_local(point.latitude, point.longitude)):
-                yield hit("fence-return", where=where)
+def _all(context: ValidationContext) -> Hits:
+    if context.mission.fence:
+        fence = _Fence.of(context)
+        yield from _points(context, fence)
+        yield from _ways(context, fence)
+        yield from _kept(context, fence)
 
 
-def _broken(fence: FenceMap, shape: Any) -> str:
-    """Return in words which parts of the fence `shape`, or a place (2,), m, breaks, "" if none."""
-    import shapely
+def _points(context: ValidationContext, fence: _Fence) -> Hits:
+    """Tell of the fence itself, and of points beside the items that lie outside."""
+    for area in fence.areas:
+        if area.crosses_itself:
+            yield hit("fence-crosses-itself", name=area.name)
+    then = context.vehicle.type.home_outside_fence
+    if context.home is not None and (where := fence.where((0.0, 0.0))):
+        yield hit("fence-home", where=where, then=f"; {then}" if then else "")
+    back = context.mission.fence.breach_return
+    points = [("fence-rally", n, p) for n, p in enumerate(context.mission.rally, start=1)]
+    for rule, n, point in [*points, *([("fence-return", 0, back)] if back is not None else [])]:
+        if where := fence.where(fence.frame.to_local(point.latitude, point.longitude)):
+            yield hit(rule, n=n, where=where)
 
-    shape = shape if isinstance(shape, shapely.Geometry) else shapely.Point(shape)
-    return " and ".join(broken for broken, _ in fence.broken_by(shape))
 
-
-@checks()
-def _ways(context: ValidationContext) -> Hits:
-    """Legs, circles and the predicted flight, of which no item is told twice, and the margin."""
-    for fence in context.fences:
-        legs, circles, flight = _shapes(context)
-        heading = context.track.item[1:] if context.track is not None else np.empty(0, dtype=int)
-        told = set()
-        for k in np.flatnonzero(fence.leave(legs)).tolist():
-            leg, broken = context.legs[k], fence.broken_by(legs[k])
-            parts = " and ".join(f"{length:.1f} m of it {what}" for what, length in broken)
-            jump = " by a jump" if leg.jump else ""
-            told.add(leg.index)
-            yield hit("fence-leg", leg.index, leg=leg, jump=jump, parts=parts)
-        for k in np.flatnonzero(fence.leave(circles)).tolist():
-            index = [*context.circles][k]
-            told.add(index)
-            yield hit("fence-circle", index, where=_broken(fence, circles[k]))
-        outside = fence.leave(flight)
-        for index, k in _firsts(outside, heading):
-            if index not in told and context.track is not None:
-                where = _broken(fence, flight[k])
-                yield hit("fence-flight", index, where=where, time=context.track.t[k])
-        nearest = None
-        if len(legs) and not told and not outside.any():
-            nearest = fence.nearest(np.concatenate([legs, circles, flight]))
-        if nearest is not None:
-            k, margin = nearest
-            index = [*(leg.index for leg in context.legs), *context.circles, *heading.tolist()][k]
-            rule = "fence-close" if margin < LEAST_MARGIN else "fence-margin"
-            yield hit(rule, index, margin=margin)
-            if "fence_margin" in context.vehicle.type.parameters:
-                keep, name = context.parameter("fence_margin")
-                if margin < keep:
-                    yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)
+def _ways(context: ValidationContext, fence: _Fence) -> Hits:
+    """Tell of legs, circles and the predicted flight, of no item twice, and of the margin."""
+    legs, circles, flight = _shapes(context)
+    heading = context.track.item[1:] if context.track is not None else np.empty(0, dtype=int)
+    told = set()
+    for k in np.flatnonzero(fence.leave(legs)).tolist():
+        leg, jump = context.legs[k], " by a jump" if context.legs[k].jump else ""
+        broken = (f"{length:.1f} m of it {what}" for what, length in fence.broken_by(legs[k]))
+        told.add(leg.index)
+        yield hit("fence-leg", leg.index, leg=leg, jump=jump, parts=" and ".join(broken))
+    for k in np.flatnonzero(fence.leave(circles)).tolist():
+        index = [*context.circles][k]
+        told.add(index)
+        yield hit("fence-circle", index, where=fence.where(circles[k]))
+    outside = fence.leave(flight)
+    for index, k in _firsts(outside, heading):
+        if index not in told and context.track is not None:
+            yield hit("fence-flight", index, where=fence.where(flight[k]), time=context.track.t[k])
+    if told or outside.any() or not len(legs):
+        return
+    nearest = fence.nearest(np.concatenate([legs, circles, flight]))
+    if nearest is not None:
+        k, margin = nearest
+        index = [*(leg.index for leg in context.legs), *context.circles, *heading.tolist()][k]
+        yield hit("fence-close" if margin < LEAST_MARGIN else "fence-margin", index, margin=margin)
+        if "fence_margin" in context.vehicle.type.parameters:
+            keep, name = context.parameter("fence_margin")
+            if margin < keep:
+                yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)
 
 
 def _shapes(context: ValidationContext) -> list[Shapes]:
     """Return legs, circles, and the predicted flight from sample to sample."""
+    import shapely
+
     legs = np.array([[leg.start.ground, leg.end.ground] for leg in context.legs])
     circles, flown = np.array([*context.circles.values()]), np.empty((1, 2))
     if context.track_positions is not None:
         flown = context.track_positions[:, :2]
-    steps = np.stack([flown[:-1], flown[1:]], axis=1)
-    return [lines(each if len(each) else steps[:0]) for each in (legs, circles, steps)]
+    steps, shapes = np.stack([flown[:-1], flown[1:]], axis=1), []
+    for corners in (legs, circles, steps):
+        corners = corners if len(corners) else steps[:0]
+        lines = np.asarray(shapely.linestrings(corners), dtype=object)
+        still = (corners == corners[:, :1]).all(axis=(1, 2))
+        lines[still] = shapely.points(corners[still, 0])
+        shapes.append(lines)
+    return shapes
 
 
-@checks()
-def _kept(context: ValidationContext) -> Hits:
-    """What the vehicle does at its fence, and where it looks ahead for it."""
+def _kept(context: ValidationContext, fence: _Fence) -> Hits:
+    """Tell what the vehicle does at its fence, and where it looks ahead for it."""
     vehicle, track, positions = context.vehicle, context.track, context.track_positions
     response = vehicle.type.at_fence(vehicle)
-    if context.fences and response.parameter and not response.keeps:
+    if response.parameter and not response.keeps:
         value, name = context.parameter(response.parameter)
         does = "says so, and flies on" if response.action == "report" else "flies on"
         to, parameter = response.set_to, name.partition(",")[0]
@@ -106,13 +190,12 @@ def _kept(context: ValidationContext) -> Hits:
         return
     velocity, speed = track.velocity[:, :2], lengths(track.velocity[:, :2])
     ahead = vehicle.type.fence_ahead(vehicle, speed)
-    for fence in context.fences if ahead.any() else ():
+    if ahead.any():
         import shapely
 
         heading = velocity / np.maximum(speed, _STILL)[:, None]
-        tested = shapely.points(positions[:, :2] + heading * ahead[:, None])
-        outside = fence.leave(np.asarray(tested)) & (speed > _STILL)
-        for index, k in _firsts(outside, track.item):
+        tested = np.asarray(shapely.points(positions[:, :2] + heading * ahead[:, None]))
+        for index, k in _firsts(fence.leave(tested) & (speed > _STILL), track.item):
             yield hit("fence-ahead", index, time=track.t[k], speed=speed[k], ahead=ahead[k])
 
 

@@ -32,9 +32,6 @@ _BEFORE = 1.0
 _COARSE, _FINE = 0.4, 0.02
 """Steps in which the time of departure is searched, s. Chosen."""
 
-_BLOCK = 1_000_000
-"""Positions that are compared at once, so that memory does not grow with the flight. Chosen."""
-
 _METRES_PER_SECOND = 0.5
 """How many metres off the planned path weigh as much as a second before or after its time, where
 the path comes by a place more than once, or rests there: as for the end of a flight."""
@@ -132,7 +129,10 @@ def _departure(solution: Solution, line: Line, flight: Line) -> tuple[float, flo
         return float(squares.min()), float(starts[np.argmin(squares)])
 
     coarse = np.arange(first, last + _COARSE, _COARSE)
-    near = min(map(nearest, np.array_split(coarse, 1 + len(coarse) * len(t) // _BLOCK)))[1]
+    around = coarse[lengths(positions_at(coarse + begin, *flight) - w[0]) < reach]
+    if not len(around):
+        return math.inf, 0.0
+    near = nearest(around)[1]
     fine = np.clip(near + np.arange(-2 * _COARSE, 2 * _COARSE, _FINE), first, last)
     square, start = nearest(fine)
     return math.sqrt(square) / reach, start
