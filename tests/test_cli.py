@@ -125,6 +125,7 @@ def test_bad_plans_exit_with_2_and_good_ones_without_a_mission_with_1(
     plan: Path, tmp_path: Path
 ) -> None:
     out, save = tmp_path / "m.txt", tmp_path / "r.npz"
+    out.write_text("precious")
     plan.write_text(FLYABLE.replace("altitude: 40", "altitude: -1"))
     result = run(plan, "--out", out)
     assert result.exit_code == 2
