@@ -153,6 +153,10 @@ def test_kml_in_an_archive() -> None:
     for content, told in ((archive.getvalue()[:60], "not a KMZ archive"), (b"PK\3\4", "not a KMZ")):
         with pytest.raises(MissionFileError, match=told):
             kml(content)
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("doc.txt", KML)
+    with pytest.raises(MissionFileError, match=r"an archive without a \.kml file"):
+        kml(archive.getvalue())
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("doc.kml", " " * 10_000_000)
     with pytest.raises(MissionFileError, match="larger than 4,000,000 bytes"):
@@ -175,8 +179,10 @@ def test_the_parts_of_an_inclusion_are_one_area() -> None:
 
 
 def test_an_empty_part_is_named_and_passed_over() -> None:
+    inner = {"type": "Polygon", "coordinates": [SQUARE]}
     found = geojson(collection(
-        feature("Polygon", [SQUARE], {"name": "field"}),
+        feature("", [], {"name": "field"})
+        | {"geometry": {"type": "GeometryCollection", "geometries": [inner]}},
         feature("MultiPolygon", [[]], {}),
         feature("MultiPolygon", [[HOLE], []], {"name": "no-fly"}),
         feature("Polygon", [], {"name": "school"}),
@@ -220,6 +226,13 @@ def test_what_is_no_fence_is_refused_with_its_place(value: Any, told: str) -> No
     ("text", "told"),
     [
         ("<kml>", "not XML"),
+        (KML.replace("innerB", "outerB"), "polygon 'field': expected one outerBoundaryIs"),
+        (
+            KML.replace(
+                "<gx", "<ExtendedData><Data name='a'><value>NFZ</value></Data></ExtendedData><gx"
+            ),
+            "an exclusion with a hole",
+        ),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><kml>&b;</kml>", "document type or entities"),
         (KML.replace("8.1,47,0", "8.1;47"), "polygon 'field': '8.1;47'"),
         (KML.replace("8.1,47,0", "800,47,0"), "polygon 'field': fence polygon: 47.0, 800.0"),

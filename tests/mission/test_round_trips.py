@@ -98,6 +98,8 @@ def test_what_becomes_0_is_told(mission: Mission, name: str) -> None:
     unset = any(math.isnan(value) for item in mission.items for value in item.numbers)
     assert unset == any("not set (NaN) becomes 0" in line for line in lost)
     assert any("no home is known" in line for line in lost) == (mission.home is None)
+    low = dataclasses.replace(mission, home=Home(1.0, 2.0, math.nan))
+    assert "the altitude of home is not known: the file says 0 m" in render_files(low, "x.txt").lost
 
 
 WPL = write_wpl(Mission((MissionItem(16, 3, x=47.5, y=8.6, z=50.0),), Home(47.4, 8.5, 400.0)))
