@@ -21,7 +21,7 @@ from faao_mav.fly.fly import fly
 from faao_mav.fly.logs import read_log
 from faao_mav.fly.seen import Flight
 from faao_mav.fly.telling import Telling
-from faao_mav.report.debrief import debriefed
+from faao_mav.report.debrief import FromLog
 from faao_mav.validate.flown import Debriefing
 from missions import plan_of
 
@@ -44,7 +44,7 @@ def watched(autopilots: Path, autopilot: str, result: Result, folder: Path) -> s
     logs = [path for path in folder.rglob("*") if path.suffix in {".BIN", ".ulg"}]
     logs.sort(key=lambda path: path.stat().st_size)
     begun = time.process_time()
-    _, own = debriefed(read_log(logs[-1]), result, logs[-1].name)
+    own = FromLog.of(read_log(logs[-1]), result, logs[-1].name).found
     share = 100 * own.flown.delivered_rate / result.solution.delivered_rate
     cells.append(f"{own.flown.rms_position_error:5.2f} {share:7.2f} %")
     apart = max(abs(here / there - 1) for here, there in zip(rates(own), rates(seen), strict=True))

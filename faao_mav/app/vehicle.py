@@ -13,7 +13,6 @@ import numpy as np
 
 from faao_mav.app.answers import thinned
 from faao_mav.errors import FaaoError, PlanError
-from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import joined
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle
 from faao_mav.workflow import Result
@@ -132,15 +131,14 @@ def debriefed(result: Result, log: Path, name: str) -> tuple[str, list[list[floa
     log, and `InputError` for a file that is none.
     """
     from faao_mav.fly.logs import read_log
-    from faao_mav.report import debrief
+    from faao_mav.report.debrief import FromLog
 
     try:
         records = read_log(log)
     except FaaoError as error:
         raise type(error)(str(error).replace(str(log), name)) from None
-    record, found = debrief.debriefed(records, result, name)
-    remarks = debrief.remarks_on(records, record, found, result)
-    said = joined([*debriefing_lines(found), *remarks])
+    told = FromLog.of(records, result, name)
+    record, found = told.record, told.found
     relay = (record.t >= found.start) & (record.t <= found.start + found.flown.duration)
     places = np.stack([record.latitude, record.longitude], axis=1)[relay]
-    return said, thinned(places).round(8).tolist()
+    return joined(told.lines()), thinned(places).round(8).tolist()

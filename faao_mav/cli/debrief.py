@@ -47,36 +47,23 @@ def debrief(
     check_page(report, {"LOG": log, "--plan": plan_file, "--solution": solution_file})
     from faao_mav.fly.logs import read_log
     from faao_mav.fly.radio import Radios
-    from faao_mav.report.debrief import debriefed, other_parameters, remarks_on
-    from faao_mav.report.flights import debriefing_lines
+    from faao_mav.report.debrief import FromLog
     from faao_mav.report.lines import joined
     from faao_mav.validate.flown import Line
-    from faao_mav.workflow import Result, debriefing_as_dict, with_mission
+    from faao_mav.workflow import Result, with_mission
 
     records = read_log(log, system)
     solution = planned(plan_file, solution_file)
     assert solution is not None
     radios = None if radio is None else Radios(solution, radio)
-    result = with_mission(Result(solution))
-    record, found = debriefed(records, result, str(log))
-    remarks = list(remarks_on(records, record, found, result))
+    told = FromLog.of(records, with_mission(Result(solution)), str(log))
     if report is not None:
         from faao_mav.report.page import render_report
 
-        page = render_report(result, title=f"{log.name}", debriefing=found, remarks=remarks)
+        page = render_report(told, title=log.name)
         write_whole(report, page.encode())
-    wind = record.mean_wind(found.start, solution.plan.flight.duration)
-    own = {
-        "wind": None if wind is None else wind.tolist(),
-        "parameters": other_parameters(record, result),
-        "system": record.system,
-    }
-    show(
-        lambda: debriefing_as_dict(found) | own,
-        lambda: [joined([*debriefing_lines(found), *remarks])],
-        as_json=as_json,
-    )
+    show(told.as_dict, lambda: [joined(told.lines())], as_json=as_json)
     if radios is not None:
-        flight = record.line(solution)
-        count = radios.replay(Line(flight.t - found.start, flight.w))
+        flight = told.record.line(solution)
+        count = radios.replay(Line(flight.t - told.found.start, flight.w))
         note(f"{count} slots were told to {radio}")

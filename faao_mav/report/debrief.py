@@ -1,15 +1,18 @@
 """What became of a plan in a flight, watched or from a log, in lines for people."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
+from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.record import FlightRecord, predicted_line
 from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import Line
 from faao_mav.validate.flown import Debriefing
-from faao_mav.workflow import Result
+from faao_mav.workflow import Result, debriefing_as_dict
 
 _SAME = 1e-5
 """Relative difference of two parameters that single precision does not tell apart."""
@@ -24,58 +27,86 @@ def flight_lines(report: FlightReport, found: Debriefing | None) -> Iterator[Lin
         yield report.ending.kind, report.ending.text
 
 
-def debriefed(
-    records: Sequence[FlightRecord], result: Result, source: str
-) -> tuple[FlightRecord, Debriefing]:
-    """Return the flight in the log `source` that is the plan's of `result`, and what became of it.
+@dataclass(frozen=True, slots=True)
+class FromLog:
+    """The flight in a log that is the plan's of `result`, and what became of that plan.
 
-    Of several `records` it is the nearest to the plan. Raises `FaaoError` where none is.
+    `records` are all flights in the log, `record` is the plan's; `found` compares it with the plan.
     """
-    track = None if result.check is None else result.check.track
-    line = predicted_line(result.solution, track)
-    debriefings = ((record, record.debriefing(result.solution, line)) for record in records)
-    found = [(record, each) for record, each in debriefings if each is not None]
-    if not found:
-        longest = max(record.t[-1] - record.t[0] for record in records)
-        raise FaaoError(
-            f"{source}: the plan's flight is not in it: no departure from flight.start like the "
-            f"predicted one in {longest:.0f} s of flight"
-        )
-    return min(found, key=lambda pair: pair[1].flown.rms_position_error)
 
+    result: Result
+    records: Sequence[FlightRecord]
+    record: FlightRecord
+    found: Debriefing
 
-def remarks_on(
-    records: Sequence[FlightRecord], record: FlightRecord, found: Debriefing, result: Result
-) -> Iterator[Line]:
-    """Yield what the log says of vehicles, wind and parameters."""
-    if len(records) > 1:
-        others = ", ".join(str(each.system) for each in records if each is not record)
-        yield "vehicle", f"system {record.system}, by its flight; also in the log: {others}"
-    wind = record.mean_wind(found.start, found.solution.plan.flight.duration)
-    if wind is None:
-        yield "wind", "not estimated by the autopilot"
-    else:
-        east, north = map(float, wind)
-        source = math.degrees(math.atan2(-east, -north)) % 360
-        yield "wind", f"{math.hypot(east, north):.1f} m/s from {source:.0f} degrees, as estimated"
-    timed = result.conversion.parameters if result.conversion is not None else {}
-    differing = other_parameters(record, result)
-    known = sum(name in record.parameters for name in timed)
-    if differing:
-        text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in differing.items())
-        yield "parameters", f"other than the mission is timed for: {text}"
-    elif timed and known:
-        yield "parameters", f"{known} in the log, as the mission is timed for"
-    elif timed:
-        yield "parameters", "not in the log"
+    @classmethod
+    def of(cls, records: Sequence[FlightRecord], result: Result, source: str) -> "FromLog":
+        """Return the flight in the log `source` that is the nearest to the plan of `result`.
 
+        Raises `FaaoError` where none is.
+        """
+        line = predicted_line(result.solution, result.check.track if result.check else None)
+        debriefings = ((record, record.debriefing(result.solution, line)) for record in records)
+        found = [(record, each) for record, each in debriefings if each is not None]
+        if not found:
+            longest = max(record.t[-1] - record.t[0] for record in records)
+            raise FaaoError(
+                f"{source}: the plan's flight is not in it: no departure from flight.start like "
+                f"the predicted one in {longest:.0f} s of flight"
+            )
+        nearest = min(found, key=lambda pair: pair[1].flown.rms_position_error)
+        return cls(result, records, *nearest)
 
-def other_parameters(record: FlightRecord, result: Result) -> dict[str, tuple[float, float]]:
-    """Return by name the value in the log and the one that the mission is timed for, if another."""
-    timed = result.conversion.parameters if result.conversion is not None else {}
-    return {
-        name: (record.parameters[name], value)
-        for name, value in timed.items()
-        if name in record.parameters
-        and not math.isclose(record.parameters[name], value, rel_tol=_SAME)
-    }
+    @property
+    def wind(self) -> Real | None:
+        """The velocity of the air as the autopilot estimated it, m/s east and north, or None."""
+        return self.record.mean_wind(self.found.start, self.result.solution.plan.flight.duration)
+
+    @property
+    def timed(self) -> Mapping[str, float]:
+        """The parameters that the mission is timed for, by name."""
+        return self.result.conversion.parameters if self.result.conversion is not None else {}
+
+    @property
+    def other_parameters(self) -> dict[str, tuple[float, float]]:
+        """By name the value in the log and the one that the mission is timed for, if another."""
+        known = self.record.parameters
+        return {
+            name: (known[name], value)
+            for name, value in self.timed.items()
+            if name in known and not math.isclose(known[name], value, rel_tol=_SAME)
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON object of `--json`."""
+        return debriefing_as_dict(self.found) | {
+            "wind": None if self.wind is None else self.wind.tolist(),
+            "parameters": self.other_parameters,
+            "system": self.record.system,
+        }
+
+    def lines(self) -> list[Line]:
+        """Return what became of the plan, and what else the log says."""
+        return [*debriefing_lines(self.found), *self.remarks()]
+
+    def remarks(self) -> Iterator[Line]:
+        """Yield what the log says of vehicles, wind and parameters."""
+        if len(self.records) > 1:
+            others = ", ".join(str(r.system) for r in self.records if r is not self.record)
+            told = f"system {self.record.system}, by its flight; also in the log: {others}"
+            yield "vehicle", told
+        if self.wind is None:
+            yield "wind", "not estimated by the autopilot"
+        else:
+            east, north = map(float, self.wind)
+            start = math.degrees(math.atan2(-east, -north)) % 360
+            told = f"{math.hypot(east, north):.1f} m/s from {start:.0f} degrees, as estimated"
+            yield "wind", told
+        known = sum(name in self.record.parameters for name in self.timed)
+        if other := self.other_parameters:
+            text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in other.items())
+            yield "parameters", f"other than the mission is timed for: {text}"
+        elif self.timed and known:
+            yield "parameters", f"{known} in the log, as the mission is timed for"
+        elif self.timed:
+            yield "parameters", "not in the log"

@@ -7,7 +7,8 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from faao_mav.report.flights import check_lines, debriefing_lines
+from faao_mav.report.debrief import FromLog
+from faao_mav.report.flights import check_lines
 from faao_mav.report.lines import Line
 from faao_mav.report.style import inline_svg
 from faao_mav.report.summary import result_lines
@@ -27,16 +28,8 @@ _PARTS = ("faao-mav", "numpy", "scipy", "matplotlib")
 """The packages whose versions the page names."""
 
 
-def render_report(
-    about: Result | Check,
-    *,
-    title: str = "",
-    debriefing: Debriefing | None = None,
-    remarks: Sequence[Line] = (),
-) -> str:
-    """Return the page about a planned flight, or about a mission that was checked.
-
-    With a `debriefing` of that plan it is about the real flight too, and what the `remarks` say.
+def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
+    """Return the page about a planned flight, a mission that was checked, or a flight in a log.
 
     The page is whole, offline, for light, dark, phone and paper. A part that a `Result` does not
     have leaves its sections out. The title is the plan's name unless one is given. The same flight
@@ -46,8 +39,7 @@ def render_report(
         title = about.solution.plan.name
     title = escape(title or "Relay flight")
     style = files("faao_mav.report").joinpath("page.css").read_text(encoding="utf-8")
-    flown = [*debriefing_lines(debriefing), *remarks] if debriefing is not None else []
-    sections = "\n".join(_sections(about, flown, debriefing))
+    sections = "\n".join(_sections(about))
     return f"""<!doctype html>
 <html lang="en">
 <head>
@@ -69,19 +61,19 @@ def render_report(
 """
 
 
-def _sections(
-    about: Result | Check, flown: Sequence[Line], debriefing: Debriefing | None
-) -> Iterator[str]:
-    result = about if isinstance(about, Result) else None
-    check = about if isinstance(about, Check) else about.check
+def _sections(about: Result | Check | FromLog) -> Iterator[str]:
+    log = about if isinstance(about, FromLog) else None
+    planned = about.result if isinstance(about, FromLog) else about
+    result = planned if isinstance(planned, Result) else None
+    check = planned if isinstance(planned, Check) else planned.check
     lines = list(result_lines(result, timed=False)) if result else []
     # the check of a mission that was made from the plan says the same as the conversion
     judged = check if check is not None and not (result and result.conversion) else None
     if judged is not None:
         lines += [("mission items", str(len(judged.mission.items))), *check_lines(judged)]
-    if flown:
-        yield _section("Flown", _facts(flown), "wide")
-    yield _section("Result" if not flown else "Planned", _facts(lines), "wide")
+    if log is not None:
+        yield _section("Flown", _facts(log.lines()), "wide")
+    yield _section("Result" if log is None else "Planned", _facts(lines), "wide")
     if check is not None:
         yield _section("Findings", _findings(check.findings), "wide")
     if result is not None and result.conversion is not None and result.conversion.parameters:
@@ -97,7 +89,7 @@ def _sections(
         title = f"Power of the whole predicted flight over time, and the {what}"
         yield _figure("energy", "Energy", energy(check.energy), title)
     if result is not None:
-        yield from _plan_figures(result, debriefing)
+        yield from _plan_figures(result, log.found if log is not None else None)
         text = f"<pre>{escape(result.solution.plan.text)}</pre>"
         yield _section("Plan", text, "wide text")
 
