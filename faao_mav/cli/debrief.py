@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
+from faao_mav.cli.planned import PlanFile, SolutionFile, planned
 from faao_mav.cli.shared import (
     AsJson,
     File,
@@ -41,7 +41,6 @@ def debrief(
 
     Exit status: 0 told; 1 the plan's flight is not in the log; 2 unusable arguments or input.
     """
-    check_one(plan_file, solution_file)
     if plan_file is None and solution_file is None:
         raise InputError("--plan or --solution: give the plan that was flown")
     check_page(report, {"LOG": log, "--plan": plan_file, "--solution": solution_file})

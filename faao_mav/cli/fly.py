@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
+from faao_mav.cli.planned import PlanFile, SolutionFile, planned
 from faao_mav.cli.shared import (
     VEHICLE,
     Component,
@@ -91,7 +91,6 @@ def fly(
             typer.echo(HEADER)
         typer.echo(json.dumps(told, allow_nan=False) if as_json else as_text(told))
 
-    check_one(plan_file, solution_file)
     if stream and not arm:
         raise InputError("--stream: needs --arm: it arms the vehicle, and flies it")
     for name, given in (("--stream", stream), ("--radio", radio)):

@@ -28,14 +28,13 @@ SolutionFile: TypeAlias = Annotated[
 ]
 
 
-def check_one(plan_file: Path | None, solution_file: Path | None) -> None:
-    """Raise `InputError` where both options are given."""
+def planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | None":
+    """Return the solution saved, or that of the plan; None without either.
+
+    Raises `InputError` where both are given.
+    """
     if plan_file is not None and solution_file is not None:
         raise InputError("--plan and --solution: give one; the solution has its plan in it")
-
-
-def planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | None":
-    """Return the solution saved, or that of the plan; None without either."""
     if solution_file is not None:
         from faao_mav.optimizer.solution import load_solution
 

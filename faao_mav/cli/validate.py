@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from faao_mav.cli.planned import PlanFile, SolutionFile, check_one, planned
+from faao_mav.cli.planned import PlanFile, SolutionFile, planned
 from faao_mav.cli.shared import (
     Aircraft,
     AsJson,
@@ -78,7 +78,6 @@ def validate(
         return
     if mission_file is None:
         raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
-    check_one(plan_file, solution_file)
     check_known(autopilot, kind)
     most = {"duration": max_duration, "distance": max_distance, "altitude": max_altitude}
     for name, value in most.items():
