@@ -1,6 +1,5 @@
 """`faao-mission PLAN.yaml --out MISSION`: from a plan to a mission file."""
 
-import json
 import sys
 import time
 from dataclasses import replace
@@ -9,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from faao_mav.cli.shared import AllowArmed, AsJson, File, System, exit_status, flag, note, option
+from faao_mav.cli.shared import (
+    AllowArmed,
+    AsJson,
+    File,
+    System,
+    exit_status,
+    flag,
+    note,
+    option,
+    show,
+)
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable
 
@@ -63,6 +72,8 @@ def plan(
     input.
     """
     from faao_mav.cli.progress import optimizer_progress
+    from faao_mav.cli.upload import as_dict as upload_as_dict
+    from faao_mav.report import summary
     from faao_mav.report.parts import write_part
     from faao_mav.workflow import plan_mission
 
@@ -90,11 +101,20 @@ def plan(
     uploaded, failure = None, None
     if upload is not None and sound:
         try:
+            from faao_mav.wire.upload_text import upload_text
+
             uploaded = _upload(result, upload, system, allow_armed, shown)
         except FaaoError as error:  # told after the result
             failure = error
     if not quiet or as_json:
-        _show(result, written, precoders, uploaded, as_json=as_json, verbose=verbose)
+        show(
+            lambda: result.as_dict() | {"upload": upload_as_dict(uploaded) if uploaded else None},
+            lambda: [
+                summary(result, written, precoders, verbose=verbose),
+                *([upload_text(uploaded)] if uploaded else []),
+            ],
+            as_json=as_json,
+        )
     if failure is not None:
         raise failure
     if not sound or (uploaded is not None and not uploaded.verified):
@@ -177,26 +197,3 @@ def _upload(
     if not report.verified:
         note("the mission is not verified; do not fly it")
     return report
-
-
-def _show(
-    result: "Result",
-    written: list[Path],
-    precoders: Path | None,
-    uploaded: "UploadReport | None",
-    *,
-    as_json: bool,
-    verbose: bool,
-) -> None:
-    from faao_mav.cli import upload
-    from faao_mav.report import summary
-
-    if as_json:
-        told = upload.as_dict(uploaded) if uploaded is not None else None
-        typer.echo(json.dumps(result.as_dict() | {"upload": told}, allow_nan=False))
-        return
-    typer.echo(summary(result, written, precoders, verbose=verbose))
-    if uploaded is not None:
-        from faao_mav.wire.upload_text import upload_text
-
-        typer.echo(upload_text(uploaded))
