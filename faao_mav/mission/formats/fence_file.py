@@ -82,10 +82,10 @@ def geojson_zones(text: str) -> Iterator[DrawnZone]:
                     [[_position(p) for p in ring.each(MAX_CORNERS + 1)] for ring in part.each()]
                     for part in parts
                 ]
-                folded = {key.casefold(): value for key, value in properties.items()}
-                name = next((folded[key] for key in _NAMES if folded.get(key)), "")
+                folded = {key.casefold(): told for key, told in properties.items()}
+                named = (folded[key] for key in _NAMES if folded.get(key) not in (None, ""))
                 place = value.place or "the polygon"
-                yield DrawnZone(place, str(name), properties, around, rings)
+                yield DrawnZone(place, str(next(named, "")), properties, around, rings)
             case "Point" | "MultiPoint" | "LineString" | "MultiLineString":
                 continue
             case _:
