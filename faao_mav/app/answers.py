@@ -17,7 +17,7 @@ from faao_mav.autopilot import Track
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
-from faao_mav.mission.fence_area import Area, FreeArea
+from faao_mav.mission.fence_area import Area
 from faao_mav.optimizer.rough import RoughFlight, rough_flight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
@@ -143,7 +143,7 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
         drawn["zones"] = [
             [zone.inclusion, degrees(edge)]
             for zone in _zones_of_file(plan)
-            for edge in FreeArea(zone.shape).edges()
+            for edge in zone.rings()
         ]
     if result is not None and result.conversion is not None:
         drawn["track"] = degrees(thinned(result.conversion.schedule.track()["predicted_w"]))

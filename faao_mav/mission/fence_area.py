@@ -50,6 +50,15 @@ class Area:
     crosses_itself: bool = False
     disc: tuple[float, float, float] | None = None
 
+    def rings(self) -> list[Real]:
+        """Return the closed rings (k, 2), m, that bound the area."""
+        return _rings(self.shape)
+
+
+def _rings(shape: BaseGeometry) -> list[Real]:
+    rings = shapely.get_rings(shapely.get_parts(shape))
+    return [np.asarray(shapely.get_coordinates(ring)) for ring in rings]
+
 
 def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
     """Return the parts of `fence` in `frame`: polygons, then circles."""
@@ -159,9 +168,7 @@ class FreeArea:
 
     def edges(self) -> list[Real]:
         """Return the closed rings (k, 2), m, that bound the area; of the plane's square none."""
-        rings = shapely.get_rings(shapely.get_parts(self.shape))
-        corners = map(shapely.get_coordinates, rings)
-        return [ring for ring in corners if np.abs(ring).max() < FARTHEST / 2]
+        return [ring for ring in _rings(self.shape) if np.abs(ring).max() < FARTHEST / 2]
 
     def covers(self, points: Real) -> Flags:
         """Return which of `points` (n, 2) lie inside or on the edge, (n,)."""

@@ -11,6 +11,7 @@ from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import FLOWN_TO, Command
 from faao_mav.mission.fence import Fence
+from faao_mav.mission.fence_area import areas_of
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
@@ -43,7 +44,6 @@ _WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 _PIECES = 240  # pieces of the route with a colour each, at most: more cannot be told apart
 _LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
 _SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
-_ROUND = 72  # corners that a circle is drawn with; chosen: 5 degrees each
 
 _SIZE = 8.0  # height of a number, points
 _DIGIT = 0.66  # width of a digit in the widest usual font, of its size
@@ -71,7 +71,7 @@ def route_map(
     marked = zip(("base station", "user"), stations.tolist(), "s^", strict=True)
     frame = LocalFrame(origin.latitude, origin.longitude)
     fence = conversion.mission.fence if conversion is not None else solution.plan.geofence
-    outlines = list(_outlines_of(fence, frame))
+    outlines = _outlines_of(fence, frame)
     lines, places = [solution.w], np.empty((0, 2))
     numbers: list[int] = []
     if conversion is not None:
@@ -103,7 +103,7 @@ def mission_map(mission: Mission, track: Track) -> "Figure":
     numbers, places = _places_of(mission, track.frame, FLOWN_TO)
     with drawing(WIDTH, 4.2) as figure:
         plot = figure.subplots()
-        outlines = list(_outlines_of(mission.fence, track.frame))
+        outlines = _outlines_of(mission.fence, track.frame)
         _draw_fence(plot, outlines)
         plot.plot(*flown.T, color=SERIES[0], label="predicted")
         _draw_waypoints(plot, places, "item")
@@ -201,16 +201,10 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
         bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
 
 
-def _outlines_of(fence: Fence, frame: LocalFrame) -> Iterator[_Outline]:
-    """Yield the areas of `fence` in metres about `frame`'s origin."""
-    for polygon in fence.polygons:
-        corners = np.array([*polygon.vertices, polygon.vertices[0]])
-        yield frame.to_local(corners[:, 0], corners[:, 1]), polygon.inclusion
-    angles = np.linspace(0.0, 2 * np.pi, _ROUND + 1)
-    for circle in fence.circles:
-        center = frame.to_local(*circle.center)
-        ring = np.column_stack([np.cos(angles), np.sin(angles)])
-        yield center + circle.radius * ring, circle.inclusion
+def _outlines_of(fence: Fence, frame: LocalFrame) -> list[_Outline]:
+    """Return the areas of `fence` in metres about `frame`'s origin."""
+    areas = areas_of(fence, frame)
+    return [(ring, area.inclusion) for area in areas for ring in area.rings()]
 
 
 def _write_numbers(
