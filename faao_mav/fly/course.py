@@ -18,6 +18,11 @@ class Setpoint(NamedTuple):
     acceleration: Real
 
 
+def at_rest(place: Real) -> Setpoint:
+    """Return the setpoint of an aircraft that stays at `place` (3,), m."""
+    return Setpoint(place, np.zeros(3), np.zeros(3))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
     """Pieces of constant acceleration: from `t` (k,), s, on the aircraft flies by `start` and `a`.
@@ -25,7 +30,7 @@ class Course:
     It is at `p` (k, 3), m east, north, up, with the velocity `v` (k, 3), m/s, when a piece begins,
     and has the acceleration `a` (k, 3), m/s², until the next. In the last piece it stands still.
 
-    >>> course = Course.through([[0, 0, 10], [20, 0, 10]], speed=4.0, acceleration=2.0)
+    >>> course = Course.through([[0, 0, 10], [20, 0, 10]], [(4.0, 2.0)])
     >>> course.end
     7.0
     >>> course.at(3.0).position.tolist(), course.at(3.0).velocity.tolist()
@@ -39,24 +44,33 @@ class Course:
 
     @classmethod
     def through(
-        cls, places: Sequence[Sequence[float]] | Real, *, speed: float, acceleration: float
+        cls, places: Sequence[Sequence[float]] | Real, limits: Sequence[tuple[float, float]]
     ) -> "Course":
         """Return the quickest flight from rest to rest along each of the legs between `places`.
 
-        They are (k, 3), m; a leg takes at most `speed`, m/s, and `acceleration`, m/s². It begins
-        at 0 s.
+        They are (k, 3), m; a leg has `limits` of speed, m/s, and acceleration, m/s². It begins at
+        0 s.
         """
-        corners = np.asarray(places, dtype=float)
-        pieces: list[tuple[float, Real]] = []
-        for leg in np.diff(corners, axis=0):
+        corners, rest = np.asarray(places, dtype=float), np.zeros(3)
+        t, pieces = 0.0, list[tuple[float, Real, Real, Real]]()
+        for start, leg, (speed, push) in zip(
+            corners[:-1], np.diff(corners, axis=0), limits, strict=True
+        ):
             length = float(np.linalg.norm(leg))
             if length < 1e-6:
                 continue
-            along, top = leg / length, min(speed, (acceleration * length) ** 0.5)
-            ramp = top / acceleration
-            push = acceleration * along
-            pieces += [(ramp, push), (length / top - ramp, 0 * push), (ramp, -push)]
-        return cls._of(0.0, corners[0], np.zeros(3), pieces)
+            along, top = leg / length, min(speed, (push * length) ** 0.5)
+            ramp, even = top / push, length / top - top / push
+            early = start + along * top * ramp / 2
+            late = early + along * top * even
+            pieces += [
+                (t, start, rest, push * along),
+                (t + ramp, early, top * along, rest),
+                (t + ramp + even, late, top * along, -push * along),
+            ]
+            t += 2 * ramp + even
+        pieces.append((t, corners[-1], rest, rest))
+        return cls(*(np.array(column) for column in zip(*pieces, strict=True)))
 
     @classmethod
     def of(cls, solution: Solution) -> "Course":
@@ -79,21 +93,6 @@ class Course:
         pushes = [v[0] / max(run_in, 1e-9), *a[:-1], -v[-1] / max(run_out, 1e-9), rest]
         return cls(np.array(t), np.array(p), np.array([rest, *v, rest]), np.array(pushes))
 
-    @classmethod
-    def _of(cls, t: float, p: Real, v: Real, pieces: Sequence[tuple[float, Real]]) -> "Course":
-        rows = []
-        for lasting, a in pieces:
-            rows.append((t, p, v, a))
-            t, p, v = t + lasting, p + v * lasting + a * lasting**2 / 2, v + a * lasting
-        rows.append((t, p, np.zeros(3), np.zeros(3)))
-        return cls(*(np.array(column, dtype=float) for column in zip(*rows, strict=True)))
-
-    def then(self, other: "Course") -> "Course":
-        """Return this flight, and `other` when it ends, where it ends."""
-        t = other.t - other.begin + self.end
-        pairs = ((self.t, t), (self.p, other.p), (self.v, other.v), (self.a, other.a))
-        return Course(*(np.concatenate([first[:-1], second]) for first, second in pairs))
-
     @property
     def begin(self) -> float:
         """When it begins, s."""
@@ -108,6 +107,6 @@ class Course:
         """Return where the aircraft is to be at `time`, s; before it begins, at rest there."""
         k = int(np.searchsorted(self.t, time, side="right")) - 1
         if k < 0:
-            return Setpoint(self.p[0], np.zeros(3), np.zeros(3))
+            return at_rest(self.p[0])
         p, v, a, since = self.p[k], self.v[k], self.a[k], time - float(self.t[k])
         return Setpoint(p + v * since + a * since**2 / 2, v + a * since, a)

@@ -1,6 +1,7 @@
 """The gate of all setpoints: where an aircraft can be, and where it may be sent to from there."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,7 +13,7 @@ NEAR, LEVEL = 2.0, 1.0
 """Metres across and up within which an aircraft is on course; chosen: a stream that nothing
 disturbs keeps its plan to 0.5 m rms in the simulators."""
 
-CLIMB, CLIMB_ACCELERATION = 2.0, 1.0
+CLIMB = 2.0, 1.0
 """The speed, m/s, and acceleration, m/s², of a climb by setpoints; chosen: below all defaults."""
 
 _AROUND, _QUICKER = 2.0, 2.0
@@ -31,10 +32,11 @@ _BORNE = 3.0
 class Gate:
     """The gate of the setpoints for a flight of `plan`: see `believes` and `passes`.
 
-    Times are the vehicle's. `told` is what changes, in words.
+    Times are the vehicle's. `tell` is told when a place is doubted, and believed again.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, tell: Callable[[str], object]) -> None:
+        self._tell = tell
         self._fence, self._speed = plan.keep_in, plan.max_ground_speed
         self._acceleration = plan.vehicle.max_acceleration
         self._on_course: float | None = None
@@ -42,7 +44,6 @@ class Gate:
         self._jumped_from: tuple[float, Real] | None = None
         self._moved = 0.0
         self._doubted_since = math.inf
-        self.told: list[str] = []
 
     def passes(self, t: float, place: Real, setpoint: Setpoint) -> bool:
         """Tell whether an aircraft at `place` (3,), m, at `t`, s, may be sent to `setpoint`.
@@ -56,7 +57,7 @@ class Gate:
             self._on_course = t
         since = t - self._on_course
         far = NEAR + _lag(since, self._speed, self._acceleration)
-        if across > far or up > LEVEL + _lag(since, CLIMB, CLIMB_ACCELERATION):
+        if across > far or up > LEVEL + _lag(since, *CLIMB):
             return False
         straight = np.array([place[:2], setpoint.position[:2]])
         return across <= NEAR or self._fence is None or self._fence.covers_path(straight)
@@ -79,10 +80,10 @@ class Gate:
         if doubted and self._doubted_since == math.inf:
             self._doubted_since = t
             why = "does not change, though it moves" if stands else "has jumped"
-            self.told.append(f"its place {why}: no setpoints are sent")
+            self._tell(f"its place {why}: no setpoints are sent")
         elif not doubted and self._doubted_since < math.inf:
             self._doubted_since = math.inf
-            self.told.append("its place is believed again")
+            self._tell("its place is believed again")
         return not doubted
 
     def has_lost_it(self, t: float) -> bool:

@@ -1,7 +1,6 @@
 """The gate of one flight while its vehicle is watched: what was read of it, and is heard now."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from faao_mav.fly.preflight import preflight
 from faao_mav.fly.seen import Flight, Held, Seen, read_held
@@ -9,8 +8,7 @@ from faao_mav.fly.telemetry import Telemetry
 from faao_mav.mission.item import Home
 from faao_mav.validate.rule import Finding, Level
 from faao_mav.wire.machine import Script
-from faao_mav.wire.messages import Envelope, Message, ParamValue
-from faao_mav.wire.parameters import setting_in
+from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.transfer.exchange import Peer
 from faao_mav.wire.transfer.pace import Timeouts
 
@@ -21,17 +19,13 @@ _LOOK = 5.0
 """Seconds after which it is told what stands against a flight, though its place is not known.
 Chosen."""
 
-_READ_BEFORE = 15.0
-"""Seconds for which what was read of a vehicle counts: later it is read again before it is armed.
-Chosen."""
-
 
 class Readiness:
     """The gate of `flight` by the vehicle of `peer`, of which `held` was read just before.
 
     For `elsewhere` and `untimed` see `preflight`. `findings` is what it found last, None before.
-    Setup, once: `start`; then `on` with what arrives, `judge` now and then, and before the vehicle
-    is armed `settle`, until it is up to date.
+    `begun` is when it was first heard, s. `judge` says what stands against it, now and then; before
+    the vehicle is armed `settle` reads it again, while `on` is given what arrives.
     """
 
     def __init__(
@@ -49,7 +43,7 @@ class Readiness:
         self.findings: tuple[Finding, ...] | None = None
         self._judged: Seen | None = None
         self._reading: Script[Held] | None = None
-        self._read_at = self._begun = 0.0
+        self.begun = 0.0
 
     @property
     def errors(self) -> tuple[Finding, ...]:
@@ -61,26 +55,15 @@ class Readiness:
         """The vehicle's parameters that a flight depends on, by name."""
         return self._held.reading.values
 
-    def start(self, now: float) -> None:
-        """Begin: what is held was read just now."""
-        self._read_at = self._begun = now
-
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of what the vehicle says, also of a parameter that somebody sets; answer it."""
-        message = envelope.message
-        if isinstance(message, ParamValue):
-            reading, name = self._held.reading, message.param_id
-            found = setting_in(message, self._peer.vehicle)
-            if name in reading.settings and reading.settings[name] != found:
-                settings = {**reading.settings, name: found}
-                self._held = replace(self._held, reading=replace(reading, settings=settings))
-        return () if self._reading is None else self._take(self._reading.on(envelope, now), now)
+        """Take note of what the vehicle says, and answer it."""
+        return () if self._reading is None else self._reading.on(envelope, now)
 
     def judge(self, seen: Telemetry, now: float) -> None:
         """Judge what is heard, once enough is, and again when that is something else."""
         beat, place, vehicle = seen.heartbeat, seen.place, self._peer.vehicle
         known = place is not None and seen.status is not None
-        if beat is None or vehicle is None or not (known or now >= self._begun + _LOOK):
+        if beat is None or vehicle is None or not (known or now >= self.begun + _LOOK):
             return
         if place is not None:
             level = round(place.latitude, _STEADY), round(place.longitude, _STEADY)
@@ -95,24 +78,19 @@ class Readiness:
     def settle(self, seen: Telemetry, now: float) -> Sequence[Message] | None:
         """Return what is to be sent until the gate is up to date; None: `findings` is.
 
-        What was read too long ago is read again; without fresh news of the vehicle it waits.
+        What it holds is read again; without fresh news of the vehicle it waits.
         """
-        if self._reading is not None:
-            return self._take(self._reading.tick(now), now)
+        if self._reading is None:
+            self._reading = Script(read_held(self._peer, self._timeouts))
+            return self._reading.start(now)
+        if self._reading.outcome is None:
+            return self._reading.tick(now)
         if not seen.is_fresh(now):
             return ()
-        if now > self._read_at + _READ_BEFORE:
-            self._reading = Script(read_held(self._peer, self._timeouts))
-            return self._take(self._reading.start(now), now)
+        self._held = self._reading.outcome
         self.judge(seen, now)
         return None
 
     def cancel(self, now: float) -> Sequence[Message]:
         """Read no more."""
         return () if self._reading is None else self._reading.cancel(now)
-
-    def _take(self, out: Sequence[Message], now: float) -> Sequence[Message]:
-        """Return `out`, and take what the vehicle holds once it is read."""
-        if self._reading is not None and self._reading.outcome is not None:
-            self._held, self._reading, self._read_at = self._reading.outcome, None, now
-        return out

@@ -15,18 +15,18 @@ from faao_mav.wire.transfer.exchange import Peer
 _ACCEPTED, _IN_PROGRESS = 0, 5
 """MAV_RESULT."""
 
-_LISTEN, _WORDS = 2.0, 1.0
-"""Seconds of listening for other ground stations before anything is started, two of their
-heartbeats; and of waiting for what the vehicle says of a denial, chosen."""
+_LISTEN = 2.0
+"""Seconds of listening for other ground stations before anything is started: two heartbeats."""
 
 _AGAIN, _TRIES = 1.5, 5
-"""Seconds after which a command without an answer is repeated, and how often it is sent, or
-refused: as the MAVLink guide has it for missions."""
+"""Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
+guide has it for missions. A vehicle may refuse for a while: PX4 its mode for setpoints, until they
+have come for a second."""
 
 
 @dataclass(slots=True)
 class Order:
-    """A command that is repeated until it is answered, or what it asks for is seen.
+    """A command that is repeated until it is carried out.
 
     `due` is when it is sent next, s; `answer` is what became of it, in words.
     """
@@ -145,15 +145,10 @@ class Start(Watch):
         order.refusals += 1
         if self.phase == "disarming" and order.refusals == _TRIES:
             self._leave_armed(f"it {order.answer}")
-        return self._denied(order, now) if self.phase in ("arming", "starting") else ()
+        return self._refused(order, now) if self.phase == "starting" else ()
 
     def _accepted(self, now: float) -> Sequence[Message]:
         return self._start(now) if self.phase == "arming" else ()
-
-    def _denied(self, order: Order, now: float) -> Sequence[Message]:
-        """End, now that arming or starting has been denied; why it does not arm may come later."""
-        order.sent, order.due = _TRIES, now + _WORDS * (self.phase == "arming")
-        return self._repeat(now)
 
     def _begin(self) -> None:
         self._order = None

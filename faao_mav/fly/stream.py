@@ -13,7 +13,7 @@ from faao_mav.fly.gate import Gate
 from faao_mav.fly.itinerary import Itinerary
 from faao_mav.fly.own import OwnClock, OwnFrame
 from faao_mav.fly.readiness import Readiness
-from faao_mav.fly.start import Order, Start
+from faao_mav.fly.start import Start
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.lean import beyond_lean
 from faao_mav.wire.messages import (
@@ -27,13 +27,6 @@ from faao_mav.wire.messages import (
 )
 from faao_mav.wire.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
 from faao_mav.wire.transfer.exchange import Peer
-
-_STREAMED = 1.5
-"""By how many times as long as the vehicle wants setpoints come before it is asked to follow them.
-Chosen."""
-
-_ARM_AGAIN = 2.0
-"""Seconds after which it is asked to arm again that refused; chosen."""
 
 _OFF_GROUND = 0.3
 """Metres above home from which on a take-off is under way, though its answer is lost; chosen."""
@@ -56,13 +49,6 @@ _HOME_MOVED = 1.0
 """Metres by which home has to rise or fall in flight to be told; chosen."""
 
 _FAILSAFE = "it is in its failsafe, until setpoints come again"
-
-_PARTS = {
-    "out": "on the way to flight.start",
-    "relay": "the relay flight begins",
-    "back": "the relay flight is over",
-    "over": "setpoints end",
-}
 
 
 class Stream(Start):
@@ -103,14 +89,14 @@ class Stream(Start):
         self._height, self._top = plan.flight.altitude, plan.max_ground_speed
         self._period = 1 / rate
         self._held = 0.0 if self._rules.carries_on else self._period / 2
-        self._clock, self._gate = OwnClock(), Gate(plan)
-        takes_off = not self._rules.takes_off_by_setpoints
-        self.flight = Itinerary(solution, self._gate, takes_off=takes_off)
+        tell, takes_off = self.seen.told.append, not self._rules.takes_off_by_setpoints
+        self._clock, self._gate = OwnClock(), Gate(plan, tell)
+        self.flight = Itinerary(solution, self._gate, tell, takes_off=takes_off)
         self._frame = OwnFrame(self._family, plan.origin)
         self._home_told = False
         self._unsure_since: float | None = None
         """Since when it is not known who flies it: then nothing that moves it is sent."""
-        self._heard_at = self._first_sent = self._sent_by = math.inf
+        self._heard_at = self._sent_by = math.inf
         self._last_sent = -math.inf
         if self._rules.loss:
             self.seen.ask_for(CURRENT_MODE, _MODE_AGAIN)
@@ -162,8 +148,6 @@ class Stream(Start):
             self.seen.told.append(lean)
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
         self.phase, self._asked = "engaging", {self._mode}
-        if self._rules.takes_off_by_setpoints:
-            return ()  # setpoints come first
         return self._set_mode(now, self._guided)
 
     def _start(self, now: float) -> Sequence[Message]:
@@ -177,13 +161,6 @@ class Stream(Start):
         if self.phase == "starting":
             self._begin()
         return super()._accepted(now)
-
-    def _denied(self, order: Order, now: float) -> Sequence[Message]:
-        if self.phase == "arming" and now < self._begun + self._patience:
-            # In this mode it may need what its checks did not ask for before, a position above all.
-            order.sent, order.due = 0, now + _ARM_AGAIN
-            return ()
-        return super()._denied(order, now)
 
     def _begin(self) -> None:
         self.phase, self._order = "flying", None
@@ -266,9 +243,6 @@ class Stream(Start):
         under_way, gate = self.phase in ("flying", "ending"), self._gate
         believed = not under_way or gate.believes(t, place, velocity)
         setpoint = self._setpoint(t, place, velocity) if believed else None
-        for told in (gate.told, self.flight.told):
-            self.seen.told += told
-            told.clear()
         if under_way and (gate.has_lost_it(t) or self.flight.trouble is not None):
             lost = "where it is, is not known"
             return self._give_up(lost if gate.has_lost_it(t) else str(self.flight.trouble), now)
@@ -283,12 +257,8 @@ class Stream(Start):
         if self.phase == "flying" and self.flight.part == "over" and self._is_guided:
             self.phase = "ending"
             out += self._set_mode(now, self._finish)
-        streamed = t >= self._first_sent + _STREAMED * self._rules.streamed
-        if self.phase == "engaging" and self._order is None and streamed:
-            out += self._set_mode(now, self._guided)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
             self._last_sent, self._sent_by = t, now + self._patience
-            self._first_sent = min(self._first_sent, t)
             out.append(self._frame.message(setpoint, position, self._peer.address))
         return out
 
@@ -309,13 +279,11 @@ class Stream(Start):
         if self.phase == "flying" or (asked and self._is_guided):
             if self._unsure_since is not None:
                 return None
-            part, lead = self.flight.part, self._held + self._clock.lead
+            lead = self._held + self._clock.lead
             speed = max(float(np.linalg.norm(velocity)), self._top)
             by_then = place + lead * velocity * (self._top / speed)
             setpoint = self.flight.setpoint(t + lead, by_then, velocity)
-            if self.flight.part != part:
-                self.seen.told.append(_PARTS[self.flight.part])
-                self.relay_start = self.flight.relay_start
+            self.relay_start = self.flight.relay_start
             return setpoint
         if self._rules.takes_off_by_setpoints and self.phase in ("engaging", "arming"):
             return Setpoint(place, np.zeros(3), np.zeros(3))

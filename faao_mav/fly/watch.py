@@ -82,7 +82,7 @@ class Watch(Machine[Ending]):
         """Listen, and ask for telemetry."""
         self.seen.start(now)
         if self._ready is not None:
-            self._ready.start(now)
+            self._ready.begun = now
         return self._time_out(now)
 
     def cancel(self, now: float) -> Sequence[Message]:
@@ -170,11 +170,9 @@ class Watch(Machine[Ending]):
 
     def _step_aside(self) -> None:
         """Send nothing more."""
-        at_end = self.phase == "flying" and self._furthest >= self._last - 1 >= 0
-        perhaps = "the mission is at its end, or " if at_end else ""  # PX4's return is a mode
         self.phase, self.seen.patience = "aside", self._patience
-        who = f"{perhaps}the pilot or a failsafe has the aircraft"
-        self.seen.told.append(f"mode {self.seen.mode}: {who}; nothing more is sent")
+        who = "the pilot or a failsafe has the aircraft; nothing more is sent"
+        self.seen.told.append(f"mode {self.seen.mode}: {who}")
 
     def _end_as_heard(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """End where what was heard says so."""

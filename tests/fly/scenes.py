@@ -22,7 +22,9 @@ from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
     Message,
+    MissionAck,
     MissionRequestInt,
+    MissionRequestList,
     ParamRequestRead,
     SetMode,
     Timesync,
@@ -117,9 +119,10 @@ class Scene:
 
 
 def harmless(message: Message) -> bool:
-    asks = isinstance(message, CommandLong) and message.command == MavCommand.SET_INTERVAL
-    asks |= isinstance(message, CommandLong) and message.command == MavCommand.REQUEST_MESSAGE
-    return asks or isinstance(message, MissionRequestInt | ParamRequestRead | Timesync)
+    asked = (MavCommand.SET_INTERVAL, MavCommand.REQUEST_MESSAGE)
+    asks = isinstance(message, CommandLong) and message.command in asked
+    reads = MissionRequestList | MissionRequestInt | MissionAck | ParamRequestRead | Timesync
+    return asks or isinstance(message, reads)
 
 
 class AnotherStation(Machine[None]):

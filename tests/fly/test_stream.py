@@ -17,7 +17,6 @@ from faao_mav import optimize, parse_plan
 from faao_mav.autopilot import vehicle_type
 from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.errors import InfeasibleError, InputError
-from faao_mav.fly.course import Course
 from faao_mav.fly.own import OwnClock
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.seen import Flight, Held
@@ -96,7 +95,7 @@ def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
     assert {each.type_mask for each in setpoints(scene)} == {3072}
 
 
-@pytest.mark.parametrize(("kind", "time"), [("ardupilot", 18.0), ("px4", 5.0), ("px4", 18.0)])
+@pytest.mark.parametrize(("kind", "time"), [("ardupilot", 18.0), ("px4", 8.0), ("px4", 18.0)])
 def test_nothing_is_sent_after_a_pilots_mode_change(kind: str, time: float) -> None:
     scene = Scene(kind, solution=low())
     guided, sent = scene.watch._guided, list[int]()
@@ -227,7 +226,7 @@ def test_interrupted_it_holds(kind: str) -> None:
 
 
 @KINDS
-@pytest.mark.parametrize("time", [5.0, 14.0])
+@pytest.mark.parametrize("time", [8.0, 14.0])
 def test_without_a_terminal_it_holds_and_then_is_left(kind: str, time: float) -> None:
     scene = Scene(kind, solution=low())
 
@@ -313,20 +312,6 @@ def test_local_frames_go_there_and_back(
     own = LocalFrame(latitude, 179.99)
     apart = np.linalg.norm(own.to_local(*frame.to_geodetic(there)) - there)
     assert apart <= 0.0075 * np.linalg.norm(there) + 1e-6  # each has another Earth
-
-
-def test_a_course_is_what_its_pieces_add_up_to() -> None:
-    solution = solved({"flight.start_velocity": [3.0, 4.0]})
-    course = Course.of(solution)
-    assert course.at(course.begin - 1).velocity.tolist() == [0, 0, 0]
-    for t, w, v in zip(solution.t, solution.w, solution.v, strict=True):
-        np.testing.assert_allclose(course.at(t - 1e-9).position[:2], w, atol=1e-6)
-        np.testing.assert_allclose(course.at(t - 1e-9).velocity[:2], v, atol=1e-6)
-    t = np.linspace(course.begin - 1, course.end + 1, 4001)
-    p = np.array([course.at(each).position for each in t])
-    v = np.array([course.at(each).velocity for each in t])
-    np.testing.assert_allclose(np.gradient(p, t, axis=0)[1:-1], v[1:-1], atol=0.02)
-    assert np.linalg.norm(v[-1]) == 0
 
 
 def test_what_others_asked_tells_nothing_of_the_link() -> None:
