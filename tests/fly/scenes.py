@@ -114,8 +114,44 @@ class Scene:
         self.mock.tick = lambda now: through(tick(now), now)
         self.mock.on = lambda envelope, now: through(on(envelope, now), now)
 
+    def loses(self, when: Callable[[Any, float], object], *, heard: bool = False) -> None:
+        """Let what is sent to the vehicle be lost; or, where it is `heard`, its answers."""
+        on = self.mock.on
+
+        def hear(envelope: Envelope, now: float) -> Sequence[Message]:
+            lost = when(envelope.message, now)
+            answers = on(envelope, now) if heard or not lost else ()
+            return () if lost else cast(Sequence[Message], answers)
+
+        self.mock.on = hear
+
+    def interrupt(self, now: float) -> None:
+        """Press Ctrl-C; what is sent then is lost at first."""
+        self.client.sent += self.watch.cancel(now)
+
+    def hang_up(self, now: float) -> None:
+        """Close the terminal; what is sent then is lost at first."""
+        self.client.sent += self.watch.hang_up(now)
+
+    @property
+    def commands(self) -> list[tuple[int, float]]:
+        """The commands that were given, with their first parameters."""
+        orders = (each for each in self.orders if isinstance(each, CommandLong))
+        return [(each.command, each.param1) for each in orders]
+
     def told(self, words: str) -> bool:
         return any(words in text for text in self.watch.seen.told)
+
+
+def arms(message: object, wanted: float | None = None) -> bool:
+    """Tell whether a message is an order to arm, or to disarm."""
+    ordered = isinstance(message, CommandLong) and message.command == MavCommand.ARM
+    return ordered and wanted in (None, getattr(message, "param1", None))
+
+
+def starts(message: object) -> bool:
+    """Tell whether a message is an order to start, or to take off."""
+    return getattr(message, "command", None) in (MavCommand.START, MavCommand.TAKEOFF)
 
 
 def harmless(message: Message) -> bool:

@@ -9,13 +9,12 @@ import pytest
 from conftest import FLYABLE, edited
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import AnotherStation, Scene
+from scenes import AnotherStation, Scene, starts
 from simulate import Station
 from stations import FOREIGN, HOME, a_mission, peer_of, vehicle_of
 
 from faao_mav import optimize, parse_plan
 from faao_mav.autopilot import vehicle_type
-from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.fly.own import OwnClock
 from faao_mav.fly.readiness import Readiness
@@ -26,14 +25,17 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.sim.faults import Faults
-from faao_mav.wire.messages import CommandLong, Envelope, SetPositionTargetLocalNed, Timesync
+from faao_mav.wire.messages import SetPositionTargetLocalNed, Timesync
 from faao_mav.wire.parameters import Reading
-from faao_mav.wire.protocol import GROUND_STATION, MavCommand
+from faao_mav.wire.protocol import MavCommand
 from faao_mav.wire.transfer.exchange import Peer
 
 KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 LOITER = 5
 """A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
+LAND = 4 << 16 | 6 << 24
+"""PX4's."""
+HOLD = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
 FENCE = {
     "margin": 2,
     "inclusion": [[-30, -30], [80, -30], [80, 80], [-30, 80]],
@@ -53,11 +55,7 @@ LOW: dict[str, Any] = {
 @cache
 def low() -> Solution:
     """Return the small plan solved: 16 s at up to 6 m/s, 6 m above home."""
-    return solved({})
-
-
-def solved(changes: dict[str, Any]) -> Solution:
-    return optimize(parse_plan(edited(FLYABLE, LOW | changes)))
+    return optimize(parse_plan(edited(FLYABLE, LOW)))
 
 
 def under(changes: dict[str, Any]) -> Solution:
@@ -71,27 +69,28 @@ def flown(scene: Scene, solution: Solution) -> Prediction:
     return price_flight(solution, line.t - scene.watch.relay_start, line.w)
 
 
+def is_setpoint(message: object) -> bool:
+    return isinstance(message, SetPositionTargetLocalNed)
+
+
 def setpoints(scene: Scene) -> list[SetPositionTargetLocalNed]:
     return [each for each in scene.client.sent if isinstance(each, SetPositionTargetLocalNed)]
 
 
 @pytest.mark.parametrize(("kind", "loss"), [("ardupilot", 0.0), ("px4", 0.0), ("px4", 0.2)])
 def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
-    solution = low()
-    scene = Scene(kind, solution=solution)
+    solution, scene = low(), Scene(kind, solution=low())
     assert scene.run(Faults(loss=loss, seed=3)) == "finished"
     assert not scene.mock.armed
     found = flown(scene, solution)
     assert found.rms_position_error < (0.3 if not loss else 0.6)
     assert found.delivered_rate > 0.997 * solution.delivered_rate
-    record = scene.watch.seen.record()
-    begin = scene.watch.relay_start
+    record, begin = scene.watch.seen.record(), scene.watch.relay_start
     during = (record.t > begin) & (record.t < begin + solution.plan.flight.duration)
     np.testing.assert_allclose(record.height[during], 6, atol=0.2)
-    sent = [each.time_boot_ms for each in setpoints(scene)]
-    assert np.diff(sent).min() >= 80
-    if not loss:
-        assert np.diff(sent).max() <= 120
+    steps = np.diff([each.time_boot_ms for each in setpoints(scene)])
+    assert steps.min() >= 80
+    assert loss or steps.max() <= 120
     assert {each.type_mask for each in setpoints(scene)} == {3072}
 
 
@@ -111,36 +110,29 @@ def test_nothing_is_sent_after_a_pilots_mode_change(kind: str, time: float) -> N
     assert scene.told("nothing more is sent")
 
 
-@KINDS
-def test_it_stops_when_setpoints_cease(kind: str) -> None:
-    scene = Scene(kind, solution=low(), parameters={"COM_OBL_RC_ACT": 3.0})
-    receive = scene.mock.on
-    deaf, at = [False], list[Any]()
-
-    def hear(envelope: Any, now: float) -> Any:
-        setpoint = isinstance(envelope.message, SetPositionTargetLocalNed)
-        return () if deaf[0] and setpoint else receive(envelope, now)
-
-    scene.mock.on = hear
-
-    def cease(_: float) -> None:
-        deaf[0] = True
-
-    def look(now: float) -> None:
-        at.append(scene.mock.posture(now))
-
-    events = [(14.0, cease), (26.0, look), (27.0, look)]
-    words = (
-        "stops after 1 s (GUID_TIMEOUT)" if kind == "ardupilot" else "changes to Return after 1 s"
-    )
-    ending = scene.run(events=events, until=90.0)
+@pytest.mark.parametrize(
+    ("kind", "action", "told"),
+    [
+        ("ardupilot", 0, "it stops after 1 s (GUID_TIMEOUT)"),
+        ("px4", 3, "it changes to Return after 1 s"),
+        ("px4", 0, "it changes to Position (and sinks, unless sticks fly it) after 1 s"),
+    ],
+)
+def test_what_it_does_when_setpoints_cease_is_told_before(
+    kind: str, action: int, told: str
+) -> None:
+    scene = Scene(kind, solution=low(), parameters={"COM_OBL_RC_ACT": action})
+    scene.loses(lambda message, now: is_setpoint(message) and now > 16.0)
+    assert scene.run(events=[(60.0, scene.does(MavCommand.ARM, 0))]) == "taken over"
     (lost,) = (each for each in scene.watch.findings if each.rule == "on-setpoints-lost")
-    assert lost.message.startswith(f"setpoints lost: it {words}")
+    assert lost.message.startswith(f"setpoints lost: {told}")
+    assert scene.told("its failsafe, until setpoints come again") == (action == 3)
+    record = scene.watch.seen.record()
     if kind == "ardupilot":
-        assert np.linalg.norm(at[1].position - at[0].position) < 0.1
+        late = record.line(low()).w[(record.t > 20.0) & (record.t < 59.0)]
+        assert np.ptp(late, axis=0).max() < 0.1
     else:
-        assert ending == "taken over"
-        assert scene.told("its failsafe, until setpoints come again")
+        assert record.height[-1] == pytest.approx(0.0, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -153,46 +145,29 @@ def test_an_outage_on_px4_ends_the_setpoints_only_where_somebody_may_fly(
     """COM_OBL_RC_ACT 5 is Hold, 0 Position, by sticks; the pilot, too, sets Hold meanwhile."""
     scene, sent = Scene("px4", solution=low(), parameters={"COM_OBL_RC_ACT": action}), list[int]()
     events = [
-        (15.0, scene.sets(px4_mode(4, 3)) if pilot else lambda _: None),
-        (20.0, lambda _: sent.append(len(scene.orders))),
-        (25.0, scene.sets(px4_mode(4, 6)) if pilot else lambda _: None),
+        (17.0, scene.sets(HOLD["px4"]) if pilot else lambda _: None),
+        (22.0, lambda _: sent.append(len(scene.orders))),
+        (27.0, scene.sets(LAND) if pilot else lambda _: None),
     ]
-    assert scene.run(Faults(outages=((14.0, 16.5),), seed=1), events=events) == ending
+    assert scene.run(Faults(outages=((16.0, 18.5),), seed=1), events=events) == ending
     assert (len(scene.orders) > sent[0]) == (ending == "finished")
     assert scene.told("its failsafe") == (ending == "finished")
 
 
-def test_without_setpoints_or_sticks_px4_sinks_in_position() -> None:
-    scene = Scene("px4", solution=low())
-    receive = scene.mock.on
-
-    def hear(envelope: Any, now: float) -> Any:
-        ceased = isinstance(envelope.message, SetPositionTargetLocalNed) and now > 14.0
-        return () if ceased else receive(envelope, now)
-
-    scene.mock.on = hear
-    modes = list[int]()
-    events = [(16.0, lambda _: modes.append(scene.mock.mode))]
-    assert scene.run(events=events, until=90.0) == "taken over"
-    told = "setpoints lost: it changes to Position (and sinks, unless sticks fly it) after 1 s"
-    assert any(each.message.startswith(told) for each in scene.watch.findings)
-    assert modes == [px4_mode(3, 0)]
-    assert scene.watch.seen.height == pytest.approx(0.0, abs=0.1)
-
-
 @KINDS
 def test_it_is_not_started_where_it_must_not_be(kind: str) -> None:
-    scene = Scene(kind, solution=low())
-    assert scene.run(others=[Station(AnotherStation(), FOREIGN)]) == "contested"
-    assert scene.orders == []
-    scene = Scene(kind, solution=low())
-    assert scene.run(events=[(0.5, scene.does(MavCommand.ARM, 1))]) == "refused"
-    assert scene.orders == []
     away = under({"site.origin.latitude": HOME.latitude + 0.001})
-    scene = Scene(kind, solution=away)
-    assert scene.run() == "refused"
-    assert scene.orders == []
+    others = [Station(AnotherStation(), FOREIGN)]
+    for solution, ending, beside in ((low(), "contested", others), (away, "refused", [])):
+        scene = Scene(kind, solution=solution)
+        assert scene.run(others=beside) == ending
+        assert scene.orders == []
     assert "111 m from the mission's home" in scene.watch.outcome.text
+    peer = peer_of("ardupilot")
+    plane = Peer(peer.own, peer.address, vehicle_type("ardupilot", "plane"))
+    ready = Readiness(Flight(a_mission(5)), Held({}, Reading({})), plane)
+    with pytest.raises(InputError, match="only copters"):
+        Stream(plane, low(), ready)
 
 
 @KINDS
@@ -200,8 +175,6 @@ def test_a_pilot_may_have_the_mission_flown_instead(kind: str) -> None:
     scene = Scene(kind, solution=low())
     assert scene.run(events=[(18.0, scene.sets(scene.watch._modes.mission))]) == "taken over"
     record = scene.watch.seen.record()
-    steps = np.linalg.norm(np.diff(record.line(low()).w, axis=0), axis=1)
-    assert steps.max() < 1.5  # 10 m/s, ten times a second: it jumps nowhere
     last = scene.mock.mission().items[-2]
     path = LocalFrame(last.x, last.y).to_local(record.latitude, record.longitude)
     assert np.linalg.norm(path, axis=1).min() < 1
@@ -210,93 +183,57 @@ def test_a_pilot_may_have_the_mission_flown_instead(kind: str) -> None:
 
 @KINDS
 def test_interrupted_it_holds(kind: str) -> None:
-    scene, modes = Scene(kind, solution=low()), list[int]()
-
-    def interrupt(now: float) -> None:
-        for message in scene.watch.cancel(now):
-            scene.client.sent.append(message)
-            scene.mock.on(Envelope(GROUND_STATION, message), now)
-        modes.append(scene.mock.mode)
-
-    assert scene.run(events=[(14.0, interrupt), (17.0, interrupt)]) == "left"
+    returns = {"COM_OBL_RC_ACT": 3}
+    scene, modes = Scene(kind, solution=low(), parameters=returns), list[int]()
+    events = [
+        (16.0, scene.interrupt),
+        (20.0, lambda _: modes.append(scene.mock.mode)),
+        (21.0, scene.interrupt),
+    ]
+    assert scene.run(events=events) == "left"
     asks = [getattr(each, "command", None) == MavCommand.SET_MODE for each in scene.orders]
     last = max(n for n, asked in enumerate(asks) if asked)
-    assert not any(isinstance(each, SetPositionTargetLocalNed) for each in scene.orders[last:])
-    assert modes[0] == {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}[kind]
-
-
-@KINDS
-@pytest.mark.parametrize("time", [8.0, 14.0])
-def test_without_a_terminal_it_holds_and_then_is_left(kind: str, time: float) -> None:
-    scene = Scene(kind, solution=low())
-
-    def hang_up(now: float) -> None:
-        for message in scene.watch.hang_up(now):
-            scene.mock.on(Envelope(GROUND_STATION, message), now)
-
-    assert scene.run(events=[(time, hang_up)]) == "left"
-    assert scene.mock.armed
-    assert scene.mock.mode == {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}[kind]
-    assert scene.watch.outcome.text.startswith("the terminal has gone; the vehicle is in mode ")
+    assert not any(map(is_setpoint, scene.orders[last:]))
+    assert modes == [HOLD[kind]]
+    for time in (8.0, 14.0):  # without a terminal too
+        scene = Scene(kind, solution=low(), parameters=returns)
+        assert scene.run(events=[(time, scene.hang_up)]) == "left"
+        assert scene.mock.armed
+        assert scene.mock.mode == HOLD[kind]
+        assert scene.watch.outcome.text.startswith("the terminal has gone; the vehicle is in mode ")
 
 
 def test_a_lost_answer_to_the_take_off_does_not_end_it() -> None:
     scene = Scene("ardupilot", solution=low())
-    receive = scene.mock.on
-
-    def mute(envelope: Any, now: float) -> Any:
-        message, answers = envelope.message, receive(envelope, now)
-        takes_off = isinstance(message, CommandLong) and message.command == MavCommand.TAKEOFF
-        return () if takes_off else answers
-
-    scene.mock.on = mute
+    scene.loses(lambda message, _: starts(message), heard=True)
     assert scene.run(until=30.0) == ""
     assert scene.watch.phase == "flying"
     assert scene.watch.relay_start is not None
 
 
 @pytest.mark.parametrize("finish", ["rtl", "hover"])
-def test_it_ends_as_the_plan_says(finish: str) -> None:
-    solution = under({"mission.on_finish": finish})
+def test_it_ends_as_the_plan_says_inside_its_fence(finish: str) -> None:
+    solution = under({"mission.on_finish": finish, "fence": FENCE})
     scene = Scene("ardupilot", solution=solution)
     assert scene.run() == "finished"
     assert scene.mock.armed == (finish == "hover")
-    record = scene.watch.seen.record()
-    last = solution.w[-1] if finish == "hover" else np.zeros(2)
-    assert np.linalg.norm(record.line(solution).w[-1] - last) < 1
-    assert record.height[-1] == pytest.approx(6 if finish == "hover" else 0, abs=1)
-
-
-def test_the_ways_out_and_home_keep_the_fence() -> None:
-    solution = under({"fence": FENCE, "mission.on_finish": "rtl"})
-    scene = Scene("ardupilot", solution=solution)
-    assert scene.run() == "finished"
-    area = solution.plan.keep_in
+    record, area = scene.watch.seen.record(), solution.plan.keep_in
     assert area is not None
-    record = scene.watch.seen.record()
-    high = record.height > 5.9
-    first = int(np.argmax(high))
-    path = record.line(solution).w[first:][record.height[first:] > 1]
-    assert area.inside(1.0).covers(path).all()
+    path = record.line(solution).w
+    assert np.linalg.norm(path[-1] - (solution.w[-1] if finish == "hover" else 0)) < 1
+    assert record.height[-1] == pytest.approx(6 if finish == "hover" else 0, abs=1)
+    first = int(np.argmax(record.height > 5.9))
+    assert area.inside(1.0).covers(path[first:][record.height[first:] > 1]).all()
     velocity = solution.v.copy()
     velocity[0] = [20, 0]  # its run-in begins west of the fence
-    begins_at_speed = replace(solution, v=velocity)
     with pytest.raises(InfeasibleError, match="fence"):
-        Scene("ardupilot", solution=begins_at_speed)
+        Scene("ardupilot", solution=replace(solution, v=velocity))
 
 
 def test_the_mock_is_late_in_a_wind_that_is_too_strong() -> None:
     scene = Scene("ardupilot", solution=low(), wind=(0.0, 9.0))  # it flies south
     assert scene.run() == "finished"
     assert flown(scene, low()).rms_position_error > 3
-
-
-def test_planes_do_not_fly_by_setpoints() -> None:
-    peer = peer_of("ardupilot")
-    plane = Peer(peer.own, peer.address, vehicle_type("ardupilot", "plane"))
-    ready = Readiness(Flight(a_mission(5)), Held({}, Reading({})), plane)
-    with pytest.raises(InputError, match="only copters"):
-        Stream(plane, low(), ready)
 
 
 @KINDS
