@@ -7,31 +7,26 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import AnotherStation, Scene
+from scenes import AnotherStation, Scene, starts
 from simulate import Station
-from stations import FOREIGN, HOME, a_mission
+from stations import FOREIGN, HOME, a_mission, vehicle_of
 from test_gate import CAP, swift
-from test_stream import KINDS, LOITER, low, setpoints, under
+from test_stream import HOLD, KINDS, LAND, LOITER, is_setpoint, low, setpoints, under
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import family
-from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.fly.gate import LEVEL, NEAR
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim.faults import Faults
 from faao_mav.wire.messages import (
     CurrentMode,
-    Envelope,
     GlobalPositionInt,
     Heartbeat,
     Message,
     SetPositionTargetLocalNed,
 )
-from faao_mav.wire.protocol import GROUND_STATION, MavCommand
+from faao_mav.wire.protocol import MavCommand
 
-HOLD = {"ardupilot": 17, "px4": px4_mode(4, 3)}
-GUIDED = {"ardupilot": 4, "px4": px4_mode(6, 0)}
 METRE = 1e7 / 111_319.5
 """A metre of latitude in 1e-7 degrees."""
 
@@ -79,6 +74,11 @@ class Flown:
             if area is not None and far > NEAR + lag:
                 assert area.covers_path(np.array([place[:2], to[:2]]))
 
+    def assert_arrived(self) -> None:
+        """Check that it has flown to the end of its plan."""
+        last = self.scene.watch.seen.record().line(swift()).w[-1]
+        assert np.linalg.norm(last - swift().w[-1]) < 1.0
+
     def after(self, time: float) -> int:
         """Return how many setpoints it was sent after `time`, s."""
         return sum(each > time for each in self.times)
@@ -113,8 +113,7 @@ def test_after_px4s_landing_failsafe_it_climbs_before_it_goes_on() -> None:
     climbs = (np.array(flown.times) > 57.4) & (places[:, 2] < 26.0)
     assert climbs.sum() > 50
     assert np.hypot(*off[climbs, :2].T).max() < 0.5
-    last = flown.scene.watch.seen.record().line(swift()).w[-1]
-    assert np.linalg.norm(last - swift().w[-1]) < 1.0
+    flown.assert_arrived()
 
 
 def test_an_aircraft_that_its_failsafe_has_landed_is_not_taken_off_again() -> None:
@@ -136,8 +135,7 @@ def test_after_a_silence_it_goes_on_inside_the_fence(
     assert flown.scene.run(Faults(outages=(outage,))) == "finished"
     flown.assert_gated()
     assert flown.after(outage[1]) > 50
-    last = flown.scene.watch.seen.record().line(swift()).w[-1]
-    assert np.linalg.norm(last - swift().w[-1]) < 1.0
+    flown.assert_arrived()
 
 
 def test_where_no_way_leads_back_it_is_left_to_its_failsafe() -> None:
@@ -165,35 +163,17 @@ def test_where_no_way_leads_back_it_is_left_to_its_failsafe() -> None:
 def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> None:
     """It was in that mode for want of setpoints before: the last that was heard is a failsafe."""
     flown = Flown.of("px4", swift(), parameters={"COM_OBL_RC_ACT": 5})
-    deaf = [False]
-    flight = flown.scene.mock.flight
-    hear = flight.hear
-    flight.hear = lambda *told: False if deaf[0] else hear(*told)
+    scene = flown.scene
+    scene.loses(lambda message, now: is_setpoint(message) and 44.0 < now < 48.5)
     modes = Heartbeat | CurrentMode  # which come after positions, when the link is back
-    flown.scene.tells(
-        lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :]
-    )
-    events = [
-        (44.0, lambda _: deaf.__setitem__(0, True)),
-        (48.0, flown.scene.sets(HOLD["px4"])),
-        (48.5, lambda _: deaf.__setitem__(0, False)),
-        (70.0, flown.scene.sets(px4_mode(4, 6))),
-    ]
-    assert flown.scene.run(Faults(outages=((47.0, 50.0),)), events=events) == "taken over"
-    assert flown.scene.told("it is in its failsafe")
+    scene.tells(lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :])
+    events = [(48.0, scene.sets(HOLD["px4"])), (70.0, scene.sets(LAND))]
+    assert scene.run(Faults(outages=((47.0, 50.0),)), events=events) == "taken over"
+    assert scene.told("it is in its failsafe")
     assert flown.after(50.0) == 0
 
 
 # ---- hold
-
-
-def interrupt(scene: Scene) -> Callable[[float], None]:
-    """Return an event: Ctrl-C; what it sends is lost."""
-
-    def cancelled(now: float) -> None:
-        scene.client.sent += scene.watch.cancel(now)
-
-    return cancelled
 
 
 @pytest.mark.parametrize(("kind", "action"), [("ardupilot", 0), ("px4", 3), ("px4", 4)])
@@ -205,9 +185,9 @@ def test_a_hold_is_asked_for_until_it_is_confirmed(kind: str, action: int, silen
     scene.mock.flight.aircraft.landed = lambda _: False  # it does not disarm
     end = 44.0 + silence
     events = [
-        (45.0, interrupt(scene)),
+        (45.0, scene.interrupt),
         (end + 5.0, lambda _: modes.append(scene.mock.mode)),
-        (end + 6.0, interrupt(scene)),
+        (end + 6.0, scene.interrupt),
     ]
     assert scene.run(Faults(outages=((44.0, end),)), events=events) == "left"
     assert scene.told("does not confirm that it holds, it does not answer: it is asked again")
@@ -222,7 +202,7 @@ def test_a_hold_is_asked_for_until_it_is_confirmed(kind: str, action: int, silen
 def test_a_pilot_who_has_it_meanwhile_keeps_it(kind: str) -> None:
     scene, sent = Scene(kind, solution=swift(), parameters={"COM_OBL_RC_ACT": 4}), list[int]()
     events = [
-        (45.0, interrupt(scene)),
+        (45.0, scene.interrupt),
         (55.0, scene.sets(LOITER)),
         (66.0, lambda _: sent.append(len(scene.orders))),
         (90.0, scene.does(MavCommand.ARM, 0)),
@@ -235,7 +215,7 @@ def test_a_pilot_who_has_it_meanwhile_keeps_it(kind: str) -> None:
 @pytest.mark.parametrize("streams", [True, False])
 def test_who_leaves_an_unconfirmed_hold_is_told_what_is_left(kind: str, streams: bool) -> None:
     scene = Scene(kind, solution=swift()) if streams else Scene(kind, arm=True)
-    events = [(45.0, interrupt(scene)), (60.0, interrupt(scene))]
+    events = [(45.0, scene.interrupt), (60.0, scene.interrupt)]
     assert scene.run(Faults(outages=((44.0, 1e9),)), events=events) == "left"
     text = scene.watch.outcome.text
     assert "it is armed, in mode " in text
@@ -249,9 +229,9 @@ def test_a_mission_too_is_held_when_the_link_is_back(kind: str) -> None:
     mission = Mission((a_mission(3).items[0], far, MissionItem(20, 2)), HOME)
     scene, modes = Scene(kind, mission, arm=True), list[int]()
     events = [
-        (8.0, interrupt(scene)),
+        (8.0, scene.interrupt),
         (74.0, lambda _: modes.append(scene.mock.mode)),
-        (75.0, interrupt(scene)),
+        (75.0, scene.interrupt),
     ]
     assert scene.run(Faults(outages=((7.0, 70.0),)), events=events) == "left"
     assert modes == [HOLD[kind]]
@@ -261,50 +241,29 @@ def test_a_mission_too_is_held_when_the_link_is_back(kind: str) -> None:
 def test_a_mission_whose_start_is_still_under_way_is_held(kind: str) -> None:
     """The answer to the start is lost, and so is the first request to hold."""
     scene, modes = Scene(kind, arm=True), list[int]()
-    answer = scene.mock.on
-
-    def slow(envelope: Envelope, now: float) -> Any:
-        message = envelope.message
-        if getattr(message, "command", None) == MavCommand.START and not modes:
-            return ()
-        return answer(envelope, now)
-
-    def start(now: float) -> None:
-        assert scene.watch.phase == "holding"
-        modes.append(0)
-        scene.does(MavCommand.START)(now)
-
-    scene.mock.on = slow
+    scene.loses(lambda message, now: starts(message) and now < 5.5)
     events = [
-        (3.9, interrupt(scene)),
-        (4.7, start),
-        (12.0, lambda _: modes.append(scene.mock.mode)),
-        (12.5, interrupt(scene)),
+        (4.7, scene.interrupt),
+        (5.5, scene.does(MavCommand.START)),
+        (13.5, lambda _: modes.append(scene.mock.mode)),
+        (14.0, scene.interrupt),
     ]
     assert scene.run(events=events) == "left"
-    assert modes[1] == HOLD[kind]
+    assert scene.told("asking the vehicle to hold")
+    assert modes == [HOLD[kind]]
 
 
 def test_a_landing_that_is_not_confirmed_is_interrupted_by_a_hold() -> None:
     scene, modes = Scene("ardupilot", solution=low()), list[int]()
-
-    def cancelled(now: float) -> None:
-        assert scene.watch.phase == "ending"
-        interrupt(scene)(now)
-
-    answer = scene.mock.on
-    scene.mock.on = lambda envelope, now: (
-        ()
-        if getattr(envelope.message, "command", None) == MavCommand.SET_MODE
-        and envelope.message.param2 == 9
-        else answer(envelope, now)
-    )
+    lands = 9
+    scene.loses(lambda message, _: getattr(message, "param2", None) == lands)
     events = [
-        (45.0, cancelled),
+        (45.0, scene.interrupt),
         (50.0, lambda _: modes.append(scene.mock.mode)),
-        (51.0, interrupt(scene)),
+        (51.0, scene.interrupt),
     ]
     assert scene.run(events=events) == "left"
+    assert scene.told("the relay flight is over")
     assert modes == [HOLD["ardupilot"]]
 
 
@@ -335,21 +294,18 @@ def test_it_does_not_stream_to_what_would_not_be_safe_without(
 
 
 @KINDS
-@pytest.mark.parametrize("value", [math.nan, 2.5])
-def test_what_is_no_number_of_an_action_or_no_time_is_refused(kind: str, value: float) -> None:
-    rules = family(kind).setpoints
-    values = rules.defaults | {rules.timeout: 1.0}
-    assert rules.refusal(values) is None
-    assert rules.refusal(values | {rules.loss or rules.timeout: value}) is not None
-
-
-@KINDS
-def test_nor_to_one_that_does_not_tell(kind: str) -> None:
-    rules = family(kind).setpoints
+def test_nor_to_one_that_does_not_tell_or_tells_no_number(kind: str) -> None:
+    vehicle = vehicle_of(kind)
+    assert vehicle is not None
+    rules = vehicle.family.setpoints
     scene = Scene(kind, solution=low(), untold=rules.defaults)
     assert scene.run() == "refused"
     assert f"it does not tell {' and '.join(rules.defaults)}" in scene.watch.outcome.text
     assert scene.orders == []
+    values = rules.defaults | {rules.timeout: 1.0}
+    assert rules.refusal(values) is None
+    for value in (math.nan, 2.5):
+        assert rules.refusal(values | {rules.loss or rules.timeout: value}) is not None
 
 
 # ---- what it tells
@@ -383,31 +339,22 @@ def test_a_place_that_jumps_is_not_answered_and_ends_the_flight_if_it_stays(kind
     flown.assert_gated()
     assert not any(44.1 < each < 46.0 for each in flown.times)
 
-    flown = Flown.of(kind, swift(), parameters={"COM_OBL_RC_ACT": 5})
-    flown.scene.tells(during(44.0, 1e9, jumps))
-    events = [(60.0, flown.scene.does(MavCommand.ARM, 0))]
-    ending = flown.scene.run(events=events)
-    assert ending == ("held" if kind == "ardupilot" else "taken over")  # by its failsafe, to hold
-    assert flown.scene.told("setpoints end: where it is, is not known")
-    assert flown.scene.mock.mode == HOLD[kind]
-    assert flown.after(44.1) == 0
-
-
-@KINDS
-def test_a_place_that_stays_the_same_is_not_answered(kind: str) -> None:
     first = list[GlobalPositionInt]()
 
     def stuck(position: GlobalPositionInt) -> GlobalPositionInt:
         first.append(position)
         return replace(first[0], time_boot_ms=position.time_boot_ms)
 
-    flown = Flown.of(kind, swift(), parameters={"COM_OBL_RC_ACT": 5})
-    flown.scene.tells(during(44.0, 1e9, stuck))
-    events = [(60.0, flown.scene.does(MavCommand.ARM, 0))]
-    ending = flown.scene.run(events=events)
-    assert ending == ("held" if kind == "ardupilot" else "taken over")
-    assert flown.scene.told("its place does not change, though it moves")
-    assert flown.after(45.2) == 0
+    for change, told in ((jumps, "has jumped"), (stuck, "does not change, though it moves")):
+        flown = Flown.of(kind, swift(), parameters={"COM_OBL_RC_ACT": 5})
+        flown.scene.tells(during(44.0, 1e9, change))
+        events = [(60.0, flown.scene.does(MavCommand.ARM, 0))]
+        ending = flown.scene.run(events=events)
+        assert ending == ("held" if kind == "ardupilot" else "taken over")  # by its failsafe
+        assert flown.scene.told(f"its place {told}: no setpoints are sent")
+        assert flown.scene.told("setpoints end: where it is, is not known")
+        assert flown.scene.mock.mode == HOLD[kind]
+        assert flown.after(45.2) == 0
 
 
 @KINDS
@@ -461,8 +408,7 @@ def test_a_clock_that_leaps_ahead_leaves_the_aircraft_on_its_ways(kind: str, lea
     )
     assert flown.scene.run() == "finished"
     flown.assert_gated()
-    last = flown.scene.watch.seen.record().line(swift()).w[-1]
-    assert np.linalg.norm(last - swift().w[-1]) < 1.0
+    flown.assert_arrived()
 
 
 @KINDS
@@ -491,12 +437,7 @@ def test_a_ground_station_that_appears_in_flight_is_told_and_changes_nothing(kin
 def test_an_aircraft_that_does_not_follow_is_asked_to_hold(kind: str) -> None:
     """It hears orders, but its setpoints are lost from the middle of the flight on."""
     flown = Flown.of(kind, swift(), parameters={"COM_OBL_RC_ACT": 5})
-    receive = flown.scene.mock.on
-    flown.scene.mock.on = lambda envelope, now: (
-        ()
-        if isinstance(envelope.message, SetPositionTargetLocalNed) and now > 44.0
-        else receive(envelope, now)
-    )
+    flown.scene.loses(lambda message, now: is_setpoint(message) and now > 44.0)
     events = [(400.0, flown.scene.does(MavCommand.ARM, 0))]
     ending = flown.scene.run(events=events, until=500.0)
     assert ending == ("held" if kind == "ardupilot" else "taken over")
@@ -517,12 +458,8 @@ def test_positions_that_cease_end_the_setpoints_by_a_hold() -> None:
 def test_the_finish_is_asked_for_until_its_failsafe_is_over() -> None:
     """The link breaks as setpoints end, and PX4 goes into its failsafe: it lands all the same."""
     flown = Flown.of("px4", under({}), parameters={"COM_OBL_RC_ACT": 5})
-    answer = flown.scene.mock.on
-    flown.scene.mock.on = lambda envelope, now: (
-        ()
-        if now < 60.0 and flown.scene.watch.phase == "ending" and envelope.sender == GROUND_STATION
-        else answer(envelope, now)
-    )
+    watch = flown.scene.watch
+    flown.scene.loses(lambda _, now: now < 60.0 and watch.phase == "ending")
     assert flown.scene.run() == "finished"
     assert flown.scene.watch.seen.fixes[-1].t > 60.0
     assert not flown.scene.mock.armed
