@@ -61,7 +61,6 @@ class Flight:
         self.modes, self.rules = vehicle_type.modes, vehicle_type.family.setpoints
         self.mode = self.asked_mode = self.modes.rest
         self.aircraft = Follower(wind)
-        self._first_heard = self._last_heard = -math.inf
         self.stop()
 
     @property
@@ -70,7 +69,8 @@ class Flight:
         return Vehicle(self._type.family.key, self._type.kind, self._values).usable()
 
     def stop(self) -> None:
-        """Stand at home with the motors off."""
+        """Stand at home with the motors off, and know of no setpoints."""
+        self._first_heard = self._last_heard = -math.inf
         self.aircraft.stand()
         self.land()
 
@@ -98,7 +98,7 @@ class Flight:
         return next((act for act, own in self.modes.at_fence.items() if own == mode), "hold")
 
     def _do(self, action: FenceAction | Literal["sink"], now: float) -> None:
-        """Return, land, sink or hold, from where it is."""
+        """Return, land, sink or hold, from where it is; a flight that is terminated lands too."""
         self._follows = False
         vehicle, (east, north, up) = self.vehicle, self.aircraft.at(now).position
         vertical, legs = vehicle.vertical, list[tuple[Real, float]]()

@@ -49,6 +49,10 @@ BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
 
 
+STILL = SetPositionTargetLocalNed(VEHICLE, 0, 1, 3072, 0, 0, -20.0, 0, 0, 0, 0, 0, 0)
+"""A setpoint 20 m above home."""
+
+
 def desk_for(kind: MockKind, mission: Mission | None = None, **options: Any) -> Desk:
     mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, **options)
     desk = Desk(mock, GROUND_STATION)
@@ -70,6 +74,13 @@ def result(messages: Sequence[Message]) -> int:
 
 def only(messages: Sequence[Message], kind: type[T]) -> list[T]:
     return [message for message in messages if isinstance(message, kind)]
+
+
+def stream(desk: Desk) -> None:
+    """Send setpoints for two seconds."""
+    for _ in range(20):
+        desk.tell(STILL)
+        desk.wait(0.1)
 
 
 def take_off(desk: Desk, kind: MockKind) -> None:
@@ -254,18 +265,14 @@ def test_no_command_brings_it_down(kind: MockKind) -> None:
 @BOTH
 def test_no_setpoint_brings_it_down(kind: MockKind) -> None:
     desk = desk_for(kind)
-    guided = desk.machine.flight.modes.guided
-    still = SetPositionTargetLocalNed(TO, 0, 1, 3072, 0, 0, -20.0, 0, 0, 0, 0, 0, 0)
-    for _ in range(20):
-        desk.tell(still)
-        desk.wait(0.1)
-    assert result(desk.tell(SetMode(1, 1, guided))) == 0
+    stream(desk)
+    assert result(desk.tell(SetMode(1, 1, desk.machine.flight.modes.guided))) == 0
     assert result(desk.tell(command(400, 1))) == 0
     desk.tell(command(22, *[0] * 6, 20.0))
     for value in (0.0, math.nan, math.inf, 3e38, -3e38):
         for field in ("x", "vx", "afx"):
             wrong: dict[str, Any] = {field: value}
-            desk.tell(replace(still, **wrong))
+            desk.tell(replace(STILL, **wrong))
             assert only(desk.wait(0.5), GlobalPositionInt)
     assert desk.machine.armed
 
@@ -303,7 +310,9 @@ def test_a_reboot_keeps_what_is_stored() -> None:
     desk = desk_for("px4", a_mission(5), boot=2.0)
     desk.wait(3.0)
     take_off(desk, "px4")
+    stream(desk)
     assert result(desk.tell(command(246, 1))) == 0
+    assert result(desk.tell(SetMode(1, 1, px4_mode(6, 0)))) == 1  # no setpoints since
     assert not desk.machine.armed
     assert result(desk.tell(command(400, 1))) == 1
     assert len(desk.machine.lists.items(MissionType.MISSION)) == 5
