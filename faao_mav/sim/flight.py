@@ -192,7 +192,7 @@ class Flight:
         if self._late(now):
             self._first_heard = now
         self._last_heard = now
-        guided = self.armed and self.asked_mode == self.modes.guided
+        guided = self.armed and self.asked_mode == self.modes.guided is not None
         comes_back = guided and self.mode != self.asked_mode
         if comes_back:
             self.mode = self.asked_mode
@@ -232,7 +232,7 @@ class Flight:
 
     def _late(self, now: float) -> bool:
         """Tell whether there was no setpoint for as long as its parameter allows."""
-        allowed = max(self._values[self.rules.timeout], self.rules.least_timeout)
+        allowed = max(self._values.get(self.rules.timeout, 0.0), self.rules.least_timeout)
         return now - self._last_heard > allowed
 
 

@@ -326,7 +326,7 @@ class MockAutopilot(Machine[None]):
                 and rows[current].command == Command.NAV_RETURN_TO_LAUNCH
             )
             if self.vehicle.kind in self.behaviour.returns_by_mode and returns:
-                flight.mode = flight.modes.at_fence["return"]
+                flight.mode = flight.modes.at_fence.get("return", flight.mode)
             out.append(self._mission_current(now))
         if flight.aircraft.landed(clock):
             flight.land()

@@ -1,11 +1,15 @@
 """A third autopilot is one `VehicleType` and one call of `register`: nothing else names it."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MISSIONS, edited
+from conftest import MISSIONS, edited, free_port
+from served import running
+from typer.testing import CliRunner
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot import (
@@ -22,15 +26,19 @@ from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
 from faao_mav.autopilot.px4.flight_model import Px4
+from faao_mav.cli.main import app
 from faao_mav.errors import PlanError
 from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.formats import read_mission
 from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.mission.item import MissionItem
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
 from faao_mav.schedule import convert
+from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.validate import Limits
 from faao_mav.validate.check import check
+from faao_mav.workflow import plan_mission
 
 TOY = AutopilotFamily(
     key="toy",
@@ -173,6 +181,22 @@ def test_its_files_and_numbers_are_known() -> None:
     assert render_parameters({"TOY_SPEED": 8.0}, TOY.parameter_style) == "TOY_SPEED,8\n"
     assert vehicle_type_by_numbers(99, 2) is COPTER
     assert Vehicle("toy", "copter", {"TOY_SPEED_KMH": 36}).value("cruise_speed") == 10
+
+
+def test_it_is_uploaded_to_its_mock_and_flown_there(tmp_path: Path) -> None:
+    result = plan_mission(parse_plan(edited(PLAN, {"mission.parameters": "keep"})))
+    mission, *_ = result.write(tmp_path / "m.plan")
+    home = read_mission(mission).home
+    assert home is not None
+    mock = MockAutopilot(behaviour_of("px4", family=TOY), home=home, beat=0.1, speedup=50.0)
+    to = f"127.0.0.1:{free_port()}"
+    with running(mock, f"udpin:{to}"):
+        for command in (("upload", mission), ("fly", mission, "--arm", "--json")):
+            arguments = [str(each) for each in (*command, "--to", f"udpout:{to}")]
+            done = CliRunner().invoke(app, arguments)
+            assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout.splitlines()[-1])["ending"] == "finished"
+    assert not mock.armed
 
 
 def test_without_it_the_plan_is_refused_by_name() -> None:
