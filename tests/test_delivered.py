@@ -66,20 +66,6 @@ def test_without_a_bandwidth_there_are_no_megabytes(small_plan: MakePlan) -> Non
     assert told["delivered_mbytes"] is told["mbit_per_second"] is None
 
 
-def test_the_summary_leads_with_what_was_maximised(result: Result) -> None:
-    text, solution = summary(result, verbose=True), result.solution
-    _, first, *rest = text.splitlines()
-    label = "delivered" if solution.plan.radio.causal else "rate"
-    assert first.startswith(f"{label:<13}{solution.history[-1]:.4f} bit/s/Hz (")
-    assert f"{20 * solution.delivered_rate:.4g} Mbit/s" in text
-    assert f", {25 * solution.delivered_rate:.4g} megabytes" in text
-    start = f"{solution.history[0]:.4f} on the straight start"
-    assert start in "\n".join(rest[:2])
-    lost = 1 - solution.delivered_rate / solution.rates.R_avg
-    warned = lost > 0.01 and not solution.plan.radio.causal
-    assert ("radio.causal: true plans for what arrives" in text) == warned
-
-
 @pytest.mark.usefixtures("unpainted")
 def test_the_page_shows_the_queue(result: Result) -> None:
     page = render_report(result)
@@ -195,14 +181,3 @@ def test_the_command_saves_what_comes_and_goes(tmp_path: Path) -> None:
         assert archive["R_del"] == told["delivered_rate"]
     assert np.diff(waiting) == pytest.approx((received - forwarded)[:-1], abs=1e-12)
     assert forwarded.mean() == pytest.approx(told["delivered_rate"])
-
-
-def test_algorithm_1_is_refused_for_a_causal_plan(tmp_path: Path) -> None:
-    path = tmp_path / "plan.yaml"
-    path.write_text(edited(SMALL, {"radio.causal": True}))
-    for arguments in ([str(path), "--method", "algorithm1"],
-                      ["study", str(path), "--schemes", "algorithm1"]):  # fmt: skip
-        done = CliRunner().invoke(app, arguments)
-        assert done.exit_code == 2
-        assert "radio.causal: true: algorithm1" in done.stderr
-        assert "give radio.causal: false" in done.stderr

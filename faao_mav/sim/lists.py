@@ -11,19 +11,8 @@ from faao_mav.errors import InputError
 from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, MissionItem
 from faao_mav.sim.behaviour import COUNT, Behaviour
-from faao_mav.wire.messages import (
-    Envelope,
-    ListMessage,
-    Message,
-    MissionAck,
-    MissionClearAll,
-    MissionCount,
-    MissionItemInt,
-    MissionRequestInt,
-    MissionRequestList,
-    Statustext,
-    WireItem,
-)
+from faao_mav.wire import messages
+from faao_mav.wire.messages import ListMessage, Message, WireItem
 from faao_mav.wire.protocol import ALL_TYPES, Address, MavResult, MavSeverity, MissionType
 from faao_mav.wire.wire_items import home_items, mission_item, mission_of, wire_item
 
@@ -124,42 +113,42 @@ class ListServer:
         self._now, out = now, list[Message]()
         for transfer in list(self._transfers.values()):
             if now >= transfer.heard + self._manners.patience:
-                out.append(Statustext(MavSeverity.WARNING, self._behaviour.timeout_text))
+                out.append(_warning(self._behaviour.timeout_text))
                 cancelled = self._end(transfer, MavResult.OPERATION_CANCELLED)
                 out += cancelled[self._alone :]
             elif now >= self._due(transfer):
                 out += self._ask(transfer)
         return out
 
-    def on(self, envelope: Envelope, now: float) -> list[Message]:
+    def on(self, envelope: messages.Envelope, now: float) -> list[Message]:
         """Answer a message of the mission protocol."""
         sender, message, self._now = envelope.sender, envelope.message, now
         if not isinstance(message, ListMessage):
             return []
         given = message.mission_type
-        everything = given == ALL_TYPES and isinstance(message, MissionClearAll)
+        everything = given == ALL_TYPES and isinstance(message, messages.MissionClearAll)
         parts = [part for part in MissionType if everything or given == part]
         if not parts:
-            known = isinstance(message, MissionAck)
+            known = isinstance(message, messages.MissionAck)
             return [] if known else _ack(sender, given, self._behaviour.unknown_list)
         part, only = parts[0], next(iter(self._transfers.values()), None)
         under_way = only if self._alone else self._transfers.get(part)
         match message:
-            case MissionCount(count=count):
+            case messages.MissionCount(count=count):
                 return self._on_count(sender, part, count, under_way)
-            case MissionItemInt():
+            case messages.MissionItemInt():
                 return self._on_item(sender, message, under_way)
-            case MissionRequestList():
+            case messages.MissionRequestList():
                 return self._on_list(sender, part, under_way)
-            case MissionRequestInt():
+            case messages.MissionRequestInt():
                 return self._on_request(sender, message, under_way)
-            case MissionAck(type=result) if under_way is not None and self._alone:
+            case messages.MissionAck(type=result) if under_way is not None and self._alone:
                 return self._on_ack(part, result, under_way) if sender == under_way.partner else []
-            case MissionClearAll() if self._alone and under_way is not None:
+            case messages.MissionClearAll() if self._alone and under_way is not None:
                 return []
-            case MissionClearAll() if not self._alone and part == 0 and self._flying():
+            case messages.MissionClearAll() if not self._alone and part == 0 and self._flying():
                 return _ack(sender, given, MavResult.ERROR)
-            case MissionClearAll():
+            case messages.MissionClearAll():
                 return self._clear(sender, given, parts)
         return []
 
@@ -178,7 +167,9 @@ class ListServer:
         result = MavResult.ACCEPTED if fits else MavResult.NO_SPACE
         result = self._behaviour.refusals.get((part, COUNT), result)
         if result != MavResult.ACCEPTED:
-            text = Statustext(MavSeverity.WARNING, f"Only {limit[part]} items are supported")
+            text = messages.Statustext(
+                MavSeverity.WARNING, f"Only {limit[part]} items are supported"
+            )
             return [*_ack(sender, part, result), *([text] if count > limit[part] else [])]
         if count == 0:
             return self._clear(sender, part, [part])
@@ -188,7 +179,7 @@ class ListServer:
         return self._ask(self._transfers[part])
 
     def _on_item(
-        self, sender: Address, message: MissionItemInt, upload: _Transfer | None
+        self, sender: Address, message: messages.MissionItemInt, upload: _Transfer | None
     ) -> list[Message]:
         part, seq = MissionType(message.mission_type), message.seq
         if upload is None:
@@ -213,7 +204,7 @@ class ListServer:
         if upload.passed < upload.count:
             return self._ask(upload)
         if part is MissionType.FENCE and not (self._alone or self._is_fence(upload.items)):
-            text = Statustext(MavSeverity.WARNING, "Fence validation failed")
+            text = _warning("Fence validation failed")
             return [text, *self._end(upload, MavResult.ERROR)]
         self._stored.replace(part, upload.items)
         return self._end(upload, MavResult.ACCEPTED)
@@ -241,10 +232,10 @@ class ListServer:
             self._transfers = {part: sending}
         elif under_way is not None:
             return _ack(sender, part, self._busy)
-        return [MissionCount(sender, part, len(items), self._number(part))]
+        return [messages.MissionCount(sender, part, len(items), self._number(part))]
 
     def _on_request(
-        self, sender: Address, request: MissionRequestInt, under_way: _Transfer | None
+        self, sender: Address, request: messages.MissionRequestInt, under_way: _Transfer | None
     ) -> list[Message]:
         part, seq = MissionType(request.mission_type), request.seq
         items = self._stored.items(part)
@@ -259,7 +250,7 @@ class ListServer:
         if seq >= len(items):
             wrong = MavResult.ERROR if part is MissionType.MISSION else MavResult.INVALID_SEQUENCE
             return _ack(sender, part, wrong)
-        return [MissionItemInt(sender, part, seq, items[seq], request.legacy)]
+        return [messages.MissionItemInt(sender, part, seq, items[seq], request.legacy)]
 
     def _on_ack(self, part: MissionType, result: int, under_way: _Transfer) -> list[Message]:
         if result == MavResult.UNSUPPORTED and not under_way.sending:
@@ -278,13 +269,13 @@ class ListServer:
     def _ask(self, upload: _Transfer) -> list[Message]:
         upload.asked = self._now
         part, seq = upload.part, upload.passed
-        return [MissionRequestInt(upload.partner, part, seq, self._legacy)]
+        return [messages.MissionRequestInt(upload.partner, part, seq, self._legacy)]
 
     def _end(self, transfer: _Transfer, result: MavResult) -> list[Message]:
         del self._transfers[transfer.part]
         self._last = transfer
         number = self._number(transfer.part) if result == MavResult.ACCEPTED else 0
-        return [MissionAck(transfer.partner, transfer.part, result, number)]
+        return [messages.MissionAck(transfer.partner, transfer.part, result, number)]
 
     def _number(self, part: MissionType) -> int:
         return self._stored.number(part) if self._behaviour.numbers_lists else 0
@@ -332,5 +323,9 @@ def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> MavResult:
     return MavResult.ACCEPTED
 
 
+def _warning(text: str) -> Message:
+    return messages.Statustext(MavSeverity.WARNING, text)
+
+
 def _ack(to: Address, mission_type: int, result: MavResult) -> list[Message]:
-    return [MissionAck(to, mission_type, result)]
+    return [messages.MissionAck(to, mission_type, result)]

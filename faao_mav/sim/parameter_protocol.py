@@ -21,18 +21,16 @@ class ParameterServer:
     """Parameters of `vehicle` by name, in the autopilot's own units.
 
     Those whose default is an `int` are whole numbers; `given` are other values than the `defaults`.
-    Of the names that one parameter has it knows the oldest that is given.
-    PX4 sends whole numbers as their bits, and sets nothing that comes with another type than it
-    has.
+    Of the names that one parameter has it knows the oldest that is given. An autopilot that sends
+    whole numbers as their bits sets nothing that comes with another type than it has.
     """
 
     def __init__(
         self, defaults: Mapping[str, float], given: Mapping[str, float], vehicle: VehicleType
     ) -> None:
         self._vehicle = vehicle
-        self._whole = {name for name, x in {**given, **defaults}.items() if isinstance(x, int)}
-        self.values = {
-            name: int(value) if name in self._whole else value
+        self.values: dict[str, float] = {
+            name: type(defaults.get(name, value))(value)
             for name, value in {**defaults, **given}.items()
         }
         for parameter in vehicle.parameters.values():
@@ -42,30 +40,30 @@ class ParameterServer:
 
     def on(self, message: ParamRequestList | ParamRequestRead | ParamSet) -> list[Message]:
         """Return the answer to a request; unknown names get none."""
+        names = list(self.values)
         match message:
-            case ParamRequestList():
-                return [self._value(name) for name in self.values]
             case ParamRequestRead(param_index=-1, param_id=name):
-                return [self._value(name)] if name in self.values else []
+                names = [name] if name in self.values else []
             case ParamRequestRead(param_index=index):
-                names = list(self.values)
-                return [self._value(names[index])] if 0 <= index < len(names) else []
+                names = names[index : index + 1] if index >= 0 else []
             case ParamSet(param_id=name):
-                return self._set(message) if name in self.values else []
-        return []
+                names = [name] if self._takes(message) else []
+        return [self._value(name) for name in names]
 
-    def _set(self, message: ParamSet) -> list[Message]:
+    def _takes(self, message: ParamSet) -> bool:
+        """Set a parameter; tell whether it is one, whatever became of its value."""
         name, kind = message.param_id, message.param_type
-        if self._vehicle.family.whole_as_bits and kind != self._kind(name):
-            return []
+        strict = self._vehicle.family.whole_as_bits
+        if name not in self.values or (strict and kind != self._kind(name)):
+            return False
         told = ParamValue(name, message.param_value, kind, 0, 0)
         value = setting_in(told, self._vehicle).value
         if math.isfinite(value):
-            self.values[name] = int(value) if name in self._whole else value
-        return [self._value(name)]
+            self.values[name] = type(self.values[name])(value)
+        return True
 
     def _kind(self, name: str) -> int:
-        return _INT32 if name in self._whole else _REAL32
+        return _INT32 if isinstance(self.values[name], int) else _REAL32
 
     def _value(self, name: str) -> ParamValue:
         index, kind = list(self.values).index(name), self._kind(name)
