@@ -36,7 +36,6 @@ class Behaviour:
 
     Attributes:
         family: the autopilot.
-        one_at_a_time: how it takes and gives lists, see `ListServer`.
         legacy_first: it asks with MISSION_REQUEST; PX4 until it is sent MISSION_ITEM_INT.
         numbers_lists: it tells a number for each list.
         mission_limit: how many items of a mission it holds, home included.
@@ -61,7 +60,6 @@ class Behaviour:
     """
 
     family: AutopilotFamily
-    one_at_a_time: bool = False
     legacy_first: bool = False
     numbers_lists: bool = False
     mission_limit: int
@@ -162,7 +160,6 @@ MOCK_ARDUPILOT = Behaviour(
 
 MOCK_PX4 = Behaviour(
     family=PX4,
-    one_at_a_time=True,
     numbers_lists=True,
     mission_limit=1000,
     timeout_text="Operation timeout\t",

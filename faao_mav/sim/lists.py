@@ -73,11 +73,10 @@ class _Transfer:
 class ListServer:
     """Answers the messages of the mission protocol as the autopilot of `behaviour` does.
 
-    `ready` tells whether booting is over, `flying` whether the mission is being flown. Where
-    `behaviour.one_at_a_time` there is one transfer, of whatever list, downloads included; else
-    each list has an upload of its own, and every request for an item is answered by itself. What
-    is not `atomic` is changed item by item, but for fences: an upload that stops half-way leaves
-    new and old items mixed.
+    `ready` tells whether booting is over, `flying` whether the mission is being flown. By its
+    manners it answers each request for an item by itself, and each list has an upload of its own;
+    or there is one transfer, of whatever list, downloads included. What is not `atomic` is changed
+    item by item, but for fences: an upload that stops half-way leaves new and old items mixed.
     """
 
     def __init__(
@@ -89,7 +88,8 @@ class ListServer:
     ) -> None:
         self._stored, self._behaviour = stored, behaviour
         self._manners, self._dialect = stored.vehicle.family.manners, stored.vehicle.dialect
-        self._ready, self._flying, self._alone = ready, flying, behaviour.one_at_a_time
+        self._ready, self._flying = ready, flying
+        self._alone = not self._manners.any_request_order
         self._legacy, self._now = behaviour.legacy_first, 0.0
         self._busy = MavResult.ERROR if self._alone else MavResult.DENIED
         self.reset()
