@@ -1,0 +1,50 @@
+"""Whatever a file holds or the wire brings, it is read or refused: `run.py` does so at length."""
+
+import gc
+from collections.abc import Iterator
+
+import pytest
+from harness import Target, fuzz, outcome
+from tapes import datagrams
+from targets import targets
+from wire_targets import wire_targets
+
+FILES = ("plan", "fenced_plan", "kml", "geojson", "wpl", "qgc_plan", "parameters", "npz", "rows",
+         "bin", "tlog", "ulg", "vary")  # fmt: skip
+TAPES = {"client": 50, "mock_ardupilot": 20, "mock_px4": 10, "mock_px4_legacy_first": 5,
+         "signed": 150}  # fmt: skip
+CASES = dict.fromkeys(FILES, 300) | TAPES
+"""Cases of each target in the suite; chosen: half a second, but for PX4's predicted flights."""
+
+# pymavlink leaves a log open that it does not understand
+pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+
+
+@pytest.fixture(scope="module")
+def all_targets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Target]:
+    return targets(tmp_path_factory.mktemp("fuzz")) | wire_targets()
+
+
+@pytest.fixture
+def found(all_targets: dict[str, Target]) -> Iterator[dict[str, Target]]:
+    yield all_targets
+    gc.collect()
+
+
+def test_what_is_sound_is_read_to_the_end(found: dict[str, Target]) -> None:
+    assert found.keys() == CASES.keys()
+    for target in found.values():
+        assert [outcome(target, seed) for seed in target.seeds] == [""] * len(target.seeds)
+    for name in TAPES:
+        assert all(len(list(datagrams(seed))) >= 20 for seed in found[name].seeds)
+    for seed in found["client"].seeds:
+        assert found["client"].run(seed) == ["verified"] * 6  # three uploaded, three cleared
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_mutated_is_read_or_refused(found: dict[str, Target], name: str) -> None:
+    for content in found[name].corpus:  # what once was a finding
+        outcome(found[name], content)
+    counts = fuzz(found[name], CASES[name], seed=0)
+    assert counts["read"] > CASES[name] / (10 if name in TAPES else 50)
+    assert name in TAPES or counts["refused"] > CASES[name] / 50
