@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from faao_mav.autopilot import Track, Vehicle
-from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Mission
 from faao_mav.plan import parse_plan
@@ -153,18 +152,3 @@ def test_the_reserve_has_to_be_left() -> None:
         assert [each.level for each in findings(found)] == ([] if kept else ["warning"])
         assert found.left == pytest.approx(1 - total / capacity)
         assert found.as_dict()["reserve"] == pytest.approx(0.3)
-
-
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"vehicle.battery": {"capacity_wh": 60}}, "vehicle.battery: what the flight takes"),
-        ({"vehicle.power": {"hover_w": 200}}, "vehicle.power.cruise_w: missing; give hover_w"),
-        ({"vehicle.power": {"hover_w": 200, "cruise_w": 100, "at": 8}}, "at least 14"),
-        (BATTERY | {"vehicle.battery.reserve": "a lot"}, "'a lot' is not accepted"),
-    ],
-)
-def test_power_that_cannot_be(changes: dict[str, object], told: str) -> None:
-    with pytest.raises(PlanError) as caught:
-        parse_plan(edited(SMALL, changes))
-    assert told in str(caught.value)
