@@ -44,7 +44,7 @@ def vehicle(result: Result, faults: Faults | None = None) -> Iterator[tuple[str,
         home=HOME,
         parameters=result.conversion.parameters,
         beat=0.1,
-        speedup=8.0,
+        speedup=16.0,
     )
     with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
         yield f"udpout:127.0.0.1:{port}", mock
