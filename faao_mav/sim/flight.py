@@ -24,7 +24,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.item import Home, Mission
-from faao_mav.sim.follower import Follower
+from faao_mav.sim.follower import EARLY, Follower
 from faao_mav.wire.messages import SetPositionTargetLocalNed
 
 Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
@@ -32,9 +32,6 @@ Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
 
 _FIRST_DO = 176
 """The first command that is done at once; those before take time."""
-
-_EARLY = 1e-6
-"""Seconds by which an event may come early, rather than a tick late; chosen."""
 
 _FARTHEST = 1e6
 """Setpoints farther away, m, or beyond that in m/s or m/s² are none; chosen."""
@@ -154,13 +151,13 @@ class Flight:
         """Return the items of the mission that were reached since the last call."""
         if not self.on_mission:
             return []
-        due = [number for time, number in self._pending if self._begun + time <= now + _EARLY]
+        due = [number for time, number in self._pending if self._begun + time <= now + EARLY]
         self._pending = self._pending[len(due) :]
         return due
 
     def at_fence(self, now: float) -> FenceAction | None:
         """Break off a mission that leaves the fence; return what is done, once."""
-        if not self.on_mission or self._begun + self._leaves > now + _EARLY:
+        if not self.on_mission or self._begun + self._leaves > now + EARLY:
             return None
         self._leaves = math.inf
         action = self._type.at_fence(self.vehicle).action

@@ -85,7 +85,7 @@ class MockAutopilot(Machine[None]):
         self._server = ListServer(self.lists, behaviour, self._is_ready, self._is_flying)
         self._speedup, self._beat, self._boot, self._place = speedup, beat, boot, place
         self._period = 1 / rate / speedup if rate > 0 else math.inf
-        self._booted = self._now = self._next_beat = self._next_report = 0.0
+        self._booted = self._now = self._ticked = self._next_beat = self._next_report = 0.0
         self._ready_at = boot
         self._current = 0
 
@@ -103,7 +103,8 @@ class MockAutopilot(Machine[None]):
     def deadline(self) -> float | None:
         """When `tick` is due."""
         event = self._booted + self.flight.next_event / self._speedup
-        due = [self._next_beat, event if self.armed else math.inf]
+        ahead = self.armed and event > self._ticked  # what a tick has seen is over
+        due = [self._next_beat, event if ahead else math.inf]
         if self._period < math.inf:
             due.append(self._next_report)
         if self._server.deadline is not None:
@@ -139,7 +140,7 @@ class MockAutopilot(Machine[None]):
         late = now - (self.deadline or now)
         if self._speedup > 1 and self.flight.on_mission and late > _LATE:
             self._booted += late
-        self._now = now
+        self._now = self._ticked = now
         out: list[Message] = list(self._server.tick(now))
         if self.armed:
             out += self._follow(now)
