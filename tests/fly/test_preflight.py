@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from conftest import FLYABLE, edited
-from faao_mav.wire.faults import Faults
 from scenes import Scene, held_by
 from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, vehicle_of
 
